@@ -1,0 +1,465 @@
+//! `taut bridge`: the device side in a process of its own, at the other end of the network from the loops.
+//!
+//! | thread | does |
+//! |--------|------|
+//! | caller's | watches: link, signals, duration; tells what happens |
+//! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines |
+//! | `taut-bridge-net` | the link's sockets (tokio) |
+//!
+//! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
+//! has the force at zero 120 ms later, whatever else goes on.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use nalgebra::Point3;
+use taut_link::proto::SceneDescription;
+use taut_link::proto::control::LogLevel;
+use taut_link::{ClientLink, ClientOptions, LinkError, Role, connect, read_key_file};
+
+use crate::bridge_loop::{BridgeLoop, Notice};
+use crate::cli::{BridgeArgs, DeviceChoice};
+use crate::device::{Device, DeviceFault};
+use crate::device_loop::{DeviceLoop, Totals};
+use crate::devices::{
+    AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
+};
+use crate::realtime::monotonic_now;
+use crate::report::BridgeReport;
+use crate::safety::{Safety, SafetySettings};
+use crate::trace_file::{TraceFileError, read_trace, via_points};
+
+/// How often the watching thread looks.
+const WATCH_PERIOD: Duration = Duration::from_millis(20);
+
+/// Between attempts to reconnect: doubles from the first to the last.
+const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
+
+/// States per second for a client that draws nothing: the fewest.
+const STATE_RATE_HZ: u32 = 1;
+
+/// Notices that may wait to be told; more are dropped, the counts in the report are complete.
+const NOTICES: usize = 64;
+
+/// Sway of a hand that was given no path: 20 mm to either side, a cycle in 8 s.
+const SWAY: (f64, f64) = (0.02, 8.0);
+
+/// Rates that a device loop can hold, in Hz.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=10_000.0;
+
+/// Why a bridge did not run, or did not run to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum BridgeError {
+    /// No key file was named.
+    #[error("no cluster key: give --key FILE or set TAUT_KEY_FILE to the server's key file")]
+    NoKey,
+    /// A number on the command line is out of range.
+    #[error("{option} is {value}, which is out of range; use {range}")]
+    OutOfRange {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        value: f64,
+        /// What may be given.
+        range: &'static str,
+    },
+    /// A trace or path file is wrong.
+    #[error(transparent)]
+    File(#[from] TraceFileError),
+    /// A path cannot be followed.
+    #[error("{}: {cause}", path.display())]
+    Path {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: PathError,
+    },
+    /// A trace cannot be replayed.
+    #[error("{}: {cause}", path.display())]
+    Trace {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: TraceError,
+    },
+    /// The server cannot be joined.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The server's scene has no valid start pose.
+    #[error(
+        "the server's scene has a start pose that is no pose; check the scene with `taut check`"
+    )]
+    NoStartPose,
+    /// A thread cannot be started.
+    #[error("cannot start a thread for {what}: {cause}; end other programs or raise the limit")]
+    Thread {
+        /// What for.
+        what: &'static str,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+    /// The device loop panicked.
+    #[error("the device loop broke down; report this, with the lines above")]
+    LoopBroke,
+    /// The server went away while the bridge ran.
+    #[error(
+        "the server {server} was lost ({reason}): the force is zero; start it again, or use --reconnect"
+    )]
+    ServerLost {
+        /// As given.
+        server: String,
+        /// Why.
+        reason: String,
+        /// What was seen until then.
+        report: Box<BridgeReport>,
+    },
+}
+
+impl BridgeError {
+    /// Exit code of the process: 1 failed, 2 bad input.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Thread { .. } | Self::LoopBroke | Self::ServerLost { .. } => 1,
+            _ => 2,
+        }
+    }
+}
+
+/// Runs a bridge until `--duration`, a signal, the end of its trace, or the loss of the server.
+///
+/// # Errors
+/// [`BridgeError`]: bad input is found before anything is started.
+pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
+    let (options, motion) = prepare(args)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("taut-bridge-net")
+        .enable_all()
+        .build()
+        .map_err(|cause| BridgeError::Thread {
+            what: "the network",
+            cause,
+        })?;
+    let stop = Arc::new(AtomicBool::new(false));
+    runtime.spawn(stop_on_signal(Arc::clone(&stop)));
+
+    let first = runtime.block_on(connect(options.clone()))?;
+    let bridge = build_loop(args, &motion, first.description())?;
+    let mut run = Run {
+        args,
+        options,
+        runtime,
+        stop,
+        deadline: args
+            .duration
+            .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds)),
+        totals: Totals::new(),
+    };
+    run.sessions(first, bridge)
+}
+
+/// What moves the device: read and checked before anything is started.
+enum Motion {
+    Sway,
+    Path(MinJerkPath),
+    Trace(PathBuf, Trace),
+}
+
+fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
+    let in_range = |option, value: f64, valid: bool, range| {
+        if valid {
+            Ok(())
+        } else {
+            Err(BridgeError::OutOfRange {
+                option,
+                value,
+                range,
+            })
+        }
+    };
+    in_range(
+        "--rate",
+        args.rate,
+        RATES_HZ.contains(&args.rate),
+        "1 to 10000 Hz",
+    )?;
+    if let Some(seconds) = args.duration {
+        let valid = (0.0..=1e9).contains(&seconds);
+        in_range("--duration", seconds, valid, "0 to 1e9 s")?;
+    }
+
+    let motion = match (&args.device, &args.path) {
+        (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
+        (DeviceChoice::Simulated, None) => Motion::Sway,
+        (DeviceChoice::Simulated, Some(file)) => {
+            let path = MinJerkPath::new(via_points(&read_trace(file)?), args.looping);
+            Motion::Path(path.map_err(|cause| BridgeError::Path {
+                path: file.clone(),
+                cause,
+            })?)
+        }
+    };
+
+    let key_file = args
+        .key
+        .clone()
+        .or_else(|| std::env::var_os("TAUT_KEY_FILE").map(PathBuf::from))
+        .ok_or(BridgeError::NoKey)?;
+    let key = read_key_file(&key_file)?;
+    let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
+    options.transport = args.transport;
+    options.rate_hz = STATE_RATE_HZ;
+    Ok((options, motion))
+}
+
+fn build_loop(
+    args: &BridgeArgs,
+    motion: &Motion,
+    scene: &SceneDescription,
+) -> Result<BridgeLoop, BridgeError> {
+    let start = scene
+        .god_object
+        .pose
+        .to_isometry()
+        .ok_or(BridgeError::NoStartPose)?;
+    let reference_point = Point3::from(scene.reference_point);
+    let held = |path| {
+        SimulatedDevice::new(Grip::workbench(), args.hand.into(), path, reference_point)
+            .with_tremor(Tremor::new(Tremor::TYPICAL_RMS, args.seed))
+    };
+    let device: Box<dyn Device> = match motion {
+        Motion::Sway => Box::new(held(MinJerkPath::sway(start, SWAY.0, SWAY.1))),
+        Motion::Path(path) => Box::new(held(path.clone())),
+        Motion::Trace(path, trace) => {
+            let at_end = if args.looping {
+                AtEnd::Loop
+            } else {
+                AtEnd::Fault
+            };
+            let device = RecordedDevice::new(trace.clone(), at_end, reference_point);
+            Box::new(device.map_err(|cause| BridgeError::Trace {
+                path: path.clone(),
+                cause,
+            })?)
+        }
+    };
+    let limits = device.info().limits;
+    let safety = Safety::new(SafetySettings {
+        max_force: limits.max_force,
+        max_torque: limits.max_torque,
+        ..SafetySettings::default()
+    });
+    Ok(BridgeLoop::new(device, safety, reference_point))
+}
+
+async fn stop_on_signal(stop: Arc<AtomicBool>) {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        let Ok(mut terminate) = signal(SignalKind::terminate()) else {
+            return;
+        };
+        tokio::select! {
+            _ = tokio::signal::ctrl_c() => {}
+            _ = terminate.recv() => {}
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = tokio::signal::ctrl_c().await;
+    stop.store(true, Ordering::Relaxed);
+}
+
+/// Why a session ended.
+enum SessionEnd {
+    Duration,
+    Signal,
+    TraceEnded,
+    ServerLost(String),
+}
+
+/// A bridge at work.
+struct Run<'a> {
+    args: &'a BridgeArgs,
+    options: ClientOptions,
+    runtime: tokio::runtime::Runtime,
+    stop: Arc<AtomicBool>,
+    /// On the monotonic clock.
+    deadline: Option<Duration>,
+    totals: Totals,
+}
+
+impl Run<'_> {
+    fn sessions(
+        &mut self,
+        first: ClientLink,
+        mut bridge: BridgeLoop,
+    ) -> Result<BridgeReport, BridgeError> {
+        let mut link = Some(first);
+        loop {
+            let Some(session) = link.take() else {
+                return Ok(self.report(&bridge, "done while the server was away"));
+            };
+            self.totals.sessions += 1;
+            let end;
+            (bridge, end) = self.session(session, bridge)?;
+            match end {
+                SessionEnd::Duration => return Ok(self.report(&bridge, "done")),
+                SessionEnd::Signal => return Ok(self.report(&bridge, "stopped by a signal")),
+                SessionEnd::TraceEnded => return Ok(self.report(&bridge, "the trace ended")),
+                SessionEnd::ServerLost(reason) if self.args.reconnect => {
+                    tracing::warn!(
+                        "the server was lost ({reason}): the force is zero; trying again"
+                    );
+                    link = self.reconnect();
+                }
+                SessionEnd::ServerLost(reason) => {
+                    let report = self.report(&bridge, &format!("the server was lost: {reason}"));
+                    return Err(BridgeError::ServerLost {
+                        server: self.args.server.clone(),
+                        reason,
+                        report: Box::new(report),
+                    });
+                }
+            }
+        }
+    }
+
+    /// Tries until it succeeds; None when the time is up or a signal came.
+    fn reconnect(&self) -> Option<ClientLink> {
+        let mut pause = BACK_OFF.0;
+        while !self.is_over() {
+            match self.runtime.block_on(connect(self.options.clone())) {
+                Ok(link) => return Some(link),
+                Err(error) => tracing::warn!("{error}"),
+            }
+            let until = monotonic_now() + pause;
+            while monotonic_now() < until && !self.is_over() {
+                thread::sleep(WATCH_PERIOD);
+            }
+            pause = (pause * 2).min(BACK_OFF.1);
+        }
+        None
+    }
+
+    fn is_over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+            || self
+                .deadline
+                .is_some_and(|deadline| monotonic_now() >= deadline)
+    }
+
+    /// Runs the device loop on `link` until something ends it; gives the loop back.
+    fn session(
+        &mut self,
+        link: ClientLink,
+        mut bridge: BridgeLoop,
+    ) -> Result<(BridgeLoop, SessionEnd), BridgeError> {
+        let link = Arc::new(link);
+        let end_loop = Arc::new(AtomicBool::new(false));
+        let (sender, notices) = sync_channel(NOTICES);
+        let mut device_loop = DeviceLoop {
+            link: Arc::clone(&link),
+            end: Arc::clone(&end_loop),
+            notices: sender,
+            period: Duration::from_secs_f64(1.0 / self.args.rate),
+            priority: self.args.priority,
+            core: self.args.core,
+            totals: std::mem::replace(&mut self.totals, Totals::new()),
+        };
+        bridge.begin_session();
+        let thread = thread::Builder::new()
+            .name("taut-bridge-dev".to_owned())
+            .spawn(move || {
+                device_loop.run(&mut bridge);
+                (bridge, device_loop.totals)
+            })
+            .map_err(|cause| BridgeError::Thread {
+                what: "the device loop",
+                cause,
+            })?;
+
+        let mut end = None;
+        while end.is_none() && !thread.is_finished() {
+            thread::sleep(WATCH_PERIOD);
+            end = self.session_end(&link, &notices);
+        }
+        if matches!(end, Some(SessionEnd::ServerLost(_))) {
+            // Let the force fade as on any silence, rather than cut it.
+            let settings = SafetySettings::default();
+            thread::sleep(settings.hold + settings.ramp_out);
+        }
+        end_loop.store(true, Ordering::Relaxed);
+        let (bridge, totals) = thread.join().map_err(|_| BridgeError::LoopBroke)?;
+        self.totals = totals;
+        tell(&link, &notices);
+
+        let seen = link.counters();
+        self.totals.packets.packets_sent += seen.packets_sent;
+        self.totals.packets.packets_received += seen.packets_received;
+        self.totals.packets.lost += seen.lost;
+        if let Some(link) = Arc::into_inner(link) {
+            self.runtime.block_on(link.close());
+        }
+        let end = end.unwrap_or(match bridge.fault() {
+            Some(DeviceFault::Ended) => SessionEnd::TraceEnded,
+            _ => SessionEnd::Signal,
+        });
+        Ok((bridge, end))
+    }
+
+    fn session_end(&self, link: &ClientLink, notices: &Receiver<Notice>) -> Option<SessionEnd> {
+        tell(link, notices);
+        if self.stop.load(Ordering::Relaxed) {
+            Some(SessionEnd::Signal)
+        } else if self.is_over() {
+            Some(SessionEnd::Duration)
+        } else {
+            link.is_closed().map(SessionEnd::ServerLost)
+        }
+    }
+
+    fn report(&self, bridge: &BridgeLoop, ended: &str) -> BridgeReport {
+        let (totals, stats) = (&self.totals, bridge.stats());
+        let start = totals.first_tick.unwrap_or(totals.last_tick);
+        BridgeReport {
+            device: bridge.device().info().name.clone(),
+            server: self.args.server.clone(),
+            ended: ended.to_owned(),
+            duration_s: totals.last_tick.saturating_sub(start).as_secs_f64(),
+            ticks: stats.ticks,
+            missed_periods: totals.missed,
+            period_us: totals.period.summary(),
+            wrenches: stats.wrenches,
+            wrench_age_us: stats.wrench_age.summary(),
+            round_trip_us: stats.round_trip.summary(),
+            packets_sent: totals.packets.packets_sent,
+            packets_received: totals.packets.packets_received,
+            packets_lost: totals.packets.lost,
+            energy_injected_j: bridge.energy().injected(),
+            energy_delivered_j: bridge.energy().delivered(),
+            max_force_n: stats.max_force,
+            max_torque_n_m: stats.max_torque,
+            safety_events: stats.safety_events,
+            faulty_ticks: stats.faulty_ticks,
+            sessions: totals.sessions,
+            realtime: totals.realtime.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+/// Logs what the device loop noticed, here and at the server.
+fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
+    for notice in notices.try_iter() {
+        let text = match notice {
+            Notice::Safety(event) => format!("safety of the device: {event:?}"),
+            Notice::Fault(fault) => fault.to_string(),
+        };
+        tracing::warn!("{text}");
+        link.post_log(LogLevel::Warning, text);
+    }
+}

@@ -1,0 +1,363 @@
+//! One tick of the bridge: newest wrench in, through the safety stage to the device, newest pose out.
+//!
+//! No sockets, threads or clocks: times are arguments, so a tick runs in real time and under a virtual clock.
+//! No allocation after `new`.
+
+use std::time::Duration;
+
+use nalgebra::{Point3, Vector6};
+use taut_link::proto::input::INPUT_FAULT;
+use taut_link::proto::wrench::WRENCH_PAUSED;
+use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
+
+use crate::device::{Device, DeviceFault, Pose};
+use crate::energy::EnergyObserver;
+use crate::report::Durations;
+use crate::safety::{Safety, SafetyEvent};
+
+/// How many ticks a round trip may take to be measured: 1 s at 1 kHz.
+const REMEMBERED_TICKS: usize = 1024;
+
+/// What is worth telling a person, as it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Notice {
+    Safety(SafetyEvent),
+    Fault(DeviceFault),
+}
+
+/// A command and when it arrived here.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
+    pub(crate) command: WrenchCommand,
+    pub(crate) received: Duration,
+}
+
+/// What one tick gives.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TickOutput {
+    /// To be sent.
+    pub(crate) input: InputSample,
+    /// To be told.
+    pub(crate) notice: Option<Notice>,
+}
+
+/// What the ticks have seen.
+pub(crate) struct TickStats {
+    pub(crate) ticks: u64,
+    pub(crate) wrenches: u64,
+    pub(crate) safety_events: u64,
+    pub(crate) faulty_ticks: u64,
+    /// Session time now minus session time of the command, at arrival.
+    pub(crate) wrench_age: Durations,
+    /// From reading the device to holding the wrench that answers it.
+    pub(crate) round_trip: Durations,
+    pub(crate) max_force: f64,
+    pub(crate) max_torque: f64,
+}
+
+/// The device side of a session.
+pub(crate) struct BridgeLoop {
+    device: Box<dyn Device>,
+    safety: Safety,
+    energy: EnergyObserver,
+    stats: TickStats,
+    /// Number of the next reading; the first is 1, because 0 answers none.
+    next_index: u64,
+    /// When reading i was taken, at i modulo the length.
+    sent: [Duration; REMEMBERED_TICKS],
+    newest: Option<Arrival>,
+    last_pose: Pose,
+    fault: Option<DeviceFault>,
+}
+
+impl BridgeLoop {
+    pub(crate) fn new(
+        device: Box<dyn Device>,
+        safety: Safety,
+        reference_point: Point3<f64>,
+    ) -> Self {
+        Self {
+            device,
+            safety,
+            energy: EnergyObserver::new(reference_point),
+            stats: TickStats {
+                ticks: 0,
+                wrenches: 0,
+                safety_events: 0,
+                faulty_ticks: 0,
+                wrench_age: Durations::new(),
+                round_trip: Durations::new(),
+                max_force: 0.0,
+                max_torque: 0.0,
+            },
+            next_index: 1,
+            sent: [Duration::ZERO; REMEMBERED_TICKS],
+            newest: None,
+            last_pose: Pose::identity(),
+            fault: None,
+        }
+    }
+
+    pub(crate) fn device(&self) -> &dyn Device {
+        self.device.as_ref()
+    }
+
+    pub(crate) fn stats(&self) -> &TickStats {
+        &self.stats
+    }
+
+    pub(crate) fn energy(&self) -> &EnergyObserver {
+        &self.energy
+    }
+
+    /// The fault that the device is in.
+    pub(crate) fn fault(&self) -> Option<DeviceFault> {
+        self.fault
+    }
+
+    /// Forgets the last session: no force until a command of the new one, which ramps in.
+    pub(crate) fn begin_session(&mut self) {
+        self.newest = None;
+        self.safety.reset();
+    }
+
+    /// No force from now on.
+    pub(crate) fn stop(&mut self, now: Duration) {
+        self.safety.reset();
+        self.device.write(now, &Vector6::zeros());
+    }
+
+    /// One tick at `now`. `session_ns` is session time, 0 while unknown; `arrival` is the newest command,
+    /// again and again until there is a newer one.
+    pub(crate) fn tick(
+        &mut self,
+        now: Duration,
+        session_ns: u64,
+        arrival: Option<Arrival>,
+    ) -> TickOutput {
+        self.stats.ticks += 1;
+        self.adopt(now, session_ns, arrival);
+
+        let index = self.next_index;
+        self.next_index += 1;
+        self.sent[index as usize % REMEMBERED_TICKS] = now;
+        let reading = self.device.read(now);
+        let (wrench, event) = match reading {
+            Ok(_) => self.safe_wrench(now),
+            // Where the hand is, nobody knows: no force, and a ramp when it is back.
+            Err(_) => {
+                self.safety.reset();
+                (Vector6::zeros(), None)
+            }
+        };
+        self.device.write(now, &wrench);
+        self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
+        self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
+        self.stats.safety_events += u64::from(event.is_some());
+
+        let mut input = InputSample {
+            sample_time_ns: session_ns,
+            index,
+            pose: PoseF64::from_isometry(&self.last_pose),
+            velocity: [0.0; 6],
+            buttons: 0,
+            flags: INPUT_FAULT,
+        };
+        let mut notice = event.map(Notice::Safety);
+        match reading {
+            Ok(sample) => {
+                self.energy.step(&sample.pose, &wrench);
+                self.last_pose = sample.pose;
+                self.fault = None;
+                let age = now.saturating_sub(sample.time).as_nanos() as u64;
+                input.sample_time_ns = session_ns.saturating_sub(age);
+                input.pose = PoseF64::from_isometry(&sample.pose);
+                input.velocity = sample.velocity.into();
+                input.buttons = sample.buttons;
+                input.flags = 0;
+            }
+            Err(fault) => {
+                self.stats.faulty_ticks += 1;
+                if self.fault.replace(fault).is_none() {
+                    notice = Some(Notice::Fault(fault));
+                }
+            }
+        }
+        TickOutput { input, notice }
+    }
+
+    /// Takes a command that is newer than the last one.
+    fn adopt(&mut self, now: Duration, session_ns: u64, arrival: Option<Arrival>) {
+        let known = self.newest.map(|newest| newest.command.time_ns);
+        let Some(arrival) = arrival.filter(|arrival| Some(arrival.command.time_ns) > known) else {
+            return;
+        };
+        self.newest = Some(arrival);
+        self.stats.wrenches += 1;
+        if session_ns > 0 {
+            let age = session_ns.saturating_sub(arrival.command.time_ns);
+            self.stats.wrench_age.record(Duration::from_nanos(age));
+        }
+        let answered = arrival.command.input_index;
+        let remembered = answered > 0
+            && answered < self.next_index
+            && self.next_index - answered < REMEMBERED_TICKS as u64;
+        if remembered {
+            let taken = self.sent[answered as usize % REMEMBERED_TICKS];
+            self.stats.round_trip.record(now.saturating_sub(taken));
+        }
+    }
+
+    /// The newest command as the device may render it.
+    fn safe_wrench(&mut self, now: Duration) -> (Vector6<f64>, Option<SafetyEvent>) {
+        let Some(Arrival { command, received }) = self.newest else {
+            return (Vector6::zeros(), None);
+        };
+        let commanded = if command.flags & WRENCH_PAUSED == 0 {
+            Vector6::from(command.wrench)
+        } else {
+            Vector6::zeros()
+        };
+        let safe = self.safety.step(now, &commanded, received);
+        (safe.wrench, safe.event)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::devices::{
+        AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
+    };
+    use crate::safety::SafetySettings;
+
+    fn ms(time: u64) -> Duration {
+        Duration::from_millis(time)
+    }
+
+    fn bridge(device: impl Device + 'static) -> BridgeLoop {
+        let safety = Safety::new(SafetySettings::default());
+        BridgeLoop::new(Box::new(device), safety, Point3::origin())
+    }
+
+    fn simulated() -> SimulatedDevice {
+        let path = MinJerkPath::hold(Pose::translation(0.1, 0.0, 0.0));
+        SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, path, Point3::origin())
+    }
+
+    fn push(time_ms: u64, newtons: f64, input_index: u64) -> Arrival {
+        Arrival {
+            command: WrenchCommand {
+                time_ns: time_ms * 1_000_000,
+                input_index,
+                wrench: [0.0, 0.0, newtons, 0.0, 0.0, 0.0],
+                flags: 0,
+            },
+            received: ms(time_ms),
+        }
+    }
+
+    #[test]
+    fn a_wrench_from_the_far_end_moves_the_hand_and_its_pose_goes_back() {
+        let mut bridge = bridge(simulated());
+        let mut z = 0.0;
+        for tick in 1..2000 {
+            let arrival = push(tick, 2.0, tick.saturating_sub(3));
+            let output = bridge.tick(ms(tick), tick * 1_000_000, Some(arrival));
+            assert_eq!((output.input.index, output.input.flags), (tick, 0));
+            z = output.input.pose.position[2];
+        }
+        assert!((z - 2.0 / Hand::LIGHT.stiffness).abs() < 1e-3, "{z} m");
+        assert_eq!(bridge.stats().wrenches, 1999);
+        // The histogram keeps three digits.
+        let round_trip = bridge.stats().round_trip.summary().expect("measured");
+        assert!(round_trip.p50.abs_diff(3000) <= 3, "{} us", round_trip.p50);
+        assert!((bridge.stats().max_force - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_server_that_falls_silent_is_felt_no_longer_than_120_ms() {
+        let mut bridge = bridge(simulated());
+        for tick in 1..=1000 {
+            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+        }
+        let mut told = Vec::new();
+        for tick in 1001..=1300 {
+            let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
+            told.extend(output.notice);
+            let felt = bridge.safe_wrench(ms(tick)).0.norm();
+            assert_eq!(felt == 0.0, tick >= 1120, "{felt} N at {tick} ms");
+        }
+        assert_eq!(told, [Notice::Safety(SafetyEvent::Stale { age: ms(21) })]);
+    }
+
+    #[test]
+    fn the_same_command_sent_again_is_no_new_one() {
+        let mut bridge = bridge(simulated());
+        for tick in 1..=1000 {
+            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+        }
+        for tick in 1001..=1200 {
+            let repeated = Arrival {
+                received: ms(tick),
+                ..push(1000, 5.0, 0)
+            };
+            let _ = bridge.tick(ms(tick), 0, Some(repeated));
+        }
+        assert_eq!(bridge.safe_wrench(ms(1200)).0, Vector6::zeros());
+        assert_eq!(bridge.stats().wrenches, 1000);
+    }
+
+    #[test]
+    fn a_paused_server_gives_no_force() {
+        let mut bridge = bridge(simulated());
+        for tick in 1..=1000 {
+            let mut arrival = push(tick, 5.0, 0);
+            arrival.command.flags = WRENCH_PAUSED;
+            let _ = bridge.tick(ms(tick), 0, Some(arrival));
+        }
+        assert_eq!(bridge.stats().max_force, 0.0);
+        assert_eq!(bridge.stats().wrenches, 1000);
+    }
+
+    #[test]
+    fn a_faulty_device_is_told_once_and_flagged_on_every_reading() {
+        let row = |time_s| TraceRow {
+            time_s,
+            pose: Pose::translation(0.0, 0.0, time_s),
+            buttons: 0,
+        };
+        let trace = vec![row(0.0), row(0.01)];
+        let device = RecordedDevice::new(trace, AtEnd::Fault, Point3::origin());
+        let mut bridge = bridge(device.expect("a valid trace"));
+        let outputs: Vec<_> = (0..20).map(|tick| bridge.tick(ms(tick), 0, None)).collect();
+        assert!(outputs[..11].iter().all(|output| output.input.flags == 0));
+        assert!(
+            outputs[11..]
+                .iter()
+                .all(|output| output.input.flags == INPUT_FAULT)
+        );
+        let notices: Vec<_> = outputs.iter().filter_map(|output| output.notice).collect();
+        assert_eq!(notices, [Notice::Fault(DeviceFault::Ended)]);
+        assert_eq!(bridge.fault(), Some(DeviceFault::Ended));
+        // The last good pose goes on being sent, flagged.
+        assert_eq!(outputs[19].input.pose.position[2], 0.01);
+    }
+
+    #[test]
+    fn a_new_session_starts_without_force() {
+        let mut bridge = bridge(simulated());
+        for tick in 1..=1000 {
+            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+        }
+        bridge.begin_session();
+        // The new server's clock starts at zero: its commands count although their time is smaller.
+        let first = Arrival {
+            received: ms(1001),
+            ..push(1, 5.0, 0)
+        };
+        let _ = bridge.tick(ms(1001), 0, Some(first));
+        assert_eq!(bridge.safe_wrench(ms(1001)).0, Vector6::zeros());
+        assert_eq!(bridge.stats().wrenches, 1001);
+    }
+}

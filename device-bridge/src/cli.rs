@@ -1,0 +1,200 @@
+//! The arguments of `taut bridge`, and what its process prints and returns.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::str::FromStr;
+
+use taut_link::Transport;
+
+use crate::bridge::{BridgeError, run};
+use crate::devices::HandPreset;
+
+/// Read a device, send its poses to the server and render the forces that come back.
+#[derive(Clone, Debug, clap::Args)]
+#[command(
+    after_help = "Example: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+)]
+pub struct BridgeArgs {
+    /// Server, as host:port.
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+
+    /// File of the cluster key; without it the one that the environment variable TAUT_KEY_FILE names.
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+
+    /// Name of this node, unique in the workbench.
+    #[arg(long, value_name = "NAME", default_value = "bridge")]
+    pub node: String,
+
+    /// Device: `simulated`, or `trace:FILE` to replay a recorded one.
+    #[arg(long, value_name = "D", default_value = "simulated")]
+    pub device: DeviceChoice,
+
+    /// Hand that holds the simulated device: released, light, firm or arm.
+    #[arg(long, value_name = "HAND", default_value_t)]
+    pub hand: HandPreset,
+
+    /// Intention of the simulated hand: via points in the format of a trace, passed by minimum-jerk
+    /// movements. Without it the hand sways gently around the start pose.
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
+
+    /// Start the path or the trace again at its end.
+    #[arg(long = "loop")]
+    pub looping: bool,
+
+    /// Seed of the simulated hand's tremor.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+
+    /// Rate of the device loop, in Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    pub rate: f64,
+
+    /// End after this many seconds; without it, run until told to stop.
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+
+    /// How the hot plane travels: `udp`, or `quic` where only one port is open.
+    #[arg(long, value_name = "T", default_value = "udp", value_parser = parse_transport)]
+    pub transport: Transport,
+
+    /// When the server is lost, try again until --duration is over instead of ending.
+    #[arg(long)]
+    pub reconnect: bool,
+
+    /// Real-time priority of the device loop, 1 to 99; 0 asks for none.
+    #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
+    pub priority: u8,
+
+    /// Core for the device loop, counted from 0.
+    #[arg(long, value_name = "CORE")]
+    pub core: Option<usize>,
+
+    /// Print the end report as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Which device a bridge reads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// [`crate::SimulatedDevice`].
+    Simulated,
+    /// [`crate::RecordedDevice`] of a trace file.
+    Trace(PathBuf),
+}
+
+/// A word that names no device.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is no device `{0}`; use simulated or trace:FILE")]
+pub struct UnknownDevice(String);
+
+impl FromStr for DeviceChoice {
+    type Err = UnknownDevice;
+
+    fn from_str(text: &str) -> Result<Self, UnknownDevice> {
+        match text.split_once(':') {
+            None if text == "simulated" => Ok(Self::Simulated),
+            Some(("trace", file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
+            _ => Err(UnknownDevice(text.to_owned())),
+        }
+    }
+}
+
+fn parse_transport(text: &str) -> Result<Transport, String> {
+    match text {
+        "udp" => Ok(Transport::Udp),
+        "quic" => Ok(Transport::QuicDatagram),
+        _ => Err(format!("there is no transport `{text}`; use udp or quic")),
+    }
+}
+
+/// Runs a bridge as a process: report on standard output, one sentence per mistake on standard error. Returns the exit
+/// code: 0 done, 1 the server was lost, 2 bad input.
+#[must_use]
+pub fn execute(args: &BridgeArgs) -> ExitCode {
+    let (report, code) = match run(args) {
+        Ok(report) => (Some(report), ExitCode::SUCCESS),
+        Err(error) => {
+            eprintln!("{error}");
+            let code = ExitCode::from(error.exit_code());
+            match error {
+                BridgeError::ServerLost { report, .. } => (Some(*report), code),
+                _ => (None, code),
+            }
+        }
+    };
+    if let Some(report) = report {
+        if args.json {
+            match serde_json::to_string_pretty(&report) {
+                Ok(text) => println!("{text}"),
+                Err(error) => eprintln!("the report cannot be written as JSON: {error}"),
+            }
+        } else {
+            print!("{report}");
+        }
+    }
+    code
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(clap::Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: BridgeArgs,
+    }
+
+    fn parse(words: &[&str]) -> Result<BridgeArgs, clap::Error> {
+        let words = ["taut-bridge"].iter().chain(words);
+        Cli::try_parse_from(words).map(|cli| cli.args)
+    }
+
+    #[test]
+    fn a_server_alone_is_enough() {
+        let args = parse(&["--server", "pc:4857"]).expect("valid");
+        assert_eq!(args.device, DeviceChoice::Simulated);
+        assert_eq!(args.hand, HandPreset::Light);
+        assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
+    }
+
+    #[test]
+    fn devices_hands_and_transports_are_named() {
+        let args = parse(&[
+            "--server",
+            "pc:1",
+            "--device",
+            "trace:a.csv",
+            "--hand",
+            "firm",
+            "--transport",
+            "quic",
+        ])
+        .expect("valid");
+        assert_eq!(args.device, DeviceChoice::Trace("a.csv".into()));
+        assert_eq!(
+            (args.hand, args.transport),
+            (HandPreset::Firm, Transport::QuicDatagram)
+        );
+    }
+
+    #[test]
+    fn a_wrong_word_is_answered_with_the_right_ones() {
+        for (words, part) in [
+            (["--device", "spidar"], "use simulated or trace:FILE"),
+            (["--device", "trace:"], "use simulated or trace:FILE"),
+            (["--hand", "fist"], "use released, light, firm or arm"),
+            (["--transport", "tcp"], "use udp or quic"),
+        ] {
+            let words = ["--server", "pc:1", words[0], words[1]];
+            let error = parse(&words).expect_err("a wrong word").to_string();
+            assert!(error.contains(part), "{error}");
+        }
+        assert!(parse(&[]).is_err(), "a server must be named");
+    }
+}

@@ -1,0 +1,118 @@
+//! A haptic device: a pose comes in, a wrench goes out.
+//!
+//! Every driver is one type that implements [`Device`]. Time is an argument, so the same driver runs in
+//! the 1 kHz loop and under a virtual clock. A device pose is the pose of the held *body's own frame* in
+//! the world; wrenches and velocities are at the body's reference point G, in world axes, linear then
+//! angular. A driver knows G (its constructor takes it), so nothing after it has to convert.
+
+use std::time::Duration;
+
+use nalgebra::{Isometry3, Vector6};
+
+/// An element of SE(3), world from body: m and unit quaternion.
+pub type Pose = Isometry3<f64>;
+
+/// A source of device poses that can be pushed with a wrench.
+///
+/// `now` never goes back between calls; both methods are called from one thread and neither allocates,
+/// locks, logs or waits.
+pub trait Device: Send {
+    /// What the device is and what it can bear.
+    fn info(&self) -> &DeviceInfo;
+
+    /// The newest sample at `now`.
+    ///
+    /// # Errors
+    /// A [`DeviceFault`]: there is no pose that may be trusted, and the caller must stop the force.
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault>;
+
+    /// Renders `wrench` on the user's hand from `now` until the next call (zero-order hold).
+    ///
+    /// The caller has made the wrench safe ([`crate::Safety`]); a driver still refuses what is not finite.
+    fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
+}
+
+/// What a device is: its name and its limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceInfo {
+    /// For logs, reports and the monitor.
+    pub name: String,
+    /// Degrees of freedom in which a pose is measured: 3 or 6.
+    pub sensed_degrees_of_freedom: u8,
+    /// Degrees of freedom in which force or torque is rendered: 0, 3 or 6.
+    pub actuated_degrees_of_freedom: u8,
+    /// What it may be asked to render.
+    pub limits: DeviceLimits,
+    /// Rate at which it wants to be read and written, in Hz.
+    pub rate_hz: f64,
+}
+
+/// The largest commands that a device renders faithfully. Infinite where there is no limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceLimits {
+    /// Largest stable translational stiffness, in N/m.
+    pub max_stiffness: f64,
+    /// Largest stable rotational stiffness, in N m/rad.
+    pub max_rotational_stiffness: f64,
+    /// Largest norm of the force, in N.
+    pub max_force: f64,
+    /// Largest norm of the torque, in N m.
+    pub max_torque: f64,
+}
+
+impl DeviceLimits {
+    /// No limit at all: a device without motors, such as a recorded trace.
+    pub const UNLIMITED: Self = Self {
+        max_stiffness: f64::INFINITY,
+        max_rotational_stiffness: f64::INFINITY,
+        max_force: f64::INFINITY,
+        max_torque: f64::INFINITY,
+    };
+}
+
+/// One reading of a device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceSample {
+    /// When the pose was measured, on the clock of `now`; never after `now`.
+    pub time: Duration,
+    /// Pose of the held body's own frame, world from body.
+    pub pose: Pose,
+    /// Velocity of the reference point G (m/s), then angular velocity (rad/s), world axes.
+    pub velocity: Vector6<f64>,
+    /// One bit per button, bit 0 the first; 1 is pressed.
+    pub buttons: u16,
+}
+
+/// Why a device has no pose that may be trusted. The force must go to zero.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DeviceFault {
+    /// No sample has ever arrived.
+    #[error(
+        "the device has not sent a sample yet; start it, or check its cable or its network link"
+    )]
+    NotStarted,
+    /// Samples stopped.
+    #[error(
+        "the device was lost: its last sample is {} ms old; check its cable or its network link",
+        age.as_millis()
+    )]
+    Lost {
+        /// Age of the last sample.
+        age: Duration,
+    },
+    /// A sample with NaN, an infinity or a rotation that is not a unit quaternion.
+    #[error("the device sent a pose that is not finite; restart the device and calibrate it")]
+    NotFinite,
+    /// The device's time stamps went back or lie in the future.
+    #[error("the device's time stamps are not on this clock; restart the device")]
+    TimeNotOnClock,
+    /// The device at the far end of the network says that it is faulty.
+    #[error("the device at the far end reports a fault; look at the bridge's messages there")]
+    ReportedFault,
+    /// Another bridge, or the same one anew, has taken over: the pose may have jumped.
+    #[error("the device bridge has just reconnected; the force ramps in again")]
+    Reconnected,
+    /// A recorded trace came to its end.
+    #[error("the recorded trace ended; loop it or hold its last pose to go on")]
+    Ended,
+}

@@ -1,0 +1,98 @@
+//! The device loop of a bridge: ticks at absolute deadlines, in a thread of its own.
+//!
+//! The loop neither logs nor waits for another thread: what it notices goes into a bounded queue, and what
+//! does not fit is dropped (the counts of the report stay complete). Its one system call besides the clock is the
+//! sending of a reading.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::SyncSender;
+use std::time::Duration;
+
+use taut_link::{ClientCounters, ClientLink};
+
+use crate::bridge_loop::{Arrival, BridgeLoop, Notice};
+use crate::device::DeviceFault;
+use crate::realtime::{self, RealtimeGrant, Ticker, monotonic_now};
+use crate::report::Durations;
+
+/// The device loop: the only thread that touches the device.
+pub(crate) struct DeviceLoop {
+    pub(crate) link: Arc<ClientLink>,
+    pub(crate) end: Arc<AtomicBool>,
+    pub(crate) notices: SyncSender<Notice>,
+    pub(crate) period: Duration,
+    pub(crate) priority: u8,
+    pub(crate) core: Option<usize>,
+    pub(crate) totals: Totals,
+}
+
+impl DeviceLoop {
+    pub(crate) fn run(&mut self, bridge: &mut BridgeLoop) {
+        self.request_realtime();
+        let mut ticker = Ticker::new(self.period);
+        let mut last = None;
+        while !self.end.load(Ordering::Relaxed) {
+            self.totals.missed += ticker.wait();
+            let now = monotonic_now();
+            self.totals.first_tick.get_or_insert(now);
+            self.totals.last_tick = now;
+            if let Some(last) = last.replace(now) {
+                self.totals.period.record(now.saturating_sub(last));
+            }
+
+            let session_ns = self.link.session_now().map_or(0, |session| session.ns);
+            let arrival = self.link.latest_wrench().map(|wrench| Arrival {
+                command: wrench.command,
+                received: now.saturating_sub(wrench.received.elapsed()),
+            });
+            let output = bridge.tick(now, session_ns, arrival);
+            self.link.send_input(&output.input);
+            if let Some(notice) = output.notice {
+                let _ = self.notices.try_send(notice); // full: dropped, and counted in the report
+            }
+            if bridge.fault() == Some(DeviceFault::Ended) {
+                break;
+            }
+        }
+        bridge.stop(monotonic_now());
+    }
+
+    /// Asks for this thread; what was granted is told in the report, and what not also in the log.
+    fn request_realtime(&mut self) {
+        let mut grants = vec![realtime::sharpen_timers(), realtime::lock_memory()];
+        if self.priority > 0 {
+            grants.push(realtime::request_fifo(self.priority));
+        }
+        grants.extend(self.core.map(realtime::pin_to_core));
+        for grant in grants.iter().filter(|grant| !grant.is_granted()) {
+            tracing::warn!("{grant}");
+        }
+        self.totals.realtime = grants;
+    }
+}
+
+/// Sums over the sessions of a run.
+pub(crate) struct Totals {
+    pub(crate) sessions: u32,
+    pub(crate) first_tick: Option<Duration>,
+    pub(crate) last_tick: Duration,
+    pub(crate) missed: u64,
+    pub(crate) period: Durations,
+    pub(crate) packets: ClientCounters,
+    pub(crate) realtime: Vec<RealtimeGrant>,
+}
+
+impl Totals {
+    pub(crate) fn new() -> Self {
+        Self {
+            sessions: 0,
+            first_tick: None,
+            last_tick: Duration::ZERO,
+            missed: 0,
+            period: Durations::new(),
+            packets: ClientCounters::default(),
+            realtime: Vec::new(),
+        }
+    }
+}

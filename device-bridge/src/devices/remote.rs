@@ -1,0 +1,257 @@
+//! A device at the other end of the network, for the server's haptics loop.
+//!
+//! Poses come from the link's receiving thread by a triple buffer; wrenches go to the broadcast thread by another one. Both are
+//! wait-free, one writer each: this device is the only reader of the first and the only writer of the
+//! second. Silence is a fault: a pose that is old says nothing about where the hand is.
+//!
+//! `now` must be session time, the clock of [`taut_link::SessionClock`].
+
+use std::time::Duration;
+
+use nalgebra::Vector6;
+use taut_link::DeviceInput;
+use taut_link::proto::WrenchCommand;
+use taut_link::proto::input::INPUT_FAULT;
+
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+
+/// Age of the newest reading from which on the device counts as lost.
+pub const DEFAULT_MAX_AGE: Duration = Duration::from_millis(20);
+
+/// The command that says "no force".
+const NO_FORCE: WrenchCommand = WrenchCommand {
+    time_ns: 0,
+    input_index: 0,
+    wrench: [0.0; 6],
+    flags: 0,
+};
+
+/// The device that a bridge reads and renders.
+pub struct RemoteDevice {
+    info: DeviceInfo,
+    inputs: triple_buffer::Output<Option<DeviceInput>>,
+    commands: triple_buffer::Input<WrenchCommand>,
+    max_age: Duration,
+    /// The session that the readings come from.
+    session: Option<u16>,
+    /// Index of the newest reading: what a command answers.
+    index: u64,
+    faulty: bool,
+}
+
+impl RemoteDevice {
+    /// The device behind `inputs` ([`taut_link::ServerLink::device_inputs`]) and the commands for the broadcast thread
+    /// to send ([`taut_link::Broadcaster::send_wrench`]), newest each time it looks.
+    ///
+    /// `limits` are those of the device that the workbench expects there; `max_age` is the silence after
+    /// which it counts as lost ([`DEFAULT_MAX_AGE`] fits a local network).
+    #[must_use]
+    pub fn new(
+        inputs: triple_buffer::Output<Option<DeviceInput>>,
+        limits: DeviceLimits,
+        max_age: Duration,
+    ) -> (Self, triple_buffer::Output<WrenchCommand>) {
+        let (commands, to_send) = triple_buffer::TripleBuffer::new(&NO_FORCE).split();
+        let device = Self {
+            info: DeviceInfo {
+                name: "remote".to_owned(),
+                sensed_degrees_of_freedom: 6,
+                actuated_degrees_of_freedom: 6,
+                limits,
+                rate_hz: 1000.0,
+            },
+            inputs,
+            commands,
+            max_age,
+            session: None,
+            index: 0,
+            faulty: true,
+        };
+        (device, to_send)
+    }
+
+    fn newest(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let Some(input) = *self.inputs.read() else {
+            return Err(DeviceFault::NotStarted);
+        };
+        self.index = input.sample.index;
+        let known = self.session.replace(input.session);
+        if known.is_some_and(|known| known != input.session) {
+            return Err(DeviceFault::Reconnected);
+        }
+
+        let received = Duration::from_nanos(input.received_ns);
+        // The bridge's own stamp is the better one, once its clock is locked.
+        let measured = match input.sample.sample_time_ns {
+            0 => received,
+            stamp => Duration::from_nanos(stamp),
+        };
+        if measured > now.saturating_add(self.max_age) {
+            return Err(DeviceFault::TimeNotOnClock);
+        }
+        // Too old by either clock is too old: a full queue delivers old readings on time.
+        let age = now.saturating_sub(measured.min(received));
+        if age > self.max_age {
+            return Err(DeviceFault::Lost { age });
+        }
+        if input.sample.flags & INPUT_FAULT != 0 {
+            return Err(DeviceFault::ReportedFault);
+        }
+        let velocity = Vector6::from(input.sample.velocity);
+        match input.sample.pose.to_isometry() {
+            Some(pose) if velocity.iter().all(|x| x.is_finite()) => Ok(DeviceSample {
+                time: measured.min(now),
+                pose,
+                velocity,
+                buttons: input.sample.buttons,
+            }),
+            _ => Err(DeviceFault::NotFinite),
+        }
+    }
+}
+
+impl Device for RemoteDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let sample = self.newest(now);
+        self.faulty = sample.is_err();
+        sample
+    }
+
+    /// Hands the wrench to the broadcast thread; a zero one while the device is faulty.
+    fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
+        let renderable = !self.faulty && wrench.iter().all(|x| x.is_finite());
+        let wrench = if renderable {
+            (*wrench).into()
+        } else {
+            [0.0; 6]
+        };
+        self.commands.write(WrenchCommand {
+            time_ns: u64::try_from(now.as_nanos()).unwrap_or(u64::MAX),
+            input_index: self.index,
+            wrench,
+            flags: 0,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_link::proto::{InputSample, PoseF64};
+
+    type Inputs = triple_buffer::Input<Option<DeviceInput>>;
+    type Commands = triple_buffer::Output<WrenchCommand>;
+
+    fn device() -> (Inputs, RemoteDevice, Commands) {
+        let (inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
+        let (device, commands) =
+            RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
+        (inputs, device, commands)
+    }
+
+    fn ms(time: u64) -> Duration {
+        Duration::from_millis(time)
+    }
+
+    fn input(measured_ms: u64, received_ms: u64) -> DeviceInput {
+        DeviceInput {
+            sample: InputSample {
+                sample_time_ns: measured_ms * 1_000_000,
+                index: 41,
+                pose: PoseF64 {
+                    position: [0.1, 0.2, 0.3],
+                    ..PoseF64::IDENTITY
+                },
+                velocity: [0.0, 0.0, -0.5, 0.0, 0.0, 0.0],
+                buttons: 5,
+                flags: 0,
+            },
+            received_ns: received_ms * 1_000_000,
+            session: 7,
+        }
+    }
+
+    #[test]
+    fn the_newest_reading_comes_through_and_the_wrench_answers_it() {
+        let (mut inputs, mut device, mut commands) = device();
+        assert_eq!(device.read(ms(1)), Err(DeviceFault::NotStarted));
+        inputs.write(Some(input(998, 1000)));
+        let sample = device.read(ms(1001)).expect("a fresh reading");
+        assert_eq!(sample.time, ms(998));
+        assert_eq!(sample.pose.translation.vector.as_slice(), [0.1, 0.2, 0.3]);
+        assert_eq!((sample.velocity[2], sample.buttons), (-0.5, 5));
+
+        device.write(ms(1001), &Vector6::new(1.0, 2.0, 3.0, 0.1, 0.2, 0.3));
+        let command = commands.read();
+        assert_eq!(command.wrench, [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]);
+        assert_eq!((command.input_index, command.time_ns), (41, 1_001_000_000));
+    }
+
+    #[test]
+    fn silence_of_more_than_20_ms_is_a_fault_and_stops_the_force() {
+        let (mut inputs, mut device, mut commands) = device();
+        inputs.write(Some(input(0, 1000))); // clock not locked: the arrival counts
+        assert!(device.read(ms(1020)).is_ok());
+        assert_eq!(
+            device.read(ms(1021)),
+            Err(DeviceFault::Lost { age: ms(21) })
+        );
+        device.write(ms(1021), &Vector6::repeat(3.0));
+        assert_eq!(commands.read().wrench, [0.0; 6]);
+        inputs.write(Some(input(0, 1030)));
+        assert!(device.read(ms(1030)).is_ok());
+    }
+
+    #[test]
+    fn a_reading_that_was_long_on_its_way_is_stale_too() {
+        let (mut inputs, mut device, _commands) = device();
+        inputs.write(Some(input(900, 1000)));
+        assert_eq!(
+            device.read(ms(1000)),
+            Err(DeviceFault::Lost { age: ms(100) })
+        );
+    }
+
+    #[test]
+    fn broken_readings_are_faults() {
+        let (mut inputs, mut device, mut commands) = device();
+        let mut read = |change: fn(&mut DeviceInput)| {
+            let mut broken = input(1000, 1000);
+            change(&mut broken);
+            inputs.write(Some(broken));
+            device.read(ms(1001)).expect_err("a broken reading")
+        };
+        assert_eq!(
+            read(|input| input.sample.pose.position[0] = f64::NAN),
+            DeviceFault::NotFinite
+        );
+        assert_eq!(
+            read(|input| input.sample.velocity[5] = f64::INFINITY),
+            DeviceFault::NotFinite
+        );
+        assert_eq!(
+            read(|input| input.sample.flags = INPUT_FAULT),
+            DeviceFault::ReportedFault
+        );
+        assert_eq!(
+            read(|input| input.sample.sample_time_ns = 5_000_000_000),
+            DeviceFault::TimeNotOnClock
+        );
+        assert_eq!(read(|input| input.session = 8), DeviceFault::Reconnected);
+        device.write(ms(1001), &Vector6::repeat(1.0));
+        assert_eq!(commands.read().wrench, [0.0; 6]);
+    }
+
+    #[test]
+    fn a_wrench_that_is_not_finite_is_sent_as_none() {
+        let (mut inputs, mut device, mut commands) = device();
+        inputs.write(Some(input(1000, 1000)));
+        assert!(device.read(ms(1001)).is_ok());
+        device.write(ms(1001), &Vector6::repeat(f64::NAN));
+        assert_eq!(commands.read().wrench, [0.0; 6]);
+    }
+}

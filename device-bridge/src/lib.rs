@@ -1,0 +1,34 @@
+//! The device side of taut: haptic devices, safe forces, and a device at the far end of a network.
+//!
+//! Used by the server's haptics loop and by `taut bridge` (here the thin binary `taut-bridge`).
+//!
+//! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
+//! - [`Safety`]: what every wrench passes before a motor.
+//! - [`EnergyObserver`]: what the coupling did to the hand.
+//! - [`realtime`]: what a periodic loop asks of the operating system.
+//! - [`run`]: a bridge, from arguments to report.
+
+mod bridge;
+mod bridge_loop;
+mod cli;
+mod device;
+mod device_loop;
+mod devices;
+mod energy;
+pub mod realtime;
+mod report;
+mod safety;
+mod trace_file;
+
+pub use bridge::{BridgeError, run};
+pub use cli::{BridgeArgs, DeviceChoice, UnknownDevice, execute};
+pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+pub use devices::{
+    AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,
+    RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
+    TremorMotion, UnknownHand, ViaPoint, min_jerk,
+};
+pub use energy::EnergyObserver;
+pub use report::{BridgeReport, Quantiles};
+pub use safety::{SafeWrench, Safety, SafetyEvent, SafetySettings};
+pub use trace_file::{TraceFileError, read_trace, via_points};

@@ -1,0 +1,143 @@
+//! What a bridge tells at its end.
+
+use std::fmt;
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use serde::Serialize;
+
+/// A histogram of durations from 1 us to 60 s with three digits. Recording does not allocate.
+pub(crate) struct Durations(Histogram<u64>);
+
+impl Durations {
+    const MAX_US: u64 = 60_000_000;
+    const DIGITS: u8 = 3;
+
+    pub(crate) fn new() -> Self {
+        // The bounds are constants that the crate accepts: 1 <= low, 2 low <= high, digits <= 5.
+        Self(Histogram::new_with_bounds(1, Self::MAX_US, Self::DIGITS).expect("valid bounds"))
+    }
+
+    pub(crate) fn record(&mut self, duration: Duration) {
+        let us = u64::try_from(duration.as_micros()).unwrap_or(u64::MAX);
+        self.0.saturating_record(us);
+    }
+
+    pub(crate) fn summary(&self) -> Option<Quantiles> {
+        (!self.0.is_empty()).then(|| Quantiles {
+            count: self.0.len(),
+            mean: self.0.mean(),
+            p50: self.0.value_at_quantile(0.5),
+            p99: self.0.value_at_quantile(0.99),
+            p999: self.0.value_at_quantile(0.999),
+            max: self.0.max(),
+        })
+    }
+}
+
+/// How a duration was distributed, in us.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// How often it was measured.
+    pub count: u64,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Median.
+    pub p50: u64,
+    /// 99th percentile.
+    pub p99: u64,
+    /// 99.9th percentile.
+    pub p999: u64,
+    /// Largest.
+    pub max: u64,
+}
+
+/// The end report of `taut bridge`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BridgeReport {
+    /// Name of the device.
+    pub device: String,
+    /// Server as given.
+    pub server: String,
+    /// Why the bridge ended: one sentence.
+    pub ended: String,
+    /// Seconds from the first tick to the last.
+    pub duration_s: f64,
+    /// Ticks of the device loop.
+    pub ticks: u64,
+    /// Whole periods that the loop missed and skipped.
+    pub missed_periods: u64,
+    /// From tick to tick; None before the second tick.
+    pub period_us: Option<Quantiles>,
+    /// Commands received and taken.
+    pub wrenches: u64,
+    /// Session time from making a command to its use; None while the clocks were not locked.
+    pub wrench_age_us: Option<Quantiles>,
+    /// From reading the device to holding the wrench that answers it.
+    pub round_trip_us: Option<Quantiles>,
+    /// Datagrams sent.
+    pub packets_sent: u64,
+    /// Authentic datagrams received.
+    pub packets_received: u64,
+    /// Datagrams missing in the server's sequence.
+    pub packets_lost: u64,
+    /// Most energy that the force ever put into the hand beyond what the hand had put in, J: 0 for a passive coupling.
+    pub energy_injected_j: f64,
+    /// Net energy given to the hand, J.
+    pub energy_delivered_j: f64,
+    /// Largest force rendered, N.
+    pub max_force_n: f64,
+    /// Largest torque rendered, N m.
+    pub max_torque_n_m: f64,
+    /// Events of the safety stage.
+    pub safety_events: u64,
+    /// Ticks on which the device had no pose.
+    pub faulty_ticks: u64,
+    /// Sessions with the server, the first included.
+    pub sessions: u32,
+    /// What the operating system granted and what not.
+    pub realtime: Vec<String>,
+}
+
+impl fmt::Display for BridgeReport {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "{} at {}: {}", self.device, self.server, self.ended)?;
+        writeln!(
+            out,
+            "{} ticks in {:.1} s, {} missed; {} wrenches; {} packets out, {} in, {} lost; {} session(s)",
+            self.ticks,
+            self.duration_s,
+            self.missed_periods,
+            self.wrenches,
+            self.packets_sent,
+            self.packets_received,
+            self.packets_lost,
+            self.sessions,
+        )?;
+        for (name, quantiles) in [
+            ("period", &self.period_us),
+            ("wrench age", &self.wrench_age_us),
+            ("round trip", &self.round_trip_us),
+        ] {
+            if let Some(q) = quantiles {
+                writeln!(
+                    out,
+                    "{name}: p50 {} us, p99 {} us, p99.9 {} us, max {} us",
+                    q.p50, q.p99, q.p999, q.max
+                )?;
+            }
+        }
+        writeln!(
+            out,
+            "largest force {:.2} N, torque {:.3} N m; energy injected {:.2e} J; {} safety event(s), {} faulty tick(s)",
+            self.max_force_n,
+            self.max_torque_n_m,
+            self.energy_injected_j,
+            self.safety_events,
+            self.faulty_ticks,
+        )?;
+        self.realtime
+            .iter()
+            .try_for_each(|grant| writeln!(out, "{grant}"))
+    }
+}

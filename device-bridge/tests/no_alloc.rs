@@ -1,0 +1,82 @@
+//! What runs in a 1 kHz loop takes no memory from the heap.
+
+use std::time::Duration;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use nalgebra::{Point3, Vector6};
+use taut_bridge::{
+    AtEnd, DEFAULT_MAX_AGE, Device, DeviceLimits, EnergyObserver, Grip, Hand, MinJerkPath, Pose,
+    RecordedDevice, RemoteDevice, Safety, SafetySettings, SimulatedDevice, TraceRow, Tremor,
+};
+use taut_link::DeviceInput;
+use taut_link::proto::{InputSample, PoseF64};
+
+#[global_allocator]
+static HEAP: AllocDisabler = AllocDisabler;
+
+/// Two seconds of reading, safety, energy and writing, with a silence in the middle.
+fn drive(device: &mut dyn Device, before_read: &mut dyn FnMut(u64)) {
+    let mut safety = Safety::new(SafetySettings::default());
+    let mut energy = EnergyObserver::new(Point3::origin());
+    let mut good = 0;
+    assert_no_alloc(|| {
+        for tick in 0..2000 {
+            let now = Duration::from_millis(tick);
+            before_read(tick);
+            if let Ok(sample) = device.read(now) {
+                good += 1;
+                let command = Vector6::repeat(sample.pose.translation.vector.z * 1e3);
+                let made = if (500..900).contains(&tick) {
+                    Duration::ZERO
+                } else {
+                    now
+                };
+                let safe = safety.step(now, &command, made);
+                device.write(now, &safe.wrench);
+                energy.step(&sample.pose, &safe.wrench);
+            }
+        }
+    });
+    assert!(good > 1000);
+}
+
+#[test]
+fn a_simulated_device_does_not_allocate() {
+    let path = MinJerkPath::sway(Pose::translation(0.0, 0.1, 0.02), 0.03, 0.7);
+    let mut device = SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, path, Point3::origin())
+        .with_tremor(Tremor::new(Tremor::TYPICAL_RMS, 4));
+    drive(&mut device, &mut |_| {});
+}
+
+#[test]
+fn a_recorded_device_does_not_allocate() {
+    let row = |index: u32| TraceRow {
+        time_s: f64::from(index) * 0.013,
+        pose: Pose::translation(0.0, 0.0, f64::from(index % 7)),
+        buttons: 0,
+    };
+    let trace = (0..100).map(row).collect();
+    let device = RecordedDevice::new(trace, AtEnd::Loop, Point3::origin());
+    drive(&mut device.expect("a valid trace"), &mut |_| {});
+}
+
+#[test]
+fn a_remote_device_does_not_allocate() {
+    let (mut inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
+    let (mut device, _commands) =
+        RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
+    drive(&mut device, &mut |tick| {
+        inputs.write(Some(DeviceInput {
+            sample: InputSample {
+                sample_time_ns: 0,
+                index: tick + 1,
+                pose: PoseF64::IDENTITY,
+                velocity: [0.0; 6],
+                buttons: 0,
+                flags: 0,
+            },
+            received_ns: tick * 1_000_000,
+            session: 1,
+        }));
+    });
+}

@@ -1,0 +1,67 @@
+//! What both ends take from their TLS connection: the bytes that proofs are bound to, and the keys of the hot plane.
+//!
+//! Source: RFC 5705 and RFC 8446, section 7.5 (exporters). The two ends of one connection get the same bytes, nobody else does.
+
+use crate::LinkError;
+use taut_proto::{
+    key::EXPORTER_BYTES,
+    seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
+};
+
+const PROOF_LABEL: &[u8] = b"EXPORTER-taut-proof-1";
+const HOT_LABEL: &[u8] = b"EXPORTER-taut-hot-1";
+
+/// Sender number of the server in datagram headers.
+pub(crate) const SERVER_SENDER: u16 = 0;
+
+/// Bytes that a proof of the cluster key is bound to.
+pub fn proof_binding(connection: &quinn::Connection) -> Result<[u8; EXPORTER_BYTES], LinkError> {
+    let mut bytes = [0; EXPORTER_BYTES];
+    export(connection, &mut bytes, PROOF_LABEL)?;
+    Ok(bytes)
+}
+
+/// Hot-plane keys of the server's end of `session`.
+pub(crate) fn server_keys(
+    connection: &quinn::Connection,
+    epoch: u32,
+    session: u16,
+) -> Result<(Sealer, Opener), LinkError> {
+    let (down, up) = hot_material(connection)?;
+    Ok((
+        Sealer::new(&down, epoch, SERVER_SENDER),
+        Opener::new(&up, epoch, session),
+    ))
+}
+
+/// Hot-plane keys of the client's end of `session`.
+pub(crate) fn client_keys(
+    connection: &quinn::Connection,
+    epoch: u32,
+    session: u16,
+) -> Result<(Sealer, Opener), LinkError> {
+    let (down, up) = hot_material(connection)?;
+    Ok((
+        Sealer::new(&up, epoch, session),
+        Opener::new(&down, epoch, SERVER_SENDER),
+    ))
+}
+
+type Material = [u8; KEY_MATERIAL_BYTES];
+
+/// Server to client, client to server.
+fn hot_material(connection: &quinn::Connection) -> Result<(Material, Material), LinkError> {
+    let mut both = [[0; KEY_MATERIAL_BYTES]; 2];
+    export(connection, both.as_flattened_mut(), HOT_LABEL)?;
+    let [down, up] = both;
+    Ok((down, up))
+}
+
+fn export(connection: &quinn::Connection, into: &mut [u8], label: &[u8]) -> Result<(), LinkError> {
+    connection
+        .export_keying_material(into, label, &[])
+        .map_err(|_| LinkError::System {
+            what: "derive keys from the TLS connection",
+            reason: "the connection exports none".to_owned(),
+        })
+}

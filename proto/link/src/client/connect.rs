@@ -1,0 +1,199 @@
+//! How a client gets in: name to address, QUIC, Hello, Welcome, scene.
+
+use super::{
+    ClientLink, ClientOptions,
+    hot::{Hot, Path},
+    inbound::Inbound,
+};
+use crate::{
+    DEFAULT_QUIC_PORT, LinkError, binding,
+    framing::{CLOSE_REFUSED, ReadMessageError, close_text, read_message, write_message},
+    transport,
+};
+use quinn::{Connection, ConnectionError, Endpoint, RecvStream, SendStream};
+use std::{
+    net::{Ipv4Addr, Ipv6Addr, SocketAddr},
+    sync::Arc,
+    time::Duration,
+};
+use taut_proto::{
+    DecodeError, PROTOCOL_VERSION, Refusal, SceneDescription, Transport,
+    control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
+};
+use tokio::time::{Instant, sleep_until, timeout_at};
+
+/// Distance between attempts where the network says at once that nobody is there.
+const RETRY_PERIOD: Duration = Duration::from_millis(200);
+
+/// Joins a server's session: proves the key, takes the scene, starts receiving.
+///
+/// Runs on the current tokio runtime, which must live as long as the link; over UDP, states arrive in a thread named `taut-states`.
+pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
+    let deadline = Instant::now() + options.connect_timeout;
+    let unreachable = || LinkError::Unreachable {
+        server: options.server.clone(),
+        seconds: options.connect_timeout.as_secs_f64(),
+    };
+    let addresses = timeout_at(deadline, resolve(&options.server)).await.map_err(|_| unreachable())??;
+    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses)).await.map_err(|_| unreachable())??;
+
+    let joining = timeout_at(deadline, join(&options, &connection));
+    let (welcome, description, send) = match joining.await {
+        Ok(Ok(joined)) => joined,
+        Ok(Err(error)) => {
+            connection.close(CLOSE_REFUSED, b"not joined");
+            endpoint.wait_idle().await; // ends with the connection's closing handshake, at most three round trips
+            return Err(error);
+        }
+        Err(_) => return Err(unreachable()),
+    };
+    let (sealer, opener) = binding::client_keys(&connection, welcome.epoch, welcome.session)?;
+    let path = match options.transport {
+        Transport::QuicDatagram => Path::Quic,
+        Transport::Udp => Path::udp(SocketAddr::new(connection.remote_address().ip(), welcome.udp_port))?,
+    };
+    let hot = Arc::new(Hot::new(connection, sealer, Inbound::new(opener), path));
+    hot.clone().start()?;
+    Ok(ClientLink::new(options.server, endpoint, hot, welcome.session, description, send))
+}
+
+/// Addresses of `host:port`, IPv4 first; without a port, the default one.
+async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
+    let bad = || LinkError::BadAddress {
+        server: server.to_owned(),
+    };
+    // A number with colons and without brackets is an IPv6 address without port.
+    let complete = if let Ok(address) = server.parse::<Ipv6Addr>() {
+        format!("[{address}]:{DEFAULT_QUIC_PORT}")
+    } else if server.starts_with('[') && server.ends_with(']') {
+        format!("{server}:{DEFAULT_QUIC_PORT}")
+    } else {
+        match server.rsplit_once(':') {
+            Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port != 0) => server.to_owned(),
+            Some(_) => return Err(bad()),
+            None if server.trim().is_empty() => return Err(bad()),
+            None => format!("{server}:{DEFAULT_QUIC_PORT}"),
+        }
+    };
+    let unknown = |reason: String| LinkError::UnknownHost {
+        server: server.to_owned(),
+        reason,
+    };
+    let mut addresses: Vec<_> = tokio::net::lookup_host(complete)
+        .await
+        .map_err(|error| unknown(error.to_string()))?
+        .collect();
+    if addresses.is_empty() {
+        return Err(unknown("it has no address".to_owned()));
+    }
+    addresses.sort_by_key(SocketAddr::is_ipv6);
+    Ok(addresses)
+}
+
+/// Tries the addresses in turn, again and again; the caller sets the deadline. A server that just starts is reached too.
+async fn reach(options: &ClientOptions, addresses: &[SocketAddr]) -> Result<(Endpoint, Connection), LinkError> {
+    let config = transport::client_config(options.idle_timeout)?;
+    loop {
+        let round = Instant::now();
+        for address in addresses {
+            let any = match address {
+                SocketAddr::V4(_) => SocketAddr::from((Ipv4Addr::UNSPECIFIED, 0)),
+                SocketAddr::V6(_) => SocketAddr::from((Ipv6Addr::UNSPECIFIED, 0)),
+            };
+            let Ok(endpoint) = Endpoint::client(any) else {
+                continue; // this machine has no such address family
+            };
+            let Ok(connecting) = endpoint.connect_with(config.clone(), *address, transport::SERVER_NAME) else {
+                continue;
+            };
+            match connecting.await {
+                Ok(connection) => return Ok((endpoint, connection)),
+                Err(ConnectionError::TransportError(error)) => {
+                    return Err(LinkError::Protocol {
+                        server: options.server.clone(),
+                        reason: error.to_string(),
+                    });
+                }
+                Err(_) => {} // nobody there, or too busy: try again
+            }
+        }
+        sleep_until(round + RETRY_PERIOD).await;
+    }
+}
+
+/// Hello to scene.
+async fn join(options: &ClientOptions, connection: &Connection) -> Result<(Welcome, SceneDescription, SendStream), LinkError> {
+    let lost = |error: ConnectionError| LinkError::Closed {
+        server: options.server.clone(),
+        reason: close_text(&error, "the server"),
+    };
+    let (mut send, mut recv) = connection.open_bi().await.map_err(lost)?;
+    let binding = binding::proof_binding(connection)?;
+    let hello = Hello {
+        node: options.node.clone(),
+        role: options.role,
+        transport: options.transport,
+        rate_hz: options.rate_hz,
+        proof: options.key.client_proof(&binding, options.role, &options.node),
+    };
+    if write_message(&mut send, &ControlMessage::Hello(hello)).await.is_err() {
+        return Err(lost(connection.closed().await));
+    }
+    let welcome = match expect(options, connection, &mut recv).await? {
+        ControlMessage::Welcome(welcome) => welcome,
+        ControlMessage::Refused(refusal) => return Err(refused(options, refusal)),
+        other => return Err(protocol(options, format!("it answers Hello with {}", other.name()))),
+    };
+    // Now the server must prove the key: somebody in the middle would have ended here.
+    if !options.key.verify_server(&welcome.proof, &binding, options.role, &options.node) {
+        return Err(LinkError::WrongKey {
+            server: options.server.clone(),
+        });
+    }
+    match expect(options, connection, &mut recv).await? {
+        ControlMessage::Scene(description) => Ok((welcome, description, send)),
+        other => Err(protocol(options, format!("it sends {} where the scene is due", other.name()))),
+    }
+}
+
+async fn expect(options: &ClientOptions, connection: &Connection, recv: &mut RecvStream) -> Result<ControlMessage, LinkError> {
+    match read_message(recv, MAX_FRAME_BYTES).await {
+        Ok(message) => Ok(message),
+        Err(ReadMessageError::Decode(DecodeError::WrongVersion { theirs, ours })) => Err(LinkError::WrongVersion {
+            server: options.server.clone(),
+            theirs,
+            ours,
+        }),
+        Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
+        Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
+            server: options.server.clone(),
+            reason: connection
+                .close_reason()
+                .map_or(reason, |error| close_text(&error, "the server")),
+        }),
+    }
+}
+
+fn refused(options: &ClientOptions, refusal: Refusal) -> LinkError {
+    let server = options.server.clone();
+    match refusal.code {
+        RefusalCode::WrongKey => LinkError::WrongKey { server },
+        RefusalCode::WrongVersion => LinkError::WrongVersion {
+            server,
+            theirs: refusal.version,
+            ours: PROTOCOL_VERSION,
+        },
+        code => LinkError::Refused {
+            server,
+            code,
+            text: refusal.text,
+        },
+    }
+}
+
+fn protocol(options: &ClientOptions, reason: String) -> LinkError {
+    LinkError::Protocol {
+        server: options.server.clone(),
+        reason,
+    }
+}

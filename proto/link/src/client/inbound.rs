@@ -1,0 +1,138 @@
+//! What arrives on the hot plane: states into a bounded queue, the newest wrench, time into the clock filter; everything else counted.
+
+use super::{ReceivedState, ReceivedWrench};
+use crate::counters::ClientCounterCells;
+use std::{
+    collections::VecDeque,
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::Instant,
+};
+use taut_proto::{
+    ClockFilter, DecodeError, Payload, SessionTime,
+    seal::{OpenError, Opened, Opener},
+};
+
+/// States kept for who takes them: a quarter of a second at 1 kHz. Beyond it the oldest go, newest wins.
+const MAX_QUEUED_STATES: usize = 256;
+
+pub(crate) struct Inbound {
+    inner: Mutex<Inner>,
+    /// Zero of this client's clock in the time exchange.
+    start: Instant,
+    pub(crate) counters: ClientCounterCells,
+}
+
+struct Inner {
+    opener: Opener,
+    clock: ClockFilter,
+    states: VecDeque<ReceivedState>,
+    /// Highest sequence number of a state so far.
+    newest_state: Option<u64>,
+    wrench: Option<ReceivedWrench>,
+}
+
+impl Inbound {
+    pub(crate) fn new(opener: Opener) -> Inbound {
+        Inbound {
+            inner: Mutex::new(Inner {
+                opener,
+                clock: ClockFilter::default(),
+                states: VecDeque::with_capacity(MAX_QUEUED_STATES),
+                newest_state: None,
+                wrench: None,
+            }),
+            start: Instant::now(),
+            counters: ClientCounterCells::default(),
+        }
+    }
+
+    /// This client's clock, ns.
+    pub(crate) fn local_ns(&self, moment: Instant) -> u64 {
+        moment.saturating_duration_since(self.start).as_nanos() as u64 // 584 years fit
+    }
+
+    /// Takes one datagram in, or counts why not. What is not authentic has no effect.
+    pub(crate) fn receive(&self, datagram: &[u8], received: Instant) {
+        let counters = &self.counters;
+        let mut inner = self.lock();
+        let opened = match inner.opener.open(datagram) {
+            Ok(opened) => opened,
+            Err(OpenError::Header(DecodeError::WrongVersion { .. })) => return counters.wrong_version.one(),
+            Err(OpenError::Header(_) | OpenError::Payload(_)) => return counters.garbage.one(),
+            Err(OpenError::Forged) => return counters.forged.one(),
+            Err(OpenError::Replayed) => return counters.duplicates.one(),
+        };
+        counters.packets_received.one();
+        let sequence = opened.header.sequence;
+        match sequence.checked_sub(opened.expected) {
+            Some(gap) => counters.lost.add(gap),
+            None => counters.lost.take_one(), // late: it was counted when it was overtaken
+        }
+        inner.take(opened, received, self.local_ns(received), counters);
+    }
+
+    /// Moves the queued states to the end of `out`.
+    pub(crate) fn drain_states(&self, out: &mut Vec<ReceivedState>) {
+        out.extend(self.lock().states.drain(..));
+    }
+
+    pub(crate) fn latest_wrench(&self) -> Option<ReceivedWrench> {
+        self.lock().wrench
+    }
+
+    pub(crate) fn session_at(&self, moment: Instant) -> Option<SessionTime> {
+        let local_ns = self.local_ns(moment);
+        self.lock().clock.session_time(local_ns)
+    }
+
+    pub(crate) fn round_trip_ns(&self) -> Option<u64> {
+        self.lock().clock.round_trip_ns()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Inner {
+    fn take(&mut self, opened: Opened, received: Instant, local_ns: u64, counters: &ClientCounterCells) {
+        let sequence = opened.header.sequence;
+        match opened.payload {
+            Payload::Hot(state) => {
+                counters.states.one();
+                // Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
+                if self.newest_state.is_some_and(|last| last > sequence) {
+                    return counters.late.one();
+                }
+                self.newest_state = Some(sequence);
+                if self.states.len() == MAX_QUEUED_STATES {
+                    self.states.pop_front();
+                    counters.overrun.one();
+                }
+                self.states.push_back(ReceivedState {
+                    state,
+                    sequence,
+                    received,
+                    state_hash: opened.state_hash,
+                });
+            }
+            Payload::TimeResponse(response) => {
+                if !self.clock.update(&response, local_ns) {
+                    counters.garbage.one();
+                }
+            }
+            Payload::Wrench(command) => {
+                if self.wrench.is_none_or(|last| last.sequence < sequence) {
+                    self.wrench = Some(ReceivedWrench {
+                        command,
+                        sequence,
+                        received,
+                    });
+                }
+            }
+            Payload::Heartbeat => {}
+            // The server has no business sending these.
+            Payload::Input(_) | Payload::TimeRequest(_) => counters.garbage.one(),
+        }
+    }
+}

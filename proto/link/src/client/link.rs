@@ -1,0 +1,187 @@
+//! A joined session: scene, meshes, states, device input and reports.
+
+use super::{ReceivedState, ReceivedWrench, hot::Hot, meshes::Meshes};
+use crate::{
+    ClientCounters, LinkError,
+    framing::{CLOSE_BYE, close_text, write_message},
+};
+use quinn::{Endpoint, SendStream};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use taut_proto::{
+    ClientStats, InputSample, MeshBlob, MeshHash, Payload, SceneDescription, SessionTime,
+    control::{Bye, ControlMessage, LogEvent, LogLevel},
+};
+use tokio::{sync::mpsc, time::timeout};
+
+/// Reports and log lines that may wait for the network; more are not taken.
+const MAX_WAITING_MESSAGES: usize = 64;
+/// Time for the goodbye to arrive.
+const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// A joined session. Every method takes `&self`: share it by `Arc`. Dropping it leaves the session at once.
+pub struct ClientLink {
+    server: String,
+    endpoint: Endpoint,
+    hot: Arc<Hot>,
+    session: u16,
+    description: SceneDescription,
+    meshes: Meshes,
+    outbox: mpsc::Sender<ControlMessage>,
+}
+
+impl ClientLink {
+    /// Must be called on a tokio runtime: starts the task that writes reports.
+    pub(crate) fn new(
+        server: String,
+        endpoint: Endpoint,
+        hot: Arc<Hot>,
+        session: u16,
+        description: SceneDescription,
+        send: SendStream,
+    ) -> ClientLink {
+        let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
+        tokio::spawn(write_reports(send, messages));
+        ClientLink {
+            server,
+            endpoint,
+            hot,
+            session,
+            description,
+            meshes: Meshes::default(),
+            outbox,
+        }
+    }
+
+    /// The scene and the workbench, as at join.
+    pub fn description(&self) -> &SceneDescription {
+        &self.description
+    }
+
+    /// Number of this session at the server.
+    pub fn session(&self) -> u16 {
+        self.session
+    }
+
+    /// The mesh of `hash`, from the server or, the second time, from memory. Its hash has been checked.
+    pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
+        self.meshes.get(&self.hot.connection, &self.server, hash).await
+    }
+
+    /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
+    pub fn drain_states(&self, out: &mut Vec<ReceivedState>) {
+        self.hot.inbound.drain_states(out);
+    }
+
+    /// Session time now; `None` until the clock is locked, about 100 ms after joining.
+    pub fn session_now(&self) -> Option<SessionTime> {
+        self.session_at(Instant::now())
+    }
+
+    /// Session time at `moment`; `None` until the clock is locked.
+    pub fn session_at(&self, moment: Instant) -> Option<SessionTime> {
+        self.hot.inbound.session_at(moment)
+    }
+
+    /// Smallest round trip of the hot plane lately; `None` before the first exchange.
+    pub fn round_trip(&self) -> Option<Duration> {
+        self.hot.inbound.round_trip_ns().map(Duration::from_nanos)
+    }
+
+    /// Sends a device reading at once. Counts if [`crate::Role::Device`] joined; from any other role the server refuses it.
+    pub fn send_input(&self, sample: &InputSample) {
+        self.hot.send(&Payload::Input(*sample));
+    }
+
+    /// Newest command to the device; its `received` is the measure for the bridge's watchdog.
+    pub fn latest_wrench(&self) -> Option<ReceivedWrench> {
+        self.hot.inbound.latest_wrench()
+    }
+
+    /// Sends a report, waiting while earlier ones are not away yet.
+    pub async fn send_stats(&self, stats: ClientStats) -> Result<(), LinkError> {
+        let closed = |reason: String| LinkError::Closed {
+            server: self.server.clone(),
+            reason,
+        };
+        if let Some(reason) = self.is_closed() {
+            return Err(closed(reason));
+        }
+        let sent = self.outbox.send(ControlMessage::Stats(stats)).await;
+        sent.map_err(|_| closed(self.is_closed().unwrap_or_else(|| "reports are not taken any more".to_owned())))
+    }
+
+    /// Sends a report without waiting; `false` if earlier ones are not away yet or the link is closed.
+    pub fn post_stats(&self, stats: ClientStats) -> bool {
+        self.post(ControlMessage::Stats(stats))
+    }
+
+    /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
+    pub fn post_log(&self, level: LogLevel, text: String) -> bool {
+        self.post(ControlMessage::Log(LogEvent { level, text }))
+    }
+
+    fn post(&self, message: ControlMessage) -> bool {
+        self.is_closed().is_none() && self.outbox.try_send(message).is_ok()
+    }
+
+    /// What happened so far.
+    pub fn counters(&self) -> ClientCounters {
+        self.hot.inbound.counters.read()
+    }
+
+    /// Why the link is closed, for people; `None` while it is open.
+    pub fn is_closed(&self) -> Option<String> {
+        self.hot
+            .connection
+            .close_reason()
+            .map(|error| close_text(&error, "the server"))
+    }
+
+    /// Waits until the link is closed and returns why.
+    pub async fn closed(&self) -> String {
+        close_text(&self.hot.connection.closed().await, "the server")
+    }
+
+    /// Says goodbye and leaves; reports sent before arrive first.
+    pub async fn close(self) {
+        let bye = ControlMessage::Bye(Bye {
+            reason: "the node left".to_owned(),
+        });
+        let goodbye = async {
+            if self.outbox.send(bye).await.is_ok() {
+                self.hot.connection.closed().await; // the server closes when it has read the goodbye
+            }
+        };
+        if timeout(CLOSE_TIMEOUT, goodbye).await.is_err() {
+            tracing::debug!("the server did not answer the goodbye");
+        }
+        self.hot.stop();
+        self.hot.connection.close(CLOSE_BYE, b"the node left");
+        if timeout(CLOSE_TIMEOUT, self.endpoint.wait_idle()).await.is_err() {
+            tracing::debug!("the server did not hear the goodbye");
+        }
+    }
+}
+
+impl Drop for ClientLink {
+    fn drop(&mut self) {
+        self.hot.stop();
+        self.hot.connection.close(CLOSE_BYE, b"the node left");
+    }
+}
+
+/// Writes reports in order until the link or the stream ends; what has no encoding is skipped.
+async fn write_reports(mut send: SendStream, mut messages: mpsc::Receiver<ControlMessage>) {
+    while let Some(message) = messages.recv().await {
+        match write_message(&mut send, &message).await {
+            Ok(()) => {}
+            Err(crate::framing::WriteMessageError::Encode(error)) => {
+                tracing::warn!("a {} message was not sent: {error}", message.name());
+            }
+            Err(crate::framing::WriteMessageError::Ended(_)) => return,
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! What a client is given, and what it receives.
+
+use std::time::{Duration, Instant};
+use taut_proto::{ClusterKey, HotState, Role, Transport, WrenchCommand};
+
+/// How to connect.
+#[derive(Clone, Debug)]
+pub struct ClientOptions {
+    /// `host:port`, name or number, IPv4 or IPv6 (in brackets); without port, the default one.
+    pub server: String,
+    /// The cluster key.
+    pub key: ClusterKey,
+    /// What this client is.
+    pub role: Role,
+    /// Its name, unique in the workbench.
+    pub node: String,
+    /// How states reach it.
+    pub transport: Transport,
+    /// Most states per second; 0 for all.
+    pub rate_hz: u32,
+    /// How long to try.
+    pub connect_timeout: Duration,
+    /// Silence after which the server counts as gone.
+    pub idle_timeout: Duration,
+}
+
+impl ClientOptions {
+    /// UDP, every state, 3 s to connect.
+    pub fn new(server: impl Into<String>, key: ClusterKey, role: Role, node: impl Into<String>) -> ClientOptions {
+        ClientOptions {
+            server: server.into(),
+            key,
+            role,
+            node: node.into(),
+            transport: Transport::Udp,
+            rate_hz: 0,
+            connect_timeout: Duration::from_secs(3),
+            idle_timeout: crate::transport::IDLE_TIMEOUT,
+        }
+    }
+}
+
+/// A state with its history.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReceivedState {
+    /// The state.
+    pub state: HotState,
+    /// Sequence number of its datagram.
+    pub sequence: u64,
+    /// When it arrived, this machine's clock.
+    pub received: Instant,
+    /// Fingerprint of the state as received: report it in `ClientStats::drawn`.
+    pub state_hash: u64,
+}
+
+/// A command to the device with its history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReceivedWrench {
+    /// The command.
+    pub command: WrenchCommand,
+    /// Sequence number of its datagram.
+    pub sequence: u64,
+    /// When it arrived, this machine's clock: the watchdog's measure.
+    pub received: Instant,
+}

@@ -1,0 +1,109 @@
+//! What happened on the network, counted: nothing unexpected is silent.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+macro_rules! counters {
+    ($(#[$doc:meta])* $name:ident, $cells:ident { $($(#[$field_doc:meta])* $field:ident),* $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct $name { $($(#[$field_doc])* pub $field: u64,)* }
+
+        #[derive(Debug, Default)]
+        pub(crate) struct $cells { $(pub(crate) $field: Cell,)* }
+
+        impl $cells {
+            pub(crate) fn read(&self) -> $name {
+                $name { $($field: self.$field.get(),)* }
+            }
+        }
+    };
+}
+
+/// One counter that any thread may raise.
+#[derive(Debug, Default)]
+pub(crate) struct Cell(AtomicU64);
+
+impl Cell {
+    pub(crate) fn add(&self, count: u64) {
+        self.0.fetch_add(count, Ordering::Relaxed);
+    }
+
+    pub(crate) fn one(&self) {
+        self.add(1);
+    }
+
+    /// One less, where something counted as lost turns up late.
+    pub(crate) fn take_one(&self) {
+        let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |count| count.checked_sub(1));
+    }
+
+    pub(crate) fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+counters! {
+    /// Counts of the server since it started.
+    Counters, CounterCells {
+        /// Datagrams sent to clients.
+        packets_sent,
+        /// Bytes of these.
+        bytes_sent,
+        /// Datagrams that the system or QUIC did not take; the client sees a gap.
+        send_errors,
+        /// States that could not be encoded (a number that is not finite): nobody got them.
+        encode_errors,
+        /// Authentic datagrams received.
+        packets_received,
+        /// Datagrams that are not of taut at all.
+        garbage,
+        /// Datagrams and Hellos of another protocol version.
+        wrong_version,
+        /// Datagrams whose seal is broken, or of no session.
+        forged,
+        /// Authentic datagrams seen before.
+        replayed,
+        /// Device readings taken.
+        inputs,
+        /// Device readings refused: the session is not the device's.
+        inputs_refused,
+        /// Device readings overtaken by newer ones.
+        inputs_late,
+        /// Clients let in.
+        joined,
+        /// Clients refused, for whatever reason.
+        refused,
+        /// Clients refused for the wrong key.
+        wrong_key,
+        /// Events dropped because nobody took them.
+        events_dropped,
+    }
+}
+
+counters! {
+    /// Counts of a client since it joined.
+    ClientCounters, ClientCounterCells {
+        /// Authentic datagrams received.
+        packets_received,
+        /// States received.
+        states,
+        /// Datagrams missing in the sequence.
+        lost,
+        /// Datagrams seen before.
+        duplicates,
+        /// States overtaken by newer ones, not delivered.
+        late,
+        /// States dropped because nobody took them from the queue.
+        overrun,
+        /// Datagrams that are not of taut, or that make no sense.
+        garbage,
+        /// Datagrams of another protocol version.
+        wrong_version,
+        /// Datagrams whose seal is broken.
+        forged,
+        /// Datagrams sent.
+        packets_sent,
+        /// Datagrams that the system did not take.
+        send_errors,
+    }
+}

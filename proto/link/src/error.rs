@@ -1,0 +1,131 @@
+//! Why a link does not come about or fails; each text says what, where and what to do.
+
+use std::{io, net::SocketAddr, path::PathBuf};
+use taut_proto::control::RefusalCode;
+
+/// Why a link does not come about or fails.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// Another program has the port.
+    #[error("cannot listen on {address} ({plane}): the port is in use; stop the other server or choose another port")]
+    PortInUse {
+        /// Address asked for.
+        address: SocketAddr,
+        /// "control" or "state".
+        plane: &'static str,
+    },
+    /// The system does not let us listen.
+    #[error("cannot listen on {address} ({plane}): {source}; choose an address of this machine")]
+    Listen {
+        /// Address asked for.
+        address: SocketAddr,
+        /// "control" or "state".
+        plane: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Not `host:port`.
+    #[error("\"{server}\" is no server address: write host:port, such as haptic-pc:4857 or [::1]:4857")]
+    BadAddress {
+        /// What was given.
+        server: String,
+    },
+    /// The name does not resolve.
+    #[error("the server name in \"{server}\" is unknown: {reason}; check the spelling or give a numeric address")]
+    UnknownHost {
+        /// What was given.
+        server: String,
+        /// What the resolver says.
+        reason: String,
+    },
+    /// Nobody answers.
+    #[error("no server answers at {server} within {seconds:.0} s: check that it runs, the address, and that the firewall lets UDP through")]
+    Unreachable {
+        /// What was given.
+        server: String,
+        /// How long we tried, s.
+        seconds: f64,
+    },
+    /// Either end does not hold the other's key.
+    #[error("the server at {server} does not hold the same cluster key: give this node the server's key file (--key)")]
+    WrongKey {
+        /// What was given.
+        server: String,
+    },
+    /// Either end is of another release.
+    #[error("the server at {server} speaks protocol version {theirs}, this program speaks {ours}: install the same release on both")]
+    WrongVersion {
+        /// What was given.
+        server: String,
+        /// Version of the server.
+        theirs: u8,
+        /// Our version.
+        ours: u8,
+    },
+    /// The server has a reason of its own.
+    #[error("the server at {server} refuses this node: {text}")]
+    Refused {
+        /// What was given.
+        server: String,
+        /// Why, for programs.
+        code: RefusalCode,
+        /// Why, for people.
+        text: String,
+    },
+    /// What comes is no taut.
+    #[error("the server at {server} does not speak taut: {reason}; check the port")]
+    Protocol {
+        /// What was given.
+        server: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The session ended.
+    #[error("the link to {server} is closed: {reason}")]
+    Closed {
+        /// What was given.
+        server: String,
+        /// Why.
+        reason: String,
+    },
+    /// The server has no such mesh.
+    #[error("the server at {server} has no mesh {hash}: its scene changed, connect again")]
+    NoSuchMesh {
+        /// What was given.
+        server: String,
+        /// The hash.
+        hash: String,
+    },
+    /// A mesh arrived damaged.
+    #[error("mesh {hash} from {server} is damaged: {reason}; connect again")]
+    BadMesh {
+        /// What was given.
+        server: String,
+        /// The hash.
+        hash: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A key file cannot be used.
+    #[error("cannot use the key file {path}: {reason}")]
+    KeyFile {
+        /// The file.
+        path: PathBuf,
+        /// Why and what to do.
+        reason: String,
+    },
+    /// The content cannot be sent.
+    #[error("the scene cannot be sent to clients: {reason}")]
+    Content {
+        /// Why and what to do.
+        reason: String,
+    },
+    /// The system fails us.
+    #[error("cannot {what}: {reason}")]
+    System {
+        /// What we wanted.
+        what: &'static str,
+        /// What the system says.
+        reason: String,
+    },
+}

@@ -1,0 +1,251 @@
+//! How a client gets in, and its control plane while it is in.
+
+use super::{
+    LinkEvent,
+    receive::receive,
+    session::{Admitted, Session},
+    shared::Shared,
+};
+use crate::{
+    binding,
+    framing::{
+        CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text, read_message, write_message,
+    },
+};
+use quinn::{Connection, RecvStream, SendStream};
+use std::{sync::Arc, time::Duration};
+use taut_proto::{
+    DecodeError, PROTOCOL_VERSION, Refusal, Transport,
+    control::{ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode, Welcome},
+};
+use tokio::{sync::Semaphore, time::timeout};
+
+/// Clients that may be joining at once; more are turned away before any cryptography.
+const MAX_JOINING: usize = 64;
+/// Time for a client to join.
+const JOIN_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time for a refused client to read why.
+const REFUSAL_TIMEOUT: Duration = Duration::from_millis(500);
+/// Most bytes of a Hello: nobody has proven anything yet.
+const MAX_HELLO_BYTES: usize = 1024;
+
+/// Lets clients in until the endpoint closes.
+pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
+    let joining = Arc::new(Semaphore::new(MAX_JOINING));
+    while let Some(incoming) = endpoint.accept().await {
+        let Ok(permit) = joining.clone().try_acquire_owned() else {
+            shared.counters.refused.one();
+            incoming.refuse();
+            continue;
+        };
+        let shared = shared.clone();
+        tokio::spawn(async move {
+            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming)).await;
+            drop(permit);
+            if let Ok(Some((session, send, recv))) = joined {
+                attend(&shared, session, send, recv).await;
+            }
+        });
+    }
+}
+
+/// Hello to Welcome; `None` if the client is not let in.
+async fn join(shared: &Arc<Shared>, incoming: quinn::Incoming) -> Option<(Arc<Session>, SendStream, RecvStream)> {
+    let connection = incoming.await.ok()?;
+    let (mut send, mut recv) = connection.accept_bi().await.ok()?;
+    let mut node = String::new();
+    let outcome = match read_message(&mut recv, MAX_HELLO_BYTES).await {
+        Ok(ControlMessage::Hello(hello)) => {
+            node.clone_from(&hello.node);
+            admit(shared, &connection, hello)
+        }
+        Ok(other) => Err((RefusalCode::BadHello, format!("its first message is {}, not Hello", other.name()))),
+        Err(ReadMessageError::Decode(error @ DecodeError::WrongVersion { .. })) => {
+            shared.counters.wrong_version.one();
+            Err((RefusalCode::WrongVersion, error.to_string()))
+        }
+        Err(error) => Err((RefusalCode::BadHello, error.to_string())),
+    };
+    let (session, welcome) = match outcome {
+        Ok(admitted) => admitted,
+        Err((code, text)) => {
+            refuse(shared, &connection, send, node, code, text).await;
+            return None;
+        }
+    };
+    let mut welcomed = write_message(&mut send, &ControlMessage::Welcome(welcome)).await.is_ok();
+    welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
+    if !welcomed {
+        shared.sessions.remove(session.number);
+        return None;
+    }
+    Some((session, send, recv))
+}
+
+/// Checks a Hello and makes the session.
+fn admit(shared: &Arc<Shared>, connection: &Connection, hello: Hello) -> Result<(Arc<Session>, Welcome), (RefusalCode, String)> {
+    let bad = |text: String| (RefusalCode::BadHello, text);
+    let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
+    if !shared.key.verify_client(&hello.proof, &binding, hello.role, &hello.node) {
+        shared.counters.wrong_key.one();
+        let text = "it does not hold the same cluster key: give this node the server's key file (--key)";
+        return Err((RefusalCode::WrongKey, text.to_owned()));
+    }
+    let printable = hello.node.chars().all(|c| !c.is_control());
+    if hello.node.trim().is_empty() || hello.node.len() > MAX_NODE_NAME_BYTES || !printable {
+        let text = format!("a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)");
+        return Err(bad(text));
+    }
+    let now_ns = shared.clock.now_ns();
+    let (session, replaced) = shared.sessions.admit(&hello.node, hello.role, now_ns, |number| {
+        let keys = binding::server_keys(connection, shared.epoch, number).map_err(|error| error.to_string())?;
+        let admitted = Admitted {
+            number,
+            node: hello.node.clone(),
+            role: hello.role,
+            transport: hello.transport,
+            rate_hz: hello.rate_hz,
+            joined_ns: now_ns,
+        };
+        Ok(Session::new(admitted, connection.clone(), keys))
+    })?;
+    if let Some(old) = replaced {
+        let reason = format!("a new node named \"{}\" took the place of this silent one", old.node);
+        old.connection.close(CLOSE_REPLACED, reason.as_bytes());
+        shared.tell(LinkEvent::Left { status: old.status(), reason });
+    }
+    let welcome = Welcome {
+        proof: shared.key.server_proof(&binding, hello.role, &hello.node),
+        session: session.number,
+        epoch: shared.epoch,
+        udp_port: shared.udp_port,
+        session_time_ns: now_ns,
+    };
+    Ok((session, welcome))
+}
+
+async fn refuse(shared: &Shared, connection: &Connection, mut send: SendStream, node: String, code: RefusalCode, text: String) {
+    shared.counters.refused.one();
+    tracing::info!(address = %connection.remote_address(), node, ?code, "client refused: {text}");
+    let refusal = Refusal {
+        code,
+        version: PROTOCOL_VERSION,
+        text: text.clone(),
+    };
+    shared.tell(LinkEvent::Refused {
+        address: connection.remote_address(),
+        node,
+        code,
+        text: text.clone(),
+    });
+    let told = async {
+        if write_message(&mut send, &ControlMessage::Refused(refusal)).await.is_ok() && send.finish().is_ok() {
+            connection.closed().await; // the client closes when it has read why
+        }
+    };
+    if timeout(REFUSAL_TIMEOUT, told).await.is_err() {
+        tracing::debug!("a refused client did not close");
+    }
+    connection.close(CLOSE_REFUSED, text.as_bytes());
+}
+
+/// The session from Welcome to the end.
+async fn attend(shared: &Arc<Shared>, session: Arc<Session>, _send: SendStream, mut recv: RecvStream) {
+    shared.counters.joined.one();
+    tracing::info!(node = session.node, role = ?session.role, transport = ?session.transport, "client joined");
+    shared.tell(LinkEvent::Joined(session.status()));
+
+    let connection = &session.connection;
+    let reason = tokio::select! {
+        reason = read_control(shared, &session, &mut recv) => reason,
+        reason = serve_meshes(shared, connection) => reason,
+        reason = read_datagrams(shared, &session) => reason,
+    };
+    connection.close(CLOSE_BYE, b"");
+    // A session that was replaced is gone already, and told.
+    if shared.sessions.remove(session.number) {
+        tracing::info!(node = session.node, "client left: {reason}");
+        shared.tell(LinkEvent::Left {
+            status: session.status(),
+            reason,
+        });
+    }
+}
+
+/// Reports and log lines until the client says goodbye; returns why it ended.
+async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream) -> String {
+    loop {
+        match read_message(recv, MAX_FRAME_BYTES).await {
+            Ok(ControlMessage::Stats(stats)) => {
+                session.report(stats.clone(), shared);
+                shared.tell(LinkEvent::Stats {
+                    node: session.node.clone(),
+                    stats,
+                });
+            }
+            Ok(ControlMessage::Log(event)) => shared.tell(LinkEvent::Log {
+                node: session.node.clone(),
+                event,
+            }),
+            Ok(ControlMessage::Bye(bye)) => return bye.reason,
+            Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
+            Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),
+            Err(ReadMessageError::Ended(_)) => {
+                let error = session.connection.closed().await;
+                return close_text(&error, "the node");
+            }
+        }
+    }
+}
+
+fn broken(session: &Session, reason: &str) -> String {
+    session.connection.close(CLOSE_PROTOCOL, reason.as_bytes());
+    reason.to_owned()
+}
+
+/// One stream per mesh, until the connection ends.
+async fn serve_meshes(shared: &Arc<Shared>, connection: &Connection) -> String {
+    loop {
+        match connection.accept_bi().await {
+            Ok((send, recv)) => {
+                let shared = shared.clone();
+                // Ends with the connection; the number of streams is limited by the transport.
+                tokio::spawn(async move { serve_mesh(&shared, send, recv).await });
+            }
+            Err(error) => return close_text(&error, "the node"),
+        }
+    }
+}
+
+async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream) {
+    let Ok(ControlMessage::MeshRequest(request)) = read_message(&mut recv, MAX_HELLO_BYTES).await else {
+        return; // dropping the stream resets it
+    };
+    let mesh = shared.content.meshes.get(&request.hash);
+    let header = MeshHeader {
+        hash: request.hash,
+        length: mesh.map_or(0, |bytes| bytes.len() as u32), // MAX_MESH_BYTES is far below 2^32
+    };
+    if write_message(&mut send, &ControlMessage::MeshHeader(header)).await.is_err() {
+        return;
+    }
+    if let Some(bytes) = mesh
+        && send.write_all(bytes).await.is_err()
+    {
+        return;
+    }
+    let _ = send.finish(); // fails only if the client is gone
+}
+
+/// Hot plane over QUIC; a client on UDP sends none here.
+async fn read_datagrams(shared: &Shared, session: &Session) -> String {
+    loop {
+        match session.connection.read_datagram().await {
+            Ok(datagram) if session.transport == Transport::QuicDatagram => {
+                receive(shared, session, &datagram, None, shared.clock.now_ns());
+            }
+            Ok(_) => shared.counters.garbage.one(),
+            Err(error) => return close_text(&error, "the node"),
+        }
+    }
+}

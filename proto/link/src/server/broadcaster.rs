@@ -1,0 +1,80 @@
+//! States to all clients, from one thread that is none of the loops.
+
+use super::{
+    session::{Sent, Session},
+    shared::Shared,
+};
+use std::sync::Arc;
+use taut_proto::{
+    HotState, Kind, Payload, Role, WrenchCommand,
+    codec::encode_into,
+    header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
+    state::payload_hash,
+};
+
+/// Sends states and wrenches. Belongs to one thread; never waits for a client: what the system does not take at once is counted and gone.
+pub struct Broadcaster {
+    shared: Arc<Shared>,
+    sessions: Arc<[Arc<Session>]>,
+    generation: u64,
+    payload: [u8; MAX_PAYLOAD_BYTES],
+    buffer: [u8; MAX_DATAGRAM_BYTES],
+}
+
+/// What became of one send.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SendReport {
+    /// Clients that were sent it.
+    pub sent: usize,
+    /// Clients that were not due, by their rate, or have not opened their UDP path yet.
+    pub skipped: usize,
+    /// Clients to whom sending failed, as counted in `send_errors`.
+    pub failed: usize,
+}
+
+impl Broadcaster {
+    pub(crate) fn new(shared: Arc<Shared>) -> Broadcaster {
+        Broadcaster {
+            sessions: shared.sessions.all(),
+            shared,
+            generation: u64::MAX,
+            payload: [0; MAX_PAYLOAD_BYTES],
+            buffer: [0; MAX_DATAGRAM_BYTES],
+        }
+    }
+
+    /// Sends `state` to every client that is due by its rate, each under its own key.
+    ///
+    /// A state with a number that is not finite goes to nobody and is counted in `encode_errors`.
+    pub fn send(&mut self, state: &HotState) -> SendReport {
+        let mut report = SendReport::default();
+        let Ok(length) = encode_into(state, &mut self.payload) else {
+            self.shared.counters.encode_errors.one();
+            return report;
+        };
+        let payload = &self.payload[..length];
+        self.shared.sent_states.remember(state.tick, payload_hash(payload));
+        self.shared.sessions.refresh(&mut self.sessions, &mut self.generation);
+        for session in self.sessions.iter() {
+            if !session.take_due(state.sample_time_ns) {
+                report.skipped += 1;
+                continue;
+            }
+            match session.send_bytes(Kind::Hot, payload, &mut self.buffer, &self.shared) {
+                Sent::Yes => report.sent += 1,
+                Sent::NoPath => report.skipped += 1,
+                Sent::Failed => report.failed += 1,
+            }
+        }
+        report
+    }
+
+    /// Sends `wrench` to the device bridge; `false` if there is none or sending failed.
+    pub fn send_wrench(&mut self, wrench: &WrenchCommand) -> bool {
+        self.shared.sessions.refresh(&mut self.sessions, &mut self.generation);
+        self.sessions
+            .iter()
+            .find(|session| session.role == Role::Device)
+            .is_some_and(|session| session.send(&Payload::Wrench(*wrench), &self.shared) == Sent::Yes)
+    }
+}

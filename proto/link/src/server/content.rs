@@ -1,0 +1,46 @@
+//! What clients fetch at join: the scene description, and meshes by hash.
+
+use crate::LinkError;
+use std::{collections::HashMap, sync::Arc};
+use taut_proto::{MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
+
+/// What clients fetch at join.
+#[derive(Clone, Debug)]
+pub struct Content {
+    /// The scene, the workbench.
+    pub description: SceneDescription,
+    /// Every mesh that the description names.
+    pub meshes: Vec<MeshBlob>,
+}
+
+/// The same as bytes, made once.
+pub(crate) struct EncodedContent {
+    /// The framed scene message.
+    pub(crate) scene: Vec<u8>,
+    pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
+}
+
+impl Content {
+    /// Encodes everything; an error if the description names a mesh that is not there.
+    pub(crate) fn encode(self) -> Result<EncodedContent, LinkError> {
+        let refuse = |reason: String| LinkError::Content { reason };
+        let mut meshes = HashMap::new();
+        for mesh in &self.meshes {
+            let bytes = mesh.encode().map_err(|error| refuse(error.to_string()))?;
+            meshes.insert(MeshHash::of(&bytes), Arc::from(bytes));
+        }
+        let described = [&self.description.god_object];
+        for body in described.into_iter().chain(&self.description.obstacles) {
+            if !meshes.contains_key(&body.mesh) {
+                return Err(refuse(format!(
+                    "body \"{}\" names mesh {}, which is not among its meshes; add it",
+                    body.name, body.mesh
+                )));
+            }
+        }
+        let scene = ControlMessage::Scene(self.description)
+            .to_frame()
+            .map_err(|error| refuse(error.to_string()))?;
+        Ok(EncodedContent { scene, meshes })
+    }
+}

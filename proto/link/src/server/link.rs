@@ -1,0 +1,195 @@
+//! A running server: its addresses, its clients, its end.
+
+use super::{
+    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
+    device_input::InputWriter,
+    receive,
+    sent_states::SentStates,
+    session::lock,
+    shared::{Sessions, Shared},
+};
+use crate::{
+    Counters, LinkError, SessionClock,
+    counters::CounterCells,
+    framing::CLOSE_STOPPING,
+    transport,
+};
+use ring::rand::{SecureRandom, SystemRandom};
+use std::{
+    io,
+    net::{SocketAddr, UdpSocket},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+        mpsc::{self, Receiver},
+    },
+    thread::JoinHandle,
+    time::Duration,
+};
+use tokio::time::timeout;
+
+/// Events kept for who takes them; more are dropped and counted.
+const MAX_EVENTS: usize = 1024;
+/// Time for the clients to hear that the server stops.
+const STOP_TIMEOUT: Duration = Duration::from_millis(500);
+/// What clients hear then.
+const STOP_REASON: &[u8] = b"server is stopping";
+
+/// A running server. Dropping it stops it at once; [`ServerLink::shutdown`] also waits until the clients have heard.
+pub struct ServerLink {
+    shared: Arc<Shared>,
+    endpoint: quinn::Endpoint,
+    quic_address: SocketAddr,
+    udp_address: SocketAddr,
+    events: Mutex<Receiver<LinkEvent>>,
+    inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
+    udp_thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
+///
+/// Fails if an address cannot be had, or if `content` names a mesh that it does not hold; nothing is left running then.
+pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLink, LinkError> {
+    let content = content.encode()?;
+    let quic_socket = listen(options.quic, "control")?;
+    let udp = listen(options.udp, "state")?;
+    let address_of = |socket: &UdpSocket| socket.local_addr().map_err(|error| system("read a socket's address", &error));
+    let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
+    let endpoint = quinn::Endpoint::new(
+        quinn::EndpointConfig::default(),
+        Some(transport::server_config(options.idle_timeout)?),
+        quic_socket,
+        Arc::new(quinn::TokioRuntime),
+    )
+    .map_err(|error| system("start QUIC", &error))?;
+
+    let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
+    let (input, output) = triple_buffer::triple_buffer(&None);
+    let shared = Arc::new(Shared {
+        key: options.key,
+        clock: options.clock,
+        epoch: random_epoch()?,
+        content,
+        udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),
+        udp,
+        sessions: Sessions::new(options.max_clients),
+        counters: CounterCells::default(),
+        events: events_in,
+        inputs: InputWriter::new(input),
+        sent_states: SentStates::new(),
+        stopping: AtomicBool::new(false),
+    });
+    let of_thread = shared.clone();
+    let udp_thread = std::thread::Builder::new()
+        .name("taut-udp".to_owned())
+        .spawn(move || receive::run_udp(&of_thread))
+        .map_err(|error| system("start the state thread", &error))?;
+    tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
+    Ok(ServerLink {
+        shared,
+        endpoint,
+        quic_address,
+        udp_address,
+        events: Mutex::new(events),
+        inputs: Mutex::new(Some(output)),
+        udp_thread: Mutex::new(Some(udp_thread)),
+    })
+}
+
+impl ServerLink {
+    /// Address of the control plane, with the port that was taken.
+    pub fn quic_addr(&self) -> SocketAddr {
+        self.quic_address
+    }
+
+    /// Address of the hot plane, with the port that was taken.
+    pub fn udp_addr(&self) -> SocketAddr {
+        self.udp_address
+    }
+
+    /// The clock of the session.
+    pub fn clock(&self) -> SessionClock {
+        self.shared.clock
+    }
+
+    /// A sender of states, for the broadcast thread.
+    pub fn broadcaster(&self) -> Broadcaster {
+        Broadcaster::new(self.shared.clone())
+    }
+
+    /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.
+    pub fn device_inputs(&self) -> Option<triple_buffer::Output<Option<DeviceInput>>> {
+        lock(&self.inputs).take()
+    }
+
+    /// The clients that are in.
+    pub fn clients(&self) -> Vec<ClientStatus> {
+        self.shared.sessions.all().iter().map(|session| session.status()).collect()
+    }
+
+    /// Next event, if there is one.
+    pub fn try_event(&self) -> Option<LinkEvent> {
+        lock(&self.events).try_recv().ok()
+    }
+
+    /// What happened so far.
+    pub fn counters(&self) -> Counters {
+        self.shared.counters.read()
+    }
+
+    /// Tells the clients that the server stops, and stops it.
+    pub async fn shutdown(self) {
+        self.endpoint.close(CLOSE_STOPPING, STOP_REASON);
+        if timeout(STOP_TIMEOUT, self.endpoint.wait_idle()).await.is_err() {
+            tracing::debug!("some clients did not hear that the server stops");
+        }
+        self.shared.stopping.store(true, Ordering::Relaxed);
+        let thread = lock(&self.udp_thread).take();
+        if let Some(thread) = thread {
+            // Ends within one wait of the thread.
+            let joined = tokio::task::spawn_blocking(move || thread.join()).await;
+            if !matches!(joined, Ok(Ok(()))) {
+                tracing::error!("the state thread panicked");
+            }
+        }
+    }
+}
+
+impl Drop for ServerLink {
+    fn drop(&mut self) {
+        self.shared.stopping.store(true, Ordering::Relaxed);
+        self.endpoint.close(CLOSE_STOPPING, STOP_REASON);
+    }
+}
+
+fn listen(address: SocketAddr, plane: &'static str) -> Result<UdpSocket, LinkError> {
+    let socket = UdpSocket::bind(address).map_err(|source| match source.kind() {
+        io::ErrorKind::AddrInUse => LinkError::PortInUse { address, plane },
+        _ => LinkError::Listen {
+            address,
+            plane,
+            source,
+        },
+    })?;
+    socket
+        .set_nonblocking(true)
+        .map_err(|error| system("make a socket non-blocking", &error))?;
+    Ok(socket)
+}
+
+/// A new incarnation has a new number, so that datagrams of an earlier one are told apart.
+fn random_epoch() -> Result<u32, LinkError> {
+    let mut bytes = [0; 4];
+    SystemRandom::new().fill(&mut bytes).map_err(|_| LinkError::System {
+        what: "draw a random number",
+        reason: "the system gives none".to_owned(),
+    })?;
+    Ok(u32::from_le_bytes(bytes))
+}
+
+fn system(what: &'static str, error: &io::Error) -> LinkError {
+    LinkError::System {
+        what,
+        reason: error.to_string(),
+    }
+}

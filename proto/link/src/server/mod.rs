@@ -1,0 +1,20 @@
+//! Server half of a session.
+
+mod accept;
+mod broadcaster;
+mod content;
+mod device_input;
+mod link;
+mod options;
+mod receive;
+mod sent_states;
+mod session;
+mod shared;
+mod status;
+
+pub use broadcaster::{Broadcaster, SendReport};
+pub use content::Content;
+pub use device_input::DeviceInput;
+pub use link::{ServerLink, serve};
+pub use options::ServerOptions;
+pub use status::{ClientStatus, LinkEvent};

@@ -1,0 +1,51 @@
+//! What a server is given: addresses, key, limits.
+
+use crate::{DEFAULT_QUIC_PORT, DEFAULT_UDP_PORT, SessionClock};
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    time::Duration,
+};
+use taut_proto::ClusterKey;
+
+/// How to serve. Port 0 takes any free port.
+#[derive(Clone, Debug)]
+pub struct ServerOptions {
+    /// Address of the control plane.
+    pub quic: SocketAddr,
+    /// Address of the hot plane.
+    pub udp: SocketAddr,
+    /// Port of the hot plane that clients are told, where a forwarding router or relay stands before the server; `None`: the one of `udp`.
+    pub announced_udp_port: Option<u16>,
+    /// The cluster key.
+    pub key: ClusterKey,
+    /// Most clients at a time.
+    pub max_clients: usize,
+    /// Silence after which a client counts as gone and its name is free.
+    pub idle_timeout: Duration,
+    /// The clock that the server's loops stamp with.
+    pub clock: SessionClock,
+}
+
+impl ServerOptions {
+    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence.
+    pub fn new(key: ClusterKey) -> ServerOptions {
+        ServerOptions {
+            quic: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_QUIC_PORT)),
+            udp: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_UDP_PORT)),
+            announced_udp_port: None,
+            key,
+            max_clients: 32,
+            idle_timeout: crate::transport::IDLE_TIMEOUT,
+            clock: SessionClock::start_now(),
+        }
+    }
+
+    /// The same on free ports of 127.0.0.1: for one machine and for tests.
+    pub fn loopback(key: ClusterKey) -> ServerOptions {
+        ServerOptions {
+            quic: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+            udp: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+            ..ServerOptions::new(key)
+        }
+    }
+}

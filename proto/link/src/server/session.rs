@@ -1,0 +1,211 @@
+//! One client's session: its keys, where its datagrams go, and what is counted of it.
+
+use super::{ClientStatus, shared::Shared};
+use crate::counters::Cell;
+use std::{
+    net::SocketAddr,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+use taut_proto::{
+    ClientStats, Kind, Payload, Role, Transport,
+    seal::{DatagramBuffer, Opened, OpenError, Opener, Sealer},
+};
+
+pub(crate) struct Session {
+    pub(crate) number: u16,
+    pub(crate) node: String,
+    pub(crate) role: Role,
+    pub(crate) transport: Transport,
+    pub(crate) rate_hz: u32,
+    pub(crate) connection: quinn::Connection,
+    pub(crate) joined_ns: u64,
+    sealer: Sealer,
+    opener: Mutex<Opener>,
+    udp_address: Mutex<Option<SocketAddr>>,
+    last_heard_ns: AtomicU64,
+    /// Session time of the state from which on the next one is due, ns.
+    due_ns: AtomicU64,
+    packets_sent: Cell,
+    bytes_sent: Cell,
+    send_errors: Cell,
+    stats: Mutex<Option<ClientStats>>,
+    matches: Cell,
+    mismatches: Cell,
+}
+
+/// What became of one datagram to a client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sent {
+    Yes,
+    /// The client has not opened its UDP path yet.
+    NoPath,
+    Failed,
+}
+
+/// What a client said in its Hello, once it is let in.
+pub(crate) struct Admitted {
+    pub(crate) number: u16,
+    pub(crate) node: String,
+    pub(crate) role: Role,
+    pub(crate) transport: Transport,
+    pub(crate) rate_hz: u32,
+    pub(crate) joined_ns: u64,
+}
+
+impl Session {
+    pub(crate) fn new(
+        admitted: Admitted,
+        connection: quinn::Connection,
+        (sealer, opener): (Sealer, Opener),
+    ) -> Session {
+        Session {
+            number: admitted.number,
+            node: admitted.node,
+            role: admitted.role,
+            transport: admitted.transport,
+            rate_hz: admitted.rate_hz,
+            connection,
+            joined_ns: admitted.joined_ns,
+            sealer,
+            opener: Mutex::new(opener),
+            udp_address: Mutex::new(None),
+            last_heard_ns: AtomicU64::new(admitted.joined_ns),
+            due_ns: AtomicU64::new(0),
+            packets_sent: Cell::default(),
+            bytes_sent: Cell::default(),
+            send_errors: Cell::default(),
+            stats: Mutex::new(None),
+            matches: Cell::default(),
+            mismatches: Cell::default(),
+        }
+    }
+
+    /// Whether the state sampled at `time_ns` is due at this client's rate; if so, plans the next one.
+    pub(crate) fn take_due(&self, time_ns: u64) -> bool {
+        if self.rate_hz == 0 {
+            return true;
+        }
+        let period = 1_000_000_000 / u64::from(self.rate_hz);
+        let due = self.due_ns.load(Ordering::Relaxed);
+        if time_ns < due {
+            return false;
+        }
+        // Keep the rhythm; after a pause start a new one instead of catching up.
+        let next = due.saturating_add(period);
+        let next = if next > time_ns { next } else { time_ns.saturating_add(period) };
+        self.due_ns.store(next, Ordering::Relaxed);
+        true
+    }
+
+    /// Seals an encoded payload and sends it at once, or counts the failure. Never waits for the network.
+    pub(crate) fn send_bytes(&self, kind: Kind, payload: &[u8], buffer: &mut DatagramBuffer, shared: &Shared) -> Sent {
+        let address = match self.transport {
+            Transport::QuicDatagram => None,
+            Transport::Udp => match *lock(&self.udp_address) {
+                Some(address) => Some(address),
+                None => return Sent::NoPath,
+            },
+        };
+        let sent = match self.sealer.seal_bytes(kind, payload, buffer) {
+            Err(_) => None,
+            Ok(datagram) => match address {
+                Some(address) => shared.udp.send_to(datagram, address).ok(),
+                None => self
+                    .connection
+                    .send_datagram(datagram.to_vec().into())
+                    .ok()
+                    .map(|()| datagram.len()),
+            },
+        };
+        match sent {
+            Some(bytes) => {
+                for (packets, sizes) in [
+                    (&self.packets_sent, &self.bytes_sent),
+                    (&shared.counters.packets_sent, &shared.counters.bytes_sent),
+                ] {
+                    packets.one();
+                    sizes.add(bytes as u64);
+                }
+                Sent::Yes
+            }
+            None => {
+                self.send_errors.one();
+                shared.counters.send_errors.one();
+                Sent::Failed
+            }
+        }
+    }
+
+    /// Encodes and sends a payload.
+    pub(crate) fn send(&self, payload: &Payload, shared: &Shared) -> Sent {
+        let mut bytes = [0; taut_proto::header::MAX_PAYLOAD_BYTES];
+        let mut buffer = [0; taut_proto::header::MAX_DATAGRAM_BYTES];
+        match payload.encode_into(&mut bytes) {
+            Ok(used) => self.send_bytes(payload.kind(), &bytes[..used], &mut buffer, shared),
+            Err(_) => {
+                shared.counters.encode_errors.one();
+                Sent::Failed
+            }
+        }
+    }
+
+    /// Opens a datagram; if authentic, notes the sign of life and where it came from.
+    pub(crate) fn open(&self, datagram: &[u8], from: Option<SocketAddr>, now_ns: u64) -> Result<Opened, OpenError> {
+        let opened = lock(&self.opener).open(datagram)?;
+        self.last_heard_ns.fetch_max(now_ns, Ordering::Relaxed);
+        // Only the newest datagram may move the path: a late one tells where the client was.
+        if let Some(from) = from
+            && opened.header.sequence >= opened.expected
+        {
+            *lock(&self.udp_address) = Some(from);
+        }
+        Ok(opened)
+    }
+
+    /// Session time of the last authentic datagram, ns; `None` if there was none yet.
+    pub(crate) fn last_heard_ns(&self) -> Option<u64> {
+        let heard = self.last_heard_ns.load(Ordering::Relaxed);
+        (heard > self.joined_ns).then_some(heard)
+    }
+
+    /// Takes a report in and compares the drawn states with those that were sent.
+    pub(crate) fn report(&self, stats: ClientStats, shared: &Shared) {
+        for drawn in &stats.drawn {
+            match shared.sent_states.agrees(drawn.tick, drawn.state_hash) {
+                Some(true) => self.matches.one(),
+                Some(false) => self.mismatches.one(),
+                None => {}
+            }
+        }
+        *lock(&self.stats) = Some(stats);
+    }
+
+    pub(crate) fn status(&self) -> ClientStatus {
+        ClientStatus {
+            session: self.number,
+            node: self.node.clone(),
+            role: self.role,
+            transport: self.transport,
+            rate_hz: self.rate_hz,
+            address: self.connection.remote_address(),
+            udp_address: *lock(&self.udp_address),
+            joined_ns: self.joined_ns,
+            last_heard_ns: self.last_heard_ns.load(Ordering::Relaxed),
+            round_trip_us: self.connection.rtt().as_micros() as u64,
+            packets_sent: self.packets_sent.get(),
+            bytes_sent: self.bytes_sent.get(),
+            send_errors: self.send_errors.get(),
+            stats: lock(&self.stats).clone(),
+            state_hash_matches: self.matches.get(),
+            state_hash_mismatches: self.mismatches.get(),
+        }
+    }
+}
+
+/// The lock, whoever panicked while holding it: no datum here can be left half-changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,166 @@
+//! What the tasks and threads of a server share.
+
+use super::{
+    LinkEvent,
+    content::EncodedContent,
+    device_input::InputWriter,
+    sent_states::SentStates,
+    session::{Session, lock},
+};
+use crate::{SessionClock, counters::CounterCells};
+use std::{
+    net::UdpSocket,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+        mpsc::SyncSender,
+    },
+};
+use taut_proto::{ClusterKey, Role, control::RefusalCode};
+
+pub(crate) struct Shared {
+    pub(crate) key: ClusterKey,
+    pub(crate) clock: SessionClock,
+    pub(crate) epoch: u32,
+    pub(crate) content: EncodedContent,
+    pub(crate) udp: UdpSocket,
+    pub(crate) udp_port: u16,
+    pub(crate) sessions: Sessions,
+    pub(crate) counters: CounterCells,
+    pub(crate) events: SyncSender<LinkEvent>,
+    pub(crate) inputs: InputWriter,
+    pub(crate) sent_states: SentStates,
+    pub(crate) stopping: AtomicBool,
+}
+
+impl Shared {
+    /// Hands an event over, or counts that nobody takes them.
+    pub(crate) fn tell(&self, event: LinkEvent) {
+        if self.events.try_send(event).is_err() {
+            self.counters.events_dropped.one();
+        }
+    }
+}
+
+/// The clients that are in. The list is replaced as a whole, so that readers keep theirs without a lock.
+pub(crate) struct Sessions {
+    list: Mutex<Listed>,
+    generation: AtomicU64,
+    max_clients: usize,
+}
+
+struct Listed {
+    sessions: Arc<[Arc<Session>]>,
+    last_number: u16,
+}
+
+/// A silence after which a new client of the same name takes the place of the old one, ns. The hot plane speaks every 100 ms.
+const SUSPECT_NS: u64 = 500_000_000;
+
+impl Sessions {
+    pub(crate) fn new(max_clients: usize) -> Sessions {
+        Sessions {
+            list: Mutex::new(Listed {
+                sessions: Arc::new([]),
+                last_number: 0,
+            }),
+            generation: AtomicU64::new(0),
+            // Session numbers are 1 ..= u16::MAX.
+            max_clients: max_clients.min(usize::from(u16::MAX)),
+        }
+    }
+
+    /// The present list.
+    pub(crate) fn all(&self) -> Arc<[Arc<Session>]> {
+        lock(&self.list).sessions.clone()
+    }
+
+    /// Brings `cached` up to date; costs one atomic load while nobody joins or leaves.
+    pub(crate) fn refresh(&self, cached: &mut Arc<[Arc<Session>]>, generation: &mut u64) {
+        let now = self.generation.load(Ordering::Acquire);
+        if now != *generation {
+            *cached = self.all();
+            *generation = now;
+        }
+    }
+
+    pub(crate) fn by_number(&self, number: u16) -> Option<Arc<Session>> {
+        let list = lock(&self.list);
+        list.sessions.iter().find(|session| session.number == number).cloned()
+    }
+
+    /// Lets a client in, if its name and role are free; `make` gets its session number.
+    ///
+    /// Returns the session, and the silent one whose place it took, if any.
+    pub(crate) fn admit(
+        &self,
+        node: &str,
+        role: Role,
+        now_ns: u64,
+        make: impl FnOnce(u16) -> Result<Session, String>,
+    ) -> Result<(Arc<Session>, Option<Arc<Session>>), (RefusalCode, String)> {
+        let mut list = lock(&self.list);
+        let rival = list
+            .sessions
+            .iter()
+            .find(|other| other.node == node || (role == Role::Device && other.role == Role::Device))
+            .cloned();
+        let replaced = match rival {
+            Some(rival) if rival.node == node && silent(&rival, now_ns) => Some(rival),
+            Some(rival) if rival.node == node => {
+                let text = format!(
+                    "a node named \"{node}\" is connected already (from {}): give this one another name (--node)",
+                    rival.connection.remote_address()
+                );
+                return Err((RefusalCode::NameTaken, text));
+            }
+            Some(rival) => {
+                let text = format!(
+                    "the device bridge \"{}\" is connected already (from {}): stop it first",
+                    rival.node,
+                    rival.connection.remote_address()
+                );
+                return Err((RefusalCode::DeviceTaken, text));
+            }
+            None => None,
+        };
+        let gone = replaced.as_ref().map(|session| session.number);
+        let staying = || list.sessions.iter().filter(|session| Some(session.number) != gone);
+        if staying().count() >= self.max_clients {
+            let text = format!("it has its {} clients already: stop one, or raise its limit", self.max_clients);
+            return Err((RefusalCode::Full, text));
+        }
+        let mut number = list.last_number;
+        loop {
+            number = number.checked_add(1).unwrap_or(1);
+            // Ends: there are more numbers than clients.
+            if list.sessions.iter().all(|session| session.number != number) {
+                break;
+            }
+        }
+        let session = make(number).map_err(|text| (RefusalCode::BadHello, text))?;
+        let session = Arc::new(session);
+        let sessions = staying().cloned().chain([session.clone()]).collect();
+        list.sessions = sessions;
+        list.last_number = number;
+        self.generation.fetch_add(1, Ordering::Release);
+        Ok((session, replaced))
+    }
+
+    /// Lets a client go; `false` if it is gone already.
+    pub(crate) fn remove(&self, number: u16) -> bool {
+        let mut list = lock(&self.list);
+        let before = list.sessions.len();
+        let staying: Arc<[_]> = list.sessions.iter().filter(|session| session.number != number).cloned().collect();
+        let removed = staying.len() < before;
+        list.sessions = staying;
+        self.generation.fetch_add(1, Ordering::Release);
+        removed
+    }
+}
+
+fn silent(session: &Session, now_ns: u64) -> bool {
+    session
+        .last_heard_ns()
+        .is_some_and(|heard| now_ns.saturating_sub(heard) > SUSPECT_NS)
+}

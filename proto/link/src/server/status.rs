@@ -1,0 +1,80 @@
+//! What the server knows of its clients, and what it tells of them.
+
+use std::net::SocketAddr;
+use taut_proto::{ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
+
+/// A client as the server sees it.
+#[derive(Clone, Debug)]
+pub struct ClientStatus {
+    /// Session number.
+    pub session: u16,
+    /// Name.
+    pub node: String,
+    /// Role.
+    pub role: Role,
+    /// How it gets its states.
+    pub transport: Transport,
+    /// Most states per second that it wants; 0 for all.
+    pub rate_hz: u32,
+    /// Where its control plane comes from.
+    pub address: SocketAddr,
+    /// Where its states go, once its first authentic datagram came; for UDP only.
+    pub udp_address: Option<SocketAddr>,
+    /// Session time when it joined, ns.
+    pub joined_ns: u64,
+    /// Session time when its last authentic datagram came, ns.
+    pub last_heard_ns: u64,
+    /// Round trip as QUIC measures it, µs.
+    pub round_trip_us: u64,
+    /// States and other datagrams sent to it.
+    pub packets_sent: u64,
+    /// Bytes of these.
+    pub bytes_sent: u64,
+    /// Datagrams that the system or QUIC did not take.
+    pub send_errors: u64,
+    /// Its last report.
+    pub stats: Option<ClientStats>,
+    /// Reported drawn states whose fingerprint is the one that was sent.
+    pub state_hash_matches: u64,
+    /// Reported drawn states whose fingerprint differs from the one that was sent.
+    pub state_hash_mismatches: u64,
+}
+
+/// Something that happened to a client.
+#[derive(Clone, Debug)]
+pub enum LinkEvent {
+    /// It was let in.
+    Joined(ClientStatus),
+    /// It is gone.
+    Left {
+        /// As it was at the end.
+        status: ClientStatus,
+        /// Why, one sentence.
+        reason: String,
+    },
+    /// It was not let in.
+    Refused {
+        /// Where it came from.
+        address: SocketAddr,
+        /// The name that it gave; empty if it did not come that far.
+        node: String,
+        /// Why, for programs.
+        code: RefusalCode,
+        /// Why, for people.
+        text: String,
+    },
+    /// It reported.
+    Stats {
+        /// Its name.
+        node: String,
+        /// The report.
+        stats: ClientStats,
+    },
+    /// It has a line for the log.
+    Log {
+        /// Its name.
+        node: String,
+        /// The line.
+        event: LogEvent,
+    },
+}

@@ -1,0 +1,228 @@
+//! What the network and other programs do to a session: garbage, replay, damage, loss, sudden death.
+
+mod support;
+
+use std::{net::UdpSocket, time::Duration};
+use support::{
+    relay::{Impairment, Relay, Waiting},
+    *,
+};
+use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
+use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
+
+/// A server whose hot plane is behind a relay.
+async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) {
+    let waiting = Waiting::new();
+    let server = server_with(ServerOptions {
+        announced_udp_port: Some(waiting.port()),
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    (server, relay)
+}
+
+/// Sends states until `client` has `count` of them.
+async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {
+    let mut states = Vec::new();
+    let next = broadcast_until(&mut server.broadcaster(), first, || {
+        client.drain_states(&mut states);
+        states.len() >= count
+    })
+    .await;
+    assert_in_order(&states);
+    next
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn garbage_is_counted_and_has_no_effect() {
+    let server = server().await;
+    let client = client(&server, Role::Render, "left").await;
+    let tick = take_states(&server, &client, 1, 20).await;
+
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let throw = |bytes: &[u8]| assert!(socket.send_to(bytes, server.udp_addr()).is_ok());
+    let header = |version: u8, sender: u8| {
+        let mut bytes = vec![0; 24 + 16];
+        bytes[..2].copy_from_slice(&MAGIC.to_le_bytes());
+        bytes[2] = version;
+        bytes[3] = 8; // INPUT
+        bytes[8] = sender;
+        bytes
+    };
+    for size in [0, 1, 23, 24, 40, 1150, 1151, 9000] {
+        throw(&vec![0xa5; size]);
+    }
+    throw(&header(PROTOCOL_VERSION + 1, 1));
+    throw(&header(PROTOCOL_VERSION, client.session() as u8));
+    throw(&header(PROTOCOL_VERSION, 200));
+    wait_until("counting", || {
+        let counters = server.counters();
+        counters.garbage == 8 && counters.wrong_version == 1 && counters.forged == 2
+    })
+    .await;
+    assert_eq!(server.counters().inputs + server.counters().inputs_refused, 0);
+    let status = &server.clients()[0];
+    assert_ne!(status.udp_address, socket.local_addr().ok(), "a forger does not get the client's states");
+    take_states(&server, &client, tick, 20).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
+    let (server, relay) = behind_relay(Impairment::default(), 1).await;
+    let Some(mut inputs) = server.device_inputs() else {
+        panic!("the first taker gets the inputs");
+    };
+    let bridge = client(&server, Role::Device, "bridge").await;
+    let mut index = 0;
+    wait_until("input", || {
+        index += 1;
+        bridge.send_input(&input(index));
+        server.counters().inputs >= 5
+    })
+    .await;
+    wait_until("path", || server.clients()[0].udp_address.is_some()).await;
+    // Everything under way has arrived when the server has counted what the relay has seen.
+    wait_until("arrival", || server.counters().packets_received >= relay.upstream().len() as u64).await;
+
+    let path = server.clients()[0].udp_address;
+    let newest = *inputs.read();
+    let before = server.counters();
+    let thief = UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
+    let stolen = relay.upstream();
+    for datagram in &stolen {
+        assert!(thief.send_to(datagram, server.udp_addr()).is_ok());
+    }
+    // Of the last ones stolen the server may not have seen the original yet when the copy comes: those count as fresh, once.
+    wait_until("counting", || server.counters().replayed >= before.replayed + stolen.len() as u64 - 1).await;
+    assert_eq!(server.counters().inputs, before.inputs);
+    assert_eq!(*inputs.read(), newest);
+    wait_until("path", || server.clients()[0].udp_address == path).await;
+    assert_ne!(path, thief.local_addr().ok());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bad_network_costs_states_but_never_order_or_truth() {
+    let impairment = Impairment {
+        lost: 50,
+        doubled: 50,
+        swapped: 50,
+        damaged: 50,
+    };
+    let (server, relay) = behind_relay(impairment, 2).await;
+    let client = client(&server, Role::Render, "left").await;
+    take_states(&server, &client, 1, 600).await; // asserts order and equality with what was sent
+
+    // Let what is under way arrive, then compare with what the relay did.
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    let counters = client.counters();
+    assert!(relay.lost_down() > 0 && relay.doubled_down() > 0);
+    assert!(counters.lost > 0 && counters.lost <= relay.lost_down() + 1, "{counters:?}, relay lost {}", relay.lost_down());
+    assert!(counters.duplicates > 0 && counters.duplicates <= relay.doubled_down() + 1, "{counters:?}");
+    assert!(counters.late > 0, "{counters:?}");
+    assert!(counters.forged > 0, "{counters:?}");
+    assert_eq!(client.is_closed(), None);
+    assert!(client.session_now().is_some(), "the clock locks all the same");
+}
+
+/// A client that dies without a word: its runtime goes first, so that nothing can be sent any more.
+fn murdered_client(server: &ServerLink, node: &str) {
+    let options = options(server, Role::Render, node);
+    let died = std::thread::Builder::new().name("victim".to_owned()).spawn(move || {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .unwrap_or_else(|error| panic!("{error}"));
+        let link = runtime
+            .block_on(taut_link::connect(options))
+            .unwrap_or_else(|error| panic!("{error}"));
+        std::thread::sleep(Duration::from_millis(100));
+        runtime.shutdown_background();
+        drop(link);
+    });
+    let died = died.unwrap_or_else(|error| panic!("{error}"));
+    assert!(died.join().is_ok());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
+    let server = server().await;
+    let survivor = client(&server, Role::Render, "right").await;
+    let tick = take_states(&server, &survivor, 1, 20).await;
+    tokio::task::block_in_place(|| murdered_client(&server, "left"));
+
+    // The survivor goes on while the server finds out.
+    let mut states = Vec::new();
+    let tick = broadcast_until(&mut server.broadcaster(), tick, || {
+        survivor.drain_states(&mut states);
+        server.clients().len() == 1
+    })
+    .await;
+    assert_in_order(&states);
+    assert_eq!(survivor.is_closed(), None);
+    assert_eq!(survivor.counters().lost, 0);
+    event(&server, "leaving", |event| matches!(event, LinkEvent::Left { status, .. } if status.node == "left")).await;
+
+    let again = client(&server, Role::Render, "left").await;
+    take_states(&server, &again, tick, 20).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_restarted_node_takes_the_place_of_its_silent_self() {
+    let server = server_with(ServerOptions {
+        // QUIC alone would take a minute to notice; the client's own timeout is as long, see below.
+        idle_timeout: Duration::from_secs(60),
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let options = taut_link::ClientOptions {
+        idle_timeout: Duration::from_secs(60),
+        ..options(&server, Role::Render, "left")
+    };
+    let first = options.clone();
+    let died = std::thread::Builder::new().name("victim".to_owned()).spawn(move || {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .unwrap_or_else(|error| panic!("{error}"));
+        let link = runtime.block_on(taut_link::connect(first)).unwrap_or_else(|error| panic!("{error}"));
+        std::thread::sleep(Duration::from_millis(200));
+        runtime.shutdown_background();
+        drop(link);
+    });
+    let died = died.unwrap_or_else(|error| panic!("{error}"));
+    tokio::task::block_in_place(|| assert!(died.join().is_ok()));
+    tokio::time::sleep(Duration::from_millis(600)).await; // silent for longer than the server forgives
+    let again = taut_link::connect(options).await.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(server.clients().len(), 1);
+    take_states(&server, &again, 1, 20).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_dead_server_is_noticed() {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .unwrap_or_else(|error| panic!("{error}"));
+    let (to_us, from_it) = tokio::sync::oneshot::channel();
+    let host = runtime.spawn(async move {
+        let server = server().await;
+        let options = options(&server, Role::Render, "left");
+        assert!(to_us.send(options).is_ok());
+        std::future::pending::<()>().await;
+        drop(server);
+    });
+    let Ok(options) = from_it.await else {
+        panic!("no server");
+    };
+    let client = taut_link::connect(options).await.unwrap_or_else(|error| panic!("{error}"));
+    // Its endpoint dies with its runtime and says nothing.
+    runtime.shutdown_background();
+    drop(host);
+    wait_until("noticing", || client.is_closed().is_some()).await;
+    let reason = client.is_closed().unwrap_or_default();
+    assert!(reason == "the server fell silent" || reason == "server is stopping", "{reason}");
+}

@@ -1,0 +1,305 @@
+//! Two ends on real sockets: joining, scene, states, device, clock, leaving.
+
+mod support;
+
+use std::time::Duration;
+use support::*;
+use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, serve};
+use taut_proto::{
+    ClientStats, MeshHash, WrenchCommand,
+    control::{LogLevel, RefusalCode},
+    stats::DrawnState,
+};
+
+async fn states_arrive_over(transport: Transport) {
+    let server = server().await;
+    let client = taut_link::connect(ClientOptions {
+        transport,
+        ..options(&server, Role::Render, "left")
+    })
+    .await
+    .unwrap_or_else(|error| panic!("{error}"));
+
+    assert_eq!(client.description(), &content().description);
+    for mesh in content().meshes {
+        let hash = hash_of(&mesh);
+        let fetched = client.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(*fetched, mesh);
+        let again = client.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
+        assert!(std::sync::Arc::ptr_eq(&fetched, &again), "the second time it comes from memory");
+    }
+
+    let mut broadcaster = server.broadcaster();
+    let mut states = Vec::new();
+    broadcast_until(&mut broadcaster, 1, || {
+        client.drain_states(&mut states);
+        states.len() >= 500
+    })
+    .await;
+    assert_in_order(&states);
+    assert_eq!(server.counters().garbage + server.counters().forged, 0);
+    let status = &server.clients()[0];
+    assert_eq!((status.node.as_str(), status.role, status.transport), ("left", Role::Render, transport));
+    assert!(status.packets_sent >= 500);
+    assert_eq!(status.udp_address.is_some(), transport == Transport::Udp);
+    client.close().await;
+    server.shutdown().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn states_arrive_in_order_over_udp() {
+    states_arrive_over(Transport::Udp).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn states_arrive_in_order_over_quic_datagrams() {
+    states_arrive_over(Transport::QuicDatagram).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_that_joins_late_gets_everything() {
+    let server = server().await;
+    let mut broadcaster = server.broadcaster();
+    let first = client(&server, Role::Render, "left").await;
+    let mut seen = Vec::new();
+    let tick = broadcast_until(&mut broadcaster, 1, || {
+        first.drain_states(&mut seen);
+        seen.len() >= 50
+    })
+    .await;
+
+    let late = client(&server, Role::Observer, "late").await;
+    assert_eq!(late.description(), first.description());
+    let hash = late.description().obstacles[0].mesh;
+    let mesh = late.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(mesh.triangles().len(), 27_000);
+    let (mut of_first, mut of_late) = (Vec::new(), Vec::new());
+    broadcast_until(&mut broadcaster, tick, || {
+        first.drain_states(&mut of_first);
+        late.drain_states(&mut of_late);
+        of_late.len() >= 50
+    })
+    .await;
+    assert_in_order(&of_late);
+
+    // The same ticks are the same states on both.
+    for received in &of_late {
+        if let Some(other) = of_first.iter().find(|other| other.state.tick == received.state.tick) {
+            assert_eq!(other.state_hash, received.state_hash);
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_client_gets_no_more_states_than_it_asked_for() {
+    let server = server().await;
+    let mut broadcaster = server.broadcaster();
+    let slow = taut_link::connect(ClientOptions {
+        rate_hz: 100,
+        ..options(&server, Role::Observer, "slow")
+    })
+    .await
+    .unwrap_or_else(|error| panic!("{error}"));
+    let mut states = Vec::new();
+    broadcast_until(&mut broadcaster, 1, || {
+        slow.drain_states(&mut states);
+        states.len() >= 20
+    })
+    .await;
+    assert_in_order(&states);
+    for pair in states.windows(2) {
+        assert!(pair[1].state.tick - pair[0].state.tick >= 9, "100 of 1000 states per second");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
+    let server = server().await;
+    let Some(mut inputs) = server.device_inputs() else {
+        panic!("the first taker gets the inputs");
+    };
+    assert!(server.device_inputs().is_none(), "there is one reader");
+    let bridge = client(&server, Role::Device, "bridge").await;
+    let mut index = 0;
+    wait_until("input", || {
+        index += 1;
+        bridge.send_input(&input(index));
+        inputs.read().is_some_and(|taken| taken.sample.index >= 5)
+    })
+    .await;
+    let Some(taken) = *inputs.read() else {
+        panic!("an input was read before");
+    };
+    assert_eq!(taken.sample, input(taken.sample.index));
+    assert_eq!(taken.session, bridge.session());
+    assert!(taken.received_ns <= server.clock().now_ns());
+
+    let mut broadcaster = server.broadcaster();
+    let command = WrenchCommand {
+        time_ns: 1,
+        input_index: taken.sample.index,
+        wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.01],
+        flags: 0,
+    };
+    wait_until("wrench", || {
+        broadcaster.send_wrench(&command);
+        bridge.latest_wrench().is_some()
+    })
+    .await;
+    assert_eq!(bridge.latest_wrench().map(|wrench| wrench.command), Some(command));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn device_input_of_a_render_node_is_refused() {
+    let server = server().await;
+    let Some(mut inputs) = server.device_inputs() else {
+        panic!("the first taker gets the inputs");
+    };
+    let render = client(&server, Role::Render, "left").await;
+    wait_until("refusal", || {
+        render.send_input(&input(1));
+        server.counters().inputs_refused >= 3
+    })
+    .await;
+    assert_eq!(*inputs.read(), None);
+    assert_eq!(server.counters().inputs, 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
+    let server = server().await;
+    let Some(mut inputs) = server.device_inputs() else {
+        panic!("the first taker gets the inputs");
+    };
+    let bridge = client(&server, Role::Device, "bridge").await;
+    let mut bent = input(1);
+    bent.pose.rotation = [0.5, 0.0, 0.0, 0.0];
+    wait_until("refusal", || {
+        bridge.send_input(&bent);
+        server.counters().inputs_refused >= 3
+    })
+    .await;
+    let mut nan = input(2);
+    nan.pose.position[0] = f64::NAN;
+    let errors = bridge.counters().send_errors;
+    bridge.send_input(&nan);
+    assert_eq!(bridge.counters().send_errors, errors + 1, "NaN does not even leave");
+    assert_eq!(*inputs.read(), None);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn there_is_one_device_bridge() {
+    let server = server().await;
+    let _bridge = client(&server, Role::Device, "bridge").await;
+    match taut_link::connect(options(&server, Role::Device, "second")).await {
+        Err(LinkError::Refused { code: RefusalCode::DeviceTaken, text, .. }) => assert!(text.contains("\"bridge\""), "{text}"),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("two bridges"),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn session_time_is_within_its_stated_uncertainty() {
+    for transport in [Transport::Udp, Transport::QuicDatagram] {
+        let server = server().await;
+        let client = taut_link::connect(ClientOptions {
+            transport,
+            ..options(&server, Role::Render, "left")
+        })
+        .await
+        .unwrap_or_else(|error| panic!("{error}"));
+        wait_until("clock lock", || client.session_now().is_some()).await;
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        for _ in 0..20 {
+            let before = server.clock().now_ns();
+            let Some(time) = client.session_now() else {
+                panic!("a locked clock stays locked");
+            };
+            let after = server.clock().now_ns();
+            assert!(time.ns + time.uncertainty_ns >= before, "{time:?} is before {before}");
+            assert!(time.ns <= after + time.uncertainty_ns, "{time:?} is after {after}");
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+        let round_trip = client.round_trip().unwrap_or(PATIENCE);
+        assert!(round_trip < Duration::from_millis(50), "loopback takes {round_trip:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn reports_and_log_lines_reach_the_server_and_drawn_states_are_compared() {
+    let server = server().await;
+    let client = client(&server, Role::Render, "left").await;
+    let mut broadcaster = server.broadcaster();
+    let mut states = Vec::new();
+    broadcast_until(&mut broadcaster, 1, || {
+        client.drain_states(&mut states);
+        states.len() >= 3
+    })
+    .await;
+    let drawn = |received: &taut_link::ReceivedState, flip: u64| DrawnState {
+        tick: received.state.tick,
+        state_hash: received.state_hash ^ flip,
+    };
+    let stats = ClientStats {
+        frames: 60,
+        fps: 59.9,
+        drawn: vec![drawn(&states[0], 0), drawn(&states[1], 0), drawn(&states[2], 1)],
+        ..ClientStats::default()
+    };
+    client.send_stats(stats.clone()).await.unwrap_or_else(|error| panic!("{error}"));
+    assert!(client.post_log(LogLevel::Warning, "software rendering".to_owned()));
+    event(&server, "log", |event| matches!(event, LinkEvent::Log { node, event } if node == "left" && event.level == LogLevel::Warning)).await;
+    let status = &server.clients()[0];
+    assert_eq!(status.stats.as_ref(), Some(&stats));
+    assert_eq!((status.state_hash_matches, status.state_hash_mismatches), (2, 1));
+    client.close().await;
+    let left = event(&server, "leaving", |event| matches!(event, LinkEvent::Left { .. })).await;
+    let LinkEvent::Left { status, reason } = left else {
+        panic!("it was just matched");
+    };
+    assert_eq!(status.stats, Some(stats));
+    assert_eq!(reason, "the node left");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn clients_hear_that_the_server_stops() {
+    let server = server().await;
+    let client = client(&server, Role::Render, "left").await;
+    assert_eq!(client.is_closed(), None);
+    server.shutdown().await;
+    wait_until("closing", || client.is_closed().is_some()).await;
+    assert_eq!(client.is_closed().as_deref(), Some("server is stopping"));
+    assert!(client.send_stats(ClientStats::default()).await.is_err());
+    assert!(!client.post_stats(ClientStats::default()));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_mesh_that_the_server_lacks_is_an_error_and_the_link_lives_on() {
+    let server = server().await;
+    let client = client(&server, Role::Render, "left").await;
+    let missing = MeshHash::of(b"no mesh");
+    assert!(matches!(client.mesh(missing).await, Err(LinkError::NoSuchMesh { .. })));
+    assert!(client.mesh(client.description().god_object.mesh).await.is_ok());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_host_name_will_do() {
+    let server = server().await;
+    let port = server.quic_addr().port();
+    let by_name = ClientOptions {
+        server: format!("localhost:{port}"),
+        ..options(&server, Role::Observer, "named")
+    };
+    assert!(taut_link::connect(by_name).await.is_ok());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn content_without_its_meshes_is_not_served() {
+    let mut content = content();
+    content.meshes.pop();
+    match serve(ServerOptions::loopback(key('a')), content).await {
+        Err(LinkError::Content { reason }) => assert!(reason.contains("\"box\""), "{reason}"),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("served without a mesh"),
+    }
+}

@@ -1,0 +1,203 @@
+//! A small scene, states, and a server on free ports of 127.0.0.1.
+#![allow(
+    dead_code,
+    unreachable_pub,
+    reason = "each test binary uses its own part of the support"
+)]
+
+pub mod relay;
+
+use std::time::{Duration, Instant};
+use taut_link::{
+    Broadcaster, ClientLink, ClientOptions, ClusterKey, Content, LinkEvent, ReceivedState, Role,
+    ServerLink, ServerOptions, serve,
+};
+use taut_proto::{
+    HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
+    mesh_blob::Positions,
+    scene::{
+        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo,
+        WindowDescription,
+    },
+    state::{RunState, ToolState},
+};
+
+/// Long enough for the busiest machine; every wait ends as soon as its condition holds.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+
+pub fn key(digit: char) -> ClusterKey {
+    ClusterKey::parse(&digit.to_string().repeat(64)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A strip of `count` triangles.
+pub fn strip(count: u32) -> MeshBlob {
+    let positions = (0..count + 2)
+        .map(|i| [f64::from(i) * 1e-3, f64::from(i % 2) * 1e-3, 0.0])
+        .collect();
+    let triangles = (0..count).map(|i| [i, i + 1, i + 2]).collect();
+    MeshBlob::new(Positions::F64(positions), triangles, None)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub fn hash_of(mesh: &MeshBlob) -> MeshHash {
+    match mesh.encode() {
+        Ok(bytes) => MeshHash::of(&bytes),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+pub fn content() -> Content {
+    let meshes = vec![strip(12), strip(27_000)];
+    let body = |name: &str, mesh: &MeshBlob| BodyDescription {
+        name: name.to_owned(),
+        mesh: hash_of(mesh),
+        pose: PoseF64::IDENTITY,
+        colour: [1.0, 0.5, 0.1, 1.0],
+    };
+    let description = SceneDescription {
+        name: "test".to_owned(),
+        revision: 7,
+        god_object: body("peg", &meshes[0]),
+        obstacles: vec![body("box", &meshes[1])],
+        reference_point: [0.0, 0.0, 0.01],
+        scene_origin: PoseF64::IDENTITY,
+        display_scale: 1.0,
+        screens: vec![ScreenDescription {
+            name: "front".to_owned(),
+            lower_left: [-0.5, 0.5, 0.0],
+            lower_right: [0.5, 0.5, 0.0],
+            upper_left: [-0.5, 0.5, 1.0],
+        }],
+        nodes: vec![NodeDescription {
+            name: "left".to_owned(),
+            screens: vec!["front".to_owned()],
+            stereo: Stereo::SideBySide,
+            window: WindowDescription {
+                width: 640,
+                height: 480,
+                fullscreen: false,
+            },
+        }],
+        viewer: PoseF64::IDENTITY,
+        eye_separation: 0.064,
+        near: 0.05,
+        far: 10.0,
+        show: ShowOptions::default(),
+    };
+    Content {
+        description,
+        meshes,
+    }
+}
+
+pub async fn server() -> ServerLink {
+    server_with(ServerOptions::loopback(key('a'))).await
+}
+
+pub async fn server_with(options: ServerOptions) -> ServerLink {
+    serve(options, content())
+        .await
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
+    // A busy test machine may starve a client for longer than a workbench would forgive.
+    ClientOptions {
+        connect_timeout: PATIENCE,
+        ..ClientOptions::new(server.quic_addr().to_string(), key('a'), role, node)
+    }
+}
+
+pub async fn client(server: &ServerLink, role: Role, node: &str) -> ClientLink {
+    taut_link::connect(options(server, role, node))
+        .await
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// State of `tick`, 1 kHz, whose numbers tell the tick.
+pub fn state(tick: u64) -> HotState {
+    let mut state = HotState {
+        tick,
+        sample_time_ns: tick * 1_000_000,
+        scene_revision: 7,
+        run: RunState::Running,
+        ..HotState::empty()
+    };
+    state.tools.push(ToolState {
+        god_object: PoseF32 {
+            position: [tick as f32 * 1e-6, 0.0, 0.1],
+            ..PoseF32::IDENTITY
+        },
+        force: [0.0, 1.5, tick as f32 * 1e-3],
+        ..ToolState::default()
+    });
+    state
+}
+
+pub fn input(index: u64) -> InputSample {
+    InputSample {
+        sample_time_ns: index * 1_000_000,
+        index,
+        pose: PoseF64 {
+            position: [index as f64 * 1e-3, 0.0, 0.0],
+            ..PoseF64::IDENTITY
+        },
+        velocity: [0.0; 6],
+        buttons: 1,
+        flags: 0,
+    }
+}
+
+/// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.
+pub async fn broadcast_until(
+    broadcaster: &mut Broadcaster,
+    first: u64,
+    mut done: impl FnMut() -> bool,
+) -> u64 {
+    let start = Instant::now();
+    let mut tick = first;
+    while !done() {
+        assert!(start.elapsed() < PATIENCE, "what was waited for did not happen by tick {tick}");
+        broadcaster.send(&state(tick));
+        tick += 1;
+        tokio::time::sleep(Duration::from_millis(1)).await;
+    }
+    tick
+}
+
+pub async fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !done() {
+        assert!(start.elapsed() < PATIENCE, "{what}: did not happen in time");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+pub fn drain(client: &ClientLink) -> Vec<ReceivedState> {
+    let mut states = Vec::new();
+    client.drain_states(&mut states);
+    states
+}
+
+pub async fn event(server: &ServerLink, what: &str, mut wanted: impl FnMut(&LinkEvent) -> bool) -> LinkEvent {
+    let start = Instant::now();
+    loop {
+        while let Some(event) = server.try_event() {
+            if wanted(&event) {
+                return event;
+            }
+        }
+        assert!(start.elapsed() < PATIENCE, "{what}: no such event");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
+pub fn assert_in_order(states: &[ReceivedState]) {
+    for pair in states.windows(2) {
+        assert!(pair[0].state.tick < pair[1].state.tick);
+    }
+    for received in states {
+        assert_eq!(received.state, state(received.state.tick));
+        assert_eq!(Ok(received.state_hash), received.state.hash());
+    }
+}

@@ -1,0 +1,271 @@
+//! Control messages, on QUIC streams.
+//!
+//! A message on a stream is framed as below; the frame and `Refused` keep their layout in every later version, so that programs of
+//! two versions can at least tell each other why they part.
+//!
+//! | offset | field   | bytes | meaning                              |
+//! |--------|---------|-------|--------------------------------------|
+//! | 0      | length  | 4     | bytes after this field, ≥ 4          |
+//! | 4      | magic   | 2     | [`MAGIC`]                            |
+//! | 6      | version | 1     | [`PROTOCOL_VERSION`]                 |
+//! | 7      | tag     | 1     | which message                        |
+//! | 8      | body    |       | its fields                           |
+//!
+//! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, or `Refused`. There is no challenge:
+//! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
+//! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
+
+use crate::{
+    ClientStats, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION, SceneDescription,
+    codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
+    version::MAGIC,
+};
+
+/// Bytes of a frame's `length` field.
+pub const LENGTH_BYTES: usize = 4;
+/// Bytes of magic, version and tag.
+pub const PREFIX_BYTES: usize = 4;
+/// Most bytes after a frame's `length` field.
+pub const MAX_FRAME_BYTES: usize = MAX_VALUE_BYTES;
+/// Most bytes of a node name.
+pub const MAX_NODE_NAME_BYTES: usize = 64;
+
+/// What a client is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// Draws screens of the workbench.
+    Render,
+    /// The device bridge: the only one whose INPUT counts; one at a time.
+    Device,
+    /// Watches.
+    Observer,
+    /// Watches and operates: records traces.
+    Operator,
+}
+
+/// How states reach a client.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Transport {
+    /// Plain UDP, sealed: the fast way on a wired network.
+    #[default]
+    Udp,
+    /// QUIC datagrams: one port, through firewalls and across sites.
+    QuicDatagram,
+}
+
+/// Why a client was not let in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RefusalCode {
+    /// The proof of the cluster key does not verify.
+    WrongKey,
+    /// Another protocol version.
+    WrongVersion,
+    /// The node name is in use.
+    NameTaken,
+    /// There is a device bridge already.
+    DeviceTaken,
+    /// No room for another client.
+    Full,
+    /// The Hello makes no sense.
+    BadHello,
+    /// The server stops.
+    Stopping,
+}
+
+/// First message of a client.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Hello {
+    /// Name of the node, unique among the clients.
+    pub node: String,
+    /// What it is.
+    pub role: Role,
+    /// How it wants its states.
+    pub transport: Transport,
+    /// Most states per second that it wants; 0 for all.
+    pub rate_hz: u32,
+    /// [`crate::key::ClusterKey::client_proof`].
+    pub proof: [u8; 32],
+}
+
+/// The server lets the client in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Welcome {
+    /// [`crate::key::ClusterKey::server_proof`].
+    pub proof: [u8; 32],
+    /// Session number: the client's `sender` in datagram headers.
+    pub session: u16,
+    /// Epoch in datagram headers.
+    pub epoch: u32,
+    /// UDP port of the state plane, at the address that the client reached.
+    pub udp_port: u16,
+    /// Session time when this was written, ns.
+    pub session_time_ns: u64,
+}
+
+/// The server does not let the client in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// Why, for programs.
+    pub code: RefusalCode,
+    /// Protocol version of the server.
+    pub version: u8,
+    /// Why and what to do, for people: one sentence.
+    pub text: String,
+}
+
+/// Asks for a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshRequest {
+    /// Which.
+    pub hash: MeshHash,
+}
+
+/// Answers [`MeshRequest`]; the blob's bytes follow raw on the same stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshHeader {
+    /// Which.
+    pub hash: MeshHash,
+    /// Bytes that follow; 0 if the server has no such mesh.
+    pub length: u32,
+}
+
+/// Weight of a [`LogEvent`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LogLevel {
+    /// Good to know.
+    Info,
+    /// Works, but not as it should.
+    Warning,
+    /// Does not work.
+    Error,
+}
+
+/// A line for the log of the whole workbench.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogEvent {
+    /// Weight.
+    pub level: LogLevel,
+    /// One sentence.
+    pub text: String,
+}
+
+/// Last words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Bye {
+    /// Why, one sentence.
+    pub reason: String,
+}
+
+/// Everything that is said on a control stream.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "each variant is documented at its struct")]
+pub enum ControlMessage {
+    Refused(Refusal),
+    Hello(Hello),
+    Welcome(Welcome),
+    Scene(SceneDescription),
+    MeshRequest(MeshRequest),
+    MeshHeader(MeshHeader),
+    Stats(ClientStats),
+    Log(LogEvent),
+    Bye(Bye),
+}
+
+impl ControlMessage {
+    /// Name for error texts.
+    pub fn name(&self) -> &'static str {
+        match self {
+            ControlMessage::Refused(_) => "Refused",
+            ControlMessage::Hello(_) => "Hello",
+            ControlMessage::Welcome(_) => "Welcome",
+            ControlMessage::Scene(_) => "Scene",
+            ControlMessage::MeshRequest(_) => "MeshRequest",
+            ControlMessage::MeshHeader(_) => "MeshHeader",
+            ControlMessage::Stats(_) => "Stats",
+            ControlMessage::Log(_) => "Log",
+            ControlMessage::Bye(_) => "Bye",
+        }
+    }
+
+    /// The framed message.
+    pub fn to_frame(&self) -> Result<Vec<u8>, EncodeError> {
+        let mut frame = vec![0; LENGTH_BYTES];
+        codec::encode_onto(&MAGIC, &mut frame)?;
+        frame.push(PROTOCOL_VERSION);
+        codec::encode_onto(self, &mut frame)?;
+        let length = u32::try_from(frame.len() - LENGTH_BYTES)
+            .ok()
+            .filter(|length| *length as usize <= MAX_FRAME_BYTES)
+            .ok_or(EncodeError::BufferFull)?;
+        frame[..LENGTH_BYTES].copy_from_slice(&length.to_le_bytes());
+        Ok(frame)
+    }
+
+    /// Length of what follows, from a frame's first four bytes; refused if no frame can have it.
+    pub fn frame_length(bytes: [u8; LENGTH_BYTES], max: usize) -> Result<usize, DecodeError> {
+        let len = u32::from_le_bytes(bytes) as usize;
+        if len < PREFIX_BYTES {
+            return Err(DecodeError::Truncated);
+        }
+        if len > max {
+            return Err(DecodeError::TooLong {
+                what: "message",
+                len,
+                max,
+            });
+        }
+        Ok(len)
+    }
+
+    /// Reads a message from what follows a frame's `length` field. Another version is an error, except in `Refused`.
+    pub fn from_frame_body(bytes: &[u8]) -> Result<ControlMessage, DecodeError> {
+        let Some(([m0, m1, version], message)) = bytes.split_first_chunk::<3>() else {
+            return Err(DecodeError::Truncated);
+        };
+        if u16::from_le_bytes([*m0, *m1]) != MAGIC {
+            return Err(DecodeError::WrongMagic);
+        }
+        let refused = message.first() == Some(&REFUSED_TAG);
+        if *version != PROTOCOL_VERSION && !refused {
+            return Err(DecodeError::WrongVersion {
+                theirs: *version,
+                ours: PROTOCOL_VERSION,
+            });
+        }
+        codec::decode(message)
+    }
+}
+
+const REFUSED_TAG: u8 = 0;
+
+macro_rules! wire_messages {
+    ($($variant:ident($body:ty) = $tag:literal),* $(,)?) => {
+        impl Wire for ControlMessage {
+            fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
+                match self { $( ControlMessage::$variant(body) => { let tag: u8 = $tag; tag.write(to)?; body.write(to) } )* }
+            }
+            fn read(from: &mut Reader<'_>) -> Result<ControlMessage, DecodeError> {
+                match u8::read(from)? {
+                    $( $tag => Ok(ControlMessage::$variant(<$body>::read(from)?)), )*
+                    tag => Err(DecodeError::UnknownTag { what: "message", tag }),
+                }
+            }
+        }
+    };
+}
+wire_messages! {
+    Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
+    MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
+}
+
+wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
+wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
+wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6 });
+wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
+wire_struct!(Hello { node, role, transport, rate_hz, proof });
+wire_struct!(Welcome { proof, session, epoch, udp_port, session_time_ns });
+wire_struct!(Refusal { code, version, text });
+wire_struct!(MeshRequest { hash });
+wire_struct!(MeshHeader { hash, length });
+wire_struct!(LogEvent { level, text });
+wire_struct!(Bye { reason });

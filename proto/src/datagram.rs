@@ -1,0 +1,67 @@
+//! The payload of a datagram, by kind.
+
+use crate::{
+    DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
+    codec::{decode, encode_into},
+    time::{TimeRequest, TimeResponse},
+};
+
+/// What a datagram says.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "lives on the stack of the receiving thread, which must not allocate"
+)]
+pub enum Payload {
+    /// State of the workbench.
+    Hot(HotState),
+    /// Asks for session time.
+    TimeRequest(TimeRequest),
+    /// Tells session time.
+    TimeResponse(TimeResponse),
+    /// "Alive."
+    Heartbeat,
+    /// Device reading.
+    Input(InputSample),
+    /// Command to the device.
+    Wrench(WrenchCommand),
+}
+
+impl Payload {
+    /// Kind that the header names.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Payload::Hot(_) => Kind::Hot,
+            Payload::TimeRequest(_) => Kind::TimeRequest,
+            Payload::TimeResponse(_) => Kind::TimeResponse,
+            Payload::Heartbeat => Kind::Heartbeat,
+            Payload::Input(_) => Kind::Input,
+            Payload::Wrench(_) => Kind::Wrench,
+        }
+    }
+
+    /// Writes the payload to the front of `buffer`, returns the bytes used. No allocation.
+    pub fn encode_into(&self, buffer: &mut [u8]) -> Result<usize, EncodeError> {
+        match self {
+            Payload::Hot(value) => encode_into(value, buffer),
+            Payload::TimeRequest(value) => encode_into(value, buffer),
+            Payload::TimeResponse(value) => encode_into(value, buffer),
+            Payload::Heartbeat => Ok(0),
+            Payload::Input(value) => encode_into(value, buffer),
+            Payload::Wrench(value) => encode_into(value, buffer),
+        }
+    }
+
+    /// Reads the payload of a datagram of `kind`. No allocation.
+    pub fn decode(kind: Kind, bytes: &[u8]) -> Result<Payload, DecodeError> {
+        Ok(match kind {
+            Kind::Hot => Payload::Hot(decode(bytes)?),
+            Kind::TimeRequest => Payload::TimeRequest(decode(bytes)?),
+            Kind::TimeResponse => Payload::TimeResponse(decode(bytes)?),
+            Kind::Heartbeat if bytes.is_empty() => Payload::Heartbeat,
+            Kind::Heartbeat => return Err(DecodeError::TrailingBytes { left: bytes.len() }),
+            Kind::Input => Payload::Input(decode(bytes)?),
+            Kind::Wrench => Payload::Wrench(decode(bytes)?),
+        })
+    }
+}

@@ -1,0 +1,25 @@
+//! INPUT payload: what the device bridge read, upstream to the haptics loop.
+
+use crate::{PoseF64, codec::wire_struct};
+
+/// One reading of the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputSample {
+    /// When it was read: session time as the bridge knows it, ns; 0 while its clock is not locked.
+    pub sample_time_ns: u64,
+    /// Number of the reading, strictly increasing; the newest wins.
+    pub index: u64,
+    /// Device in the scene frame.
+    pub pose: PoseF64,
+    /// Velocity, m/s and rad/s, linear then angular, scene axes.
+    pub velocity: [f64; 6],
+    /// Buttons, bit 0 the first.
+    pub buttons: u16,
+    /// Bit 0: the device reports a fault.
+    pub flags: u16,
+}
+
+/// [`InputSample::flags`]: the device reports a fault.
+pub const INPUT_FAULT: u16 = 1;
+
+wire_struct!(InputSample { sample_time_ns, index, pose, velocity, buttons, flags });

@@ -1,0 +1,45 @@
+//! Wire types of taut: what the haptic PC, the render nodes, the device bridge and the observers say to each other.
+//!
+//! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
+//!
+//! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`time`].
+//! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
+//!
+//! Every byte goes through [`codec`]: little-endian, fixed size integers, explicit limits, no number that is not finite.
+//! Poses are of a body's own frame; forces and torques are at the reference point, world axes; SI units.
+#![forbid(unsafe_code)]
+
+pub mod clock;
+pub mod codec;
+pub mod control;
+pub mod datagram;
+pub mod header;
+pub mod input;
+pub mod key;
+pub mod mesh_blob;
+pub mod pose;
+pub mod replay;
+pub mod scene;
+pub mod seal;
+pub mod state;
+pub mod stats;
+pub mod time;
+pub mod version;
+pub mod wrench;
+
+pub use arrayvec::ArrayVec;
+pub use clock::{ClockFilter, SessionTime};
+pub use codec::{DecodeError, EncodeError};
+pub use control::{ControlMessage, Refusal, Role, Transport};
+pub use datagram::Payload;
+pub use header::{Header, Kind};
+pub use input::InputSample;
+pub use key::ClusterKey;
+pub use mesh_blob::{MeshBlob, MeshHash};
+pub use pose::{PoseF32, PoseF64};
+pub use scene::SceneDescription;
+pub use state::HotState;
+pub use stats::ClientStats;
+pub use version::PROTOCOL_VERSION;
+pub use wrench::WrenchCommand;

@@ -1,0 +1,215 @@
+//! A mesh as it travels: bytes named by their BLAKE3 hash.
+//!
+//! | offset | field     | bytes              | meaning                                      |
+//! |--------|-----------|--------------------|----------------------------------------------|
+//! | 0      | magic     | 4                  | "tmsh"                                       |
+//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals          |
+//! | 5      | reserved  | 3                  | 0                                            |
+//! | 8      | vertices  | 4                  | count n                                      |
+//! | 12     | triangles | 4                  | count m                                      |
+//! | 16     | positions | n × 12 or n × 24   | m, body frame                                |
+//! |        | triangles | m × 12             | vertex indices, counter-clockwise from outside |
+//! |        | normals   | n × 12 or 0        | unit, per vertex                             |
+
+use crate::{DecodeError, EncodeError, codec::wire_struct};
+
+/// Most bytes of an encoded mesh: 4 million triangles.
+pub const MAX_MESH_BYTES: usize = 128 << 20;
+
+const BLOB_MAGIC: [u8; 4] = *b"tmsh";
+const PREFIX_BYTES: usize = 16;
+const LAYOUT_F64: u8 = 1;
+const LAYOUT_NORMALS: u8 = 2;
+
+/// BLAKE3 hash of an encoded mesh.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MeshHash {
+    /// The 32 bytes.
+    pub bytes: [u8; 32],
+}
+
+wire_struct!(MeshHash { bytes });
+
+impl MeshHash {
+    /// Hash of an encoded mesh.
+    pub fn of(encoded: &[u8]) -> MeshHash {
+        MeshHash {
+            bytes: *blake3::hash(encoded).as_bytes(),
+        }
+    }
+}
+
+impl std::fmt::Display for MeshHash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.bytes.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl std::fmt::Debug for MeshHash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "MeshHash({self})")
+    }
+}
+
+/// Vertex positions, m, body frame, in the precision of the source.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Positions {
+    /// Single precision.
+    F32(Vec<[f32; 3]>),
+    /// Double precision.
+    F64(Vec<[f64; 3]>),
+}
+
+/// A triangle mesh. Every index is below the number of vertices, every number finite: checked when made or decoded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshBlob {
+    positions: Positions,
+    triangles: Vec<[u32; 3]>,
+    normals: Option<Vec<[f32; 3]>>,
+}
+
+impl Positions {
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        match self {
+            Positions::F32(list) => list.len(),
+            Positions::F64(list) => list.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl MeshBlob {
+    /// Checks and keeps the parts. `normals`, if any, are one per vertex.
+    pub fn new(
+        positions: Positions,
+        triangles: Vec<[u32; 3]>,
+        normals: Option<Vec<[f32; 3]>>,
+    ) -> Result<MeshBlob, DecodeError> {
+        let finite = match &positions {
+            Positions::F32(list) => list.iter().flatten().all(|x| x.is_finite()),
+            Positions::F64(list) => list.iter().flatten().all(|x| x.is_finite()),
+        };
+        let normals_finite = normals.iter().flatten().flatten().all(|x| x.is_finite());
+        if !(finite && normals_finite) {
+            return Err(DecodeError::NotFinite);
+        }
+        if triangles.iter().flatten().any(|index| *index as usize >= positions.len()) {
+            return Err(DecodeError::Inconsistent { what: "vertex index" });
+        }
+        if normals.as_ref().is_some_and(|normals| normals.len() != positions.len()) {
+            return Err(DecodeError::Inconsistent { what: "normal count" });
+        }
+        Ok(MeshBlob { positions, triangles, normals })
+    }
+
+    /// Positions in the precision of the source.
+    pub fn positions(&self) -> &Positions {
+        &self.positions
+    }
+
+    /// Positions for drawing.
+    pub fn positions_f32(&self) -> Vec<[f32; 3]> {
+        match &self.positions {
+            Positions::F32(list) => list.clone(),
+            Positions::F64(list) => list.iter().map(|p| p.map(|x| x as f32)).collect(),
+        }
+    }
+
+    /// Positions for computing.
+    pub fn positions_f64(&self) -> Vec<[f64; 3]> {
+        match &self.positions {
+            Positions::F32(list) => list.iter().map(|p| p.map(f64::from)).collect(),
+            Positions::F64(list) => list.clone(),
+        }
+    }
+
+    /// Vertex indices, counter-clockwise seen from outside.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Unit normals per vertex, if the source had any.
+    pub fn normals(&self) -> Option<&[[f32; 3]]> {
+        self.normals.as_deref()
+    }
+
+    /// The bytes that travel and are hashed. Fails above [`MAX_MESH_BYTES`].
+    pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
+        let vertices = self.positions.len();
+        let (wide, position_bytes) = match &self.positions {
+            Positions::F32(_) => (0, 12),
+            Positions::F64(_) => (LAYOUT_F64, 24),
+        };
+        let normals = if self.normals.is_some() { LAYOUT_NORMALS } else { 0 };
+        let normal_bytes = if self.normals.is_some() { 12 } else { 0 };
+        let len = PREFIX_BYTES + vertices * (position_bytes + normal_bytes) + self.triangles.len() * 12;
+        if len > MAX_MESH_BYTES {
+            return Err(EncodeError::TooLong {
+                what: "mesh",
+                len,
+                max: MAX_MESH_BYTES,
+            });
+        }
+        let mut bytes = Vec::with_capacity(len);
+        bytes.extend(BLOB_MAGIC);
+        bytes.extend([wide | normals, 0, 0, 0]);
+        bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
+        bytes.extend((self.triangles.len() as u32).to_le_bytes());
+        match &self.positions {
+            Positions::F32(list) => list.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes())),
+            Positions::F64(list) => list.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes())),
+        }
+        self.triangles.iter().flatten().for_each(|i| bytes.extend(i.to_le_bytes()));
+        self.normals.iter().flatten().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+        Ok(bytes)
+    }
+
+    /// Reads what [`MeshBlob::encode`] wrote. Memory is bounded by the length of `bytes`, whatever its counts claim.
+    pub fn decode(bytes: &[u8]) -> Result<MeshBlob, DecodeError> {
+        let Some((prefix, body)) = bytes.split_first_chunk::<PREFIX_BYTES>() else {
+            return Err(DecodeError::Truncated);
+        };
+        let [m0, m1, m2, m3, layout, r0, r1, r2, v0, v1, v2, v3, t0, t1, t2, t3] = *prefix;
+        if [m0, m1, m2, m3] != BLOB_MAGIC {
+            return Err(DecodeError::WrongMagic);
+        }
+        if layout & !(LAYOUT_F64 | LAYOUT_NORMALS) != 0 || [r0, r1, r2] != [0; 3] {
+            return Err(DecodeError::UnknownTag { what: "mesh layout", tag: layout });
+        }
+        let vertices = u64::from(u32::from_le_bytes([v0, v1, v2, v3]));
+        let triangles = u64::from(u32::from_le_bytes([t0, t1, t2, t3]));
+        let wide = layout & LAYOUT_F64 != 0;
+        let with_normals = layout & LAYOUT_NORMALS != 0;
+
+        // The counts must account for every byte before anything is read.
+        let position_len = vertices * if wide { 24 } else { 12 };
+        let triangle_len = triangles * 12;
+        let normal_len = if with_normals { vertices * 12 } else { 0 };
+        if position_len + triangle_len + normal_len != body.len() as u64 {
+            return Err(DecodeError::Inconsistent { what: "mesh length" });
+        }
+        let (positions, rest) = body.split_at(position_len as usize);
+        let (triangles, normals) = rest.split_at(triangle_len as usize);
+        MeshBlob::new(
+            if wide {
+                Positions::F64(triples(positions, f64::from_le_bytes))
+            } else {
+                Positions::F32(triples(positions, f32::from_le_bytes))
+            },
+            triples(triangles, u32::from_le_bytes),
+            with_normals.then(|| triples(normals, f32::from_le_bytes)),
+        )
+    }
+}
+
+/// Numbers of `N` bytes, three by three; `bytes` is a whole number of triples.
+fn triples<T: Copy, const N: usize>(bytes: &[u8], number: fn([u8; N]) -> T) -> Vec<[T; 3]> {
+    let (numbers, _) = bytes.as_chunks::<N>();
+    let (triples, _) = numbers.as_chunks::<3>();
+    triples.iter().map(|triple| triple.map(number)).collect()
+}

@@ -1,0 +1,125 @@
+//! Scene description: everything a client needs to draw, except the meshes, which it asks for by hash.
+
+use crate::{
+    MeshHash, PoseF64,
+    codec::{wire_struct, wire_tag},
+};
+
+/// What a client learns at join, before the first state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneDescription {
+    /// Name of the scene.
+    pub name: String,
+    /// Revision; [`crate::HotState::scene_revision`] refers to it.
+    pub revision: u32,
+    /// The god-object.
+    pub god_object: BodyDescription,
+    /// The obstacles; a state's body numbers are indices into this list.
+    pub obstacles: Vec<BodyDescription>,
+    /// Reference point of the god-object, m, in its body frame.
+    pub reference_point: [f64; 3],
+    /// Scene frame in the workbench frame.
+    pub scene_origin: PoseF64,
+    /// Size of the scene on the workbench over its size in the simulation, above 0.
+    pub display_scale: f64,
+    /// The screens.
+    pub screens: Vec<ScreenDescription>,
+    /// The render nodes.
+    pub nodes: Vec<NodeDescription>,
+    /// The viewer where no head tracker says otherwise, in the workbench frame.
+    pub viewer: PoseF64,
+    /// Distance between the pupils, m.
+    pub eye_separation: f64,
+    /// Near clipping distance, m.
+    pub near: f64,
+    /// Far clipping distance, m.
+    pub far: f64,
+    /// What is drawn besides the scene.
+    pub show: ShowOptions,
+}
+
+/// A body: mesh by hash, pose at start, colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyDescription {
+    /// Name, unique in the scene.
+    pub name: String,
+    /// Mesh, in the body's own frame.
+    pub mesh: MeshHash,
+    /// Body in the scene frame at start.
+    pub pose: PoseF64,
+    /// Linear RGB and opacity, 0 to 1.
+    pub colour: [f32; 4],
+}
+
+/// A flat screen by three corners, m, workbench frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScreenDescription {
+    /// Name, unique in the workbench.
+    pub name: String,
+    /// Lower left corner as the viewer sees it.
+    pub lower_left: [f64; 3],
+    /// Lower right corner.
+    pub lower_right: [f64; 3],
+    /// Upper left corner.
+    pub upper_left: [f64; 3],
+}
+
+/// A render node.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeDescription {
+    /// Name that the node gives in its Hello.
+    pub name: String,
+    /// Names of the screens that it draws.
+    pub screens: Vec<String>,
+    /// How it shows two eyes.
+    pub stereo: Stereo,
+    /// Its window.
+    pub window: WindowDescription,
+}
+
+/// How two eyes reach a screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stereo {
+    /// One eye, between the two.
+    Mono,
+    /// Left half for the left eye.
+    SideBySide,
+    /// Upper half for the left eye.
+    TopBottom,
+    /// Red for the left eye, cyan for the right.
+    Anaglyph,
+    /// A window per eye.
+    TwoWindows,
+}
+
+/// A window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WindowDescription {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Without frame, over the whole monitor.
+    pub fullscreen: bool,
+}
+
+/// What is drawn besides the scene; nothing by default: the user sees the god-object only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ShowOptions {
+    /// The device pose, translucent.
+    pub ghost: bool,
+    /// Contact points and normals.
+    pub contacts: bool,
+    /// The force.
+    pub force: bool,
+}
+
+wire_struct!(SceneDescription {
+    name, revision, god_object, obstacles, reference_point, scene_origin, display_scale, screens, nodes, viewer, eye_separation, near, far, show,
+});
+wire_struct!(BodyDescription { name, mesh, pose, colour });
+wire_struct!(ScreenDescription { name, lower_left, lower_right, upper_left });
+wire_struct!(NodeDescription { name, screens, stereo, window });
+wire_struct!(WindowDescription { width, height, fullscreen });
+wire_struct!(ShowOptions { ghost, contacts, force });
+wire_tag!(Stereo, "stereo mode" { Mono = 0, SideBySide = 1, TopBottom = 2, Anaglyph = 3, TwoWindows = 4 });

@@ -1,0 +1,44 @@
+//! What a client reports about itself, about once per second.
+
+use crate::codec::wire_struct;
+
+/// A client's report; counts are since it joined, ages are over the time since its last report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClientStats {
+    /// Frames drawn.
+    pub frames: u64,
+    /// Frames per second since the last report.
+    pub fps: f32,
+    /// Median age of the drawn state when the frame was presented, ms.
+    pub pose_age_ms_p50: f32,
+    /// 99th percentile of the same, ms.
+    pub pose_age_ms_p99: f32,
+    /// Largest of the same, ms.
+    pub pose_age_ms_max: f32,
+    /// Median difference of the present call to the planned time, ms; 0 where frames are not locked.
+    pub swap_skew_ms_p50: f32,
+    /// Largest of the same, ms.
+    pub swap_skew_ms_max: f32,
+    /// States lost on the way.
+    pub packets_lost: u64,
+    /// States received.
+    pub packets_received: u64,
+    /// Uncertainty of the client's session time, ns.
+    pub clock_uncertainty_ns: u64,
+    /// Recently drawn states, for the server to compare with what it sent.
+    pub drawn: Vec<DrawnState>,
+}
+
+/// A state that a client drew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawnState {
+    /// [`crate::HotState::tick`].
+    pub tick: u64,
+    /// [`crate::HotState::hash`] as the client computed it.
+    pub state_hash: u64,
+}
+
+wire_struct!(ClientStats {
+    frames, fps, pose_age_ms_p50, pose_age_ms_p99, pose_age_ms_max, swap_skew_ms_p50, swap_skew_ms_max, packets_lost, packets_received, clock_uncertainty_ns, drawn,
+});
+wire_struct!(DrawnState { tick, state_hash });

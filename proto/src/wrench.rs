@@ -1,0 +1,21 @@
+//! WRENCH payload: what the user is to feel, downstream to the device bridge.
+
+use crate::codec::wire_struct;
+
+/// One command to the device. A bridge that hears none for its watchdog time gives zero force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WrenchCommand {
+    /// When it was computed: session time, ns.
+    pub time_ns: u64,
+    /// [`crate::InputSample::index`] of the reading that it answers; 0 for none.
+    pub input_index: u64,
+    /// Force then torque on the user's hand at the reference point, N and N m, scene axes, limited already.
+    pub wrench: [f64; 6],
+    /// Bit 0: paused, the wrench is zero.
+    pub flags: u16,
+}
+
+/// [`WrenchCommand::flags`]: paused.
+pub const WRENCH_PAUSED: u16 = 1;
+
+wire_struct!(WrenchCommand { time_ns, input_index, wrench, flags });

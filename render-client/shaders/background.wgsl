@@ -1,0 +1,28 @@
+// The far surroundings, drawn first over the whole view.
+
+struct Fragment {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) place: vec2<f32>,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Fragment {
+    let place = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
+    var fragment: Fragment;
+    fragment.clip = vec4(place, 1.0, 1.0);
+    fragment.place = place;
+    return fragment;
+}
+
+// A threshold between 0 and 1 that differs from pixel to pixel: spreads the steps of 8-bit colours.
+fn dither(pixel: vec2<f32>) -> f32 {
+    return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
+}
+
+@fragment
+fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+    let far = frame.workbench_from_clip * vec4(in.place, 1.0, 1.0);
+    let direction = normalize(far.xyz / far.w - frame.eye.xyz);
+    let light = surroundings(direction) + (dither(in.clip.xy) - 0.5) * 0.0025;
+    return vec4(shown(light), 1.0);
+}

@@ -1,0 +1,84 @@
+// What every shader knows of the eye, the lights and the shadow map. Put before the others.
+// Frame: workbench, metres, z up. Colours: linear.
+
+struct Frame {
+    clip_from_workbench: mat4x4<f32>,
+    workbench_from_clip: mat4x4<f32>,
+    shadow_from_workbench: mat4x4<f32>,
+    eye: vec4<f32>,          // xyz; w: 1 when the state is stale
+    key: vec4<f32>,          // unit, to the light; w: size of a shadow texel, m
+    floor: vec4<f32>,        // centre; w: radius, m
+    grid: vec4<f32>,         // x: spacing of the lines, m
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var shadow_map: texture_depth_2d;
+@group(0) @binding(2) var shadow_sampler: sampler_comparison;
+
+const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.60;
+const FILL_COLOUR = vec3<f32>(0.62, 0.76, 1.0) * 0.26;
+const FILL_DIRECTION = vec3<f32>(0.80, -0.52, 0.30); // unit, to the light: low, from the right
+const SKY_COLOUR = vec3<f32>(0.44, 0.52, 0.64) * 0.55;
+const GROUND_COLOUR = vec3<f32>(0.30, 0.27, 0.25) * 0.40;
+
+// Share of the key light that reaches a point: 3 x 3 samples, each filtered over 2 x 2 texels.
+fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
+    let off_surface = position + normal * (1.6 * frame.key.w);
+    let clip = frame.shadow_from_workbench * vec4(off_surface, 1.0);
+    let place = clip.xy * vec2(0.5, -0.5) + 0.5;
+    if any(place < vec2(0.0)) || any(place > vec2(1.0)) || clip.z > 1.0 {
+        return 1.0; // outside the map nothing casts
+    }
+    let texel = 1.0 / f32(textureDimensions(shadow_map).x);
+    var lit = 0.0;
+    for (var y = -1; y <= 1; y++) {
+        for (var x = -1; x <= 1; x++) {
+            let tap = place + vec2(f32(x), f32(y)) * (1.4 * texel);
+            lit += textureSampleCompareLevel(shadow_map, shadow_sampler, tap, clip.z);
+        }
+    }
+    return lit / 9.0;
+}
+
+fn ambient(normal: vec3<f32>) -> vec3<f32> {
+    return mix(GROUND_COLOUR, SKY_COLOUR, 0.5 + 0.5 * normal.z);
+}
+
+// Light leaving a surface towards the eye. `gloss`: x strength, y exponent of the highlight.
+fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, gloss: vec2<f32>) -> vec3<f32> {
+    let to_eye = normalize(frame.eye.xyz - position);
+    let key = frame.key.xyz;
+    let key_share = lit_by_key(position, normal) * smoothstep(0.0, 0.12, dot(normal, key));
+    let diffuse = ambient(normal)
+        + KEY_COLOUR * (key_share * max(dot(normal, key), 0.0))
+        + FILL_COLOUR * max(dot(normal, FILL_DIRECTION), 0.0);
+
+    let facing = max(dot(normal, to_eye), 0.0);
+    let rim = pow(1.0 - facing, 4.0);
+    let highlight = pow(max(dot(normal, normalize(key + to_eye)), 0.0), gloss.y);
+    let shine = KEY_COLOUR * (key_share * highlight) + SKY_COLOUR * (0.9 * rim);
+    return colour * diffuse * 0.80 + gloss.x * shine;
+}
+
+// Keeps bright parts from clipping and their hue from turning: about linear below 0.6.
+fn tone(light: vec3<f32>) -> vec3<f32> {
+    let peak = max(max(light.r, light.g), max(light.b, 1e-4));
+    let kept = peak / pow(1.0 + peak * peak * peak, 1.0 / 3.0);
+    return mix(light / peak, vec3(1.0), 0.6 * smoothstep(1.2, 4.0, peak)) * kept;
+}
+
+// The colour that leaves a fragment; a stale picture loses its colours.
+fn shown(light: vec3<f32>) -> vec3<f32> {
+    let colour = tone(light);
+    let grey = vec3(dot(colour, vec3(0.2126, 0.7152, 0.0722))) * vec3(0.75, 0.78, 0.85);
+    return mix(colour, grey, 0.8 * frame.eye.w);
+}
+
+// The far surroundings in one direction: the same from both screens at their common edge.
+fn surroundings(direction: vec3<f32>) -> vec3<f32> {
+    let up = direction.z;
+    let horizon = vec3(0.042, 0.049, 0.062);
+    let above = mix(horizon, vec3(0.010, 0.013, 0.021), smoothstep(0.0, 0.8, up));
+    let below = mix(horizon, vec3(0.016, 0.018, 0.023), smoothstep(0.0, 0.6, -up));
+    return select(below, above, up > 0.0);
+}

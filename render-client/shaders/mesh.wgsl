@@ -1,0 +1,43 @@
+// Opaque lit bodies: obstacles, god-object, contact dots, force arrow.
+
+struct Instance {
+    @location(2) model_x: vec4<f32>,
+    @location(3) model_y: vec4<f32>,
+    @location(4) model_z: vec4<f32>,
+    @location(5) model_w: vec4<f32>,
+    @location(6) colour: vec4<f32>,
+    @location(7) gloss: vec4<f32>,   // x strength, y exponent, z own light
+}
+
+struct Fragment {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) colour: vec4<f32>,
+    @location(3) gloss: vec4<f32>,
+}
+
+@vertex
+fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>, instance: Instance) -> Fragment {
+    let model = mat4x4(instance.model_x, instance.model_y, instance.model_z, instance.model_w);
+    let place = model * vec4(position, 1.0);
+    // For a rotation times a scale along its axes the inverse transpose divides by scale squared.
+    let squares = vec3(
+        dot(instance.model_x.xyz, instance.model_x.xyz),
+        dot(instance.model_y.xyz, instance.model_y.xyz),
+        dot(instance.model_z.xyz, instance.model_z.xyz),
+    );
+    var fragment: Fragment;
+    fragment.clip = frame.clip_from_workbench * place;
+    fragment.position = place.xyz;
+    fragment.normal = (model * vec4(normal / squares, 0.0)).xyz;
+    fragment.colour = instance.colour;
+    fragment.gloss = instance.gloss;
+    return fragment;
+}
+
+@fragment
+fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+    let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss.xy);
+    return vec4(shown(mix(light, in.colour.rgb, in.gloss.z)), 1.0);
+}

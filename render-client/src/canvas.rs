@@ -1,0 +1,106 @@
+//! A node's screens drawn off-screen.
+
+use image::RgbaImage;
+
+use crate::error::RenderError;
+use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
+use crate::stage::{Show, Stage};
+use crate::timeline::Latched;
+use crate::view::Eyes;
+
+/// All pictures of a node without a window.
+#[derive(Debug)]
+pub struct Canvas {
+    gpu: Gpu,
+    stage: Stage,
+    renderer: Renderer,
+    sheets: Vec<Sheet>,
+}
+
+/// One picture.
+#[derive(Debug)]
+struct Sheet {
+    /// Place of the screen in the stage.
+    screen: usize,
+    name: String,
+    target: PictureTarget,
+    image: OffScreen,
+}
+
+impl Canvas {
+    /// Makes ready to draw all screens of `stage`.
+    pub fn new(gpu: Gpu, stage: Stage) -> Self {
+        let renderer = Renderer::new(&gpu, &stage, OffScreen::FORMAT);
+        let mut sheets = Vec::new();
+        for (index, screen) in stage.screens.iter().enumerate() {
+            let most = gpu.device.limits().max_texture_dimension_2d;
+            let (width, height) = screen.stereo.picture_size(screen.pixels);
+            let size = (width.clamp(1, most), height.clamp(1, most));
+            sheets.extend(screen.stereo.pictures().iter().map(|picture| Sheet {
+                screen: index,
+                name: format!("{}{}", screen.name, picture.suffix),
+                target: renderer.picture(&gpu, picture, size),
+                image: OffScreen::new(&gpu, size),
+            }));
+        }
+        Self {
+            gpu,
+            stage,
+            renderer,
+            sheets,
+        }
+    }
+
+    /// The stage that is drawn.
+    pub fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// The device that draws.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Draws a state on all screens and waits until that is done.
+    ///
+    /// With `copy` the pictures can be had from [`Self::images`] afterwards.
+    pub fn draw(&mut self, latched: &Latched, show: Show, copy: bool) -> Result<(), RenderError> {
+        let Self {
+            gpu,
+            stage,
+            renderer,
+            sheets,
+        } = self;
+        renderer.set_state(gpu, stage, latched, show);
+        let eyes = eyes_of(stage, latched);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.draw_shadow(&mut encoder);
+        for sheet in sheets.iter() {
+            let screen = &stage.screens[sheet.screen].screen;
+            let view = sheet.image.view();
+            renderer.draw(gpu, &mut encoder, screen, &eyes, &sheet.target, view);
+            if copy {
+                sheet.image.copy(&mut encoder);
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        gpu.finish()
+    }
+
+    /// Name (screen, and eye where it has a picture of its own) and content of each picture.
+    pub fn images(&self) -> Result<Vec<(&str, RgbaImage)>, RenderError> {
+        let image = |sheet| {
+            let Sheet { name, image, .. }: &Sheet = sheet;
+            Ok((name.as_str(), image.read(&self.gpu)?))
+        };
+        self.sheets.iter().map(image).collect()
+    }
+}
+
+/// The eyes of the tracked head, or of the viewer that the workbench declares.
+pub(crate) fn eyes_of(stage: &Stage, latched: &Latched) -> Eyes {
+    match &latched.state.head {
+        Some(head) => Eyes::of_head(&head.pose, head.eye_separation),
+        None => Eyes::of_head(&stage.head, stage.eye_separation),
+    }
+}

@@ -1,0 +1,271 @@
+//! The command line of a render node, shared by `taut render` and `taut-render`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use taut_link::{ClientOptions, Role, Transport, read_key_file};
+
+use crate::canvas::Canvas;
+use crate::description::Overrides;
+use crate::error::RenderError;
+use crate::renderer::Gpu;
+use crate::session::Session;
+use crate::stage::Show;
+use crate::statistics::{RenderReport, Statistics};
+use crate::stereo::Stereo;
+use crate::timeline::Timeline;
+use crate::{headless, window};
+
+/// Frames per second without a window: enough to follow, and cheap in software.
+const HEADLESS_FPS: f64 = 20.0;
+
+/// Frames per second in a window, at most; the monitor may take fewer.
+const WINDOW_FPS: f64 = 120.0;
+
+/// Longest delay of the picture, in milliseconds: as far as states are kept at 1 kHz.
+const MAX_DELAY_MS: f64 = 200.0;
+
+/// One node of the render cluster.
+#[derive(Args, Clone, Debug)]
+pub struct RenderArgs {
+    /// Address of the server.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub server: String,
+    /// Name of this node in the server's workbench file.
+    #[arg(long, value_name = "NAME")]
+    pub node: String,
+    /// File with the cluster key, copied from the server.
+    #[arg(long, value_name = "FILE", env = "TAUT_KEY_FILE")]
+    pub key: PathBuf,
+    /// How states travel to this node.
+    #[arg(long, value_enum, default_value_t = TransportArg::Udp)]
+    pub transport: TransportArg,
+    /// Draw off-screen instead of in windows.
+    #[arg(long)]
+    pub headless: bool,
+    /// End after this many frames.
+    #[arg(long, value_name = "N")]
+    pub frames: Option<u64>,
+    /// Write every frame to PNG files in this folder (with --headless).
+    #[arg(long, value_name = "DIR", requires = "headless")]
+    pub out: Option<PathBuf>,
+    /// End after this many seconds.
+    #[arg(long, value_name = "SECONDS")]
+    pub duration: Option<f64>,
+    /// Most frames per second [default: 20 off-screen, 120 in windows].
+    #[arg(long, value_name = "N")]
+    pub fps: Option<f64>,
+    /// Draw these too, whatever the server says.
+    #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
+    pub show: Option<Vec<ShowArg>>,
+    /// Show the two eyes in this way, whatever the server says.
+    #[arg(long, value_name = "MODE", value_enum)]
+    pub stereo: Option<StereoArg>,
+    /// Width of a view in pixels.
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub width: Option<u32>,
+    /// Height of a view in pixels.
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
+    pub height: Option<u32>,
+    /// Draw the world of this many milliseconds ago, so that late states can be interpolated.
+    #[arg(long, value_name = "MS", default_value_t = 2.0)]
+    pub delay_ms: f64,
+}
+
+/// How states travel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TransportArg {
+    /// Plain UDP, sealed: the fast way on a wired network.
+    Udp,
+    /// QUIC datagrams: one port, through firewalls.
+    Quic,
+}
+
+/// What can be drawn besides god-object and obstacles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ShowArg {
+    /// The device pose, translucent.
+    Ghost,
+    /// Contact points.
+    Contacts,
+    /// The force on the hand.
+    Force,
+    /// Nothing.
+    None,
+}
+
+/// Stereo modes by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StereoArg {
+    /// One view from between the eyes.
+    Mono,
+    /// Left half for the left eye.
+    SideBySide,
+    /// Upper half for the left eye.
+    TopBottom,
+    /// Red and cyan glasses.
+    Anaglyph,
+    /// A window (or image) per eye.
+    TwoWindows,
+}
+
+/// Joins the server and draws until told, asked or forced to end.
+///
+/// Blocks, and in windows wants the main thread; must not be called from within an async runtime,
+/// because it owns one.
+pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
+    let delay_ns = (1e6 * within("--delay-ms", args.delay_ms, 0.0, MAX_DELAY_MS)?) as u64;
+    let default_fps = if args.headless { HEADLESS_FPS } else { WINDOW_FPS };
+    let fps = within("--fps", args.fps.unwrap_or(default_fps), 0.01, 1000.0)?;
+    let frame_time = Duration::from_secs_f64(1.0 / fps);
+    let longest = 1e9;
+    let duration = args.duration.map(|s| within("--duration", s, 0.0, longest)).transpose()?;
+    let duration = duration.map(Duration::from_secs_f64);
+
+    // Without an adapter there is no use in joining the server.
+    let gpu = if args.headless { Some(Gpu::open()?) } else { None };
+    let key = read_key_file(&args.key)?;
+    let mut options = ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
+    options.transport = args.transport.into();
+    let mut session = Session::join(options)?;
+    let overrides = Overrides {
+        width: args.width,
+        height: args.height,
+        stereo: args.stereo.map(Stereo::from),
+        headless: args.headless,
+    };
+    let (stage, server_shows) = session.stage(&overrides)?;
+    let show = args.show.as_deref().map_or(server_shows, listed);
+
+    let mut timeline = Timeline::new(delay_ns);
+    let mut statistics = Statistics::new();
+    let ended = if let Some(gpu) = gpu {
+        let adapter = gpu.summary().to_string();
+        let mut canvas = Canvas::new(gpu, stage);
+        let plan = headless::Plan {
+            frames: args.frames,
+            duration,
+            frame_time,
+            out: args.out.clone().map(|folder| (folder, args.node.clone())),
+            show,
+        };
+        headless::run(&mut session, &mut canvas, &mut timeline, &mut statistics, &plan)
+            .map(|ended| (ended, adapter))
+    } else {
+        let plan = window::Plan {
+            frames: args.frames,
+            duration,
+            frame_time,
+            fullscreen: session.fullscreen(),
+            show,
+        };
+        window::run(&mut session, stage, &mut timeline, &mut statistics, plan)
+    };
+
+    if let Some(stats) = statistics.report(true) {
+        session.report(stats);
+    }
+    let (packets_lost, packets_received) = session.packets();
+    session.leave();
+    let (ended, adapter) = ended?;
+    let (pose_age_ms, drawn_age_ms) = statistics.ages();
+    Ok(RenderReport {
+        node: args.node,
+        transport: match args.transport {
+            TransportArg::Udp => "udp",
+            TransportArg::Quic => "quic",
+        }
+        .to_owned(),
+        adapter,
+        frames: statistics.frames,
+        stale_frames: statistics.stale_frames,
+        fps: statistics.fps(),
+        pose_age_ms,
+        drawn_age_ms,
+        packets_lost,
+        packets_received,
+        ended,
+    })
+}
+
+/// The value if it is a number in the range.
+fn within(option: &'static str, value: f64, low: f64, high: f64) -> Result<f64, RenderError> {
+    let fits = low <= value && value <= high; // false for NaN
+    if fits {
+        return Ok(value);
+    }
+    Err(RenderError::Option {
+        option,
+        rule: format!("a number from {low} to {high}"),
+        value: value.to_string(),
+    })
+}
+
+fn listed(list: &[ShowArg]) -> Show {
+    Show {
+        ghost: list.contains(&ShowArg::Ghost),
+        contacts: list.contains(&ShowArg::Contacts),
+        force: list.contains(&ShowArg::Force),
+    }
+}
+
+impl From<TransportArg> for Transport {
+    fn from(arg: TransportArg) -> Self {
+        match arg {
+            TransportArg::Udp => Self::Udp,
+            TransportArg::Quic => Self::QuicDatagram,
+        }
+    }
+}
+
+impl From<StereoArg> for Stereo {
+    fn from(arg: StereoArg) -> Self {
+        match arg {
+            StereoArg::Mono => Self::Mono,
+            StereoArg::SideBySide => Self::SideBySide,
+            StereoArg::TopBottom => Self::TopBottom,
+            StereoArg::Anaglyph => Self::Anaglyph,
+            StereoArg::TwoWindows => Self::TwoWindows,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: RenderArgs,
+    }
+
+    fn parse(rest: &[&str]) -> Result<RenderArgs, clap::Error> {
+        let always = ["taut-render", "--server", "h:1", "--node", "n", "--key", "k"];
+        Line::try_parse_from(always.iter().chain(rest)).map(|line| line.args)
+    }
+
+    #[test]
+    fn a_list_of_marks_is_taken_apart() {
+        let args = parse(&["--show", "ghost,force"]).expect("valid");
+        let show = listed(&args.show.expect("given"));
+        assert_eq!((show.ghost, show.contacts, show.force), (true, false, true));
+    }
+
+    #[test]
+    fn pictures_are_only_written_off_screen() {
+        assert!(parse(&["--out", "pictures"]).is_err());
+        assert!(parse(&["--headless", "--out", "pictures"]).is_ok());
+    }
+
+    #[test]
+    fn numbers_that_make_no_sense_are_refused_by_the_option_s_name() {
+        for (option, value) in [("--fps", "0"), ("--fps", "NaN"), ("--delay-ms", "-1"), ("--duration", "inf")] {
+            let args = parse(&[&format!("{option}={value}"), "--headless"]).expect("a number");
+            let error = run(args).expect_err("out of range").to_string();
+            assert!(error.starts_with(option), "{error}");
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! From the server's scene description to the stage that this node draws.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Similarity3};
+use taut_proto::scene::{BodyDescription, NodeDescription, ScreenDescription, SceneDescription};
+use taut_proto::{MeshBlob, PoseF64, scene};
+
+use crate::error::RenderError;
+use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
+use crate::stereo::Stereo;
+use crate::view::Screen;
+
+/// Id of the god-object among the bodies; obstacles are numbered from 0.
+const GOD_OBJECT_ID: u16 = u16::MAX;
+
+/// Width, in pixels, of a view that is drawn off-screen and no size is asked for: small, because a
+/// machine without a display mostly has no graphics card either.
+const OFF_SCREEN_WIDTH: u32 = 480;
+
+/// What the command line asks for, over what the server says.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Overrides {
+    pub(crate) width: Option<u32>,
+    pub(crate) height: Option<u32>,
+    pub(crate) stereo: Option<Stereo>,
+    pub(crate) headless: bool,
+}
+
+/// The description of the node named `node`.
+pub(crate) fn find_node<'a>(
+    description: &'a SceneDescription,
+    node: &str,
+) -> Result<&'a NodeDescription, RenderError> {
+    let found = description.nodes.iter().find(|known| known.name == node);
+    found.ok_or_else(|| RenderError::UnknownNode {
+        node: node.to_owned(),
+        known: match description.nodes.as_slice() {
+            [] => "none".to_owned(),
+            nodes => nodes.iter().map(|n| n.name.as_str()).collect::<Vec<_>>().join(", "),
+        },
+    })
+}
+
+/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle.
+pub(crate) fn stage(
+    description: &SceneDescription,
+    node: &NodeDescription,
+    meshes: &[Arc<MeshBlob>],
+    overrides: &Overrides,
+) -> Result<Stage, RenderError> {
+    let bad = |what: String| RenderError::BadScene { what };
+    let pose = |pose: &PoseF64, whose: &str| {
+        pose.to_isometry().ok_or_else(|| bad(format!("the pose of {whose} is not a rigid motion")))
+    };
+    let positive = description.display_scale.is_finite() && description.display_scale > 0.0;
+    if !positive {
+        return Err(bad(format!("its display_scale is {}", description.display_scale)));
+    }
+    let origin = pose(&description.scene_origin, "the scene on the workbench")?;
+    let body = |id, mesh, described: &BodyDescription| -> Result<StageBody, RenderError> {
+        let [red, green, blue, _] = described.colour;
+        Ok(StageBody {
+            id,
+            mesh,
+            scale: 1.0,
+            pose: pose(&described.pose, &described.name)?,
+            colour: [red, green, blue],
+        })
+    };
+    let obstacle = |(index, described)| body(index as u16, index + 1, described);
+    let screens = node.screens.iter().map(|name| {
+        let found = description.screens.iter().find(|screen| screen.name == *name);
+        let described = found.ok_or_else(|| RenderError::UnknownScreen {
+            node: node.name.clone(),
+            screen: name.clone(),
+        })?;
+        stage_screen(described, node, overrides)
+    });
+    Ok(Stage {
+        screens: screens.collect::<Result<_, _>>()?,
+        head: pose(&description.viewer, "the viewer")?,
+        eye_separation: description.eye_separation,
+        workbench_from_scene: Similarity3::from_isometry(origin, description.display_scale),
+        meshes: meshes.iter().map(|blob| Arc::new(mesh_of(blob))).collect(),
+        god_object: body(GOD_OBJECT_ID, 0, &description.god_object)?,
+        reference_point: Point3::from(description.reference_point),
+        obstacles: description.obstacles.iter().enumerate().map(obstacle).collect::<Result<_, _>>()?,
+    })
+}
+
+/// What the server shows besides god-object and obstacles.
+pub(crate) fn show(options: &scene::ShowOptions) -> Show {
+    Show {
+        ghost: options.ghost,
+        contacts: options.contacts,
+        force: options.force,
+    }
+}
+
+fn stage_screen(
+    described: &ScreenDescription,
+    node: &NodeDescription,
+    overrides: &Overrides,
+) -> Result<StageScreen, RenderError> {
+    let [lower_left, lower_right, upper_left] =
+        [described.lower_left, described.lower_right, described.upper_left].map(Point3::from);
+    let screen = Screen::from_corners(lower_left, lower_right, upper_left).map_err(|source| {
+        RenderError::BadScreen {
+            screen: described.name.clone(),
+            source,
+        }
+    })?;
+    Ok(StageScreen {
+        name: described.name.clone(),
+        pixels: pixels(&screen, node, overrides),
+        screen,
+        stereo: overrides.stereo.unwrap_or(match node.stereo {
+            scene::Stereo::Mono => Stereo::Mono,
+            scene::Stereo::SideBySide => Stereo::SideBySide,
+            scene::Stereo::TopBottom => Stereo::TopBottom,
+            scene::Stereo::Anaglyph => Stereo::Anaglyph,
+            scene::Stereo::TwoWindows => Stereo::TwoWindows,
+        }),
+    })
+}
+
+/// As asked for; a length left open follows from the other and the screen's shape. Windows have
+/// the size that the workbench gives them.
+fn pixels(screen: &Screen, node: &NodeDescription, overrides: &Overrides) -> (u32, u32) {
+    let shape = screen.height() / screen.width();
+    let high = |width: u32| ((f64::from(width) * shape).round() as u32).max(1);
+    match (overrides.width, overrides.height) {
+        (Some(width), Some(height)) => (width, height),
+        (Some(width), None) => (width, high(width)),
+        (None, Some(height)) => (((f64::from(height) / shape).round() as u32).max(1), height),
+        (None, None) if overrides.headless => (OFF_SCREEN_WIDTH, high(OFF_SCREEN_WIDTH)),
+        (None, None) => (node.window.width.max(1), node.window.height.max(1)),
+    }
+}
+
+fn mesh_of(blob: &MeshBlob) -> TriangleMesh {
+    TriangleMesh {
+        vertices: blob.positions_f32(),
+        triangles: blob.triangles().to_vec(),
+    }
+}
+

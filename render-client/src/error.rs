@@ -1,0 +1,117 @@
+//! What can go wrong on a render node.
+
+use std::path::PathBuf;
+
+use taut_link::LinkError;
+use thiserror::Error;
+
+use crate::view::ScreenError;
+
+/// Why a render node ended other than by being told to.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RenderError {
+    /// No adapter: the caller may go on without drawing.
+    #[error(
+        "no graphics adapter was found on this machine; install the packages mesa-vulkan-drivers and libvulkan1 to draw in software"
+    )]
+    NoGpu,
+    /// There is an adapter, and it does not work.
+    #[error("the graphics adapter {adapter} cannot be used: {reason}; update its driver, or take another with WGPU_ADAPTER_NAME")]
+    Gpu {
+        /// Name of the adapter.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
+    /// Windows were asked for where there is no display.
+    #[error("no display can be opened ({reason}); set DISPLAY or WAYLAND_DISPLAY, or draw off-screen with --headless")]
+    NoDisplay {
+        /// What the window system said.
+        reason: String,
+    },
+    /// A picture could not be written.
+    #[error("cannot write the picture {}: {reason}; name a folder that can be written with --out", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// The server cannot be reached, or refuses this node.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The server was there and is not any more.
+    #[error("the server {server} was lost: {reason}; see whether it still runs, then start this node again")]
+    ServerLost {
+        /// Its address.
+        server: String,
+        /// What the link said.
+        reason: String,
+    },
+    /// The workbench file has no such node.
+    #[error("the workbench has no render node named \"{node}\"; it has {known}: give one of them with --node")]
+    UnknownNode {
+        /// The name given.
+        node: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A node names a screen that the workbench has not.
+    #[error("render node {node} is to draw the screen \"{screen}\", which the workbench has not; correct the workbench file on the server")]
+    UnknownScreen {
+        /// The node.
+        node: String,
+        /// The screen's name.
+        screen: String,
+    },
+    /// A screen cannot be drawn on.
+    #[error("the screen \"{screen}\" cannot be drawn on: {source}; correct the workbench file on the server")]
+    BadScreen {
+        /// Its name.
+        screen: String,
+        /// Why not.
+        source: ScreenError,
+    },
+    /// The scene's description has a value that cannot be drawn.
+    #[error("the server's scene cannot be drawn: {what}; correct the scene or workbench file on the server")]
+    BadScene {
+        /// What is wrong.
+        what: String,
+    },
+    /// The operating system refuses a thread, a runtime or a signal handler.
+    #[error("the operating system gave no {what}: {reason}; close other programs and try again")]
+    System {
+        /// What was asked for.
+        what: &'static str,
+        /// What it said.
+        reason: String,
+    },
+    /// An option has a value that makes no sense.
+    #[error("{option} must be {rule}, not {value}")]
+    Option {
+        /// The option's name.
+        option: &'static str,
+        /// What it must be.
+        rule: String,
+        /// What it was.
+        value: String,
+    },
+}
+
+impl RenderError {
+    /// The exit code of a program that ends with this error: 2 for bad input, 1 for the rest.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Option { .. } | Self::UnknownNode { .. } | Self::UnknownScreen { .. } => 2,
+            Self::BadScreen { .. } | Self::BadScene { .. } => 2,
+            // A wrong key, a name that does not resolve, a server that does not answer.
+            Self::Link(error) => match error {
+                LinkError::Closed { .. } | LinkError::System { .. } => 1,
+                _ => 2,
+            },
+            Self::NoGpu | Self::Gpu { .. } | Self::NoDisplay { .. } => 1,
+            Self::Picture { .. } | Self::ServerLost { .. } | Self::System { .. } => 1,
+        }
+    }
+}

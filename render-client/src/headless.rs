@@ -1,0 +1,115 @@
+//! Draws without a window: to PNG files, or to nowhere to see how a node keeps up.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use crate::canvas::Canvas;
+use crate::error::RenderError;
+use crate::session::{Ending, Session};
+use crate::stage::Show;
+use crate::statistics::{Ended, Statistics};
+use crate::timeline::Timeline;
+
+/// Longest sleep between two looks at signals and the server.
+const LONGEST_SLEEP: Duration = Duration::from_millis(50);
+
+/// When to end and how fast to draw.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    pub(crate) frames: Option<u64>,
+    pub(crate) duration: Option<Duration>,
+    pub(crate) frame_time: Duration,
+    /// Where pictures are written, and what their names begin with.
+    pub(crate) out: Option<(PathBuf, String)>,
+    pub(crate) show: Show,
+}
+
+/// Draws until the plan, the server or a signal ends it: each distinct state once.
+pub(crate) fn run(
+    session: &mut Session,
+    canvas: &mut Canvas,
+    timeline: &mut Timeline,
+    statistics: &mut Statistics,
+    plan: &Plan,
+) -> Result<Ended, RenderError> {
+    if let Some((folder, _)) = &plan.out {
+        std::fs::create_dir_all(folder).map_err(|error| RenderError::Picture {
+            path: folder.clone(),
+            reason: error.to_string(),
+        })?;
+    }
+    let start = Instant::now();
+    let mut next_frame = start;
+    let mut last_drawn = None;
+    loop {
+        if session.interrupted() {
+            return Ok(Ended::Interrupted);
+        }
+        match session.ending() {
+            Some(Ending::Told) => return Ok(Ended::ServerStopped),
+            Some(Ending::Lost(reason)) => return Err(session.lost(reason)),
+            None => {}
+        }
+        if plan.duration.is_some_and(|duration| start.elapsed() >= duration) {
+            return Ok(Ended::Duration);
+        }
+        if let Some(stats) = statistics.report(false) {
+            session.report(stats);
+        }
+
+        session.take_states(timeline);
+        let due = Instant::now() >= next_frame;
+        let now_ns = session.now_ns().filter(|_| due);
+        let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
+        if let Some((taken_ns, latched)) = latched {
+            let drawn = Some((latched.state.time_ns, latched.stale));
+            if drawn != last_drawn {
+                last_drawn = drawn;
+                canvas.draw(&latched, plan.show, plan.out.is_some())?;
+                let drawn_ns = session.now_ns().unwrap_or(taken_ns);
+                statistics.frame(&latched.state, latched.stale, taken_ns, drawn_ns);
+                write_pictures(canvas, plan, statistics.frames)?;
+                if plan.frames.is_some_and(|frames| statistics.frames >= frames) {
+                    return Ok(Ended::Frames);
+                }
+            }
+            // A late frame does not hurry the next ones.
+            next_frame = (next_frame + plan.frame_time).max(Instant::now());
+        }
+        let left = next_frame.saturating_duration_since(Instant::now());
+        // Nothing to draw yet: look again soon, but not at once.
+        let rest = if left.is_zero() { Duration::from_millis(2) } else { left };
+        std::thread::sleep(rest.min(LONGEST_SLEEP));
+    }
+}
+
+/// Writes `NODE-SCREEN[-left|-right]-00001.png` and so on.
+fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), RenderError> {
+    let Some((folder, node)) = &plan.out else {
+        return Ok(());
+    };
+    for (name, image) in canvas.images()? {
+        let path = folder.join(plain(&format!("{node}-{name}-{frame:05}.png")));
+        image.save(&path).map_err(|error| RenderError::Picture {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+    }
+    Ok(())
+}
+
+/// A file name without characters that a file system or a shell might take for something else.
+fn plain(name: &str) -> String {
+    let keep = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
+    name.chars().map(|c| if keep(c) { c } else { '_' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+
+    #[test]
+    fn a_picture_stays_in_its_folder_whatever_its_screen_is_called() {
+        assert_eq!(plain("left-../../wall 1-00001.png"), "left-.._.._wall_1-00001.png");
+    }
+}

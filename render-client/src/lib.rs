@@ -1,0 +1,27 @@
+//! One node of the render cluster: draws the god-object's world on the screens of a workbench.
+//!
+//! The node gets everything from the server (screens, viewer, meshes, states) and simulates
+//! nothing. A frame goes through the modules in this order: the session takes states from the link,
+//! [`timeline`] picks the one to draw, [`view`] projects the [`stage`] onto a screen for each eye,
+//! [`stereo`] shares a picture between the eyes, [`renderer`] draws it with wgpu, off-screen
+//! ([`canvas`]) or in windows, and [`statistics`] counts it.
+#![forbid(unsafe_code)]
+
+pub mod canvas;
+pub mod cli;
+mod description;
+pub mod error;
+mod headless;
+pub mod normals;
+pub mod renderer;
+mod session;
+pub mod stage;
+pub mod statistics;
+pub mod stereo;
+pub mod timeline;
+pub mod view;
+mod window;
+
+pub use cli::{RenderArgs, run};
+pub use error::RenderError;
+pub use statistics::RenderReport;

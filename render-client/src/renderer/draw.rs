@@ -1,0 +1,335 @@
+//! Puts the drawn things together: once per state the instances and the shadow map, then each
+//! picture of each screen.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::anaglyph::Anaglyph;
+use super::frame::{Floor, FrameUniform, KeyLight};
+use super::gpu::Gpu;
+use super::mesh::{Batch, Instance, MeshBuffers};
+use super::picture::{PictureTarget, ViewTarget};
+use super::pipeline::{FrameLayout, Output};
+use super::shadow::ShadowMap;
+use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
+use crate::stage::{Bounds, Show, Stage, StageBody};
+use crate::stereo::Picture;
+use crate::timeline::{Latched, State};
+use crate::view::{ClipPlanes, Eyes, Screen};
+
+/// Nothing nearer to the eye than this, in metres, is drawn: two eyes could not fuse it.
+const NEAR: f64 = 0.02;
+
+/// Everything on the graphics card that does not depend on the size of a picture.
+#[derive(Debug)]
+pub struct Renderer {
+    output: Output,
+    layout: FrameLayout,
+    pipelines: Pipelines,
+    anaglyph: Anaglyph,
+    shadow: ShadowMap,
+    meshes: Vec<MeshBuffers>,
+    mesh_bounds: Vec<Bounds>,
+    god_object_box: (Point3<f64>, Point3<f64>),
+    instances: wgpu::Buffer,
+    floor: Floor,
+    plan: Plan,
+}
+
+#[derive(Debug)]
+struct Pipelines {
+    background: wgpu::RenderPipeline,
+    floor: wgpu::RenderPipeline,
+    mesh: wgpu::RenderPipeline,
+    ghost: wgpu::RenderPipeline,
+}
+
+/// What the state of this frame asks to be drawn.
+#[derive(Debug)]
+struct Plan {
+    light: KeyLight,
+    stale: bool,
+    /// God-object and obstacles.
+    casters: Vec<Batch>,
+    /// Contact dots and force arrow.
+    marks: Vec<Batch>,
+    ghost: Option<Batch>,
+}
+
+impl Renderer {
+    /// Brings the stage's meshes to the graphics card, for pictures of `format`.
+    pub fn new(gpu: &Gpu, stage: &Stage, format: wgpu::TextureFormat) -> Self {
+        let device = &gpu.device;
+        let output = Output {
+            format,
+            samples: gpu.samples(format),
+        };
+        let layout = FrameLayout::new(device);
+        let pipelines = Pipelines {
+            background: background::pipeline(device, &layout, output),
+            floor: floor::pipeline(device, &layout, output),
+            mesh: mesh::pipeline(device, &layout, output),
+            ghost: ghost::pipeline(device, &layout, output),
+        };
+        let mut meshes: Vec<MeshBuffers> =
+            stage.meshes.iter().map(|mesh| MeshBuffers::new(device, mesh)).collect();
+        meshes.push(MeshBuffers::new(device, &shapes::sphere(1.0, 20)));
+        meshes.push(MeshBuffers::new(device, &shapes::arrow(0.06, 0.25, 24)));
+        let mesh_bounds: Vec<Bounds> = stage.meshes.iter().map(|mesh| mesh.bounds()).collect();
+
+        // Obstacles, god-object, ghost, dots, arrow.
+        let most = stage.obstacles.len() + 2 + contacts::MAX_CONTACTS + 1;
+        let instances = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("instances"),
+            size: (most * size_of::<Instance>()) as u64,
+            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let bodies = standing_bodies(stage, &mesh_bounds);
+        Self {
+            output,
+            layout,
+            pipelines,
+            anaglyph: Anaglyph::new(device, format),
+            shadow: ShadowMap::new(device),
+            meshes,
+            mesh_bounds,
+            god_object_box: stage.meshes[stage.god_object.mesh].corners(),
+            instances,
+            floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
+            plan: Plan {
+                light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
+                stale: true,
+                casters: Vec::new(),
+                marks: Vec::new(),
+                ghost: None,
+            },
+        }
+    }
+
+    /// Attachments for a picture of `size` pixels.
+    pub fn picture(&self, gpu: &Gpu, picture: &Picture, size: (u32, u32)) -> PictureTarget {
+        let Self {
+            output,
+            layout,
+            shadow,
+            anaglyph,
+            ..
+        } = self;
+        PictureTarget::new(gpu, picture, size, *output, layout, shadow, anaglyph)
+    }
+
+    /// Takes the state that the next submission draws.
+    pub fn set_state(&mut self, gpu: &Gpu, stage: &Stage, latched: &Latched, show: Show) {
+        let state = &latched.state;
+        let mut list = InstanceList::default();
+        let mut casters = Vec::new();
+        let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
+        let radius = bounds.radius;
+        let god_object = god_object::instance(stage, &state.god_object);
+        casters.push(list.batch(stage.god_object.mesh, [god_object]));
+        for body in &stage.obstacles {
+            let pose = pose_of(body, state);
+            bounds = bounds.union(&self.bounds(stage, body, pose));
+            casters.push(list.batch(body.mesh, [obstacles::instance(stage, body, pose)]));
+        }
+
+        let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
+        let mut marks = Vec::new();
+        if show.contacts {
+            marks.push(list.batch(dot, contacts::instances(stage, &state.contacts, radius)));
+        }
+        if show.force {
+            let pose = &state.god_object;
+            let mark = force::instance(stage, pose, &state.force, &self.god_object_box, radius);
+            marks.push(list.batch(arrow, mark));
+        }
+        let ghost = show
+            .ghost
+            .then(|| list.batch(stage.god_object.mesh, [ghost::instance(stage, &state.device)]));
+
+        self.plan = Plan {
+            light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
+            stale: latched.stale,
+            casters,
+            marks,
+            ghost,
+        };
+        gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
+        self.shadow.aim(&gpu.queue, &self.plan.light);
+    }
+
+    /// Draws the shadow map of the state: once per state, before its pictures.
+    pub fn draw_shadow(&self, encoder: &mut wgpu::CommandEncoder) {
+        let mut pass = self.shadow.begin(encoder);
+        pass.set_vertex_buffer(1, self.instances.slice(..));
+        self.draw_batches(&mut pass, &self.plan.casters);
+    }
+
+    /// Draws one picture of one screen to `target`.
+    pub fn draw(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        screen: &Screen,
+        eyes: &Eyes,
+        picture: &PictureTarget,
+        target: &wgpu::TextureView,
+    ) {
+        let sees = |view: &ViewTarget| self.set_view(gpu, screen, eyes, view);
+        let seen: Vec<bool> = picture.views.iter().map(sees).collect();
+        if let Some(combined) = &picture.anaglyph {
+            for (view, seen) in picture.views.iter().zip(&seen) {
+                let own = view.own.as_ref().unwrap_or(target);
+                let mut pass = begin(encoder, picture, own);
+                if *seen {
+                    self.draw_view(&mut pass, picture, view);
+                }
+            }
+            self.anaglyph.draw(encoder, combined, target);
+        } else {
+            let mut pass = begin(encoder, picture, target);
+            for (view, _) in picture.views.iter().zip(&seen).filter(|(_, seen)| **seen) {
+                self.draw_view(&mut pass, picture, view);
+            }
+        }
+    }
+
+    /// Writes a view's uniform; `false` where this eye does not see the screen.
+    fn set_view(&self, gpu: &Gpu, screen: &Screen, eyes: &Eyes, view: &ViewTarget) -> bool {
+        let eye = eyes.position(view.eye);
+        let reach = (eye - self.floor.center).norm() + 2.0 * self.floor.radius;
+        let planes = ClipPlanes {
+            near: NEAR,
+            far: reach.max(10.0 * NEAR),
+        };
+        let Some(clip) = screen.clip_from_workbench(&eye, &planes) else {
+            return false;
+        };
+        let Plan { light, stale, .. } = &self.plan;
+        let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale);
+        gpu.queue.write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
+        true
+    }
+
+    fn draw_view(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        picture: &PictureTarget,
+        view: &ViewTarget,
+    ) {
+        let [x, y, width, height] = pixels_of(view, picture.size);
+        pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
+        pass.set_scissor_rect(x, y, width, height);
+        pass.set_bind_group(0, &view.group, &[]);
+
+        pass.set_pipeline(&self.pipelines.background);
+        pass.draw(0..3, 0..1);
+        pass.set_pipeline(&self.pipelines.mesh);
+        pass.set_vertex_buffer(1, self.instances.slice(..));
+        self.draw_batches(pass, &self.plan.casters);
+        self.draw_batches(pass, &self.plan.marks);
+        pass.set_pipeline(&self.pipelines.floor);
+        pass.draw(0..4, 0..1);
+        if let Some(ghost) = &self.plan.ghost {
+            pass.set_pipeline(&self.pipelines.ghost);
+            self.draw_batches(pass, std::slice::from_ref(ghost));
+        }
+    }
+
+    fn draw_batches(&self, pass: &mut wgpu::RenderPass<'_>, batches: &[Batch]) {
+        for batch in batches.iter().filter(|batch| !batch.instances.is_empty()) {
+            self.meshes[batch.mesh].draw(pass, batch.instances.clone());
+        }
+    }
+
+    fn bounds(&self, stage: &Stage, body: &StageBody, pose: &Isometry3<f64>) -> Bounds {
+        stage.body_bounds(body, pose, &self.mesh_bounds[body.mesh])
+    }
+}
+
+/// Instances of one frame, in the order of the buffer.
+#[derive(Default)]
+struct InstanceList {
+    instances: Vec<Instance>,
+}
+
+impl InstanceList {
+    fn batch(&mut self, mesh: usize, instances: impl IntoIterator<Item = Instance>) -> Batch {
+        let first = self.instances.len() as u32;
+        self.instances.extend(instances);
+        let instances = first..self.instances.len() as u32;
+        Batch { mesh, instances }
+    }
+}
+
+/// Where a body is: where the state says, else where the scene put it.
+fn pose_of<'a>(body: &'a StageBody, state: &'a State) -> &'a Isometry3<f64> {
+    let moved = state.bodies.iter().find(|(id, _)| *id == body.id);
+    moved.map_or(&body.pose, |(_, pose)| pose)
+}
+
+/// The obstacles; the god-object where there are none.
+fn standing_bodies(stage: &Stage, mesh_bounds: &[Bounds]) -> Bounds {
+    let bounds = |body: &StageBody| stage.body_bounds(body, &body.pose, &mesh_bounds[body.mesh]);
+    let all = stage.obstacles.iter().map(bounds).reduce(|a, b| a.union(&b));
+    all.unwrap_or_else(|| bounds(&stage.god_object))
+}
+
+/// Height of the lowest vertex of what stands on the workbench, in metres.
+fn lowest_point(stage: &Stage) -> f64 {
+    let god_object = std::slice::from_ref(&stage.god_object);
+    let standing = if stage.obstacles.is_empty() { god_object } else { &stage.obstacles };
+    let height = |body: &StageBody| {
+        let model = god_object::workbench_from_mesh(stage, body, &body.pose);
+        let mesh = &stage.meshes[body.mesh];
+        let heights = mesh.vertices.iter().map(move |v| {
+            model.transform_point(&Point3::from(*v).cast::<f64>()).z
+        });
+        heights.fold(f64::INFINITY, f64::min)
+    };
+    let lowest = standing.iter().map(height).fold(f64::INFINITY, f64::min);
+    if lowest.is_finite() { lowest } else { 0.0 }
+}
+
+/// The pixels of a view: left, top, width, height; at least one pixel each way.
+fn pixels_of(view: &ViewTarget, (width, height): (u32, u32)) -> [u32; 4] {
+    let part = view.part;
+    let cut = |fraction: f32, size: u32| ((fraction * size as f32).round() as u32).min(size - 1);
+    let (x, y) = (cut(part.x, width), cut(part.y, height));
+    let wide = ((part.width * width as f32).round() as u32).clamp(1, width - x);
+    let high = ((part.height * height as f32).round() as u32).clamp(1, height - y);
+    [x, y, wide, high]
+}
+
+/// Begins the main pass of a picture, cleared to black.
+fn begin<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    picture: &PictureTarget,
+    target: &wgpu::TextureView,
+) -> wgpu::RenderPass<'a> {
+    let (view, resolve_target, store) = match &picture.multisampled {
+        Some(samples) => (samples, Some(target), wgpu::StoreOp::Discard),
+        None => (target, None, wgpu::StoreOp::Store),
+    };
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("picture"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &picture.depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Discard,
+            }),
+            stencil_ops: None,
+        }),
+        ..Default::default()
+    })
+}

@@ -1,0 +1,42 @@
+//! The device ghost: the god-object's body where the device is, translucent. The gap between the
+//! two is what the coupling turns into force.
+
+use nalgebra::Isometry3;
+
+use super::god_object::workbench_from_mesh;
+use super::mesh::{Instance, Material, buffer_layouts};
+use super::pipeline::{FrameLayout, Layer, Output, PipelineParts};
+use crate::stage::Stage;
+
+const MATERIAL: Material = Material {
+    colour: [0.02, 0.50, 0.64, 0.16],
+    gloss: 0.0,
+    sharpness: 1.0,
+    own_light: 0.0,
+};
+
+/// The ghost at the device's pose, scene frame.
+pub(crate) fn instance(stage: &Stage, device_pose: &Isometry3<f64>) -> Instance {
+    Instance::new(&workbench_from_mesh(stage, &stage.god_object, device_pose), &MATERIAL)
+}
+
+/// The pipeline of translucent bodies.
+pub(crate) fn pipeline(
+    device: &wgpu::Device,
+    layout: &FrameLayout,
+    output: Output,
+) -> wgpu::RenderPipeline {
+    let parts = PipelineParts {
+        label: "ghost",
+        source: concat!(
+            include_str!("../../shaders/mesh.wgsl"),
+            include_str!("../../shaders/ghost.wgsl")
+        ),
+        vertex: "vertex",
+        fragment: "ghost",
+        buffers: &buffer_layouts(),
+        topology: wgpu::PrimitiveTopology::TriangleList,
+        layer: Layer::Translucent,
+    };
+    layout.pipeline(device, output, &parts)
+}

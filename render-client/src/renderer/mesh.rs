@@ -1,0 +1,130 @@
+//! Meshes on the graphics card, their instances, and the pipeline that draws them lit and opaque.
+
+use bytemuck::{Pod, Zeroable};
+use nalgebra::Matrix4;
+
+use super::pipeline::{FrameLayout, Layer, Output, PipelineParts, filled};
+use crate::normals::shade;
+use crate::stage::TriangleMesh;
+
+/// A vertex with its normal.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct Vertex {
+    position: [f32; 3],
+    normal: [f32; 3],
+}
+
+/// One body of one state. Mirrors `struct Instance` of mesh.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(crate) struct Instance {
+    model: [[f32; 4]; 4],
+    colour: [f32; 4],
+    gloss: [f32; 4],
+}
+
+/// How a surface takes light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Material {
+    /// Linear red, green, blue; opacity.
+    pub(crate) colour: [f32; 4],
+    /// Strength of the highlight.
+    pub(crate) gloss: f32,
+    /// Exponent of the highlight: higher is narrower.
+    pub(crate) sharpness: f32,
+    /// Share of the colour shown as it is, without lighting, in [0, 1].
+    pub(crate) own_light: f32,
+}
+
+/// A mesh on the graphics card.
+#[derive(Debug)]
+pub(crate) struct MeshBuffers {
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    count: u32,
+}
+
+/// Consecutive instances of one mesh.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Batch {
+    /// Place of the mesh in the renderer's list.
+    pub(crate) mesh: usize,
+    /// Places of the instances in the renderer's buffer.
+    pub(crate) instances: std::ops::Range<u32>,
+}
+
+impl Instance {
+    /// `workbench_from_mesh` is a rotation times a scale along the mesh's axes, then a translation.
+    pub(crate) fn new(workbench_from_mesh: &Matrix4<f64>, material: &Material) -> Self {
+        Self {
+            model: workbench_from_mesh.cast::<f32>().into(),
+            colour: material.colour,
+            gloss: [material.gloss, material.sharpness, material.own_light, 0.0],
+        }
+    }
+}
+
+impl MeshBuffers {
+    pub(crate) fn new(device: &wgpu::Device, mesh: &TriangleMesh) -> Self {
+        let shaded = shade(mesh);
+        let vertex = |&(position, normal)| Vertex { position, normal };
+        let mut vertices: Vec<Vertex> = shaded.vertices.iter().map(vertex).collect();
+        if vertices.is_empty() {
+            vertices.push(Vertex::zeroed()); // a buffer has at least one element
+        }
+        let indices = if shaded.indices.is_empty() { vec![0] } else { shaded.indices };
+        let count = if mesh.triangles.is_empty() { 0 } else { indices.len() as u32 };
+        Self {
+            vertices: filled(device, "vertices", &vertices, wgpu::BufferUsages::VERTEX),
+            indices: filled(device, "indices", &indices, wgpu::BufferUsages::INDEX),
+            count,
+        }
+    }
+
+    /// Draws instances; pipeline, bind group and instance buffer (slot 1) are set.
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, instances: std::ops::Range<u32>) {
+        pass.set_vertex_buffer(0, self.vertices.slice(..));
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.count, 0, instances);
+    }
+}
+
+const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 2] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+const INSTANCE_ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
+    2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32x4, 6 => Float32x4, 7 => Float32x4
+];
+
+/// Layouts of the two vertex buffers: vertices, instances.
+pub(crate) fn buffer_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2] {
+    let layout = |stride: usize, step_mode, attributes| {
+        Some(wgpu::VertexBufferLayout {
+            array_stride: stride as u64,
+            step_mode,
+            attributes,
+        })
+    };
+    [
+        layout(size_of::<Vertex>(), wgpu::VertexStepMode::Vertex, &VERTEX_ATTRIBUTES),
+        layout(size_of::<Instance>(), wgpu::VertexStepMode::Instance, &INSTANCE_ATTRIBUTES),
+    ]
+}
+
+/// The pipeline of opaque lit bodies.
+pub(crate) fn pipeline(
+    device: &wgpu::Device,
+    layout: &FrameLayout,
+    output: Output,
+) -> wgpu::RenderPipeline {
+    let parts = PipelineParts {
+        label: "mesh",
+        source: include_str!("../../shaders/mesh.wgsl"),
+        vertex: "vertex",
+        fragment: "fragment",
+        buffers: &buffer_layouts(),
+        topology: wgpu::PrimitiveTopology::TriangleList,
+        layer: Layer::Opaque,
+    };
+    layout.pipeline(device, output, &parts)
+}

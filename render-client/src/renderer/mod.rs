@@ -1,0 +1,23 @@
+//! Draws the stage with wgpu: one file per drawn thing, its shader of the same name in `shaders/`.
+
+mod anaglyph;
+mod background;
+mod contacts;
+mod draw;
+mod floor;
+mod force;
+mod frame;
+mod ghost;
+mod god_object;
+mod gpu;
+mod mesh;
+mod obstacles;
+mod picture;
+mod pipeline;
+mod shadow;
+pub mod shapes;
+
+pub use draw::Renderer;
+pub(crate) use gpu::new_instance;
+pub use gpu::{AdapterSummary, Gpu};
+pub use picture::{OffScreen, PictureTarget};

@@ -1,0 +1,178 @@
+//! What one picture (window or image) needs on the graphics card, and pictures that are read back.
+
+use super::anaglyph::Anaglyph;
+use super::gpu::Gpu;
+use super::pipeline::{DEPTH, FrameLayout, Output, attachment};
+use super::shadow::ShadowMap;
+use crate::error::RenderError;
+use crate::stereo::{Part, Picture};
+use crate::view::Eye;
+
+/// Attachments and uniforms of one picture at one size.
+#[derive(Debug)]
+pub struct PictureTarget {
+    pub(crate) size: (u32, u32),
+    /// Where several samples per pixel are drawn to.
+    pub(crate) multisampled: Option<wgpu::TextureView>,
+    pub(crate) depth: wgpu::TextureView,
+    pub(crate) views: Vec<ViewTarget>,
+    /// Combines the views when they lie over each other.
+    pub(crate) anaglyph: Option<wgpu::BindGroup>,
+}
+
+/// One eye's part of a picture.
+#[derive(Debug)]
+pub(crate) struct ViewTarget {
+    pub(crate) eye: Eye,
+    pub(crate) part: Part,
+    pub(crate) uniform: wgpu::Buffer,
+    pub(crate) group: wgpu::BindGroup,
+    /// A picture of this eye's own, when views lie over each other.
+    pub(crate) own: Option<wgpu::TextureView>,
+}
+
+impl PictureTarget {
+    pub(crate) fn new(
+        gpu: &Gpu,
+        picture: &Picture,
+        size: (u32, u32),
+        output: Output,
+        layout: &FrameLayout,
+        shadow: &ShadowMap,
+        anaglyph: &Anaglyph,
+    ) -> Self {
+        let device = &gpu.device;
+        let only_drawn = wgpu::TextureUsages::empty();
+        let depth = Output {
+            format: DEPTH,
+            ..output
+        };
+        let single = Output {
+            samples: 1,
+            ..output
+        };
+        let view_of = |texture: wgpu::Texture| texture.create_view(&Default::default());
+        let views: Vec<ViewTarget> = picture
+            .views
+            .iter()
+            .map(|&(eye, part)| {
+                let (uniform, group) = layout.view(device, &shadow.view, &shadow.sampler);
+                let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
+                let own = || view_of(attachment(device, "eye", size, single, sampled));
+                ViewTarget {
+                    eye,
+                    part,
+                    uniform,
+                    group,
+                    own: picture.anaglyph.then(own),
+                }
+            })
+            .collect();
+        let combined = match views.as_slice() {
+            [
+                ViewTarget {
+                    own: Some(left), ..
+                },
+                ViewTarget {
+                    own: Some(right), ..
+                },
+            ] => Some(anaglyph.bind(device, left, right)),
+            _ => None,
+        };
+        let multisampled = (output.samples > 1)
+            .then(|| view_of(attachment(device, "samples", size, output, only_drawn)));
+        Self {
+            size,
+            multisampled,
+            depth: view_of(attachment(device, "depth", size, depth, only_drawn)),
+            views,
+            anaglyph: combined,
+        }
+    }
+}
+
+/// A picture that is drawn without a window, and can be read back.
+#[derive(Debug)]
+pub struct OffScreen {
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+    readback: wgpu::Buffer,
+    size: (u32, u32),
+    padded_row: u32,
+}
+
+impl OffScreen {
+    /// The colour format of off-screen pictures.
+    pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+
+    /// An empty picture.
+    pub fn new(gpu: &Gpu, (width, height): (u32, u32)) -> Self {
+        let output = Output {
+            format: Self::FORMAT,
+            samples: 1,
+        };
+        let copied = wgpu::TextureUsages::COPY_SRC;
+        let texture = attachment(&gpu.device, "picture", (width, height), output, copied);
+        let padded_row = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        Self {
+            view: texture.create_view(&Default::default()),
+            readback: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("readback"),
+                size: u64::from(padded_row) * u64::from(height),
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            }),
+            texture,
+            size: (width, height),
+            padded_row,
+        }
+    }
+
+    /// What to draw to.
+    pub fn view(&self) -> &wgpu::TextureView {
+        &self.view
+    }
+
+    /// Asks for the picture to be copied after what `encoder` holds so far.
+    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder) {
+        let (width, height) = self.size;
+        encoder.copy_texture_to_buffer(
+            self.texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.readback,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(self.padded_row),
+                    rows_per_image: Some(height),
+                },
+            },
+            self.texture.size(),
+        );
+        debug_assert_eq!(self.texture.size().width, width);
+    }
+
+    /// The picture of the last copy that was submitted; waits for it.
+    pub fn read(&self, gpu: &Gpu) -> Result<image::RgbaImage, RenderError> {
+        let (width, height) = self.size;
+        let (done, mapped) = std::sync::mpsc::channel();
+        self.readback.map_async(wgpu::MapMode::Read, .., move |result| {
+            let _ = done.send(result); // nobody listens only if the wait below failed
+        });
+        gpu.finish()?;
+        match mapped.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(gpu.broken(&error)),
+            Err(error) => return Err(gpu.broken(&error)),
+        }
+        let mut pixels = Vec::with_capacity(4 * width as usize * height as usize);
+        {
+            let rows = self.readback.get_mapped_range(..).map_err(|error| gpu.broken(&error))?;
+            for row in rows.chunks(self.padded_row as usize) {
+                pixels.extend_from_slice(&row[..4 * width as usize]);
+            }
+        }
+        self.readback.unmap();
+        image::RgbaImage::from_raw(width, height, pixels)
+            .ok_or_else(|| gpu.broken(&"a picture of the wrong size was read back"))
+    }
+}

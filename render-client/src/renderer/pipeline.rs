@@ -1,0 +1,210 @@
+//! What the pipelines have in common: formats, the shared bind group, the way to build one.
+
+use wgpu::util::DeviceExt;
+
+use super::frame::FrameUniform;
+
+/// Format of all depth textures.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Colour format and samples that a set of pipelines draws to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Output {
+    pub(crate) format: wgpu::TextureFormat,
+    pub(crate) samples: u32,
+}
+
+/// How a pipeline of the main pass treats colour and depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Layer {
+    /// Hides what is behind it.
+    Opaque,
+    /// Lets what is behind it shine through; seen from its front.
+    Translucent,
+    /// As `Translucent`, seen from both sides.
+    Plane,
+    /// Behind everything.
+    Background,
+}
+
+/// A pipeline of the main pass.
+pub(crate) struct PipelineParts<'a> {
+    pub(crate) label: &'a str,
+    pub(crate) source: &'a str,
+    pub(crate) vertex: &'a str,
+    pub(crate) fragment: &'a str,
+    pub(crate) buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub(crate) topology: wgpu::PrimitiveTopology,
+    pub(crate) layer: Layer,
+}
+
+/// The shared bind group's layout, and the pipeline layout made of it alone.
+#[derive(Debug)]
+pub(crate) struct FrameLayout {
+    group: wgpu::BindGroupLayout,
+    pipeline: wgpu::PipelineLayout,
+}
+
+impl FrameLayout {
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
+        let entry = |binding, visibility, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility,
+            ty,
+            count: None,
+        };
+        let uniform = wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        let shadow_map = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Depth,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
+        let group = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("frame"),
+            entries: &[
+                entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT, uniform),
+                entry(1, wgpu::ShaderStages::FRAGMENT, shadow_map),
+                entry(2, wgpu::ShaderStages::FRAGMENT, comparison),
+            ],
+        });
+        let pipeline = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("frame"),
+            bind_group_layouts: &[Some(&group)],
+            immediate_size: 0,
+        });
+        Self { group, pipeline }
+    }
+
+    /// A uniform buffer and its bind group: one pair for each view that is drawn in one submission.
+    pub(crate) fn view(
+        &self,
+        device: &wgpu::Device,
+        shadow_map: &wgpu::TextureView,
+        shadow_sampler: &wgpu::Sampler,
+    ) -> (wgpu::Buffer, wgpu::BindGroup) {
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("frame"),
+            size: size_of::<FrameUniform>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &self.group,
+            entries: &[
+                entry(0, buffer.as_entire_binding()),
+                entry(1, wgpu::BindingResource::TextureView(shadow_map)),
+                entry(2, wgpu::BindingResource::Sampler(shadow_sampler)),
+            ],
+        });
+        (buffer, group)
+    }
+
+    /// A pipeline of the main pass; `source` follows frame.wgsl.
+    pub(crate) fn pipeline(
+        &self,
+        device: &wgpu::Device,
+        output: Output,
+        parts: &PipelineParts<'_>,
+    ) -> wgpu::RenderPipeline {
+        let source = format!("{}\n{}", include_str!("../../shaders/frame.wgsl"), parts.source);
+        let module = shader(device, parts.label, source);
+        let opaque = matches!(parts.layer, Layer::Opaque | Layer::Background);
+        let one_sided = matches!(parts.layer, Layer::Opaque | Layer::Translucent);
+        let background = parts.layer == Layer::Background;
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(parts.label),
+            layout: Some(&self.pipeline),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some(parts.vertex),
+                compilation_options: Default::default(),
+                buffers: parts.buffers,
+            },
+            primitive: wgpu::PrimitiveState {
+                topology: parts.topology,
+                cull_mode: one_sided.then_some(wgpu::Face::Back),
+                ..Default::default()
+            },
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(parts.layer == Layer::Opaque),
+                depth_compare: Some(if background {
+                    wgpu::CompareFunction::Always
+                } else {
+                    wgpu::CompareFunction::Less
+                }),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: wgpu::MultisampleState {
+                count: output.samples,
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(parts.fragment),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: output.format,
+                    blend: (!opaque).then_some(wgpu::BlendState::ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+/// A shader module from WGSL that is part of this program.
+pub(crate) fn shader(device: &wgpu::Device, label: &str, source: String) -> wgpu::ShaderModule {
+    device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    })
+}
+
+/// A buffer filled once.
+pub(crate) fn filled<T: bytemuck::NoUninit>(
+    device: &wgpu::Device,
+    label: &str,
+    contents: &[T],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents: bytemuck::cast_slice(contents),
+        usage,
+    })
+}
+
+/// A texture to draw to.
+pub(crate) fn attachment(
+    device: &wgpu::Device,
+    label: &str,
+    (width, height): (u32, u32),
+    output: Output,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: output.samples,
+        dimension: wgpu::TextureDimension::D2,
+        format: output.format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
+        view_formats: &[],
+    })
+}

@@ -1,0 +1,115 @@
+//! The shadow map of the key light: depth of god-object and obstacles as the light sees them.
+
+use super::frame::KeyLight;
+use super::mesh::buffer_layouts;
+use super::pipeline::{DEPTH, Output, attachment, shader};
+
+/// The map, its sampler and the pipeline that draws it.
+#[derive(Debug)]
+pub(crate) struct ShadowMap {
+    pub(crate) view: wgpu::TextureView,
+    pub(crate) sampler: wgpu::Sampler,
+    pipeline: wgpu::RenderPipeline,
+    uniform: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+impl ShadowMap {
+    /// Texels along an edge: sharp enough for one view of a scene, and cheap in software.
+    pub(crate) const TEXELS: u32 = 1024;
+
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
+        let single = Output {
+            format: DEPTH,
+            samples: 1,
+        };
+        let size = (Self::TEXELS, Self::TEXELS);
+        let map = attachment(device, "shadow map", size, single, wgpu::TextureUsages::TEXTURE_BINDING);
+        let pipeline = pipeline(device);
+        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("shadow"),
+            size: size_of::<[[f32; 4]; 4]>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: uniform.as_entire_binding(),
+            }],
+        });
+        Self {
+            view: map.create_view(&Default::default()),
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("shadow"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                compare: Some(wgpu::CompareFunction::LessEqual),
+                ..Default::default()
+            }),
+            pipeline,
+            uniform,
+            group,
+        }
+    }
+
+    /// Sets the light for the next submission.
+    pub(crate) fn aim(&self, queue: &wgpu::Queue, light: &KeyLight) {
+        let columns: [[f32; 4]; 4] = light.shadow_from_workbench.cast::<f32>().into();
+        queue.write_buffer(&self.uniform, 0, bytemuck::cast_slice(&columns));
+    }
+
+    /// Begins the pass; the caller sets the instances and draws what casts.
+    pub(crate) fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadow"),
+            color_attachments: &[],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.view,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(1.0),
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.group, &[]);
+        pass
+    }
+}
+
+fn pipeline(device: &wgpu::Device) -> wgpu::RenderPipeline {
+    let source = include_str!("../../shaders/shadow.wgsl").to_owned();
+    let module = shader(device, "shadow", source);
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("shadow"),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &buffer_layouts(),
+        },
+        primitive: Default::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: Default::default(),
+            // Against a surface shadowing itself; the rest is done by the offset along the normal.
+            bias: wgpu::DepthBiasState {
+                constant: 2,
+                slope_scale: 1.5,
+                clamp: 0.0,
+            },
+        }),
+        multisample: Default::default(),
+        fragment: None,
+        multiview_mask: None,
+        cache: None,
+    })
+}

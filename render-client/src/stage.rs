@@ -1,0 +1,159 @@
+//! What a node draws, as plain data: screens, viewer, bodies with their meshes.
+//!
+//! Two frames are in use. Bodies move in the **scene** frame of the simulation; screens and eyes
+//! live in the **workbench** frame. `workbench_from_scene` places one in the other and may enlarge
+//! it: a scene of a hand's size fills a workbench of two metres.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Point3, Similarity3};
+
+use crate::stereo::Stereo;
+use crate::view::Screen;
+
+/// Everything that stays the same over a session.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// Screens of this node.
+    pub screens: Vec<StageScreen>,
+    /// Where the viewer's head is while no tracker says so, workbench frame.
+    pub head: Isometry3<f64>,
+    /// Distance between the viewer's eyes, in metres.
+    pub eye_separation: f64,
+    /// Places the scene on the workbench.
+    pub workbench_from_scene: Similarity3<f64>,
+    /// Meshes, each named by its place in this list.
+    pub meshes: Vec<Arc<TriangleMesh>>,
+    /// The body in the user's hand.
+    pub god_object: StageBody,
+    /// Where the force on the hand applies, in the god-object's body frame.
+    pub reference_point: Point3<f64>,
+    /// All others.
+    pub obstacles: Vec<StageBody>,
+}
+
+/// One screen of a node.
+#[derive(Clone, Debug)]
+pub struct StageScreen {
+    /// Name, unique on the node.
+    pub name: String,
+    /// Where it stands.
+    pub screen: Screen,
+    /// Pixels of one eye's view, across and down.
+    pub pixels: (u32, u32),
+    /// How it shows two eyes.
+    pub stereo: Stereo,
+}
+
+/// A body to draw.
+#[derive(Clone, Copy, Debug)]
+pub struct StageBody {
+    /// Id by which states name it.
+    pub id: u16,
+    /// Place of its mesh in [`Stage::meshes`].
+    pub mesh: usize,
+    /// Size of the body over that of its mesh.
+    pub scale: f64,
+    /// Pose at the start, scene frame.
+    pub pose: Isometry3<f64>,
+    /// Linear red, green and blue in [0, 1].
+    pub colour: [f32; 3],
+}
+
+/// Vertices and triangles, counter-clockwise seen from outside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TriangleMesh {
+    /// In metres, body frame.
+    pub vertices: Vec<[f32; 3]>,
+    /// Three places in `vertices` each.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What is drawn besides god-object and obstacles. The paper shows the user the god-object only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Show {
+    /// The device pose as a translucent copy of the god-object.
+    pub ghost: bool,
+    /// Contact points as dots.
+    pub contacts: bool,
+    /// The force on the hand as an arrow.
+    pub force: bool,
+}
+
+/// A sphere around something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Its centre, in metres.
+    pub center: Point3<f64>,
+    /// Its radius, in metres.
+    pub radius: f64,
+}
+
+impl TriangleMesh {
+    /// Lowest and highest coordinates, body frame; both the origin for an empty mesh.
+    pub fn corners(&self) -> (Point3<f64>, Point3<f64>) {
+        let points = self.vertices.iter().map(|v| Point3::from(*v).cast::<f64>());
+        let boxes = points.map(|p| (p, p));
+        let around = boxes.reduce(|(low, high), (p, q)| (low.inf(&p), high.sup(&q)));
+        around.unwrap_or_default()
+    }
+
+    /// Sphere around the middle of the mesh's box, body frame.
+    pub fn bounds(&self) -> Bounds {
+        let (low, high) = self.corners();
+        let center = nalgebra::center(&low, &high);
+        let far = |v: &[f32; 3]| (Point3::from(*v).cast::<f64>() - center).norm();
+        let radius = self.vertices.iter().map(far).fold(0.0, f64::max);
+        Bounds { center, radius }
+    }
+}
+
+impl Stage {
+    /// Sphere around a body at `pose` (scene frame), in the workbench frame, from that of its mesh.
+    pub fn body_bounds(&self, body: &StageBody, pose: &Isometry3<f64>, mesh: &Bounds) -> Bounds {
+        let Bounds { center, radius } = *mesh;
+        Bounds {
+            center: self.workbench_from_scene * (pose * Point3::from(center.coords * body.scale)),
+            radius: radius * body.scale * self.workbench_from_scene.scaling(),
+        }
+    }
+}
+
+impl Bounds {
+    /// A sphere around both.
+    pub fn union(&self, other: &Self) -> Self {
+        let apart = (other.center - self.center).norm();
+        if apart + other.radius <= self.radius {
+            return *self;
+        }
+        if apart + self.radius <= other.radius {
+            return *other;
+        }
+        let radius = 0.5 * (apart + self.radius + other.radius);
+        let toward = (other.center - self.center) / apart; // apart > 0: neither holds the other
+        Self {
+            center: self.center + toward * (radius - self.radius),
+            radius,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_union_holds_both_spheres(
+            x in -1.0..1.0f64, y in -1.0..1.0f64, a in 0.0..1.0f64, b in 0.0..1.0f64,
+        ) {
+            let one = Bounds { center: Point3::origin(), radius: a };
+            let two = Bounds { center: Point3::new(x, y, 0.5), radius: b };
+            let both = one.union(&two);
+            for part in [one, two] {
+                prop_assert!((part.center - both.center).norm() + part.radius <= both.radius + 1e-12);
+            }
+        }
+    }
+}

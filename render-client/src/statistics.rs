@@ -1,0 +1,243 @@
+//! What a node counts while it draws, and its report at the end.
+
+use std::time::{Duration, Instant};
+
+use hdrhistogram::Histogram;
+use taut_proto::ClientStats;
+use taut_proto::stats::DrawnState;
+
+use crate::timeline::State;
+
+/// Time between two reports to the server.
+pub(crate) const REPORT_PERIOD: Duration = Duration::from_secs(1);
+
+/// Longest age told apart, in microseconds; older counts as this.
+const MAX_AGE_US: u64 = 60_000_000;
+
+/// Most drawn states named in one report.
+const MAX_DRAWN: usize = 64;
+
+/// Median, upper percentiles and maximum of a quantity, in milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Distribution {
+    /// Half of the values are below.
+    pub p50: f64,
+    /// 99 of 100 are below.
+    pub p99: f64,
+    /// 999 of 1000 are below.
+    pub p999: f64,
+    /// The largest.
+    pub max: f64,
+    /// How many there were.
+    pub count: u64,
+}
+
+/// Why a node stopped drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// As many frames as were asked for are drawn.
+    Frames,
+    /// The time asked for is over.
+    Duration,
+    /// The server said that it stops.
+    ServerStopped,
+    /// A signal (Ctrl-C, SIGTERM).
+    Interrupted,
+    /// The user closed a window.
+    Closed,
+}
+
+/// What a node did.
+#[derive(Clone, Debug)]
+pub struct RenderReport {
+    /// Its name.
+    pub node: String,
+    /// `udp` or `quic`.
+    pub transport: String,
+    /// The adapter that drew.
+    pub adapter: String,
+    /// Frames drawn, each on all screens of the node.
+    pub frames: u64,
+    /// Frames that showed a state so old that it was marked as stale.
+    pub stale_frames: u64,
+    /// Frames per second between the first and the last.
+    pub fps: f64,
+    /// Age of the state when it was taken to be drawn.
+    pub pose_age_ms: Distribution,
+    /// Age of the state when the graphics card had drawn it.
+    pub drawn_age_ms: Distribution,
+    /// States that were sent and did not arrive.
+    pub packets_lost: u64,
+    /// States that arrived.
+    pub packets_received: u64,
+    /// Why it ended.
+    pub ended: Ended,
+}
+
+/// Counts of a running node.
+#[derive(Debug)]
+pub(crate) struct Statistics {
+    pub(crate) frames: u64,
+    pub(crate) stale_frames: u64,
+    pose_age: Histogram<u64>,
+    drawn_age: Histogram<u64>,
+    since_report: Histogram<u64>,
+    frames_at_report: u64,
+    drawn: Vec<DrawnState>,
+    first_frame: Option<Instant>,
+    last_frame: Option<Instant>,
+    last_report: Instant,
+}
+
+impl Statistics {
+    pub(crate) fn new() -> Self {
+        Self {
+            frames: 0,
+            stale_frames: 0,
+            pose_age: histogram(),
+            drawn_age: histogram(),
+            since_report: histogram(),
+            frames_at_report: 0,
+            drawn: Vec::with_capacity(MAX_DRAWN),
+            first_frame: None,
+            last_frame: None,
+            last_report: Instant::now(),
+        }
+    }
+
+    /// Counts a frame: its state, session time when the state was taken and when it was drawn.
+    pub(crate) fn frame(&mut self, state: &State, stale: bool, taken_ns: u64, drawn_ns: u64) {
+        let age_us = |now: u64| (now.saturating_sub(state.time_ns) / 1000).min(MAX_AGE_US);
+        self.pose_age.saturating_record(age_us(taken_ns));
+        self.since_report.saturating_record(age_us(taken_ns));
+        self.drawn_age.saturating_record(age_us(drawn_ns));
+        self.frames += 1;
+        self.stale_frames += u64::from(stale);
+        let (tick, state_hash) = state.source;
+        if self.drawn.len() < MAX_DRAWN {
+            self.drawn.push(DrawnState { tick, state_hash });
+        }
+        let now = Instant::now();
+        self.first_frame.get_or_insert(now);
+        self.last_frame = Some(now);
+    }
+
+    /// The report that is due, if one is, else (with `last`) the one at the end.
+    pub(crate) fn report(&mut self, last: bool) -> Option<ClientStats> {
+        let elapsed = self.last_report.elapsed();
+        if elapsed < REPORT_PERIOD && !last {
+            return None;
+        }
+        let ms = |us: u64| us as f32 / 1000.0;
+        let ages = &self.since_report;
+        let frames = self.frames - self.frames_at_report;
+        let stats = ClientStats {
+            frames: self.frames,
+            fps: frames as f32 / elapsed.as_secs_f32().max(1e-3),
+            pose_age_ms_p50: ms(ages.value_at_quantile(0.5)),
+            pose_age_ms_p99: ms(ages.value_at_quantile(0.99)),
+            pose_age_ms_max: ms(ages.max()),
+            drawn: std::mem::take(&mut self.drawn),
+            ..Default::default()
+        };
+        self.since_report.reset();
+        self.frames_at_report = self.frames;
+        self.last_report = Instant::now();
+        Some(stats)
+    }
+
+    /// Frames per second between the first and the last frame.
+    pub(crate) fn fps(&self) -> f64 {
+        match (self.first_frame, self.last_frame) {
+            (Some(first), Some(last)) if last > first => {
+                (self.frames - 1) as f64 / (last - first).as_secs_f64()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Ages when taken and when drawn.
+    pub(crate) fn ages(&self) -> (Distribution, Distribution) {
+        (distribution(&self.pose_age), distribution(&self.drawn_age))
+    }
+}
+
+fn histogram() -> Histogram<u64> {
+    // Three significant figures over a fixed range: constants that hdrhistogram takes.
+    Histogram::new_with_bounds(1, MAX_AGE_US, 3).unwrap_or_else(|_| unreachable!("constant bounds"))
+}
+
+fn distribution(histogram: &Histogram<u64>) -> Distribution {
+    let ms = |us: u64| us as f64 / 1000.0;
+    Distribution {
+        p50: ms(histogram.value_at_quantile(0.5)),
+        p99: ms(histogram.value_at_quantile(0.99)),
+        p999: ms(histogram.value_at_quantile(0.999)),
+        max: ms(histogram.max()),
+        count: histogram.len(),
+    }
+}
+
+impl std::fmt::Display for RenderReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            node,
+            frames,
+            fps,
+            pose_age_ms: age,
+            packets_lost,
+            packets_received,
+            ..
+        } = self;
+        write!(
+            f,
+            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most; {packets_received} states received, {packets_lost} lost",
+            age.p50, age.max
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Vector3};
+
+    fn state(time_ns: u64) -> State {
+        State {
+            time_ns,
+            source: (time_ns, 7),
+            god_object: Isometry3::identity(),
+            device: Isometry3::identity(),
+            force: Vector3::zeros(),
+            head: None,
+            bodies: Vec::new(),
+            contacts: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn ages_are_told_from_the_moment_taken_and_the_moment_drawn() {
+        let mut statistics = Statistics::new();
+        statistics.frame(&state(1_000_000), false, 4_000_000, 14_000_000);
+        let (taken, drawn) = statistics.ages();
+        assert!((taken.max - 3.0).abs() < 0.01 && (drawn.max - 13.0).abs() < 0.02);
+        let report = statistics.report(true).expect("asked for");
+        assert_eq!(report.frames, 1);
+        assert_eq!(report.drawn, [DrawnState { tick: 1_000_000, state_hash: 7 }]);
+        assert!((report.pose_age_ms_max - 3.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_state_from_the_future_has_no_age() {
+        let mut statistics = Statistics::new();
+        statistics.frame(&state(9_000_000), false, 4_000_000, 5_000_000);
+        assert_eq!(statistics.ages().0.max, 0.0);
+    }
+
+    #[test]
+    fn no_report_is_due_right_after_one() {
+        let mut statistics = Statistics::new();
+        assert!(statistics.report(true).is_some());
+        assert!(statistics.report(false).is_none());
+    }
+}

@@ -1,0 +1,359 @@
+//! The viewer's eyes and the off-axis (generalised perspective) projection of one screen.
+//!
+//! | symbol     | name in code                              | unit | meaning                                  |
+//! |------------|-------------------------------------------|------|------------------------------------------|
+//! | pa, pb, pc | `lower_left`, `lower_right`, `upper_left` | m    | corners of the screen, workbench frame   |
+//! | pe         | `eye`                                     | m    | one eye, workbench frame                 |
+//! | vr, vu, vn | `right`, `up`, `normal`                   | –    | screen axes; `normal` is towards the eye |
+//! | d          | `distance`                                | m    | from the eye to the plane of the screen  |
+//! | l, r, b, t | `left` … `top`                            | m    | extents of the frustum on the near plane |
+//! | n, f       | `near`, `far`                             | m    | clip planes, along `-normal`             |
+//!
+//! Two screens that share an edge show one continuous world, because each is the exact central
+//! projection of the same points from the same eye.
+//!
+//! Source: Kooima 2009, "Generalized Perspective Projection"; depth mapped to [0, 1] as wgpu wants.
+
+use nalgebra::{Isometry3, Matrix4, Point2, Point3, Vector3};
+use thiserror::Error;
+
+/// A flat screen in the workbench frame: wall, table or one side of a CAVE.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Screen {
+    lower_left: Point3<f64>,
+    right: Vector3<f64>,
+    up: Vector3<f64>,
+    normal: Vector3<f64>,
+    width: f64,
+    height: f64,
+}
+
+/// Why three corners are not a screen.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum ScreenError {
+    /// A corner has a coordinate that is not finite.
+    #[error("a corner of the screen is not a finite point; give three numbers in metres")]
+    NotFinite,
+    /// An edge is shorter than [`Screen::MIN_EDGE`].
+    #[error("an edge of the screen is {edge:.6} m long; give corners at least 0.01 m apart")]
+    TooSmall {
+        /// Length of the edge, in metres.
+        edge: f64,
+    },
+    /// The two edges are not at a right angle within [`Screen::SQUARENESS`].
+    #[error(
+        "the edges of the screen meet at {degrees:.2} degrees; give the lower left, lower right and upper left corners of a rectangle"
+    )]
+    NotSquare {
+        /// The angle found, in degrees.
+        degrees: f64,
+    },
+}
+
+/// Positions of the two eyes in the workbench frame, in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eyes {
+    /// The left eye.
+    pub left: Point3<f64>,
+    /// The right eye.
+    pub right: Point3<f64>,
+}
+
+/// Which eye a picture is drawn for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Eye {
+    /// The point between the eyes.
+    Middle,
+    /// The left eye.
+    Left,
+    /// The right eye.
+    Right,
+}
+
+/// Distances of the clip planes from the eye along the screen's normal, in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClipPlanes {
+    /// Nothing nearer is drawn.
+    pub near: f64,
+    /// Nothing farther is drawn.
+    pub far: f64,
+}
+
+impl Screen {
+    /// Shortest edge of a screen, in metres: below it a declaration in the wrong unit is likelier.
+    pub const MIN_EDGE: f64 = 0.01;
+    /// Largest |cosine| between the edges: 0.5 degrees, more than a careful tape measure errs by.
+    pub const SQUARENESS: f64 = 8.7e-3;
+    /// An eye nearer to the plane than this, in metres, or behind it sees no picture.
+    pub const MIN_EYE_DISTANCE: f64 = 1e-3;
+
+    /// The rectangle with these corners; its visible side is where `right × up` points.
+    ///
+    /// The upper left corner is squared to the lower edge, so that the projection stays exact
+    /// on the lower edge of a screen that was measured by hand.
+    pub fn from_corners(
+        lower_left: Point3<f64>,
+        lower_right: Point3<f64>,
+        upper_left: Point3<f64>,
+    ) -> Result<Self, ScreenError> {
+        let finite = |p: &Point3<f64>| p.iter().all(|x| x.is_finite());
+        if !(finite(&lower_left) && finite(&lower_right) && finite(&upper_left)) {
+            return Err(ScreenError::NotFinite);
+        }
+        let along = lower_right - lower_left;
+        let upward = upper_left - lower_left;
+        let width = along.norm();
+        for edge in [width, upward.norm()] {
+            let long_enough = edge >= Self::MIN_EDGE; // false for NaN from an overflow
+            if !long_enough {
+                return Err(ScreenError::TooSmall { edge });
+            }
+        }
+        let cosine = along.dot(&upward) / (width * upward.norm());
+        let square = cosine.abs() <= Self::SQUARENESS;
+        if !square {
+            let degrees = cosine.acos().to_degrees();
+            return Err(ScreenError::NotSquare { degrees });
+        }
+
+        let right = along / width;
+        let upright = upward - right * upward.dot(&right);
+        let height = upright.norm();
+        let up = upright / height;
+        Ok(Self {
+            lower_left,
+            right,
+            up,
+            normal: right.cross(&up),
+            width,
+            height,
+        })
+    }
+
+    /// Width of the screen, in metres.
+    pub fn width(&self) -> f64 {
+        self.width
+    }
+
+    /// Height of the screen, in metres.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// The point of the screen at fractions of its width (from the left) and height (from below).
+    pub fn point(&self, across: f64, upward: f64) -> Point3<f64> {
+        self.lower_left + self.right * (across * self.width) + self.up * (upward * self.height)
+    }
+
+    /// Distance of `eye` from the plane of the screen, in metres, positive in front of it.
+    pub fn distance(&self, eye: &Point3<f64>) -> f64 {
+        (eye - self.lower_left).dot(&self.normal)
+    }
+
+    /// The map from the workbench frame to wgpu's clip space for this eye.
+    ///
+    /// `None` where the eye is behind the screen or nearer than [`Self::MIN_EYE_DISTANCE`].
+    pub fn clip_from_workbench(
+        &self,
+        eye: &Point3<f64>,
+        planes: &ClipPlanes,
+    ) -> Option<Matrix4<f64>> {
+        debug_assert!(0.0 < planes.near && planes.near < planes.far);
+        let distance = self.distance(eye);
+        let in_front = distance > Self::MIN_EYE_DISTANCE; // false for NaN: no picture
+        if !in_front {
+            return None;
+        }
+
+        // Kooima: extents of the screen as seen from the eye, scaled to the near plane.
+        let to_corner = self.lower_left - eye;
+        let ClipPlanes { near, far } = *planes;
+        let scale = near / distance;
+        let left = self.right.dot(&to_corner) * scale;
+        let right = left + self.width * scale;
+        let bottom = self.up.dot(&to_corner) * scale;
+        let top = bottom + self.height * scale;
+
+        #[rustfmt::skip]
+        let clip_from_eye = Matrix4::new(
+            2.0 * near / (right - left), 0.0, (right + left) / (right - left), 0.0,
+            0.0, 2.0 * near / (top - bottom), (top + bottom) / (top - bottom), 0.0,
+            0.0, 0.0, -far / (far - near), -far * near / (far - near),
+            0.0, 0.0, -1.0, 0.0,
+        );
+        let (x, y, z) = (self.right, self.up, self.normal);
+        let e = eye.coords;
+        #[rustfmt::skip]
+        let eye_from_workbench = Matrix4::new(
+            x.x, x.y, x.z, -x.dot(&e),
+            y.x, y.y, y.z, -y.dot(&e),
+            z.x, z.y, z.z, -z.dot(&e),
+            0.0, 0.0, 0.0, 1.0,
+        );
+        Some(clip_from_eye * eye_from_workbench)
+    }
+}
+
+impl Eyes {
+    /// The eyes of a head whose x axis runs from its left to its right ear.
+    pub fn of_head(workbench_from_head: &Isometry3<f64>, separation: f64) -> Self {
+        let half = 0.5 * separation;
+        Self {
+            left: workbench_from_head * Point3::new(-half, 0.0, 0.0),
+            right: workbench_from_head * Point3::new(half, 0.0, 0.0),
+        }
+    }
+
+    /// The position of one eye.
+    pub fn position(&self, eye: Eye) -> Point3<f64> {
+        match eye {
+            Eye::Middle => nalgebra::center(&self.left, &self.right),
+            Eye::Left => self.left,
+            Eye::Right => self.right,
+        }
+    }
+}
+
+/// Where a point of the workbench appears, in normalised device coordinates (right and up, ±1 at
+/// the edges of the screen); `None` for a point that is not in front of the eye.
+pub fn project(clip_from_workbench: &Matrix4<f64>, point: &Point3<f64>) -> Option<Point2<f64>> {
+    let clip = clip_from_workbench * point.to_homogeneous();
+    (clip.w > 0.0).then(|| Point2::new(clip.x / clip.w, clip.y / clip.w))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion};
+    use proptest::prelude::*;
+
+    /// Rounding of a few products of numbers near 1, in normalised device coordinates.
+    const ROUNDING: f64 = 1e-9;
+    const PLANES: ClipPlanes = ClipPlanes {
+        near: 0.05,
+        far: 20.0,
+    };
+
+    fn wall() -> Screen {
+        Screen::from_corners(
+            Point3::new(-0.9, 0.6, 0.0),
+            Point3::new(0.9, 0.6, 0.0),
+            Point3::new(-0.9, 0.6, 1.2),
+        )
+        .expect("a rectangle")
+    }
+
+    fn table() -> Screen {
+        Screen::from_corners(
+            Point3::new(-0.9, -0.6, 0.0),
+            Point3::new(0.9, -0.6, 0.0),
+            Point3::new(-0.9, 0.6, 0.0),
+        )
+        .expect("a rectangle")
+    }
+
+    prop_compose! {
+        fn eye()(x in -2.0..2.0, y in -2.0..0.5, z in 0.1..2.0) -> Point3<f64> {
+            Point3::new(x, y, z)
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn corners_of_the_screen_are_corners_of_the_picture_from_any_eye(eye in eye()) {
+            for screen in [wall(), table()] {
+                let clip = screen.clip_from_workbench(&eye, &PLANES).expect("in front");
+                for (across, upward) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    let seen = project(&clip, &screen.point(across, upward)).expect("in front");
+                    prop_assert!((seen.x - (2.0 * across - 1.0)).abs() < ROUNDING);
+                    prop_assert!((seen.y - (2.0 * upward - 1.0)).abs() < ROUNDING);
+                }
+            }
+        }
+
+        #[test]
+        fn a_point_appears_where_its_line_of_sight_pierces_the_screen(
+            eye in eye(), across in 0.0..1.0f64, upward in 0.0..1.0f64, beyond in 0.2..3.0f64,
+        ) {
+            for screen in [wall(), table()] {
+                let clip = screen.clip_from_workbench(&eye, &PLANES).expect("in front");
+                let point = eye + (screen.point(across, upward) - eye) * beyond;
+                let seen = project(&clip, &point).expect("in front");
+                prop_assert!((seen.x - (2.0 * across - 1.0)).abs() < ROUNDING);
+                prop_assert!((seen.y - (2.0 * upward - 1.0)).abs() < ROUNDING);
+            }
+        }
+
+        #[test]
+        fn a_line_of_sight_through_the_common_edge_meets_it_at_one_place_on_both_screens(
+            eye in eye(), across in 0.0..1.0f64, beyond in 0.3..3.0f64,
+        ) {
+            let edge = wall().point(across, 0.0);
+            let point = eye + (edge - eye) * beyond;
+            let on_wall = wall().clip_from_workbench(&eye, &PLANES).expect("in front");
+            let on_table = table().clip_from_workbench(&eye, &PLANES).expect("in front");
+            let on_wall = project(&on_wall, &point).expect("in front");
+            let on_table = project(&on_table, &point).expect("in front");
+            prop_assert!((on_wall.x - on_table.x).abs() < ROUNDING);
+            prop_assert!((on_wall.y + 1.0).abs() < ROUNDING);
+            prop_assert!((on_table.y - 1.0).abs() < ROUNDING);
+        }
+
+        #[test]
+        fn disparity_is_that_of_similar_triangles(
+            x in -0.5..0.5f64, depth in -0.5..2.0f64, z in 0.2..1.0f64, separation in 0.05..0.07f64,
+        ) {
+            // A head looking straight at the wall from 1.2 m; a point `depth` behind the wall.
+            let from_eye = 1.2;
+            let head = Isometry3::translation(0.0, 0.6 - from_eye, 0.6);
+            let eyes = Eyes::of_head(&head, separation);
+            let point = Point3::new(x, 0.6 + depth, z);
+            let seen = |eye| {
+                let clip = wall().clip_from_workbench(&eyes.position(eye), &PLANES).expect("in front");
+                project(&clip, &point).expect("in front").x
+            };
+            let on_screen = separation * depth / (from_eye + depth); // m, right minus left
+            let expected = on_screen / (0.5 * wall().width());
+            prop_assert!((seen(Eye::Right) - seen(Eye::Left) - expected).abs() < ROUNDING);
+        }
+
+        #[test]
+        fn depth_runs_from_zero_at_the_near_plane_to_one_at_the_far_plane(eye in eye()) {
+            let screen = wall();
+            let clip = screen.clip_from_workbench(&eye, &PLANES).expect("in front");
+            for (distance, depth) in [(PLANES.near, 0.0), (PLANES.far, 1.0)] {
+                let seen = clip * (eye - screen.normal * distance).to_homogeneous();
+                prop_assert!((seen.z / seen.w - depth).abs() < 1e-7);
+            }
+        }
+    }
+
+    #[test]
+    fn eyes_lie_on_the_x_axis_of_a_turned_head() {
+        let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        let head = Isometry3::from_parts(Translation3::new(1.0, 2.0, 3.0), quarter);
+        let eyes = Eyes::of_head(&head, 0.06);
+        assert!((eyes.left - Point3::new(1.0, 1.97, 3.0)).norm() < ROUNDING);
+        assert!((eyes.right - Point3::new(1.0, 2.03, 3.0)).norm() < ROUNDING);
+        assert!((eyes.position(Eye::Middle) - Point3::new(1.0, 2.0, 3.0)).norm() < ROUNDING);
+    }
+
+    #[test]
+    fn an_eye_behind_the_screen_or_nowhere_sees_nothing() {
+        for eye in [Point3::new(0.0, 0.7, 0.5), Point3::new(0.0, f64::NAN, 0.5)] {
+            assert!(wall().clip_from_workbench(&eye, &PLANES).is_none());
+        }
+    }
+
+    #[test]
+    fn corners_that_are_no_rectangle_are_refused() {
+        let origin = Point3::origin();
+        let x = Point3::new(1.0, 0.0, 0.0);
+        let skew = Screen::from_corners(origin, x, Point3::new(0.5, 1.0, 0.0));
+        assert!(matches!(skew, Err(ScreenError::NotSquare { .. })));
+        let flat = Screen::from_corners(origin, x, origin);
+        assert!(matches!(flat, Err(ScreenError::TooSmall { .. })));
+        let nan = Screen::from_corners(origin, x, Point3::new(0.0, f64::NAN, 0.0));
+        assert_eq!(nan, Err(ScreenError::NotFinite));
+    }
+}

@@ -1,0 +1,352 @@
+//! Draws in windows: one for each picture of each screen of the node.
+//!
+//! All windows of a frame show the same state and are submitted together. Keys: Esc ends, F covers
+//! the monitor, G, C and V show or hide the device ghost, the contacts and the force.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::window::{Fullscreen, Window, WindowId};
+
+use crate::canvas::eyes_of;
+use crate::error::RenderError;
+use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
+use crate::session::{Ending, Session};
+use crate::stage::{Show, Stage};
+use crate::statistics::{Ended, Statistics};
+use crate::stereo::Picture;
+use crate::timeline::Timeline;
+
+/// When to end and how fast to draw.
+#[derive(Clone, Debug)]
+pub(crate) struct Plan {
+    pub(crate) frames: Option<u64>,
+    pub(crate) duration: Option<Duration>,
+    pub(crate) frame_time: Duration,
+    pub(crate) fullscreen: bool,
+    pub(crate) show: Show,
+}
+
+/// Draws until the plan, the user, the server or a signal ends it; says what drew.
+pub(crate) fn run(
+    session: &mut Session,
+    stage: Stage,
+    timeline: &mut Timeline,
+    statistics: &mut Statistics,
+    plan: Plan,
+) -> Result<(Ended, String), RenderError> {
+    let no_display = |error: winit::error::EventLoopError| RenderError::NoDisplay {
+        reason: error.to_string(),
+    };
+    let events = EventLoop::new().map_err(no_display)?;
+    let mut app = App {
+        session,
+        timeline,
+        statistics,
+        show: plan.show,
+        plan,
+        stage,
+        screen: None,
+        start: Instant::now(),
+        next_frame: Instant::now(),
+        last_drawn: None,
+        result: None,
+    };
+    events.run_app(&mut app).map_err(no_display)?;
+    let adapter = app.screen.map_or_else(String::new, |screen| screen.gpu.summary().to_string());
+    match app.result {
+        Some(Ok(ended)) => Ok((ended, adapter)),
+        Some(Err(error)) => Err(error),
+        None => Ok((Ended::Closed, adapter)),
+    }
+}
+
+struct App<'a> {
+    session: &'a mut Session,
+    timeline: &'a mut Timeline,
+    statistics: &'a mut Statistics,
+    plan: Plan,
+    stage: Stage,
+    show: Show,
+    screen: Option<Display>,
+    start: Instant,
+    next_frame: Instant,
+    last_drawn: Option<(u64, bool)>,
+    result: Option<Result<Ended, RenderError>>,
+}
+
+/// The windows and what draws in them.
+struct Display {
+    gpu: Gpu,
+    renderer: Renderer,
+    panes: Vec<Pane>,
+}
+
+/// One window.
+struct Pane {
+    window: Arc<Window>,
+    surface: wgpu::Surface<'static>,
+    config: wgpu::SurfaceConfiguration,
+    /// The format that is drawn: that of the surface, with sRGB encoding.
+    format: wgpu::TextureFormat,
+    picture: Picture,
+    target: PictureTarget,
+    /// Place of the screen in the stage.
+    screen: usize,
+}
+
+impl ApplicationHandler for App<'_> {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.screen.is_some() {
+            return;
+        }
+        match Display::open(events, &self.stage, self.plan.fullscreen) {
+            Ok(screen) => self.screen = Some(screen),
+            Err(error) => self.end(events, Err(error)),
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        match event {
+            WindowEvent::CloseRequested => self.end(events, Ok(Ended::Closed)),
+            WindowEvent::KeyboardInput { event, .. }
+                if event.state == ElementState::Pressed && !event.repeat =>
+            {
+                self.key(events, event.physical_key);
+            }
+            WindowEvent::Resized(size) => {
+                if let Some(screen) = &mut self.screen {
+                    screen.resize(id, size);
+                }
+                self.last_drawn = None;
+            }
+            WindowEvent::RedrawRequested => self.last_drawn = None,
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if self.result.is_some() {
+            return;
+        }
+        match self.tick() {
+            Ok(None) => events.set_control_flow(ControlFlow::WaitUntil(self.next_frame)),
+            Ok(Some(ended)) => self.end(events, Ok(ended)),
+            Err(error) => self.end(events, Err(error)),
+        }
+    }
+}
+
+impl App<'_> {
+    fn end(&mut self, events: &ActiveEventLoop, result: Result<Ended, RenderError>) {
+        self.result.get_or_insert(result);
+        events.exit();
+    }
+
+    fn key(&mut self, events: &ActiveEventLoop, key: PhysicalKey) {
+        let PhysicalKey::Code(code) = key else {
+            return;
+        };
+        match code {
+            KeyCode::Escape => self.end(events, Ok(Ended::Closed)),
+            KeyCode::KeyF => {
+                let panes = self.screen.iter().flat_map(|screen| &screen.panes);
+                panes.for_each(|pane| toggle_fullscreen(&pane.window));
+            }
+            KeyCode::KeyG => self.show.ghost = !self.show.ghost,
+            KeyCode::KeyC => self.show.contacts = !self.show.contacts,
+            KeyCode::KeyV => self.show.force = !self.show.force,
+            _ => {}
+        }
+        self.last_drawn = None;
+    }
+
+    /// Draws a frame if one is due; says if this was the last.
+    fn tick(&mut self) -> Result<Option<Ended>, RenderError> {
+        if self.session.interrupted() {
+            return Ok(Some(Ended::Interrupted));
+        }
+        match self.session.ending() {
+            Some(Ending::Told) => return Ok(Some(Ended::ServerStopped)),
+            Some(Ending::Lost(reason)) => return Err(self.session.lost(reason)),
+            None => {}
+        }
+        if self.plan.duration.is_some_and(|duration| self.start.elapsed() >= duration) {
+            return Ok(Some(Ended::Duration));
+        }
+        if let Some(stats) = self.statistics.report(false) {
+            self.session.report(stats);
+        }
+        let now = Instant::now();
+        if now < self.next_frame {
+            return Ok(None);
+        }
+        self.next_frame = (self.next_frame + self.plan.frame_time).max(now);
+        self.session.take_states(self.timeline);
+        let Some(taken_ns) = self.session.now_ns() else {
+            return Ok(None);
+        };
+        let (Some(latched), Some(screen)) = (self.timeline.latch(taken_ns), &mut self.screen) else {
+            return Ok(None);
+        };
+        let drawn = Some((latched.state.time_ns, latched.stale));
+        if drawn == self.last_drawn {
+            return Ok(None);
+        }
+        let Display {
+            gpu,
+            renderer,
+            panes,
+        } = screen;
+        renderer.set_state(gpu, &self.stage, &latched, self.show);
+        let eyes = eyes_of(&self.stage, &latched);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        renderer.draw_shadow(&mut encoder);
+        let mut textures = Vec::with_capacity(panes.len());
+        for pane in panes.iter() {
+            let Some(texture) = pane.texture(gpu)? else {
+                continue;
+            };
+            let view = texture.texture.create_view(&wgpu::TextureViewDescriptor {
+                format: Some(pane.format),
+                ..Default::default()
+            });
+            let screen = &self.stage.screens[pane.screen].screen;
+            renderer.draw(gpu, &mut encoder, screen, &eyes, &pane.target, &view);
+            textures.push((pane, texture));
+        }
+        if textures.is_empty() {
+            return Ok(None); // all windows are hidden
+        }
+        gpu.queue.submit([encoder.finish()]);
+        for (pane, texture) in textures {
+            pane.window.pre_present_notify();
+            gpu.queue.present(texture);
+        }
+        gpu.finish()?;
+        self.last_drawn = drawn;
+        let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
+        self.statistics.frame(&latched.state, latched.stale, taken_ns, drawn_ns);
+        let enough = self.plan.frames.is_some_and(|frames| self.statistics.frames >= frames);
+        Ok(enough.then_some(Ended::Frames))
+    }
+}
+
+impl Display {
+    fn open(events: &ActiveEventLoop, stage: &Stage, fullscreen: bool) -> Result<Self, RenderError> {
+        let no_display = |error: &dyn std::fmt::Display| RenderError::NoDisplay {
+            reason: error.to_string(),
+        };
+        let instance = new_instance(Some(events.owned_display_handle()));
+        let mut opened = Vec::new();
+        for (index, screen) in stage.screens.iter().enumerate() {
+            for picture in screen.stereo.pictures() {
+                let (width, height) = screen.pixels;
+                let attributes = Window::default_attributes()
+                    .with_title(format!("taut: {}{}", screen.name, picture.suffix))
+                    .with_inner_size(PhysicalSize::new(width, height))
+                    .with_fullscreen(fullscreen.then_some(Fullscreen::Borderless(None)));
+                let window = events.create_window(attributes).map_err(|error| no_display(&error))?;
+                let window = Arc::new(window);
+                let surface = instance
+                    .create_surface(Arc::clone(&window))
+                    .map_err(|error| no_display(&error))?;
+                opened.push((index, picture, window, surface));
+            }
+        }
+        let gpu = Gpu::open_for(instance, opened.first().map(|(.., surface)| surface))?;
+        let mut renderer: Option<Renderer> = None;
+        let mut panes = Vec::new();
+        for (screen, picture, window, surface) in opened {
+            // One window waits for the monitor; the others would make it wait twice.
+            let present_mode = if panes.is_empty() {
+                wgpu::PresentMode::AutoVsync
+            } else {
+                wgpu::PresentMode::AutoNoVsync
+            };
+            let size = window.inner_size();
+            let (config, format) = configuration(&gpu, &surface, size, present_mode)?;
+            surface.configure(&gpu.device, &config);
+            let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
+            let target = renderer.picture(&gpu, &picture, (config.width, config.height));
+            panes.push(Pane {
+                window,
+                surface,
+                config,
+                format,
+                picture,
+                target,
+                screen,
+            });
+        }
+        let renderer = renderer.ok_or_else(|| RenderError::BadScene {
+            what: "this node draws no screen".to_owned(),
+        })?;
+        Ok(Self {
+            gpu,
+            renderer,
+            panes,
+        })
+    }
+
+    fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {
+        let hidden = size.width == 0 || size.height == 0;
+        let pane = self.panes.iter_mut().find(|pane| pane.window.id() == id && !hidden);
+        if let Some(pane) = pane {
+            (pane.config.width, pane.config.height) = (size.width, size.height);
+            pane.surface.configure(&self.gpu.device, &pane.config);
+            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size.into());
+        }
+    }
+}
+
+impl Pane {
+    /// What to draw to next; `None` while the window is hidden or changes.
+    fn texture(&self, gpu: &Gpu) -> Result<Option<wgpu::SurfaceTexture>, RenderError> {
+        match self.surface.get_current_texture() {
+            wgpu::CurrentSurfaceTexture::Success(texture) => Ok(Some(texture)),
+            wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Ok(Some(texture)),
+            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => Ok(None),
+            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
+                self.surface.configure(&gpu.device, &self.config);
+                Ok(None)
+            }
+            wgpu::CurrentSurfaceTexture::Validation => Err(gpu.broken(&"the window's surface is invalid")),
+        }
+    }
+}
+
+/// How to show pictures on a surface, and the sRGB format to draw them in.
+fn configuration(
+    gpu: &Gpu,
+    surface: &wgpu::Surface<'_>,
+    size: PhysicalSize<u32>,
+    present_mode: wgpu::PresentMode,
+) -> Result<(wgpu::SurfaceConfiguration, wgpu::TextureFormat), RenderError> {
+    let (width, height) = (size.width.max(1), size.height.max(1));
+    let mut config = surface
+        .get_default_config(&gpu.adapter, width, height)
+        .ok_or_else(|| gpu.broken(&"it cannot show pictures in this window"))?;
+    let formats = surface.get_capabilities(&gpu.adapter).formats;
+    config.format = formats.into_iter().find(wgpu::TextureFormat::is_srgb).unwrap_or(config.format);
+    let drawn = config.format.add_srgb_suffix();
+    if drawn != config.format {
+        config.view_formats.push(drawn);
+    }
+    config.present_mode = present_mode;
+    config.desired_maximum_frame_latency = 1; // the least age that double buffering allows
+    Ok((config, drawn))
+}
+
+fn toggle_fullscreen(window: &Window) {
+    let now = match window.fullscreen() {
+        Some(_) => None,
+        None => Some(Fullscreen::Borderless(None)),
+    };
+    window.set_fullscreen(now);
+}

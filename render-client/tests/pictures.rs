@@ -1,0 +1,295 @@
+//! What the pictures show, measured in their pixels. Skipped, said aloud, without an adapter.
+
+mod support;
+
+use image::RgbaImage;
+use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
+use support::{ORANGE, canvas, l_shape, peg_in_hole, state};
+use taut_render::renderer::shapes;
+use taut_render::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
+use taut_render::stereo::Stereo;
+use taut_render::timeline::{Contact, Latched};
+use taut_render::view::{ClipPlanes, Eye, Eyes, project};
+
+/// Pixels of a view: 3 to 2 as the screens are.
+const PIXELS: (u32, u32) = (360, 240);
+
+/// Only the wall, and one orange body on it; `scale` to 1.
+fn one_body(mesh: TriangleMesh) -> Stage {
+    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+    stage.screens.truncate(1);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes = vec![mesh.into()];
+    stage.obstacles.clear();
+    stage
+}
+
+/// Draws and returns the pictures in order.
+fn draw(stage: Stage, latched: &Latched, show: Show) -> Option<Vec<RgbaImage>> {
+    let mut canvas = canvas(stage)?;
+    canvas.draw(latched, show, true).expect("drawn");
+    let images = canvas.images().expect("read back");
+    Some(images.into_iter().map(|(_, image)| image).collect())
+}
+
+/// Far more red than blue: the god-object and nothing else.
+fn is_orange(&[red, _, blue, _]: &[u8; 4]) -> bool {
+    red > 90 && u16::from(red) > 2 * u16::from(blue)
+}
+
+/// Middle (across, down) and number of the orange pixels.
+fn orange(image: &RgbaImage) -> (f64, f64, usize) {
+    let found = image.enumerate_pixels().filter(|(_, _, pixel)| is_orange(&pixel.0));
+    let (x, y, count) = found.fold((0.0, 0.0, 0), |(x, y, n), (px, py, _)| {
+        (x + f64::from(px) + 0.5, y + f64::from(py) + 0.5, n + 1)
+    });
+    (x / count.max(1) as f64, y / count.max(1) as f64, count)
+}
+
+fn brightness(image: &RgbaImage, x: f64, y: f64) -> f64 {
+    let [red, green, blue, _] = image.get_pixel(x as u32, y as u32).0;
+    (f64::from(red) + f64::from(green) + f64::from(blue)) / 3.0
+}
+
+/// Where a point of the workbench appears on a screen of the stage, in pixels.
+fn pixel_of(stage: &Stage, screen: usize, eye: Eye, point: Point3<f64>) -> (f64, f64) {
+    let StageScreen { screen, pixels, .. } = &stage.screens[screen];
+    let eyes = Eyes::of_head(&stage.head, stage.eye_separation);
+    let planes = ClipPlanes { near: 0.02, far: 20.0 };
+    let clip = screen.clip_from_workbench(&eyes.position(eye), &planes).expect("in front");
+    let seen = project(&clip, &point).expect("in front");
+    let across = (0.5 + 0.5 * seen.x) * f64::from(pixels.0);
+    (across, (0.5 - 0.5 * seen.y) * f64::from(pixels.1))
+}
+
+#[test]
+fn a_body_above_is_drawn_above_and_one_to_the_right_is_drawn_to_the_right() {
+    let ball = shapes::sphere(0.1, 32);
+    for (x, z) in [(0.0, 0.9), (0.0, 0.3), (0.4, 0.6), (-0.4, 0.6)] {
+        let at = Isometry3::translation(x, 0.1, z);
+        let stage = one_body(ball.clone());
+        let expected = pixel_of(&stage, 0, Eye::Middle, Point3::new(x, 0.1, z));
+        let Some(pictures) = draw(stage, &state(at), Show::default()) else {
+            return;
+        };
+        let (across, down, count) = orange(&pictures[0]);
+        assert!(count > 100, "{count} orange pixels");
+        assert!((across - expected.0).abs() < 2.0 && (down - expected.1).abs() < 2.0);
+        assert_eq!(down < 120.0 - 10.0, z > 0.7);
+        assert_eq!(down > 120.0 + 10.0, z < 0.5);
+        assert_eq!(across > 180.0 + 10.0, x > 0.1);
+    }
+}
+
+#[test]
+fn a_nearer_body_looks_bigger_by_the_ratio_of_the_distances() {
+    let ball = shapes::sphere(0.08, 48);
+    let size = |y: f64| {
+        let at = state(Isometry3::translation(0.0, y, 0.6));
+        let pictures = draw(one_body(ball.clone()), &at, Show::default())?;
+        Some((orange(&pictures[0]).2 as f64).sqrt())
+    };
+    // The eye is at y = -1.2: distances 0.8 and 1.6 m.
+    let (Some(near), Some(far)) = (size(-0.4), size(0.4)) else {
+        return;
+    };
+    assert!((near / far - 2.0).abs() < 0.1, "near {near}, far {far}");
+}
+
+#[test]
+fn left_and_right_eye_differ_by_the_computed_disparity() {
+    for y in [-0.3, 0.5] {
+        let mut stage = one_body(shapes::sphere(0.08, 32));
+        stage.screens[0].stereo = Stereo::TwoWindows;
+        let middle = Point3::new(0.1, y, 0.6);
+        let seen = |eye| pixel_of(&stage, 0, eye, middle).0;
+        let expected = seen(Eye::Right) - seen(Eye::Left);
+        let at = state(Isometry3::translation(middle.x, middle.y, middle.z));
+        let Some(pictures) = draw(stage, &at, Show::default()) else {
+            return;
+        };
+        let [left, right] = &pictures[..] else {
+            panic!("{} pictures", pictures.len());
+        };
+        let found = orange(right).0 - orange(left).0;
+        assert!((found - expected).abs() < 0.7, "found {found}, expected {expected} pixels");
+        // In front of the screen the right eye sees it further left, behind it further right.
+        assert_eq!(found > 1.0, y > 0.0);
+        assert_eq!(found < -1.0, y < 0.0);
+    }
+}
+
+#[test]
+fn halves_of_a_side_by_side_picture_are_the_pictures_of_the_eyes() {
+    let at = state(Isometry3::translation(0.0, -0.042, 0.0));
+    let two = draw(peg_in_hole(PIXELS, Stereo::TwoWindows), &at, Show::default());
+    let one = draw(peg_in_hole(PIXELS, Stereo::SideBySide), &at, Show::default());
+    let (Some(two), Some(one)) = (two, one) else {
+        return;
+    };
+    for screen in 0..2 {
+        let both = &one[screen];
+        assert_eq!(both.dimensions(), (2 * PIXELS.0, PIXELS.1));
+        for (eye, single) in two[2 * screen..2 * screen + 2].iter().enumerate() {
+            let offset = eye as u32 * PIXELS.0;
+            let differ = single.enumerate_pixels().filter(|(x, y, pixel)| {
+                let other = both.get_pixel(x + offset, *y);
+                (0..3).any(|c| pixel.0[c].abs_diff(other.0[c]) > 6)
+            });
+            assert!(differ.count() < 20);
+        }
+    }
+}
+
+#[test]
+fn red_of_an_anaglyph_is_the_left_eye_and_cyan_the_right() {
+    let pole = |stereo| {
+        let mut stage = one_body(shapes::cuboid([0.02, 0.02, 0.3]));
+        stage.screens[0].stereo = stereo;
+        stage.god_object.colour = [0.9, 0.9, 0.9];
+        stage
+    };
+    let at = state(Isometry3::translation(0.0, -0.5, 0.6));
+    let (Some(eyes), Some(both)) = (
+        draw(pole(Stereo::TwoWindows), &at, Show::default()),
+        draw(pole(Stereo::Anaglyph), &at, Show::default()),
+    ) else {
+        return;
+    };
+    // Middle of the pole on the central row, by the brightness of one channel.
+    let middle = |image: &RgbaImage, channel: usize| {
+        let row = (0..PIXELS.0).map(|x| (f64::from(x), image.get_pixel(x, 120).0[channel]));
+        let bright: Vec<f64> = row.filter(|(_, value)| *value > 110).map(|(x, _)| x).collect();
+        bright.iter().sum::<f64>() / bright.len() as f64
+    };
+    let (left, right) = (middle(&eyes[0], 0), middle(&eyes[1], 1));
+    assert!(left - right > 5.0);
+    assert!((middle(&both[0], 0) - left).abs() < 1.5);
+    assert!((middle(&both[0], 1) - right).abs() < 1.5);
+}
+
+#[test]
+fn a_bar_across_the_common_edge_continues_from_one_screen_to_the_other() {
+    // Upright bars behind and through the edge, seen from off the middle.
+    for (x, y) in [(-0.5, -0.1), (0.05, 0.15), (0.45, -0.05)] {
+        let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+        stage.head = Isometry3::translation(0.2, -0.9, 0.8);
+        stage.workbench_from_scene = Similarity3::identity();
+        stage.meshes = vec![shapes::cuboid([0.03, 0.01, 0.6]).into()];
+        stage.obstacles.clear();
+        let at = state(Isometry3::translation(x, y, 0.0));
+        let Some(pictures) = draw(stage, &at, Show::default()) else {
+            return;
+        };
+        let edges = |image: &RgbaImage, row: u32| {
+            let mut columns = (0..PIXELS.0).filter(|&x| is_orange(&image.get_pixel(x, row).0));
+            let first = columns.next().expect("the bar reaches the edge");
+            (first, columns.last().unwrap_or(first))
+        };
+        let wall = edges(&pictures[0], PIXELS.1 - 1);
+        let table = edges(&pictures[1], 0);
+        assert!(wall.0.abs_diff(table.0) <= 1 && wall.1.abs_diff(table.1) <= 1, "{wall:?} {table:?}");
+    }
+}
+
+#[test]
+fn a_body_throws_its_shadow_onto_what_lies_behind_it_as_seen_from_the_light() {
+    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes = vec![
+        shapes::cuboid([0.08, 0.08, 0.01]).into(),
+        shapes::cuboid([0.5, 0.4, 0.01]).into(),
+    ];
+    stage.obstacles = vec![StageBody {
+        pose: Isometry3::translation(0.0, -0.5, -0.01),
+        ..stage.obstacles[0]
+    }];
+    // The table screen is the plate's upper side; the light comes from (-0.48, -0.52, 1).
+    let height = 0.2;
+    let middle = Point3::new(0.0, -0.55, height);
+    let shadow = Point3::new(0.48 * height, -0.55 + 0.52 * height, 0.0);
+    let mirrored = Point3::new(-0.3, -0.55 + 0.52 * height, 0.0);
+    let at = state(Isometry3::translation(middle.x, middle.y, middle.z));
+    let dark = pixel_of(&stage, 1, Eye::Middle, shadow);
+    let bright = pixel_of(&stage, 1, Eye::Middle, mirrored);
+    let Some(pictures) = draw(stage, &at, Show::default()) else {
+        return;
+    };
+    let dark = brightness(&pictures[1], dark.0, dark.1);
+    let bright = brightness(&pictures[1], bright.0, bright.1);
+    assert!(dark < 0.7 * bright, "shadow {dark}, light {bright}");
+    assert!(dark > 10.0, "a shadow is not black: {dark}");
+}
+
+#[test]
+fn only_the_god_object_is_drawn_unless_more_is_asked_for() {
+    let mut latched = state(Isometry3::translation(0.0, 0.1, 0.6));
+    latched.state.device = Isometry3::translation(0.3, 0.1, 0.6);
+    latched.state.force = Vector3::new(0.0, 0.0, 8.0);
+    latched.state.contacts = vec![Contact {
+        point: Point3::new(-0.3, 0.1, 0.6),
+        normal: Vector3::z(),
+    }];
+    let picture = |show| {
+        let stage = one_body(shapes::sphere(0.1, 32));
+        Some(draw(stage, &latched, show)?.remove(0))
+    };
+    let Some(bare) = picture(Show::default()) else {
+        return;
+    };
+    let near = |x: f64, z: f64| {
+        let stage = one_body(shapes::sphere(0.1, 32));
+        pixel_of(&stage, 0, Eye::Middle, Point3::new(x, 0.1, z))
+    };
+    // Number of pixels within 8 of a place that differ from the bare picture.
+    let changed = |show, (x, y): (f64, f64)| {
+        let full = picture(show).expect("as before");
+        let close = |a: u32, b: f64| (f64::from(a) - b).abs() <= 8.0;
+        let pixels = bare.enumerate_pixels().filter(|(px, py, _)| close(*px, x) && close(*py, y));
+        let differs = |px, py, p: &image::Rgba<u8>| {
+            (0..3).any(|c| p.0[c].abs_diff(full.get_pixel(px, py).0[c]) > 25)
+        };
+        pixels.filter(|(px, py, p)| differs(*px, *py, p)).count()
+    };
+    let (ghost, contact, arrow) = (near(0.3, 0.6), near(-0.3, 0.6), near(0.0, 0.8));
+    let none = Show::default();
+    for (show, place) in [
+        (Show { ghost: true, ..none }, ghost),
+        (Show { contacts: true, ..none }, contact),
+        (Show { force: true, ..none }, arrow),
+    ] {
+        for other in [ghost, contact, arrow] {
+            let count = changed(show, other);
+            if other == place { assert!(count > 2, "{show:?}: {count}") } else { assert_eq!(count, 0, "{show:?}") }
+        }
+    }
+}
+
+#[test]
+fn a_stale_state_loses_its_colour() {
+    let mut latched = state(Isometry3::translation(0.0, 0.1, 0.6));
+    latched.stale = true;
+    let Some(pictures) = draw(one_body(shapes::sphere(0.1, 32)), &latched, Show::default()) else {
+        return;
+    };
+    assert_eq!(orange(&pictures[0]).2, 0);
+}
+
+#[test]
+fn an_eye_behind_a_screen_gets_a_black_picture_and_no_error() {
+    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+    stage.head = Isometry3::translation(0.0, -0.5, -0.5); // under the table, in front of the wall
+    let Some(pictures) = draw(stage, &state(Isometry3::identity()), Show::default()) else {
+        return;
+    };
+    assert!(pictures[1].pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]));
+    assert!(pictures[0].pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]));
+}
+
+#[test]
+fn the_synthetic_workbench_is_what_the_tests_say_it_is() {
+    let [wall, table] = l_shape();
+    assert_eq!(wall.point(0.3, 0.0), table.point(0.3, 1.0));
+    assert_eq!(peg_in_hole(PIXELS, Stereo::Mono).god_object.colour, ORANGE);
+}

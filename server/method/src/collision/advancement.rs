@@ -1,0 +1,228 @@
+//! Conservative advancement of one triangle of a moving body towards one triangle of an obstacle.
+//!
+//! | symbol | name in code | unit | meaning                                                                   |
+//! |--------|--------------|------|---------------------------------------------------------------------------|
+//! | n      | `direction`  | –    | unit direction from the obstacle's triangle to the body's                 |
+//! | x_i    |              | m    | corners of the body's triangle at `time`; velocity v_i, acceleration a_i  |
+//! | s      | `support`    | m    | `max_j n.y_j` over the corners of the obstacle's triangle                 |
+//! | g_i    |              | m    | `n.x_i - s - minimum_gap`                                                 |
+//! | h      |              | –    | step in time                                                              |
+//!
+//! For *any* direction n the distance at `time + h` is at least `min_i n.x_i(time + h) - s`, and for a rigid motion
+//! `n.x_i(time + h) >= n.x_i + h n.v_i + h^2 n.a_i / 2 - h^3 |w|^3 r_i / 6`. The largest h that keeps the right-hand side
+//! above the minimum gap is a root of a quadratic, the cubic term being bounded by the time that is left. So a step is safe whatever the
+//! closest points were worth, and a tangential or departing motion is passed in one step.
+//! Source: Mirtich 1996 (conservative advancement); Tang et al. 2009 (directional bound); the second-order bound is ours.
+
+use nalgebra::{Point3, Vector3};
+
+use super::motion::{Placement, RelativeMotion};
+use super::work::Work;
+use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
+
+/// A pair nearer than the minimum gap at the start may come down to this share of its distance there: it is free to
+/// leave and to slide, and never touches.
+const KEPT_SHARE_OF_START_GAP: f64 = 0.5;
+
+/// What a pair of triangles does in an interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PairOutcome {
+    /// They stay apart.
+    Free,
+    /// They stay apart up to this time, and are near the minimum gap there.
+    Hit(f64),
+    /// They stay apart up to this time; the iterations ran out.
+    Limit(f64),
+    /// They intersect at the start of the motion.
+    Overlap,
+}
+
+/// A search for the first impact between triangles of one body and one obstacle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PairSearch<'a> {
+    pub(super) motion: &'a RelativeMotion,
+    /// Minimum gap with the slack of rounding added, m.
+    pub(super) minimum_gap: f64,
+    pub(super) gap_tolerance: f64,
+    /// Bound on the rounding error of a distance, m.
+    pub(super) slack: f64,
+    pub(super) max_iterations: u32,
+}
+
+/// The two triangles of a pair: the body's in the body frame, the obstacle's in its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TrianglePair {
+    pub(super) on_body: [Point3<f64>; 3],
+    pub(super) body_normal: Vector3<f64>,
+    pub(super) on_obstacle: [Point3<f64>; 3],
+    pub(super) obstacle_normal: Vector3<f64>,
+}
+
+impl PairSearch<'_> {
+    /// Follows the pair over `[from, to]`; `placement` is the body at `from`.
+    pub(super) fn advance(&self, pair: &TrianglePair, placement: &Placement, from: f64, to: f64, work: &mut Work) -> PairOutcome {
+        let mut moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
+        // The planes of the faces settle most pairs, without closest points.
+        let step = moving.safe_step(&pair.obstacle_normal, &pair.on_obstacle, self.minimum_gap).step;
+        if step >= to - from {
+            return PairOutcome::Free;
+        }
+        let step = moving.safe_step(&-(placement.rotation * pair.body_normal), &pair.on_obstacle, self.minimum_gap).step;
+        if step >= to - from {
+            return PairOutcome::Free;
+        }
+
+        let mut time = from;
+        let mut placement = *placement;
+        let mut minimum_gap = self.minimum_gap;
+        for iteration in 0..self.max_iterations {
+            work.advancement_steps += 1;
+            let mut best = moving.best_step(pair, &placement, minimum_gap);
+            if iteration == 0 && best.gap < minimum_gap {
+                minimum_gap = match self.kept_gap(pair, best.gap, from) {
+                    Some(kept) => kept,
+                    None if from == 0.0 && triangles_intersect(&moving.corners, &pair.on_obstacle) => return PairOutcome::Overlap,
+                    None => return PairOutcome::Hit(from),
+                };
+                best = moving.best_step(pair, &placement, minimum_gap);
+            }
+            let left = to - time;
+            if best.step >= left {
+                return PairOutcome::Free;
+            }
+            let apart = best.gap - minimum_gap > self.gap_tolerance; // false for NaN
+            time += best.step.max(0.0);
+            if !apart {
+                return PairOutcome::Hit(time);
+            }
+            placement = self.motion.at(time);
+            moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - time);
+        }
+        PairOutcome::Limit(time)
+    }
+
+    /// The gap to keep for a pair that is nearer than the minimum gap at `from`; `None` when there is none to keep.
+    fn kept_gap(&self, pair: &TrianglePair, gap: f64, from: f64) -> Option<f64> {
+        let at_start = if from == 0.0 {
+            gap
+        } else {
+            let placement = self.motion.at(0.0);
+            MovingTriangle::at(self.motion, &placement, &pair.on_body, 0.0).best_step(pair, &placement, 0.0).gap
+        };
+        let kept = (KEPT_SHARE_OF_START_GAP * at_start).min(self.minimum_gap);
+        (kept > self.slack && gap >= kept).then_some(kept) // None for NaN
+    }
+}
+
+/// A step in time that is safe along some direction, and the gap along it.
+#[derive(Clone, Copy, Debug)]
+struct SafeStep {
+    step: f64,
+    gap: f64,
+}
+
+/// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
+#[derive(Clone, Copy, Debug)]
+struct MovingTriangle {
+    corners: [Point3<f64>; 3],
+    velocities: [Vector3<f64>; 3],
+    /// Half of the accelerations.
+    bends: [Vector3<f64>; 3],
+    /// `|w|^3 r_i H / 6`, H the time that is left.
+    remainders: [f64; 3],
+}
+
+impl MovingTriangle {
+    #[inline]
+    fn at(motion: &RelativeMotion, placement: &Placement, on_body: &[Point3<f64>; 3], time_left: f64) -> Self {
+        let corners = on_body.map(|p| placement.point(&p));
+        let arms = corners.map(|x| x.coords - placement.center);
+        let turns = arms.map(|r| motion.spin.cross(&r));
+        let cubic = motion.rate.powi(3) * time_left / 6.0;
+        Self {
+            corners,
+            velocities: turns.map(|turn| motion.velocity + turn),
+            bends: turns.map(|turn| motion.spin.cross(&turn) * 0.5),
+            remainders: arms.map(|r| r.norm() * cubic),
+        }
+    }
+
+    /// The longest of the safe steps along the closest points and the two face normals, and the largest gap.
+    fn best_step(&self, pair: &TrianglePair, placement: &Placement, minimum_gap: f64) -> SafeStep {
+        let closest = closest_on_triangles(&self.corners, &pair.on_obstacle);
+        let along_points = (closest.on_first - closest.on_second) / closest.squared_distance.sqrt(); // NaN where they touch
+        let directions = [along_points, pair.obstacle_normal, -(placement.rotation * pair.body_normal)];
+        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, minimum_gap));
+        // `max` prefers any number to NaN.
+        steps.iter().fold(SafeStep { step: 0.0, gap: f64::NEG_INFINITY }, |best, s| SafeStep {
+            step: best.step.max(s.step),
+            gap: best.gap.max(s.gap),
+        })
+    }
+
+    /// How far in time the triangle may move so that it stays `minimum_gap` off the other along `direction`. NaN goes nowhere.
+    #[inline]
+    fn safe_step(&self, direction: &Vector3<f64>, other: &[Point3<f64>; 3], minimum_gap: f64) -> SafeStep {
+        let heights = other.map(|y| direction.dot(&y.coords));
+        let support = heights[0].max(heights[1]).max(heights[2]);
+        let mut step = f64::INFINITY;
+        let mut gap = f64::INFINITY;
+        for i in 0..3 {
+            let height = direction.dot(&self.corners[i].coords) - support;
+            gap = gap.min(height);
+            let bend = self.remainders[i] - direction.dot(&self.bends[i]);
+            let until = time_to_fall(height - minimum_gap, direction.dot(&self.velocities[i]), bend);
+            step = step.min(until);
+        }
+        let known = support.is_finite();
+        SafeStep { step: if known { step } else { 0.0 }, gap: if known { gap } else { f64::NEG_INFINITY } }
+    }
+}
+
+/// The first h >= 0 at which `height + speed h - bend h^2` becomes negative; infinite when it never does, 0 for NaN.
+#[inline]
+fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
+    let above = height >= 0.0; // false for NaN
+    if !above {
+        return 0.0;
+    }
+    let discriminant = speed * speed + 4.0 * bend * height;
+    if speed < 0.0 {
+        // No real root: the path bends away in time.
+        return if discriminant < 0.0 { f64::INFINITY } else { known(2.0 * height / (discriminant.sqrt() - speed)) };
+    }
+    if bend <= 0.0 { f64::INFINITY } else { known((speed + discriminant.sqrt()) / (2.0 * bend)) }
+}
+
+#[inline]
+fn known(time: f64) -> f64 {
+    if time.is_nan() { 0.0 } else { time }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fall_ends_at_the_first_root() {
+        for (height, speed, bend) in [(1.0, -2.0, 0.5), (1.0, 2.0, 0.5), (1.0, 0.0, 0.25), (1.0, -3.0, -1.0), (1e-9, -1.0, 1e-3)] {
+            let h = time_to_fall(height, speed, bend);
+            let value: f64 = height + speed * h - bend * h * h;
+            assert!(value.abs() < 1e-12 && h > 0.0, "{height} {speed} {bend}: {h}");
+            for k in 1..100 {
+                let t = h * f64::from(k) / 100.0;
+                assert!(height + speed * t - bend * t * t > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn tangential_and_departing_paths_never_fall_and_nan_does_at_once() {
+        assert_eq!(time_to_fall(1e-6, 0.0, 0.0), f64::INFINITY);
+        assert_eq!(time_to_fall(0.0, 1.0, 0.0), f64::INFINITY);
+        assert_eq!(time_to_fall(1.0, -0.1, -1.0), f64::INFINITY);
+        for (height, speed, bend) in [(f64::NAN, 1.0, 0.0), (1.0, f64::NAN, 1.0), (1.0, -1.0, f64::NAN), (1.0, 1.0, f64::NAN)] {
+            assert_eq!(time_to_fall(height, speed, bend), 0.0);
+        }
+    }
+}

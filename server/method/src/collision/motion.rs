@@ -1,0 +1,106 @@
+//! In-between motion: how a body gets from one pose to the next.
+//!
+//! | symbol | name in code     | unit   | meaning                                                 |
+//! |--------|------------------|--------|---------------------------------------------------------|
+//! | G(t)   |                  | m      | reference point: a straight line at constant speed      |
+//! | d      | linear part      | m      | path of G over the motion                               |
+//! | w      | angular part     | rad    | constant axis times angle of the rotation, world        |
+//! | t      | `time`           | –      | fraction of the motion, in [0, 1]                       |
+//!
+//! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002.
+
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+
+use crate::spatial::{Pose, Vector6, advance_pose, angular, linear};
+
+/// Straight line for the reference point, constant axis and rate for the rotation, over t in [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    /// Pose of the reference point at the start: body axes, origin at G; world.
+    pub start: Pose,
+    /// `[d; w]`: path of G, m, and rotation vector, rad; world axes.
+    pub displacement: Vector6,
+    /// G in the body's own frame, m.
+    pub reference_point: Point3<f64>,
+}
+
+impl Motion {
+    /// Pose of the reference point at `time`.
+    pub fn pose_at(&self, time: f64) -> Pose {
+        advance_pose(&self.start, &self.displacement, time)
+    }
+}
+
+/// A motion as seen from an obstacle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RelativeMotion {
+    /// Obstacle from body axes at time 0.
+    rotation: Matrix3<f64>,
+    /// G at time 0, obstacle frame.
+    start: Vector3<f64>,
+    /// d, obstacle axes.
+    pub(crate) velocity: Vector3<f64>,
+    /// w, obstacle axes.
+    pub(crate) spin: Vector3<f64>,
+    /// |w|.
+    pub(crate) rate: f64,
+    reference_point: Point3<f64>,
+}
+
+/// The body at one instant, obstacle frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placement {
+    pub(crate) rotation: Matrix3<f64>,
+    /// Image of the body frame's origin.
+    pub(crate) origin: Vector3<f64>,
+    /// G.
+    pub(crate) center: Vector3<f64>,
+}
+
+impl Placement {
+    /// A point of the body, obstacle frame.
+    #[inline]
+    pub(crate) fn point(&self, in_body: &Point3<f64>) -> Point3<f64> {
+        Point3::from(self.rotation * in_body.coords + self.origin)
+    }
+}
+
+impl RelativeMotion {
+    pub(crate) fn new(motion: &Motion, obstacle_pose: &Pose) -> Self {
+        let obstacle_from_world = obstacle_pose.inverse();
+        let relative = obstacle_from_world * motion.start;
+        let spin = obstacle_from_world.rotation * angular(&motion.displacement);
+        Self {
+            rotation: relative.rotation.to_rotation_matrix().into_inner(),
+            start: relative.translation.vector,
+            velocity: obstacle_from_world.rotation * linear(&motion.displacement),
+            spin,
+            rate: spin.norm(),
+            reference_point: motion.reference_point,
+        }
+    }
+
+    /// Where the body is at `time`.
+    pub(crate) fn at(&self, time: f64) -> Placement {
+        let turn = Rotation3::from_scaled_axis(self.spin * time).into_inner();
+        let rotation = turn * self.rotation;
+        let center = self.start + self.velocity * time;
+        Placement { rotation, origin: center - rotation * self.reference_point.coords, center }
+    }
+
+    /// Whether every number of the motion is finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors = [&self.start, &self.velocity, &self.spin];
+        vectors.iter().all(|v| v.iter().all(|c| c.is_finite())) && self.rotation.iter().all(|c| c.is_finite())
+    }
+
+    /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.
+    pub(crate) fn reach(&self, radius: f64) -> f64 {
+        self.start.amax() + self.velocity.amax() + radius + self.reference_point.coords.amax()
+    }
+
+    /// Bound on the path of the body's fastest point, m.
+    pub(crate) fn length(&self, radius: f64) -> f64 {
+        self.velocity.norm() + self.rate * radius
+    }
+}

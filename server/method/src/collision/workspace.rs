@@ -1,0 +1,49 @@
+//! Memory of collision search and contact collection, allocated once.
+
+use arrayvec::ArrayVec;
+
+use super::swept_box::STACK_CAPACITY;
+use crate::constraint::Contact;
+
+/// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
+pub(crate) const MAX_CANDIDATES: usize = 8192;
+/// Triangle pairs kept from one search to the next.
+pub(crate) const MAX_HINTS: usize = 16;
+
+/// Buffers that the searches reuse, and the nearest triangle pairs of the last ones.
+///
+/// The pairs are looked at first in the next search. They change how soon an answer is found, never whether it is safe: any pair of triangles is
+/// a valid one to look at.
+#[derive(Clone, Debug)]
+pub struct CollisionWorkspace {
+    pub(crate) stack: Vec<(u32, u32)>,
+    pub(crate) candidates: Vec<Contact>,
+    pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
+}
+
+impl CollisionWorkspace {
+    /// Allocates everything that the searches will ever need.
+    pub fn new() -> Self {
+        Self {
+            stack: Vec::with_capacity(STACK_CAPACITY),
+            candidates: Vec::with_capacity(MAX_CANDIDATES),
+            hints: ArrayVec::new(),
+        }
+    }
+
+    /// Puts a pair at the front of the hints.
+    pub(crate) fn remember(&mut self, pair: (u32, u32)) {
+        if let Some(known) = self.hints.iter().position(|h| *h == pair) {
+            self.hints.remove(known);
+        } else if self.hints.is_full() {
+            self.hints.pop();
+        }
+        self.hints.insert(0, pair);
+    }
+}
+
+impl Default for CollisionWorkspace {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,252 @@
+//! Do two features face each other: is the separation a local minimum of the distance between the surfaces?
+//!
+//! | symbol | name in code | unit | meaning                                                         |
+//! |--------|--------------|------|-----------------------------------------------------------------|
+//! | n      | `normal`     | –    | unit, obstacle to body                                          |
+//! | x, y   |              | m    | points on the body and on the obstacle                          |
+//! | g      | `gap`        | m    | `n.(x - y)`, in [0, activation distance]                        |
+//!
+//! n must lie in the normal cone of the obstacle's feature and -n in that of the body's: no surface next to the feature rises
+//! towards the other body. The normal is that of the face or the product of the edges; only where a vertex meets an edge or a vertex
+//! is it the direction of the difference. All in the obstacle's frame until the contacts are handed out.
+//! Source: Ortega et al. 2007, Section 4.1; Lin and Canny 1991 (Voronoi regions of features).
+
+use nalgebra::{Point3, Vector3};
+
+use super::{Contact, Feature, FeaturePair};
+use crate::collision::Placement;
+use crate::geometry::Mesh;
+use crate::geometry::distance::barycentric;
+
+/// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
+/// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
+pub(super) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
+/// The same for a corner over a face, rad. The normal is the face's whatever the corner does, so the row is true; it is there
+/// before the body tilts onto the corner.
+pub(super) const LOOK_AHEAD_TILT: f64 = 0.02;
+/// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
+const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
+const FOOT_TOLERANCE_PER_SIDE: f64 = 1e-9;
+/// Edges at a smaller angle are parallel, as its sine: their vertices stand for them.
+const PARALLEL_SINE: f64 = 1e-6;
+/// Points nearer than this have no direction, m: some rounding errors of a metre.
+const NO_DIRECTION: f64 = 1e-14;
+
+/// Looks at features of one body and one obstacle at rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facing<'a> {
+    pub(super) body: &'a Mesh,
+    pub(super) obstacle: &'a Mesh,
+    pub(super) placement: &'a Placement,
+    pub(super) obstacle_index: u16,
+    pub(super) activation_distance: f64,
+}
+
+/// One triangle of each, corners in both frames where needed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair {
+    pub(super) a: u32,
+    pub(super) b: u32,
+    /// Corners of the body's triangle, obstacle frame.
+    pub(super) x: [Point3<f64>; 3],
+    /// Corners of the obstacle's triangle.
+    pub(super) y: [Point3<f64>; 3],
+}
+
+impl Facing<'_> {
+    /// Corner `k` of the body's triangle over the obstacle's face.
+    pub(super) fn vertex_face(&self, pair: &Pair, k: usize) -> Option<Contact> {
+        let normal = *self.obstacle.face_normal(pair.b);
+        let gap = normal.dot(&(pair.x[k] - pair.y[0]));
+        if !self.is_near(gap) || !is_over(&pair.x[k], &pair.y, &normal, gap) {
+            return None;
+        }
+        let v = self.body.triangles()[pair.a as usize][k];
+        let outward = -self.placement.rotation.tr_mul(&normal);
+        if !is_in_vertex_cone(self.body, v, &outward, LOOK_AHEAD_TILT) {
+            return None;
+        }
+        let foot = pair.x[k] - normal * gap;
+        let weights = barycentric(&foot, &pair.y, &normal);
+        Some(self.contact(Feature::Vertex(v), Feature::Face(pair.b), [pair.x[k], foot], normal, gap, (pair.b, weights)))
+    }
+
+    /// Corner `k` of the obstacle's triangle under the body's face.
+    pub(super) fn face_vertex(&self, pair: &Pair, k: usize) -> Option<Contact> {
+        let normal = -(self.placement.rotation * self.body.face_normal(pair.a));
+        let gap = normal.dot(&(pair.x[0] - pair.y[k]));
+        if !self.is_near(gap) || !is_over(&pair.y[k], &pair.x, &-normal, gap) {
+            return None;
+        }
+        let v = self.obstacle.triangles()[pair.b as usize][k];
+        if !is_in_vertex_cone(self.obstacle, v, &normal, LOOK_AHEAD_TILT) {
+            return None;
+        }
+        let on_body = pair.y[k] + normal * gap;
+        Some(self.contact(Feature::Face(pair.a), Feature::Vertex(v), [on_body, pair.y[k]], normal, gap, (pair.b, at_corner(k))))
+    }
+
+    /// Side `i` of the body's triangle across side `j` of the obstacle's.
+    pub(super) fn edge_edge(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
+        let (p, q) = (pair.x[i], pair.y[j]);
+        let (u, v, r) = (pair.x[(i + 1) % 3] - p, pair.y[(j + 1) % 3] - q, p - q);
+        let (a, e, b) = (u.norm_squared(), v.norm_squared(), u.dot(&v));
+        let denominator = a * e - b * b;
+        let crossing = denominator > PARALLEL_SINE * PARALLEL_SINE * a * e; // false for NaN
+        if !crossing {
+            return None;
+        }
+        let (c, f) = (u.dot(&r), v.dot(&r));
+        let (s, t) = ((b * f - c * e) / denominator, (a * f - b * c) / denominator);
+        let inside = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
+        if !inside {
+            return None;
+        }
+        let cross = u.cross(&v);
+        let unit = cross / cross.norm();
+        let (edge_a, edge_b) = (self.body.triangle_edges(pair.a)[i], self.obstacle.triangle_edges(pair.b)[j]);
+        // Out of the obstacle and into the body, by the faces at the edges: the points may be too near to say.
+        let out_of_body = self.placement.rotation * outward_of_edge(self.body, edge_a);
+        let side = unit.dot(&(outward_of_edge(self.obstacle, edge_b) - out_of_body));
+        let normal = if side < 0.0 { -unit } else { unit };
+        let (x, y) = (p + u * s, q + v * t);
+        let gap = normal.dot(&(x - y));
+        let facing = self.is_near(gap)
+            && is_in_edge_cone(self.obstacle, edge_b, &normal)
+            && is_in_edge_cone(self.body, edge_a, &-self.placement.rotation.tr_mul(&normal));
+        facing.then(|| self.contact(Feature::Edge(edge_a), Feature::Edge(edge_b), [x, y], normal, gap, (pair.b, on_side(j, t))))
+    }
+
+    /// Corner `i` of the body's triangle against side `j` of the obstacle's.
+    pub(super) fn vertex_edge(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
+        let (foot, t) = foot_on_side(&pair.x[i], &pair.y, j)?;
+        let edge = self.obstacle.triangle_edges(pair.b)[j];
+        let (normal, gap) = self.direction(&(pair.x[i] - foot), &outward_of_edge(self.obstacle, edge))?;
+        let v = self.body.triangles()[pair.a as usize][i];
+        let facing = is_in_edge_cone(self.obstacle, edge, &normal)
+            && is_in_vertex_cone(self.body, v, &-self.placement.rotation.tr_mul(&normal), NORMAL_CONE_TOLERANCE);
+        facing.then(|| self.contact(Feature::Vertex(v), Feature::Edge(edge), [pair.x[i], foot], normal, gap, (pair.b, on_side(j, t))))
+    }
+
+    /// Side `i` of the body's triangle against corner `j` of the obstacle's.
+    pub(super) fn edge_vertex(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
+        let (foot, _) = foot_on_side(&pair.y[j], &pair.x, i)?;
+        let edge = self.body.triangle_edges(pair.a)[i];
+        let into_body = -(self.placement.rotation * outward_of_edge(self.body, edge));
+        let (normal, gap) = self.direction(&(foot - pair.y[j]), &into_body)?;
+        let v = self.obstacle.triangles()[pair.b as usize][j];
+        let facing = is_in_vertex_cone(self.obstacle, v, &normal, NORMAL_CONE_TOLERANCE)
+            && is_in_edge_cone(self.body, edge, &-self.placement.rotation.tr_mul(&normal));
+        facing.then(|| self.contact(Feature::Edge(edge), Feature::Vertex(v), [foot, pair.y[j]], normal, gap, (pair.b, at_corner(j))))
+    }
+
+    /// Corner `i` of the body's triangle against corner `j` of the obstacle's.
+    pub(super) fn vertex_vertex(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
+        let (normal, gap) = self.direction(&(pair.x[i] - pair.y[j]), self.obstacle.face_normal(pair.b))?;
+        let (v, w) = (self.body.triangles()[pair.a as usize][i], self.obstacle.triangles()[pair.b as usize][j]);
+        let facing = is_in_vertex_cone(self.obstacle, w, &normal, NORMAL_CONE_TOLERANCE)
+            && is_in_vertex_cone(self.body, v, &-self.placement.rotation.tr_mul(&normal), NORMAL_CONE_TOLERANCE);
+        facing.then(|| self.contact(Feature::Vertex(v), Feature::Vertex(w), [pair.x[i], pair.y[j]], normal, gap, (pair.b, at_corner(j))))
+    }
+
+    #[inline]
+    fn is_near(&self, gap: f64) -> bool {
+        gap >= 0.0 && gap <= self.activation_distance // false for NaN
+    }
+
+    /// Unit direction and length of a difference within the activation distance; `otherwise` where it is too short to have one.
+    #[inline]
+    fn direction(&self, difference: &Vector3<f64>, otherwise: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+        let squared = difference.norm_squared();
+        let near = squared <= self.activation_distance * self.activation_distance; // false for NaN
+        if !near {
+            return None;
+        }
+        let gap = squared.sqrt();
+        let normal = if gap > NO_DIRECTION { difference / gap } else { otherwise.try_normalize(0.0)? };
+        Some((normal, gap))
+    }
+
+    fn contact(
+        &self,
+        on_body: Feature,
+        on_obstacle: Feature,
+        [x, y]: [Point3<f64>; 2],
+        normal: Vector3<f64>,
+        gap: f64,
+        (obstacle_triangle, barycentric): (u32, [f64; 3]),
+    ) -> Contact {
+        Contact {
+            features: FeaturePair { obstacle: self.obstacle_index, on_body, on_obstacle },
+            point_on_body: x,
+            point_on_obstacle: y,
+            normal,
+            gap,
+            obstacle_triangle,
+            barycentric,
+        }
+    }
+}
+
+/// Whether the foot of a point lies in the triangle, to tolerance.
+#[inline]
+fn is_over(p: &Point3<f64>, t: &[Point3<f64>; 3], normal: &Vector3<f64>, gap: f64) -> bool {
+    (0..3).all(|k| {
+        let side = t[(k + 1) % 3] - t[k];
+        let inside = normal.cross(&side).dot(&(p - t[k]));
+        inside >= 0.0 || {
+            let length = side.norm();
+            inside >= -length * (FOOT_TOLERANCE_PER_GAP * gap + FOOT_TOLERANCE_PER_SIDE * length)
+        }
+    })
+}
+
+/// The foot of a point on a side and its fraction there, when it lies on the side.
+#[inline]
+fn foot_on_side(p: &Point3<f64>, t: &[Point3<f64>; 3], side: usize) -> Option<(Point3<f64>, f64)> {
+    let along = t[(side + 1) % 3] - t[side];
+    let fraction = along.dot(&(p - t[side])) / along.norm_squared();
+    (0.0..=1.0).contains(&fraction).then(|| (t[side] + along * fraction, fraction))
+}
+
+/// No edge at the vertex rises in `direction` by more than `tolerance`.
+fn is_in_vertex_cone(mesh: &Mesh, v: u32, direction: &Vector3<f64>, tolerance: f64) -> bool {
+    let apex = mesh.vertices()[v as usize];
+    mesh.neighbours(v).iter().all(|w| {
+        let edge = mesh.vertices()[*w as usize] - apex;
+        let rise = direction.dot(&edge);
+        rise <= 0.0 || rise * rise <= tolerance * tolerance * edge.norm_squared()
+    })
+}
+
+/// Neither face at the edge rises in `direction`.
+fn is_in_edge_cone(mesh: &Mesh, edge: u32, direction: &Vector3<f64>) -> bool {
+    let edge = &mesh.edges()[edge as usize];
+    let along = mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];
+    let limit = NORMAL_CONE_TOLERANCE * NORMAL_CONE_TOLERANCE * along.norm_squared();
+    // `normal x along` points into the left face; into the right one it is the other way.
+    [(edge.faces[0], 1.0), (edge.faces[1], -1.0)].iter().all(|(face, sign)| {
+        let rise = sign * direction.dot(&mesh.face_normal(*face).cross(&along));
+        rise <= 0.0 || rise * rise <= limit
+    })
+}
+
+/// Sum of the normals at an edge: a direction inside its normal cone.
+#[inline]
+fn outward_of_edge(mesh: &Mesh, edge: u32) -> Vector3<f64> {
+    let [left, right] = mesh.edges()[edge as usize].faces;
+    mesh.face_normal(left) + mesh.face_normal(right)
+}
+
+fn at_corner(k: usize) -> [f64; 3] {
+    let mut weights = [0.0; 3];
+    weights[k] = 1.0;
+    weights
+}
+
+fn on_side(side: usize, fraction: f64) -> [f64; 3] {
+    let mut weights = [0.0; 3];
+    weights[side] = 1.0 - fraction;
+    weights[(side + 1) % 3] = fraction;
+    weights
+}

@@ -1,0 +1,23 @@
+//! Features of a mesh and pairs of them: the persistent names of contacts.
+
+/// A vertex, an edge or a face of a mesh, by its index there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Feature {
+    /// Index into [`Mesh::vertices`](crate::Mesh::vertices).
+    Vertex(u32),
+    /// Index into [`Mesh::edges`](crate::Mesh::edges).
+    Edge(u32),
+    /// Index into [`Mesh::triangles`](crate::Mesh::triangles).
+    Face(u32),
+}
+
+/// Two features that face each other. It names a contact through time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct FeaturePair {
+    /// Index of the obstacle in the world.
+    pub obstacle: u16,
+    /// Feature of the god-object's body.
+    pub on_body: Feature,
+    /// Feature of the obstacle.
+    pub on_obstacle: Feature,
+}

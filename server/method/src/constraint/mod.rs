@@ -1,0 +1,12 @@
+//! Contacts between features, and the constraint set made of them.
+
+mod collect;
+mod contact;
+mod facing;
+mod feature;
+mod set;
+
+pub use collect::collect_contacts;
+pub use contact::{Collected, Contact};
+pub use feature::{Feature, FeaturePair};
+pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};

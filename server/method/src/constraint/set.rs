@@ -1,0 +1,84 @@
+//! The constraint set: what the god-object loop hands to the coupling loop, as one value.
+//!
+//! | symbol      | name in code                             | unit | meaning                                      |
+//! |-------------|------------------------------------------|------|----------------------------------------------|
+//! | I_k         | [`NonPenetrationConstraint::point`]      | m    | contact point on the obstacle, world         |
+//! | n_k         | [`NonPenetrationConstraint::normal`]     | –    | unit, obstacle to god-object, world          |
+//! | g_k         | [`NonPenetrationConstraint::gap`]        | m    | distance between the two features, >= 0      |
+//! | J_k         | [`contact_jacobian`]                     |      | `[n; r x n]`, `r = I - G`                    |
+//! | h_k         | `gap - rest_distance`                    | m    | what the gap may still close by              |
+//!
+//! Source: Ortega et al. 2007, Sections 4.2 and 5. Rows with a gap are look-ahead constraints, beyond the paper.
+
+use nalgebra::{Point3, Vector3};
+
+use super::FeaturePair;
+use crate::spatial::{Pose, Vector6, six};
+
+/// A half-space of accelerations that one pair of facing features allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NonPenetrationConstraint {
+    /// The persistent id: which features face each other.
+    pub features: FeaturePair,
+    /// Contact point on the obstacle, world, m.
+    pub point: Point3<f64>,
+    /// Unit normal, from the obstacle to the god-object, world.
+    pub normal: Vector3<f64>,
+    /// Distance between the features, m.
+    pub gap: f64,
+    /// Interpolated normal where the surface is shaded, Section 6.1.
+    pub shading_normal: Option<Vector3<f64>>,
+}
+
+/// A god-object pose and the constraints that hold there; replaced as a whole, never in part.
+#[derive(Debug, Default)]
+pub struct ConstraintSet {
+    /// Counts the sets; 0 is the set at the start.
+    pub sequence: u64,
+    /// Pose of the body's own frame at which the constraints hold.
+    pub god_object_pose: Pose,
+    /// Rows in ascending order of their features.
+    pub constraints: Vec<NonPenetrationConstraint>,
+    /// Smallest distance between the bodies, m; infinite when none is within the activation distance.
+    pub gap_min: f64,
+    /// The capacity did not hold every row; the nearest were kept.
+    pub truncated: bool,
+}
+
+impl ConstraintSet {
+    /// An empty set that holds `capacity` rows without allocating.
+    pub fn with_capacity(capacity: usize) -> Self {
+        Self {
+            constraints: Vec::with_capacity(capacity),
+            gap_min: f64::INFINITY,
+            ..Self::default()
+        }
+    }
+}
+
+// By hand for `clone_from`: the copy into a shared buffer reuses its memory.
+impl Clone for ConstraintSet {
+    fn clone(&self) -> Self {
+        let mut copy = Self::with_capacity(self.constraints.capacity());
+        copy.clone_from(self);
+        copy
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.sequence = source.sequence;
+        self.god_object_pose = source.god_object_pose;
+        self.constraints.clone_from(&source.constraints);
+        self.gap_min = source.gap_min;
+        self.truncated = source.truncated;
+    }
+}
+
+/// The row `[n^T, (r x n)^T]` with `r = point - reference_point`, all in world axes.
+#[inline]
+pub fn contact_jacobian(
+    normal: &Vector3<f64>,
+    point: &Point3<f64>,
+    reference_point: &Point3<f64>,
+) -> Vector6 {
+    six(normal, &(point - reference_point).cross(normal))
+}

@@ -1,0 +1,210 @@
+//! Constraint-based coupling: the force on the hand from a device pose and a constraint set, in microseconds.
+//!
+//! | symbol | name in code      | unit   | meaning                                                     |
+//! |--------|-------------------|--------|-------------------------------------------------------------|
+//! | a_u    | `unconstrained`   | m, rad | `k_s (x_h - x_s)`                                           |
+//! | a_c    | `constrained`     | m, rad | projection of a_u on the constraint set (Eq. 1)             |
+//! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
+//! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
+//!
+//! No collision detection, no allocation, bounded work: the god-object stands still meanwhile.
+//! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::adaptation::AdaptationState;
+use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::quasi_statics::{HalfSpace, Projection, ProjectionStatus, Projector};
+use crate::settings::Settings;
+use crate::spatial::{
+    Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
+};
+use crate::surface::{ShadedAcceleration, TexturedSurface, perturb_force};
+use crate::world::World;
+
+/// Loop 2 of the method. `step` allocates nothing.
+#[derive(Debug)]
+pub struct Coupling {
+    settings: Settings,
+    body: CoupledBody,
+    /// Empty when no obstacle has a texture.
+    surfaces: Vec<TexturedSurface>,
+    projector: Projector,
+    adaptation: Option<AdaptationState>,
+    rows: Vec<HalfSpace>,
+    warm_start: Vec<u32>,
+    rotation: Vector3<f64>,
+}
+
+/// What the coupling needs to know of the body: no surface.
+#[derive(Debug)]
+struct CoupledBody {
+    mass: f64,
+    inertia: nalgebra::Matrix3<f64>,
+    reference_point: Point3<f64>,
+}
+
+/// The answer of one coupling step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CouplingOutput {
+    /// Force and torque on the hand at the reference point, N and N m, world axes; within the limits.
+    pub wrench: Vector6,
+    /// First pass of force shading, for the god-object loop; `None` when no contact is shaded.
+    pub shaded: Option<ShadedAcceleration>,
+    /// Rows in the active set.
+    pub active: usize,
+    /// Relative KKT residual of the force's projection.
+    pub kkt: f64,
+    /// How the projection ended. Anything but `Solved` comes with a zero wrench.
+    pub status: ProjectionStatus,
+    /// The norm clamp of force or torque was at work.
+    pub saturated: bool,
+}
+
+impl Coupling {
+    /// Prepares the loop; every buffer gets its final size.
+    pub fn new(world: &World, settings: &Settings) -> Self {
+        let textured = world.obstacles.iter().any(|obstacle| obstacle.surface.texture.is_some());
+        let surfaces = if textured { world.obstacles.iter().map(Into::into).collect() } else { Vec::new() };
+        let capacity = settings.max_constraints;
+        Self {
+            settings: *settings,
+            body: CoupledBody {
+                mass: world.body.mass,
+                inertia: world.body.inertia,
+                reference_point: world.body.reference_point,
+            },
+            surfaces,
+            projector: Projector::new(settings.solver, capacity),
+            adaptation: settings.adaptation.map(|a| AdaptationState::new(a, capacity)),
+            rows: Vec::with_capacity(capacity),
+            warm_start: Vec::with_capacity(capacity.min(6)),
+            rotation: Vector3::zeros(),
+        }
+    }
+
+    /// The force for one device pose. `time` in seconds never runs back; it drives the constraint adaptation.
+    ///
+    /// A pose that is not finite gives a zero wrench and `ProjectionStatus::NotFinite`.
+    pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
+        if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
+            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+        }
+        let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
+        let device = at_reference_point(device_pose, &self.body.reference_point);
+        let difference = pose_difference(&device, &god_object, &self.rotation);
+        self.rotation = angular(&difference);
+        let unconstrained = difference * self.settings.k_s;
+        let Some(metric) = self.body.metric(&self.settings, &god_object) else {
+            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+        };
+
+        let center = Point3::from(god_object.translation.vector);
+        let shaded = self.gather_rows(time, &unconstrained, &center, set);
+        let projection = self.projector.project(&metric, &unconstrained, &self.rows, &self.warm_start);
+        if projection.status != ProjectionStatus::Solved {
+            self.warm_start.clear();
+            return CouplingOutput::without_force(projection.status);
+        }
+        self.warm_start.clear();
+        self.warm_start.extend(projection.active.iter().map(|row| row.row));
+
+        // F_c = k_h M (a_c - a_u)
+        let change = projection.acceleration - unconstrained;
+        let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
+        if !self.surfaces.is_empty() {
+            wrench = self.textured(&wrench, &projection, &center, set);
+        }
+        let (wrench, saturated) = self.limited(&wrench);
+        CouplingOutput {
+            wrench,
+            shaded: shaded.then_some(ShadedAcceleration {
+                sequence: set.sequence,
+                acceleration: projection.acceleration,
+            }),
+            active: projection.active.len(),
+            kkt: projection.kkt_residual,
+            status: projection.status,
+            saturated,
+        }
+    }
+
+    /// Writes the half-spaces of the set into `rows`; says whether any is shaded.
+    fn gather_rows(
+        &mut self,
+        time: f64,
+        unconstrained: &Vector6,
+        center: &Point3<f64>,
+        set: &ConstraintSet,
+    ) -> bool {
+        if let Some(adaptation) = &mut self.adaptation {
+            adaptation.observe(set.sequence, &set.constraints);
+        }
+        self.rows.clear();
+        let mut shaded = false;
+        for constraint in set.constraints.iter().take(self.settings.max_constraints) {
+            let normal = constraint.shading_normal.unwrap_or(constraint.normal);
+            shaded |= constraint.shading_normal.is_some();
+            let jacobian = contact_jacobian(&normal, &constraint.point, center);
+            let mut bound = self.settings.coupling_bound(constraint.gap);
+            if let Some(adaptation) = &mut self.adaptation {
+                let reached = jacobian.dot(unconstrained);
+                bound = adaptation.bound(time, constraint.features, bound, reached);
+            }
+            self.rows.push(HalfSpace { jacobian, bound });
+        }
+        if let Some(adaptation) = &mut self.adaptation {
+            adaptation.retire(time);
+        }
+        shaded
+    }
+
+    /// The wrench tilted by the textures under the active contacts, which the motion carries along.
+    fn textured(
+        &self,
+        wrench: &Vector6,
+        projection: &Projection,
+        center: &Point3<f64>,
+        set: &ConstraintSet,
+    ) -> Vector6 {
+        let moved = |point: &Point3<f64>| {
+            let arm = point - center;
+            point + linear(&projection.acceleration) + angular(&projection.acceleration).cross(&arm)
+        };
+        let contacts = projection.active.iter().filter_map(|active| {
+            let constraint = set.constraints.get(active.row as usize)?;
+            Some((constraint.features.obstacle, moved(&constraint.point), constraint.normal))
+        });
+        perturb_force(wrench, center, &self.surfaces, contacts)
+    }
+
+    /// Force and torque clamped by norm, each with its direction kept.
+    fn limited(&self, wrench: &Vector6) -> (Vector6, bool) {
+        let clamp = |v: Vector3<f64>, limit: f64| {
+            let norm = v.norm();
+            if norm <= limit { (v, false) } else { (v * (limit / norm), true) }
+        };
+        let (force, force_clamped) = clamp(linear(wrench), self.settings.force_limit);
+        let (torque, torque_clamped) = clamp(angular(wrench), self.settings.torque_limit);
+        (six(&force, &torque), force_clamped || torque_clamped)
+    }
+}
+
+impl CoupledBody {
+    fn metric(&self, settings: &Settings, pose: &Pose) -> Option<crate::quasi_statics::Metric> {
+        crate::world::metric_at(self.mass, &self.inertia, settings.rotation_metric, pose)
+    }
+}
+
+impl CouplingOutput {
+    fn without_force(status: ProjectionStatus) -> Self {
+        Self {
+            wrench: Vector6::zeros(),
+            shaded: None,
+            active: 0,
+            kkt: f64::INFINITY,
+            status,
+            saturated: false,
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Closest points of two triangles: the nine pairs of sides and the six pairs of corner and face.
+//!
+//! The closest points of two triangles that do not intersect lie on two sides, or on a corner and a face. Whether they do
+//! intersect is [`triangles_intersect`](super::triangles_intersect)'s question: a side that pierces a face has no
+//! distance among these fifteen, and the caller must not take the answer for one.
+
+use nalgebra::{Point3, Vector3};
+
+use super::TriangleFeature::{self, Corner, Face, Side};
+use super::edge_edge::closest_on_edges;
+
+/// Closest points of two triangles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestOnTriangles {
+    /// Point on the first, m.
+    pub on_first: Point3<f64>,
+    /// Point on the second, m.
+    pub on_second: Point3<f64>,
+    /// Feature of the first on which its point lies.
+    pub first_feature: TriangleFeature,
+    /// Feature of the second on which its point lies.
+    pub second_feature: TriangleFeature,
+    /// Squared distance, m^2.
+    pub squared_distance: f64,
+}
+
+/// Closest points of the boundaries-or-faces of two triangles; robust for parallel, touching and thin triangles.
+pub fn closest_on_triangles(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> ClosestOnTriangles {
+    let mut best = closest_sides(a, b);
+    let (normal_a, normal_b) = (doubled_normal(a), doubled_normal(b));
+    for k in 0..3 {
+        if let Some(foot) = foot_inside(&a[k], b, &normal_b) {
+            best.improve(a[k], foot, Corner(k as u8), Face);
+        }
+        if let Some(foot) = foot_inside(&b[k], a, &normal_a) {
+            best.improve(foot, b[k], Face, Corner(k as u8));
+        }
+    }
+    best
+}
+
+impl ClosestOnTriangles {
+    #[inline]
+    fn improve(&mut self, on_first: Point3<f64>, on_second: Point3<f64>, first_feature: TriangleFeature, second_feature: TriangleFeature) {
+        let squared_distance = (on_first - on_second).norm_squared();
+        if squared_distance < self.squared_distance {
+            *self = Self { on_first, on_second, first_feature, second_feature, squared_distance };
+        }
+    }
+}
+
+fn closest_sides(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> ClosestOnTriangles {
+    let mut least = f64::INFINITY;
+    let mut found = (0, 0, 0.0, 0.0);
+    for i in 0..3 {
+        for j in 0..3 {
+            let c = closest_on_edges([&a[i], &a[(i + 1) % 3]], [&b[j], &b[(j + 1) % 3]]);
+            let squared = c.difference.norm_squared();
+            if squared < least {
+                least = squared;
+                found = (i, j, c.on_first, c.on_second);
+            }
+        }
+    }
+    let (i, j, s, t) = found;
+    ClosestOnTriangles {
+        on_first: a[i] + (a[(i + 1) % 3] - a[i]) * s,
+        on_second: b[j] + (b[(j + 1) % 3] - b[j]) * t,
+        first_feature: side_or_corner(i, s),
+        second_feature: side_or_corner(j, t),
+        squared_distance: least,
+    }
+}
+
+fn side_or_corner(side: usize, fraction: f64) -> TriangleFeature {
+    if fraction <= 0.0 {
+        Corner(side as u8)
+    } else if fraction >= 1.0 {
+        Corner(((side + 1) % 3) as u8)
+    } else {
+        Side(side as u8)
+    }
+}
+
+#[inline]
+fn doubled_normal(t: &[Point3<f64>; 3]) -> Vector3<f64> {
+    (t[1] - t[0]).cross(&(t[2] - t[0]))
+}
+
+/// The foot of `p` on the plane of `t` where it lies inside `t`.
+#[inline]
+fn foot_inside(p: &Point3<f64>, t: &[Point3<f64>; 3], normal: &Vector3<f64>) -> Option<Point3<f64>> {
+    let inside = (0..3).all(|k| normal.cross(&(t[(k + 1) % 3] - t[k])).dot(&(p - t[k])) >= 0.0);
+    let squared = normal.norm_squared();
+    if !inside || squared <= 0.0 {
+        return None;
+    }
+    Some(p - normal * (normal.dot(&(p - t[0])) / squared))
+}

@@ -1,0 +1,20 @@
+//! Meshes: checked once, then read only. Tree, closest points, mass, normals.
+
+pub mod distance;
+mod mass;
+mod mesh;
+mod mesh_error;
+mod normals;
+mod report;
+mod topology;
+mod tree;
+
+pub use mass::{MassProperties, mass_properties};
+pub use mesh::Mesh;
+pub use mesh_error::MeshError;
+pub use normals::corner_normals;
+pub use report::MeshReport;
+pub use topology::Edge;
+pub use tree::{Node, NormalCone, Tree};
+
+pub(crate) use tree::MAX_DEPTH;

@@ -1,0 +1,105 @@
+//! What a triangle surface is like, sound or broken: the figures behind `check`.
+
+use std::collections::HashSet;
+
+use nalgebra::Point3;
+
+use super::mesh::{face_normal, signed_volume};
+
+/// Findings about vertices and triangles as they come from a file. Works for meshes that [`Mesh`](super::Mesh) refuses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeshReport {
+    /// Number of triangles.
+    pub triangles: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Every edge has at least two triangles, and there is a triangle.
+    pub watertight: bool,
+    /// Wherever two triangles share an edge they agree about outside, and the volume is positive.
+    pub oriented: bool,
+    /// Triangles without area, with an index out of range or with a corner that is not finite.
+    pub degenerate_faces: usize,
+    /// Triangles with the same three corners as an earlier one, in any order.
+    pub duplicate_faces: usize,
+    /// Edges with one triangle.
+    pub border_edges: usize,
+    /// Edges with more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Edges along which two triangles run the same way.
+    pub misoriented_edges: usize,
+    /// Signed volume, m^3; means the inside only where the surface is watertight and oriented.
+    pub volume: f64,
+    /// Least height of a triangle with area, m; infinite when there is none.
+    pub smallest_feature: f64,
+}
+
+impl MeshReport {
+    /// Looks at a surface. Triangles that name no vertex or have no area are counted and left out of the rest.
+    pub fn of(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
+        let names_vertices = |t: &&[u32; 3]| t.iter().all(|v| vertices.get(*v as usize).is_some_and(|p| p.iter().all(|c| c.is_finite())));
+        let named: Vec<[u32; 3]> = triangles.iter().filter(names_vertices).copied().collect();
+        let with_area = |t: &&[u32; 3]| face_normal(&t.map(|v| vertices[v as usize])).is_some();
+        let sound: Vec<[u32; 3]> = named.iter().filter(with_area).copied().collect();
+
+        let mut seen = HashSet::new();
+        let duplicate = |t: &&[u32; 3]| {
+            let mut corners = **t;
+            corners.sort_unstable();
+            !seen.insert(corners)
+        };
+        let duplicate_faces = sound.iter().filter(duplicate).count();
+        let sides = count_sides(&sound);
+        let volume = if sound.is_empty() { 0.0 } else { signed_volume(vertices, &sound) };
+        let heights = sound.iter().map(|t| least_height(&t.map(|v| vertices[v as usize])));
+        Self {
+            triangles: triangles.len(),
+            vertices: vertices.len(),
+            watertight: sides.border == 0 && !sound.is_empty(),
+            oriented: sides.misoriented == 0 && volume > 0.0,
+            degenerate_faces: triangles.len() - sound.len(),
+            duplicate_faces,
+            border_edges: sides.border,
+            non_manifold_edges: sides.crowded,
+            misoriented_edges: sides.misoriented,
+            volume,
+            smallest_feature: heights.fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// Whether the method can use the surface: closed, oriented, 2-manifold, without degenerate or duplicate faces.
+    pub fn is_sound(&self) -> bool {
+        self.watertight && self.oriented && self.degenerate_faces == 0 && self.duplicate_faces == 0 && self.non_manifold_edges == 0
+    }
+}
+
+#[derive(Default)]
+struct SideCounts {
+    border: usize,
+    crowded: usize,
+    misoriented: usize,
+}
+
+fn count_sides(triangles: &[[u32; 3]]) -> SideCounts {
+    let mut sides: Vec<(u32, u32, bool)> = triangles
+        .iter()
+        .flat_map(|t| (0..3).map(move |k| (t[k], t[(k + 1) % 3])))
+        .map(|(from, to)| (from.min(to), from.max(to), from < to))
+        .collect();
+    sides.sort_unstable();
+    let mut counts = SideCounts::default();
+    for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        match *edge {
+            [_] => counts.border += 1,
+            [a, b] => counts.misoriented += usize::from(a.2 == b.2),
+            _ => counts.crowded += 1,
+        }
+    }
+    counts
+}
+
+/// Doubled area over the longest side.
+fn least_height(t: &[Point3<f64>; 3]) -> f64 {
+    let sides = [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
+    let longest = sides.iter().map(|s| s.norm()).fold(0.0, f64::max);
+    sides[0].cross(&sides[1]).norm() / longest
+}

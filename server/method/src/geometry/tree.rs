@@ -1,0 +1,236 @@
+//! Bounding-volume tree over the triangles of a mesh: boxes in the mesh's frame, and cones of normals.
+//!
+//! Built once by the surface-area heuristic on binned centroids; flat arrays, first child next to its parent.
+
+use nalgebra::{Point3, Vector3};
+
+/// Bins of the surface-area heuristic along the longest axis.
+const BINS: usize = 16;
+/// Depth below which a subtree is halved by count, so that the depth is bounded whatever the mesh.
+const HALVE_BELOW_DEPTH: usize = 48;
+/// Bound on the depth of any tree: `HALVE_BELOW_DEPTH` and 32 halvings.
+pub(crate) const MAX_DEPTH: usize = 80;
+/// Outward rounding of boxes relative to their coordinates: some units in the last place.
+const BOX_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// A box, and what is inside.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Centre, m.
+    pub center: Point3<f64>,
+    /// Half of the sides, m, rounded up.
+    pub half: Vector3<f64>,
+    /// Half of the diagonal, m, rounded up.
+    pub radius: f64,
+    /// Second child; the first follows its parent. Zero for a leaf.
+    pub second: u32,
+    /// Triangle of a leaf.
+    pub triangle: u32,
+}
+
+impl Node {
+    /// Whether the node holds one triangle and no children.
+    #[inline]
+    pub fn is_leaf(&self) -> bool {
+        self.second == 0
+    }
+}
+
+/// A cone that holds the normals of every feature below a node.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalCone {
+    /// Unit axis.
+    pub axis: Vector3<f64>,
+    /// Half-angle, rad; pi holds every direction.
+    pub angle: f64,
+    /// Cosine and sine of `angle`.
+    pub cos_sin: [f64; 2],
+}
+
+impl NormalCone {
+    fn new(axis: Vector3<f64>, angle: f64) -> Self {
+        Self { axis, angle, cos_sin: [angle.cos(), angle.sin()] }
+    }
+}
+
+/// The tree. Node 0 is the root.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    nodes: Vec<Node>,
+    cones: Vec<NormalCone>,
+}
+
+/// What the build knows of a triangle.
+#[derive(Clone, Copy)]
+struct Item {
+    low: Point3<f64>,
+    high: Point3<f64>,
+    center: Point3<f64>,
+    triangle: u32,
+}
+
+impl Tree {
+    pub(crate) fn build(vertices: &[Point3<f64>], triangles: &[[u32; 3]], face_normals: &[Vector3<f64>]) -> Self {
+        let mut items: Vec<Item> = triangles.iter().enumerate().map(|(t, corners)| item(vertices, corners, t as u32)).collect();
+        let mut nodes = Vec::with_capacity(2 * triangles.len() - 1);
+        grow(&mut items, 0, &mut nodes);
+        let leaf_cones = leaf_cones(vertices.len(), triangles, face_normals);
+        let mut cones = vec![NormalCone::new(Vector3::z(), 0.0); nodes.len()];
+        // Children follow their parent: from the back, every child is done before its parent.
+        for index in (0..nodes.len()).rev() {
+            let node: &Node = &nodes[index];
+            cones[index] = if node.is_leaf() {
+                leaf_cones[node.triangle as usize]
+            } else {
+                merge(&cones[index + 1], &cones[node.second as usize])
+            };
+        }
+        Self { nodes, cones }
+    }
+
+    /// All nodes, the root first.
+    #[inline]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Cone of normals of node `index`.
+    #[inline]
+    pub fn cone(&self, index: u32) -> &NormalCone {
+        &self.cones[index as usize]
+    }
+}
+
+fn item(vertices: &[Point3<f64>], corners: &[u32; 3], triangle: u32) -> Item {
+    let [a, b, c] = corners.map(|v| vertices[v as usize]);
+    let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+    Item { low, high, center: nalgebra::center(&low, &high), triangle }
+}
+
+/// Appends the subtree of `items`.
+fn grow(items: &mut [Item], depth: usize, nodes: &mut Vec<Node>) {
+    let (low, high) = bounds(items);
+    let index = nodes.len();
+    let center = nalgebra::center(&low, &high);
+    let rounding = BOX_ROUNDING * low.coords.abs().max().max(high.coords.abs().max());
+    let half = (high - low) * 0.5 + Vector3::repeat(rounding);
+    let radius = half.norm() * (1.0 + BOX_ROUNDING);
+    nodes.push(Node { center, half, radius, second: 0, triangle: items[0].triangle });
+    if items.len() == 1 {
+        return;
+    }
+    let split = if depth < HALVE_BELOW_DEPTH { split_by_area(items) } else { None };
+    let split = split.unwrap_or_else(|| split_by_count(items));
+    let (first, second) = items.split_at_mut(split);
+    grow(first, depth + 1, nodes);
+    nodes[index].second = nodes.len() as u32;
+    grow(second, depth + 1, nodes);
+}
+
+fn bounds(items: &[Item]) -> (Point3<f64>, Point3<f64>) {
+    items.iter().fold((items[0].low, items[0].high), |(low, high), i| (low.inf(&i.low), high.sup(&i.high)))
+}
+
+fn center_bounds(items: &[Item]) -> (Point3<f64>, Vector3<f64>) {
+    let first = items[0].center;
+    let (low, high) = items.iter().fold((first, first), |(low, high), i| (low.inf(&i.center), high.sup(&i.center)));
+    (low, high - low)
+}
+
+fn split_by_count(items: &mut [Item]) -> usize {
+    let axis = center_bounds(items).1.imax();
+    let middle = items.len() / 2;
+    items.select_nth_unstable_by(middle, |a, b| (a.center[axis], a.triangle).partial_cmp(&(b.center[axis], b.triangle)).unwrap_or(std::cmp::Ordering::Equal));
+    middle
+}
+
+/// Partitions the items where the areas of the two boxes, weighted by their counts, are least; `None` when they cannot be told apart.
+fn split_by_area(items: &mut [Item]) -> Option<usize> {
+    let (low, extent) = center_bounds(items);
+    let axis = extent.imax();
+    let scale = BINS as f64 / extent[axis];
+    if !scale.is_finite() {
+        return None;
+    }
+    let bin_of = |i: &Item| (((i.center[axis] - low[axis]) * scale) as usize).min(BINS - 1);
+    let mut bins: [Option<(Point3<f64>, Point3<f64>)>; BINS] = [None; BINS];
+    let mut counts = [0_usize; BINS];
+    for i in items.iter() {
+        let bin = bin_of(i);
+        counts[bin] += 1;
+        bins[bin] = Some(bins[bin].map_or((i.low, i.high), |(l, h)| (l.inf(&i.low), h.sup(&i.high))));
+    }
+    let cost_of = |range: std::ops::Range<usize>| {
+        let count: usize = counts[range.clone()].iter().sum();
+        let joined = bins[range].iter().flatten().copied().reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+        joined.map(|(l, h)| half_area(&(h - l)) * count as f64)
+    };
+    let mut best: Option<(f64, usize)> = None;
+    for cut in 1..BINS {
+        if let (Some(left), Some(right)) = (cost_of(0..cut), cost_of(cut..BINS)) {
+            let cost = left + right;
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, cut));
+            }
+        }
+    }
+    let (_, cut) = best?;
+    // Items of the lower bins to the front.
+    let mut front = 0;
+    for k in 0..items.len() {
+        if bin_of(&items[k]) < cut {
+            items.swap(front, k);
+            front += 1;
+        }
+    }
+    (front > 0 && front < items.len()).then_some(front)
+}
+
+fn half_area(sides: &Vector3<f64>) -> f64 {
+    sides.x * sides.y + sides.y * sides.z + sides.z * sides.x
+}
+
+/// For each triangle the cone about its normal that holds the normals of all faces that share a vertex with it.
+///
+/// A direction in which a vertex is a local maximum lies in the spherical hull of the normals around that vertex, so the cone
+/// holds the normal cones of the triangle's vertices, edges and face; wider than a right angle it holds everything.
+fn leaf_cones(vertices: usize, triangles: &[[u32; 3]], face_normals: &[Vector3<f64>]) -> Vec<NormalCone> {
+    let mut start = vec![0_u32; vertices + 1];
+    for v in triangles.iter().flatten() {
+        start[*v as usize + 1] += 1;
+    }
+    for v in 0..vertices {
+        start[v + 1] += start[v];
+    }
+    let mut next = start.clone();
+    let mut around = vec![0_u32; 3 * triangles.len()];
+    for (t, corners) in triangles.iter().enumerate() {
+        for v in corners {
+            around[next[*v as usize] as usize] = t as u32;
+            next[*v as usize] += 1;
+        }
+    }
+    let cone = |(corners, axis): (&[u32; 3], &Vector3<f64>)| {
+        let least = corners
+            .iter()
+            .flat_map(|v| &around[start[*v as usize] as usize..start[*v as usize + 1] as usize])
+            .map(|t| axis.dot(&face_normals[*t as usize]))
+            .fold(1.0, f64::min);
+        let angle = if least > 0.0 { least.min(1.0).acos() } else { std::f64::consts::PI };
+        NormalCone::new(*axis, angle)
+    };
+    triangles.iter().zip(face_normals).map(cone).collect()
+}
+
+fn merge(a: &NormalCone, b: &NormalCone) -> NormalCone {
+    let sum = a.axis + b.axis;
+    let length = sum.norm();
+    let everything = NormalCone::new(a.axis, std::f64::consts::PI);
+    if length < f64::EPSILON.sqrt() {
+        return everything;
+    }
+    let axis = sum / length;
+    let reach = |c: &NormalCone| axis.dot(&c.axis).clamp(-1.0, 1.0).acos() + c.angle;
+    let angle = reach(a).max(reach(b));
+    if angle < std::f64::consts::PI { NormalCone::new(axis, angle) } else { everything }
+}

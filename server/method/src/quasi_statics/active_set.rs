@@ -1,0 +1,172 @@
+//! Dual active set for the least-distance problem in six unknowns.
+//!
+//! Starts at the unconstrained answer and takes in violated rows one by one; a row that would begin to pull leaves on the way.
+//! The distance grows with every step, so that no working set comes twice, and the first point that violates nothing is the optimum.
+//! Storage is fixed: at most six rows are independent. A warm start begins with the rows that carried the last answer.
+//!
+//! Source: Goldfarb, Idnani 1983; Wilhelmsen 1976 for the cone (the solver of Ortega et al. 2007, Section 4.2).
+
+use super::least_distance::LeastDistance;
+use super::projection::SolverKind;
+use super::solve::{Answer, Outcome, Solve};
+use super::working_set::{DEPENDENT_SINE, WorkingSet};
+use crate::spatial::Vector6;
+
+/// A row violated by less is satisfied, relative to the problem's scale: some hundred roundings.
+const FEASIBILITY_TOLERANCE: f64 = 1e-13;
+
+/// A dependent row may stay violated by this much, relative to the problem's scale. With bounds <= 0 it never is by more
+/// than `DEPENDENT_SINE`; beyond, the rows contradict each other.
+const CONTRADICTION_TOLERANCE: f64 = 4.0 * DEPENDENT_SINE;
+
+/// Most rows taken in by one attempt. Six unknowns need about ten, thousands of rows some thirty.
+const MAX_ITERATIONS: u32 = 300;
+
+/// Which violated row is taken in next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PivotRule {
+    /// The deepest: fewest iterations.
+    MostViolated,
+    /// The first: another path, for a second attempt.
+    FirstViolated,
+}
+
+/// The solver; see the file head.
+#[derive(Clone, Debug)]
+pub(crate) struct ActiveSet {
+    set: WorkingSet,
+    pivot_rule: PivotRule,
+}
+
+impl ActiveSet {
+    pub(crate) fn new() -> ActiveSet {
+        ActiveSet {
+            set: WorkingSet::new(),
+            pivot_rule: PivotRule::MostViolated,
+        }
+    }
+
+    /// The same solver with another order of rows.
+    pub(crate) fn with_pivot_rule(&mut self, rule: PivotRule) -> &mut ActiveSet {
+        self.pivot_rule = rule;
+        self
+    }
+
+    /// Begins with those rows of the last answer that push here as well; returns the point they give.
+    fn warm_start(&mut self, problem: &LeastDistance, rows: &[u32]) -> Vector6 {
+        self.set.clear();
+        let tolerance = FEASIBILITY_TOLERANCE * problem.scale();
+        // Where no old row is violated by a_u there is nothing to keep, and a_u itself may be the answer.
+        let useful = rows.iter().any(|row| {
+            problem.can_bind(*row as usize) && problem.offset(*row as usize) > tolerance
+        });
+        if !useful {
+            return Vector6::zeros();
+        }
+        for row in rows.iter().filter(|row| problem.can_bind(**row as usize)) {
+            let normal = problem.normal(*row as usize);
+            let seen = self.set.decompose(&normal);
+            if !seen.is_dependent() {
+                self.set.push(*row, &normal, &seen, 0.0);
+            }
+        }
+        self.set.settle(problem)
+    }
+
+    fn pivot(&self, problem: &LeastDistance, y: &Vector6, tolerance: f64) -> (usize, f64) {
+        match self.pivot_rule {
+            PivotRule::MostViolated => problem.most_violated(y),
+            PivotRule::FirstViolated => problem.first_violated(y, tolerance),
+        }
+    }
+
+    /// Takes `row` in, letting rows go that would pull. False if the rows held contradict it.
+    fn take_in(&mut self, problem: &LeastDistance, row: usize, y: &mut Vector6) -> bool {
+        let normal = problem.normal(row);
+        let mut multiplier = 0.0;
+        // Each round but the last lets a row go.
+        for _ in 0..=super::projection::MAX_ACTIVE {
+            let seen = self.set.decompose(&normal);
+            let (dual_step, blocking) = self.set.longest_dual_step(&seen);
+            let primal_step = if seen.is_dependent() {
+                f64::INFINITY
+            } else {
+                problem.violation(row, y) / seen.squared
+            };
+            let step = dual_step.min(primal_step);
+            if step == f64::INFINITY {
+                return false;
+            }
+            if !seen.is_dependent() {
+                *y += seen.perpendicular * step;
+            }
+            self.set.take_dual_step(&seen, step);
+            multiplier += step;
+            match blocking {
+                Some(position) if dual_step < primal_step => self.set.remove(position),
+                _ => {
+                    self.set.push(row as u32, &normal, &seen, multiplier);
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn answer(&self, y: Vector6, outcome: Outcome, iterations: u32) -> Answer {
+        Answer {
+            correction: y,
+            active: self
+                .set
+                .rows()
+                .iter()
+                .copied()
+                .zip(self.set.multipliers().iter().copied())
+                .collect(),
+            outcome,
+            iterations,
+        }
+    }
+}
+
+impl Solve for ActiveSet {
+    fn kind(&self) -> SolverKind {
+        SolverKind::ActiveSet
+    }
+
+    /// No allocation; at most `MAX_ITERATIONS` rows taken in.
+    fn solve(&mut self, problem: &LeastDistance, warm_start: &[u32]) -> Answer {
+        let mut y = self.warm_start(problem, warm_start);
+        let mut polished = self.set.len() > 0;
+        for iteration in 0..MAX_ITERATIONS {
+            let scale = problem.scale() + y.norm();
+            let tolerance = FEASIBILITY_TOLERANCE * scale;
+            let (row, violation) = self.pivot(problem, &y, tolerance);
+
+            let violated = violation > tolerance;
+            if !violated && (polished || self.set.len() == 0) {
+                return self.answer(y, Outcome::Optimal, iteration);
+            }
+            if !violated {
+                // The polishing step: the same rows, solved anew from the problem.
+                y = self.set.settle(problem);
+                polished = true;
+                continue;
+            }
+
+            polished = false;
+            if !self.take_in(problem, row, &mut y) {
+                y = self.set.settle(problem);
+                let remaining = problem.violation(row, &y);
+                let outcome = if remaining <= CONTRADICTION_TOLERANCE * scale {
+                    Outcome::Optimal
+                } else {
+                    Outcome::Infeasible
+                };
+                return self.answer(y, outcome, iteration);
+            }
+        }
+        let y = self.set.settle(problem);
+        self.answer(y, Outcome::IterationLimit, MAX_ITERATIONS)
+    }
+}

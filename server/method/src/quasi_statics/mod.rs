@@ -1,0 +1,20 @@
+//! Quasi-statics: the motion nearest to the wished one that no contact forbids (Gauss' least constraint).
+
+mod active_set;
+mod clarabel;
+mod gauss_seidel;
+mod half_space;
+mod kkt;
+mod least_distance;
+mod metric;
+mod projection;
+mod projector;
+mod reduction;
+mod solve;
+mod working_set;
+
+pub use half_space::HalfSpace;
+pub use kkt::{KktResidual, kkt_residual};
+pub use metric::Metric;
+pub use projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
+pub use projector::{KKT_TOLERANCE, Projector};

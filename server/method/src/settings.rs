@@ -1,0 +1,253 @@
+//! Every length, gain and limit of the method, with unit and reason.
+//!
+//! | symbol   | name in code                    | unit  | paper   | meaning                                            |
+//! |----------|---------------------------------|-------|---------|----------------------------------------------------|
+//! | k_s      | [`Settings::k_s`]               | –     | 0.5     | share of the pose difference covered in one update |
+//! | k_h      | [`Settings::k_h`]               | 1/s^2 | –       | coupling constant                                  |
+//! | K_t      | [`Settings::stiffness`]         | N/m   | –       | k_h k_s m: what the hand feels in translation      |
+//! | delta_c  | [`Settings::rest_distance`]     | m     | –       | gap at which the god-object rests                  |
+//! | delta_min| [`Settings::minimum_gap`]       | m     | –       | gap below which it never comes                     |
+//! | Delta-t  | [`Adaptation::duration`]        | s     | –       | time over which a violated new constraint enters   |
+//! | epsilon  | [`Adaptation::threshold`]       | m     | < 0     | violations smaller than this enter at once         |
+//!
+//! Source: Ortega et al. 2007, Sections 4, 5 and 6. The lengths derive from one: the size of the body.
+
+use crate::quasi_statics::SolverKind;
+
+/// Rest distance per metre of body size: 10 um for a body of 0.1 m. People feel nothing below 50 um, and a clearance of
+/// 50 um must still be a clearance.
+const REST_DISTANCE_PER_SIZE: f64 = 1e-4;
+/// Minimum gap per metre of body size: 1 um for a body of 0.1 m, a tenth of the rest distance.
+const MINIMUM_GAP_PER_SIZE: f64 = 1e-5;
+/// Activation distance per metre of body size: 1 mm for a body of 0.1 m, which a hand at 0.3 m/s covers in three updates.
+const ACTIVATION_DISTANCE_PER_SIZE: f64 = 1e-2;
+/// Longest look-ahead per metre of body size: half of it, which a hand at 0.3 m/s covers in 50 ms for a body of 0.04 m.
+const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.5;
+/// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
+const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 1e-3;
+
+/// What stands in the metric for the inertia tensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RotationMetric {
+    /// The inertia tensor of the body about the reference point.
+    Inertia,
+    /// `m r^2` about every axis: a free choice that fits the torque to the device, r in metres.
+    RadiusOfGyration(f64),
+}
+
+/// How a constraint that is violated when it first appears is let in, Section 5, Figure 6.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptation {
+    /// Time over which the bound rises from where the device is to its place, s.
+    pub duration: f64,
+    /// Negative, m. A violation smaller than its magnitude enters at once, so that a new contact is felt.
+    pub threshold: f64,
+}
+
+/// Gains, limits, lengths and capacities of the method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Share of the pose difference that one update covers, in (0, 1].
+    pub k_s: f64,
+    /// Coupling constant, 1/s^2.
+    pub k_h: f64,
+    /// The rotational part of the metric.
+    pub rotation_metric: RotationMetric,
+    /// Constraint adaptation; `None` lets every constraint in at once.
+    pub adaptation: Option<Adaptation>,
+    /// Publish contacts before they touch, with their gaps. Off: the paper's cone of touching contacts.
+    pub look_ahead: bool,
+    /// Largest force on the hand, N; clamped by norm.
+    pub force_limit: f64,
+    /// Largest torque on the hand, N m; clamped by norm.
+    pub torque_limit: f64,
+    /// Gap at which the god-object comes to rest, m.
+    pub rest_distance: f64,
+    /// Gap below which the god-object never comes, m.
+    pub minimum_gap: f64,
+    /// Continuous collision detection stops at most this far above `minimum_gap`, m.
+    pub gap_tolerance: f64,
+    /// Feature pairs nearer than this make constraints, m; look-ahead adds the way that body and device may go until the
+    /// next set.
+    pub activation_distance: f64,
+    /// Most that look-ahead adds to the activation distance, m.
+    pub look_ahead_limit: f64,
+    /// A motion whose fastest point covers less than this is none, m.
+    pub motion_tolerance: f64,
+    /// Capacity of the constraint set. The nearest are kept and the set says that it is truncated.
+    pub max_constraints: usize,
+    /// Most repetitions of project, move, collect within one update.
+    pub max_substeps: u32,
+    /// Most evaluations of one feature pair's gap in one collision search.
+    pub max_advancement_steps: u32,
+    /// Advancement steps after which an update starts no further sub-step; `None` is no budget.
+    pub work_budget: Option<u64>,
+    /// Solver of the god-object loop's and the coupling's projections.
+    pub solver: SolverKind,
+}
+
+impl Settings {
+    /// Defaults for a body whose bounding box has the longest side `size`, in metres.
+    pub fn for_size(size: f64) -> Self {
+        Self {
+            k_s: 0.5,
+            k_h: 2000.0,
+            rotation_metric: RotationMetric::Inertia,
+            adaptation: Some(Adaptation { duration: 0.02, threshold: -1e-3 }),
+            look_ahead: true,
+            force_limit: 20.0,
+            torque_limit: 0.5,
+            rest_distance: REST_DISTANCE_PER_SIZE * size,
+            minimum_gap: MINIMUM_GAP_PER_SIZE * size,
+            gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
+            activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
+            look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
+            motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
+            max_constraints: 1024,
+            max_substeps: 10,
+            max_advancement_steps: 200,
+            work_budget: None,
+            solver: SolverKind::ActiveSet,
+        }
+    }
+
+    /// The method as published: a cone of touching contacts, one projection and one collision search per update.
+    pub fn paper(size: f64) -> Self {
+        Self { look_ahead: false, max_substeps: 1, ..Self::for_size(size) }
+    }
+
+    /// The translational stiffness that the hand feels, `k_h k_s m`, N/m.
+    pub fn stiffness(&self, mass: f64) -> f64 {
+        self.k_h * self.k_s * mass
+    }
+
+    /// Bound of a row in the god-object loop, m: the body may move as far as the contact is away; one nearer than the
+    /// rest distance is eased out. Without look-ahead: the paper's cone.
+    #[inline]
+    pub(crate) fn motion_bound(&self, gap: f64) -> f64 {
+        let bound = self.rest_distance - gap;
+        if self.look_ahead { bound } else { bound.max(0.0) }
+    }
+
+    /// Bound of a row in the coupling loop, m: the same, but a_u is only the fraction k_s of the difference, and a body
+    /// nearer than the rest distance is not pushed: there is no force at a distance.
+    #[inline]
+    pub(crate) fn coupling_bound(&self, gap: f64) -> f64 {
+        if self.look_ahead { (self.k_s * (self.rest_distance - gap)).min(0.0) } else { 0.0 }
+    }
+
+    /// Says what is out of range, by the key's name.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let positive = [
+            ("k_s", self.k_s),
+            ("k_h", self.k_h),
+            ("force_limit", self.force_limit),
+            ("torque_limit", self.torque_limit),
+            ("minimum_gap", self.minimum_gap),
+            ("gap_tolerance", self.gap_tolerance),
+            ("motion_tolerance", self.motion_tolerance),
+        ];
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(SettingsError::NotPositive { key, value });
+            }
+        }
+        if self.k_s > 1.0 {
+            return Err(SettingsError::Above { key: "k_s", value: self.k_s, limit: 1.0 });
+        }
+        if let RotationMetric::RadiusOfGyration(radius) = self.rotation_metric
+            && !(radius.is_finite() && radius > 0.0)
+        {
+            return Err(SettingsError::NotPositive { key: "rotation_metric", value: radius });
+        }
+        if let Some(adaptation) = self.adaptation {
+            if !(adaptation.duration.is_finite() && adaptation.duration >= 0.0) {
+                return Err(SettingsError::NotPositive { key: "adaptation.duration", value: adaptation.duration });
+            }
+            if !(adaptation.threshold.is_finite() && adaptation.threshold <= 0.0) {
+                return Err(SettingsError::Above { key: "adaptation.threshold", value: adaptation.threshold, limit: 0.0 });
+            }
+        }
+        let ordered = [
+            ("minimum_gap + gap_tolerance", self.minimum_gap + self.gap_tolerance, "rest_distance", self.rest_distance),
+            ("rest_distance", self.rest_distance, "activation_distance", self.activation_distance),
+        ];
+        for (smaller, small, larger, large) in ordered {
+            let in_order = small < large; // false for NaN
+            if !in_order {
+                return Err(SettingsError::NotOrdered { smaller, small, larger, large });
+            }
+        }
+        if !(self.look_ahead_limit.is_finite() && self.look_ahead_limit >= 0.0) {
+            return Err(SettingsError::NotPositive { key: "look_ahead_limit", value: self.look_ahead_limit });
+        }
+        if self.max_constraints == 0 || self.max_substeps == 0 || self.max_advancement_steps == 0 {
+            return Err(SettingsError::ZeroCapacity);
+        }
+        Ok(())
+    }
+}
+
+/// What is wrong with the settings.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SettingsError {
+    /// A number that must be positive and finite is not.
+    #[error("{key} is {value}, but must be a finite number greater than zero")]
+    NotPositive {
+        /// The setting's name.
+        key: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A number is above what the method allows.
+    #[error("{key} is {value}, but must not be above {limit}")]
+    Above {
+        /// The setting's name.
+        key: &'static str,
+        /// What was given.
+        value: f64,
+        /// The largest allowed value.
+        limit: f64,
+    },
+    /// Two lengths are the wrong way round.
+    #[error("{smaller} ({small} m) must be smaller than {larger} ({large} m)")]
+    NotOrdered {
+        /// The name of the length that must be smaller.
+        smaller: &'static str,
+        /// Its value, m.
+        small: f64,
+        /// The name of the length that must be larger.
+        larger: &'static str,
+        /// Its value, m.
+        large: f64,
+    },
+    /// A capacity or iteration limit is zero.
+    #[error("max_constraints, max_substeps and max_advancement_steps must be at least 1")]
+    ZeroCapacity,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_at_every_scale() {
+        for size in [1e-4, 0.1, 100.0] {
+            assert_eq!(Settings::for_size(size).validate(), Ok(()));
+            assert_eq!(Settings::paper(size).validate(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn lengths_out_of_order_and_nan_are_named() {
+        let mut settings = Settings::for_size(0.1);
+        settings.rest_distance = settings.activation_distance;
+        assert!(settings.validate().is_err_and(|e| e.to_string().contains("activation_distance")));
+        settings = Settings::for_size(0.1);
+        settings.k_h = f64::NAN;
+        assert!(settings.validate().is_err_and(|e| e.to_string().contains("k_h")));
+        settings = Settings::for_size(0.1);
+        settings.rest_distance = f64::NAN;
+        assert!(settings.validate().is_err());
+    }
+}

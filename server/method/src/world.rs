@@ -1,0 +1,97 @@
+//! What the method moves and what it moves among.
+//!
+//! A pose is always that of a body's own frame, the frame of its mesh. Forces and torques are at the reference point,
+//! which is the centre of mass unless a scene chooses another. Source: Ortega et al. 2007, Section 4.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::geometry::Mesh;
+use crate::quasi_statics::Metric;
+use crate::settings::RotationMetric;
+use crate::spatial::Pose;
+
+/// The rigid body in the user's hand.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Surface, in the body's own frame.
+    pub mesh: Mesh,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Inertia tensor about the reference point, body axes, kg m^2.
+    pub inertia: Matrix3<f64>,
+    /// The point G at which motion is split and wrenches act, body frame, m.
+    pub reference_point: Point3<f64>,
+}
+
+impl Body {
+    /// The metric M of Gauss' principle for this body at `pose`; `None` when it is not positive definite.
+    pub fn metric(&self, rotation_metric: RotationMetric, pose: &Pose) -> Option<Metric> {
+        metric_at(self.mass, &self.inertia, rotation_metric, pose)
+    }
+}
+
+/// M from mass (kg), inertia about the reference point (body axes, kg m^2) and the orientation of `pose`.
+pub(crate) fn metric_at(
+    mass: f64,
+    inertia: &Matrix3<f64>,
+    rotation_metric: RotationMetric,
+    pose: &Pose,
+) -> Option<Metric> {
+    let inertia_in_world = match rotation_metric {
+        RotationMetric::Inertia => {
+            let rotation = pose.rotation.to_rotation_matrix();
+            rotation.matrix() * inertia * rotation.matrix().transpose()
+        }
+        RotationMetric::RadiusOfGyration(radius) => Matrix3::identity() * (mass * radius * radius),
+    };
+    Metric::new(mass, &inertia_in_world)
+}
+
+/// A body that stands still.
+#[derive(Clone, Debug)]
+pub struct Obstacle {
+    /// Name in messages.
+    pub name: String,
+    /// Surface, in the obstacle's own frame.
+    pub mesh: Mesh,
+    /// World from obstacle.
+    pub pose: Pose,
+    /// How the surface feels.
+    pub surface: Surface,
+}
+
+/// How a surface feels. What is `None` costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surface {
+    /// Contact normals interpolated from vertex normals, Section 6.1.
+    pub shading: Option<ForceShading>,
+    /// A sine that tilts the force, Section 6.2.
+    pub texture: Option<SineTexture>,
+}
+
+/// Force shading, Section 6.1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceShading {
+    /// Faces that meet at more than this angle keep their edge, rad.
+    pub crease_angle: f64,
+}
+
+/// A sine along one axis that tilts the force, Section 6.2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SineTexture {
+    /// Direction along which the sine runs, unit vector, obstacle frame.
+    pub axis: Vector3<f64>,
+    /// Wavelength, m.
+    pub wavelength: f64,
+    /// Largest tilt, as the tangent of the angle.
+    pub amplitude: f64,
+}
+
+/// The god-object's body and all that it can touch.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// The body in the user's hand.
+    pub body: Body,
+    /// Everything else.
+    pub obstacles: Vec<Obstacle>,
+}

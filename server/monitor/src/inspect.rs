@@ -1,0 +1,101 @@
+//! Reads a recording back with rerun's own reader: is it whole, and what is in it?
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use rerun::StoreKind;
+use rerun::external::re_log_encoding::DecoderApp;
+use rerun::log::{Chunk, LogMsg};
+
+use crate::error::InspectError;
+
+/// What a recording holds, blueprints aside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RrdSummary {
+    /// Entity paths, sorted.
+    pub entities: Vec<String>,
+    /// Rows per entity path: one row is one set of values at one time.
+    pub rows: BTreeMap<String, u64>,
+    /// Names of the timelines, sorted.
+    pub timelines: Vec<String>,
+    /// First session time of any row, seconds.
+    pub first_time_s: Option<f64>,
+    /// Last session time of any row, seconds.
+    pub last_time_s: Option<f64>,
+    /// Blueprints (layouts of the viewer) in the file.
+    pub blueprints: usize,
+}
+
+impl RrdSummary {
+    /// Rows of all entities together.
+    #[must_use]
+    pub fn total_rows(&self) -> u64 {
+        self.rows.values().sum()
+    }
+}
+
+/// Decodes the whole file; an error if any part of it cannot be decoded.
+pub fn inspect(path: &Path) -> Result<RrdSummary, InspectError> {
+    let file = File::open(path).map_err(|source| InspectError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    let decode = |reason: String| InspectError::Decode {
+        path: path.to_owned(),
+        reason,
+    };
+
+    let messages = DecoderApp::decode_eager(BufReader::new(file))
+        .map_err(|error| decode(error.to_string()))?;
+    let mut contents = Contents::default();
+    for message in messages {
+        match message.map_err(|error| decode(error.to_string()))? {
+            LogMsg::ArrowMsg(store, arrow) if store.kind() == StoreKind::Recording => {
+                let chunk =
+                    Chunk::from_arrow_msg(&arrow).map_err(|error| decode(error.to_string()))?;
+                contents.add(&chunk);
+            }
+            LogMsg::BlueprintActivationCommand(_) => contents.blueprints += 1,
+            LogMsg::ArrowMsg(..) | LogMsg::SetStoreInfo(_) => {}
+        }
+    }
+    Ok(contents.summary())
+}
+
+#[derive(Default)]
+struct Contents {
+    rows: BTreeMap<String, u64>,
+    timelines: BTreeSet<String>,
+    time_ns: Option<(i64, i64)>,
+    blueprints: usize,
+}
+
+impl Contents {
+    fn add(&mut self, chunk: &Chunk) {
+        *self.rows.entry(chunk.entity_path().to_string()).or_default() +=
+            chunk.num_rows() as u64;
+        for (name, column) in chunk.timelines() {
+            self.timelines.insert(name.to_string());
+            if name.as_str() == crate::stream::TIMELINE {
+                let range = column.time_range();
+                let (first, last) = (range.min().as_i64(), range.max().as_i64());
+                let (old_first, old_last) = self.time_ns.unwrap_or((first, last));
+                self.time_ns = Some((old_first.min(first), old_last.max(last)));
+            }
+        }
+    }
+
+    fn summary(self) -> RrdSummary {
+        let seconds = |nanoseconds: i64| nanoseconds as f64 * 1e-9;
+        RrdSummary {
+            entities: self.rows.keys().cloned().collect(),
+            rows: self.rows,
+            timelines: self.timelines.into_iter().collect(),
+            first_time_s: self.time_ns.map(|(first, _)| seconds(first)),
+            last_time_s: self.time_ns.map(|(_, last)| seconds(last)),
+            blueprints: self.blueprints,
+        }
+    }
+}

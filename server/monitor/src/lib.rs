@@ -1,0 +1,39 @@
+//! Streams a session to rerun: the scene, the forces, the loops' times, the log.
+//!
+//! ```text
+//!  any loop ── MonitorSender::offer ──► bounded queue ──► thread "taut-monitor" ──► rerun: web page, viewer, .rrd
+//!              (wait-free, drops           (rtrb)          (batches, 30 a second)
+//!               and counts when full)
+//! ```
+//!
+//! The queue is the only thing that the rest of the server touches; rerun may stall without a loop noticing.
+
+mod colours;
+mod error;
+mod inspect;
+mod layout;
+mod log;
+mod monitor;
+mod options;
+mod paths;
+mod picture;
+mod plots;
+mod ports;
+mod queue;
+mod sample;
+mod scene;
+mod served;
+mod shading;
+mod stream;
+
+/// The application's name in rerun: viewers keep their layouts under it.
+const APPLICATION: &str = "taut";
+
+pub use error::{InspectError, MonitorError};
+pub use inspect::{RrdSummary, inspect};
+pub use log::{LogLevel, MonitorLog};
+pub use monitor::{Monitor, MonitorStats};
+pub use options::{DEFAULT_GRPC_PORT, DEFAULT_MEMORY_LIMIT_BYTES, DEFAULT_WEB_PORT, MonitorOptions};
+pub use queue::MonitorSender;
+pub use sample::{LoopTime, MAX_SHOWN_CONTACTS, MonitorSample, ShownContact, ShownContacts};
+pub use scene::{BodyRole, MonitorBody, MonitorScene, MonitorScreen, Pose};

@@ -1,0 +1,339 @@
+//! The monitor: a thread that owns rerun.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use rerun::grpc_server::GrpcServerSink;
+use rerun::log::ChunkBatcherConfig;
+use rerun::sink::{FileSink, FileSinkOptions, LogSink};
+use rerun::web_viewer::WebViewerConfig;
+use rerun::{MemoryLimit, PlaybackBehavior, RecordingStream, RecordingStreamBuilder, ServerOptions};
+
+use crate::error::MonitorError;
+use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel, MonitorLog};
+use crate::options::MonitorOptions;
+use crate::ports::{self, GRPC_KEY, WEB_KEY};
+use crate::queue::{self, Counters, MonitorReceiver, MonitorSender, SAMPLE_CAPACITY};
+use crate::sample::MonitorSample;
+use crate::scene::MonitorScene;
+use crate::served::ServedSink;
+use crate::stream::Stream;
+use crate::{APPLICATION, picture};
+
+/// Time between two pictures: 30 a second, smooth enough to watch, cheap enough beside 1 kHz loops.
+const PICTURE_PERIOD: Duration = Duration::from_nanos(1_000_000_000 / 30);
+
+/// The plots are sent with every third picture: fewer, larger messages, which the viewer takes in faster.
+const PICTURES_PER_PLOT: u32 = 3;
+
+/// Most bytes on their way inside rerun; enough for the largest mesh, small beside the history.
+const BYTES_IN_FLIGHT: u64 = 32 * 1024 * 1024;
+
+/// A running monitor. Dropping it stops it as [`Monitor::stop`] does.
+#[derive(Debug)]
+pub struct Monitor {
+    log: MonitorLog,
+    counters: Arc<Counters>,
+    messages_dropped: Arc<AtomicU64>,
+    thread: Option<JoinHandle<()>>,
+    page: Option<String>,
+    stream: Option<String>,
+}
+
+/// What the monitor did so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MonitorStats {
+    /// Samples taken from the queue and sent to the plots.
+    pub samples_shown: u64,
+    /// Samples dropped because the queue was full.
+    pub samples_dropped: u64,
+    /// Pictures left out because the sample held a number that is not finite.
+    pub samples_not_finite: u64,
+    /// Lines of text dropped because too many waited.
+    pub lines_dropped: u64,
+    /// Messages that observers missed because one of them stalled the stream.
+    pub messages_dropped: u64,
+}
+
+impl Monitor {
+    /// Starts to serve and record, sends the scene, and returns the end of the queue for the loops.
+    ///
+    /// After an error nothing is left running and no port is held.
+    pub fn start(
+        options: &MonitorOptions,
+        scene: MonitorScene,
+    ) -> Result<(Monitor, MonitorSender), MonitorError> {
+        for body in &scene.bodies {
+            picture::check_mesh(body)?;
+        }
+
+        let mut sinks: Vec<Box<dyn LogSink>> = Vec::new();
+        let messages_dropped = Arc::new(AtomicU64::new(0));
+        let mut served = None;
+        if options.serve {
+            let (server, sink) = Served::start(options, Arc::clone(&messages_dropped))?;
+            sinks.push(Box::new(sink));
+            served = Some(server);
+        }
+        if let Some(path) = &options.record {
+            // Without its footer a recording needs no memory that grows with its length; it opens just as well.
+            let file = FileSink::with_options(path, FileSinkOptions { write_footer: false });
+            sinks.push(Box::new(file.map_err(|error| MonitorError::Record {
+                path: path.clone(),
+                reason: error.to_string(),
+            })?));
+        }
+
+        let rerun_refused = |error: rerun::RecordingStreamError| MonitorError::Rerun {
+            what: "the scene",
+            reason: error.to_string(),
+        };
+        let rerun = recording_stream(&scene.name, sinks).map_err(rerun_refused)?;
+        let stream = Stream::open(rerun, &scene).map_err(rerun_refused)?;
+
+        let counters = Arc::<Counters>::default();
+        let lines_dropped = Arc::new(AtomicU64::new(0));
+        let (sender, receiver) = queue::queue(Arc::clone(&counters), Arc::clone(&lines_dropped));
+        let (commands, command_queue) = sync_channel(LINE_QUEUE_CAPACITY);
+        let page = served.as_ref().map(|served| served.page_url.clone());
+        let stream_url = served.as_ref().map(|served| served.stream_url.clone());
+        let thread = std::thread::Builder::new()
+            .name("taut-monitor".to_owned())
+            .spawn(move || {
+                run(stream, receiver, &command_queue);
+                drop(served); // The page goes last.
+            })
+            .map_err(MonitorError::Thread)?;
+
+        let monitor = Monitor {
+            log: MonitorLog {
+                commands,
+                dropped: lines_dropped,
+            },
+            counters,
+            messages_dropped,
+            thread: Some(thread),
+            page,
+            stream: stream_url,
+        };
+        Ok((monitor, sender))
+    }
+
+    /// The web page that opens the stream, for a browser; `None` unless serving.
+    #[must_use]
+    pub fn address(&self) -> Option<&str> {
+        self.page.as_deref()
+    }
+
+    /// The stream's own address, for the native viewer (`rerun <address>`); `None` unless serving.
+    #[must_use]
+    pub fn stream_address(&self) -> Option<&str> {
+        self.stream.as_deref()
+    }
+
+    /// Shows a line at the newest session time; never waits.
+    pub fn log(&self, level: LogLevel, text: impl Into<String>) {
+        self.log.log(level, text);
+    }
+
+    /// A handle with which other threads log.
+    #[must_use]
+    pub fn logger(&self) -> MonitorLog {
+        self.log.clone()
+    }
+
+    /// What was shown and dropped so far.
+    #[must_use]
+    pub fn stats(&self) -> MonitorStats {
+        let read = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
+        MonitorStats {
+            samples_shown: read(&self.counters.samples_shown),
+            samples_dropped: read(&self.counters.samples_dropped),
+            samples_not_finite: read(&self.counters.samples_not_finite),
+            lines_dropped: read(&self.log.dropped),
+            messages_dropped: read(&self.messages_dropped),
+        }
+    }
+
+    /// Shows what is queued, completes the recording, closes the ports.
+    pub fn stop(mut self) -> Result<MonitorStats, MonitorError> {
+        self.finish()?;
+        Ok(self.stats())
+    }
+
+    fn finish(&mut self) -> Result<(), MonitorError> {
+        let Some(thread) = self.thread.take() else {
+            return Ok(());
+        };
+        // Fails only when the thread has ended already, which the join tells.
+        let _ = self.log.commands.send(Command::Stop);
+        thread.join().map_err(|_| MonitorError::ThreadLost)
+    }
+}
+
+impl Drop for Monitor {
+    fn drop(&mut self) {
+        if let Err(error) = self.finish() {
+            tracing::error!("{error}");
+        }
+    }
+}
+
+/// The servers and what to type to reach them; dropping it closes the web page.
+struct Served {
+    _web_page: Box<dyn std::any::Any + Send>,
+    page_url: String,
+    stream_url: String,
+}
+
+impl Served {
+    fn start(
+        options: &MonitorOptions,
+        messages_dropped: Arc<AtomicU64>,
+    ) -> Result<(Served, ServedSink), MonitorError> {
+        let bind = options.bind;
+        let grpc_port = ports::free_port(bind, options.grpc_port, GRPC_KEY)?;
+        let web_port = ports::free_port(bind, options.web_port, WEB_KEY)?;
+        let grpc_address = SocketAddr::new(bind, grpc_port);
+
+        let web_page = WebViewerConfig {
+            bind_ip: bind.to_string(),
+            web_port: web_port.into(),
+            open_browser: false,
+            ..WebViewerConfig::default()
+        }
+        .host_web_viewer()
+        .map_err(|error| MonitorError::Listen {
+            address: SocketAddr::new(bind, web_port),
+            key: WEB_KEY,
+            source: std::io::Error::other(error.to_string()),
+        })?;
+
+        let server = GrpcServerSink::new(
+            &bracketed(bind),
+            grpc_port,
+            ServerOptions {
+                playback_behavior: PlaybackBehavior::NewestFirst,
+                memory_limit: MemoryLimit::from_bytes(options.memory_limit_bytes),
+                cors_allowed_origins: ports::allowed_origins(bind, web_port),
+            },
+        )
+        .map_err(|error| MonitorError::Rerun {
+            what: "the address to listen on",
+            reason: error.to_string(),
+        })?;
+        ports::wait_until_listening(grpc_address)?;
+        let sink = ServedSink::new(server, messages_dropped)?;
+
+        let host = ports::reachable_by_observers(bind);
+        let stream_url = ports::stream_url(host, grpc_port);
+        let page_url = ports::page_url(host, web_port, &stream_url);
+        let served = Served {
+            _web_page: Box::new(web_page),
+            page_url,
+            stream_url,
+        };
+        Ok((served, sink))
+    }
+}
+
+/// rerun puts a colon and the port behind it, so an IPv6 address needs brackets.
+fn bracketed(ip: std::net::IpAddr) -> String {
+    if ip.is_ipv6() {
+        format!("[{ip}]")
+    } else {
+        ip.to_string()
+    }
+}
+
+/// A stream into all `sinks`; into nothing without any.
+fn recording_stream(
+    scene_name: &str,
+    sinks: Vec<Box<dyn LogSink>>,
+) -> rerun::RecordingStreamResult<RecordingStream> {
+    if sinks.is_empty() {
+        return Ok(RecordingStream::disabled());
+    }
+    RecordingStreamBuilder::new(APPLICATION)
+        .recording_name(scene_name)
+        .batcher_config(ChunkBatcherConfig {
+            flush_tick: PICTURE_PERIOD,
+            max_bytes_in_flight: BYTES_IN_FLIGHT,
+            ..ChunkBatcherConfig::DEFAULT
+        })
+        .set_sinks(sinks)
+}
+
+/// The thread: a picture every [`PICTURE_PERIOD`], the plots less often, lines in between, until told to stop.
+fn run(mut stream: Stream, mut receiver: MonitorReceiver, commands: &Receiver<Command>) {
+    let mut samples = Vec::with_capacity(SAMPLE_CAPACITY);
+    let mut next_picture = Instant::now();
+    let mut pictures = 0u32;
+    loop {
+        let wait = next_picture.saturating_duration_since(Instant::now());
+        let stopped = match commands.recv_timeout(wait) {
+            Ok(Command::Line(level, text)) => {
+                said(stream.line(stream.newest_ns(), level, &text));
+                false
+            }
+            Err(RecvTimeoutError::Timeout) => false,
+            Ok(Command::Stop) | Err(RecvTimeoutError::Disconnected) => true,
+        };
+        if stopped || Instant::now() >= next_picture {
+            show_queued(&mut stream, &mut receiver, &mut samples);
+            next_picture = (next_picture + PICTURE_PERIOD).max(Instant::now());
+            pictures = pictures.wrapping_add(1);
+            if stopped || pictures.is_multiple_of(PICTURES_PER_PLOT) {
+                said(stream.show_plots(&samples));
+                samples.clear();
+            }
+        }
+        if stopped {
+            break;
+        }
+    }
+    stream.close();
+}
+
+/// Empties both queues: the newest sample into the picture, all into `samples` for the plots.
+fn show_queued(
+    stream: &mut Stream,
+    receiver: &mut MonitorReceiver,
+    samples: &mut Vec<MonitorSample>,
+) {
+    let counters = &receiver.counters;
+    let before = samples.len();
+    // At most one queue's worth at a time, however fast the writer is.
+    while samples.len() < before + SAMPLE_CAPACITY
+        && let Ok(sample) = receiver.samples.pop()
+    {
+        samples.push(sample);
+    }
+    let new = &samples[before..];
+    counters
+        .samples_shown
+        .fetch_add(new.len() as u64, Ordering::Relaxed);
+    if let Some(newest) = new.last()
+        && said(stream.show_picture(newest)) == Some(false)
+    {
+        let earlier = counters.samples_not_finite.fetch_add(1, Ordering::Relaxed);
+        if earlier == 0 {
+            let text = "a sample holds a number that is not finite: the picture stands still";
+            said(stream.line(stream.newest_ns(), LogLevel::Error, text));
+        }
+    }
+    while let Ok(line) = receiver.lines.pop() {
+        said(stream.line(line.session_time_ns, line.level, &line.text()));
+    }
+}
+
+/// Reports what rerun refused; monitoring goes on, the session does not depend on it.
+fn said<T>(result: rerun::RecordingStreamResult<T>) -> Option<T> {
+    result
+        .inspect_err(|error| tracing::warn!("rerun refused a message: {error}"))
+        .ok()
+}

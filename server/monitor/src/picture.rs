@@ -1,0 +1,330 @@
+//! The 3D picture: what is sent once, and what moves.
+
+use nalgebra::{Point3, Vector3};
+use rerun::{
+    Arrows3D, Ellipsoids3D, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
+    RecordingStream, RecordingStreamResult, Transform3D, ViewCoordinates,
+};
+
+use crate::error::MonitorError;
+use crate::sample::{MonitorSample, ShownContact};
+use crate::scene::{BodyRole, MonitorBody, MonitorScene, Pose};
+use crate::{colours, paths, shading};
+
+/// Sizes of marks, as fractions of the god-object's diagonal.
+const CONTACT_RADIUS: f64 = 0.012;
+const NORMAL_LENGTH: f64 = 0.12;
+const NORMAL_RADIUS: f64 = 0.004;
+const FORCE_RADIUS: f64 = 0.012;
+/// A force of this many newtons is drawn as long as the god-object's diagonal, unless the scene says otherwise.
+const NEWTONS_PER_DIAGONAL: f64 = 5.0;
+/// Forces below this are not drawn, N: the arrow would be shorter than it is thick.
+const LEAST_DRAWN_FORCE: f64 = 0.01;
+/// Half sizes of the head, metres: width, depth, height.
+const HEAD_HALF_SIZES: [f32; 3] = [0.075, 0.095, 0.115];
+
+/// Draws; holds what the moving part needs of the scene.
+pub(crate) struct Picture {
+    reference_point: Point3<f64>,
+    diagonal: f64,
+    metres_per_newton: f64,
+    head: Option<Head>,
+    contacts_are_drawn: bool,
+}
+
+/// The head where it was last sent. It is sent again now and then although it may not move: an observer who joins
+/// late gets the newest history first, and the oldest is thrown away.
+struct Head {
+    pose: Pose,
+    sent_ns: u64,
+}
+
+/// Time after which an unmoved head is sent again.
+const HEAD_REPEAT_NS: u64 = 1_000_000_000;
+
+/// Says what is wrong with a body's mesh, if anything.
+pub(crate) fn check_mesh(body: &MonitorBody) -> Result<(), MonitorError> {
+    let count = body.vertices.len();
+    let finite = body.vertices.iter().flatten().all(|x| x.is_finite());
+    let in_range = body
+        .triangles
+        .iter()
+        .flatten()
+        .all(|&index| (index as usize) < count);
+    let normals_fit = body
+        .normals
+        .as_ref()
+        .is_none_or(|normals| normals.len() == count);
+    let reason = if body.triangles.is_empty() {
+        "it has no triangles".to_owned()
+    } else if !finite || !is_finite(&body.pose) {
+        "a vertex or its pose is not a finite number".to_owned()
+    } else if !in_range {
+        format!("a triangle names a vertex beyond the last of {count}")
+    } else if !normals_fit {
+        format!("it needs {count} normals, one per vertex")
+    } else {
+        return Ok(());
+    };
+    Err(MonitorError::Mesh {
+        body: body.name.clone(),
+        reason,
+    })
+}
+
+impl Picture {
+    /// Sends everything that does not move, and the first poses.
+    pub(crate) fn draw_scene(
+        stream: &RecordingStream,
+        scene: &MonitorScene,
+    ) -> RecordingStreamResult<Picture> {
+        stream.log_static(paths::WORLD, &view_coordinates(&scene.up))?;
+        for body in &scene.bodies {
+            draw_body(stream, body)?;
+        }
+        for screen in &scene.screens {
+            let [a, b, c, d] = screen.corners.map(to_array);
+            let outline = LineStrips3D::new([[a, b, c, d, a]])
+                .with_colors([colours::WORKBENCH])
+                .with_radii([rerun::Radius::new_ui_points(1.0)]);
+            stream.log_static(paths::named("world/screens", &screen.name), &outline)?;
+        }
+        let head = scene.head.map(|pose| Head { pose, sent_ns: 0 });
+        if let Some(head) = &head {
+            draw_head(stream)?;
+            stream.log(paths::HEAD, &transform(&head.pose))?;
+        }
+
+        let diagonal = god_object_diagonal(scene);
+        Ok(Picture {
+            reference_point: scene.reference_point,
+            diagonal,
+            metres_per_newton: scene
+                .arrow_metres_per_newton
+                .unwrap_or(diagonal / NEWTONS_PER_DIAGONAL),
+            head,
+            contacts_are_drawn: true,
+        })
+    }
+
+    /// Length of the force arrow, metres per newton.
+    pub(crate) fn metres_per_newton(&self) -> f64 {
+        self.metres_per_newton
+    }
+
+    /// Moves everything to where `sample` says; the stream's time must be set. `false`: the sample holds a number
+    /// that is not finite, and nothing was moved.
+    pub(crate) fn show(
+        &mut self,
+        stream: &RecordingStream,
+        sample: &MonitorSample,
+    ) -> RecordingStreamResult<bool> {
+        let finite = is_finite(&sample.god_object_pose)
+            && is_finite(&sample.device_pose)
+            && sample.head_pose.as_ref().is_none_or(is_finite)
+            && sample.wrench.iter().all(|x| x.is_finite());
+        if !finite {
+            return Ok(false);
+        }
+        stream.log(paths::GOD_OBJECT, &transform(&sample.god_object_pose))?;
+        stream.log(paths::DEVICE, &transform(&sample.device_pose))?;
+        self.show_head(stream, sample)?;
+        self.show_contacts(stream, sample.contacts.as_slice())?;
+        self.show_force(stream, sample)?;
+        Ok(true)
+    }
+
+    fn show_head(
+        &mut self,
+        stream: &RecordingStream,
+        sample: &MonitorSample,
+    ) -> RecordingStreamResult<()> {
+        let Some(pose) = sample.head_pose.or(self.head.as_ref().map(|head| head.pose)) else {
+            return Ok(());
+        };
+        let now_ns = sample.session_time_ns;
+        match &self.head {
+            None => draw_head(stream)?,
+            Some(head) => {
+                let recent = now_ns.saturating_sub(head.sent_ns) < HEAD_REPEAT_NS;
+                if recent && head.pose == pose {
+                    return Ok(());
+                }
+            }
+        }
+        self.head = Some(Head {
+            pose,
+            sent_ns: now_ns,
+        });
+        stream.log(paths::HEAD, &transform(&pose))
+    }
+
+    /// Nothing is sent as long as there is nothing to draw and nothing to erase.
+    fn show_contacts(
+        &mut self,
+        stream: &RecordingStream,
+        contacts: &[ShownContact],
+    ) -> RecordingStreamResult<()> {
+        if contacts.is_empty() && !self.contacts_are_drawn {
+            return Ok(());
+        }
+        self.contacts_are_drawn = !contacts.is_empty();
+        let points = || contacts.iter().map(|contact| to_array(contact.point));
+        let length = NORMAL_LENGTH * self.diagonal;
+        let normals = contacts
+            .iter()
+            .map(|contact| to_vector(contact.normal * length));
+        let dots = Points3D::new(points())
+            .with_colors([colours::CONTACT])
+            .with_radii([(CONTACT_RADIUS * self.diagonal) as f32]);
+        let arrows = Arrows3D::from_vectors(normals)
+            .with_origins(points())
+            .with_colors([colours::NORMAL])
+            .with_radii([(NORMAL_RADIUS * self.diagonal) as f32]);
+        stream.log(paths::CONTACTS, &[&dots as &dyn rerun::AsComponents, &arrows])
+    }
+
+    fn show_force(
+        &self,
+        stream: &RecordingStream,
+        sample: &MonitorSample,
+    ) -> RecordingStreamResult<()> {
+        let force: Vector3<f64> = sample.wrench.fixed_rows::<3>(0).into_owned();
+        let drawn = (force.norm() >= LEAST_DRAWN_FORCE).then(|| {
+            let start = sample.god_object_pose * self.reference_point;
+            (to_array(start), to_vector(force * self.metres_per_newton))
+        });
+        let arrow = Arrows3D::from_vectors(drawn.iter().map(|(_, vector)| *vector))
+            .with_origins(drawn.iter().map(|(start, _)| *start))
+            .with_colors([colours::FORCE])
+            .with_radii([(FORCE_RADIUS * self.diagonal) as f32]);
+        stream.log(paths::FORCE_ARROW, &arrow)
+    }
+}
+
+/// The mesh; for the god-object also its ghost at the device's pose.
+fn draw_body(stream: &RecordingStream, body: &MonitorBody) -> RecordingStreamResult<()> {
+    let mesh = match &body.normals {
+        Some(normals) => Mesh3D::new(body.vertices.iter().copied())
+            .with_triangle_indices(body.triangles.iter().copied())
+            .with_vertex_normals(normals.iter().copied()),
+        None => {
+            let mesh = shading::shaded(&body.vertices, &body.triangles);
+            Mesh3D::new(mesh.vertices)
+                .with_triangle_indices(mesh.triangles)
+                .with_vertex_normals(mesh.normals)
+        }
+    };
+    match body.role {
+        BodyRole::Obstacle => {
+            let [r, g, b] = body.colour.unwrap_or(colours::OBSTACLE);
+            let path = paths::named("world/obstacles", &body.name);
+            stream.log_static(path.clone(), &transform(&body.pose))?;
+            stream.log_static(path, &mesh.with_albedo_factor([r, g, b, colours::OBSTACLE_OPACITY]).with_face_rendering(rerun::components::MeshFaceRendering::Front))
+        }
+        BodyRole::GodObject => {
+            let [r, g, b] = body.colour.unwrap_or(colours::GOD_OBJECT);
+            let solid = mesh.clone().with_albedo_factor([r, g, b, 255]);
+            stream.log_static(paths::named(paths::GOD_OBJECT, &body.name), &solid)?;
+            let ghost = mesh.with_albedo_factor(colours::DEVICE);
+            stream.log_static(paths::named(paths::DEVICE, &body.name), &ghost)?;
+            stream.log(paths::GOD_OBJECT, &transform(&body.pose))?;
+            stream.log(paths::DEVICE, &transform(&body.pose))
+        }
+    }
+}
+
+fn draw_head(stream: &RecordingStream) -> RecordingStreamResult<()> {
+    let shape = Ellipsoids3D::from_half_sizes([HEAD_HALF_SIZES])
+        .with_colors([colours::WORKBENCH])
+        .with_fill_mode(FillMode::MajorWireframe);
+    stream.log_static(paths::HEAD, &shape)
+}
+
+/// Largest extent of the god-object's bounding box, corner to corner; of all bodies if there is no god-object.
+fn god_object_diagonal(scene: &MonitorScene) -> f64 {
+    let god_object = scene
+        .bodies
+        .iter()
+        .find(|body| body.role == BodyRole::GodObject);
+    let bounds = match god_object {
+        Some(body) => Bounds::of(body.vertices.iter().map(|v| point(*v))),
+        None => Bounds::of_bodies(scene),
+    };
+    bounds.map_or(0.1, |bounds| 2.0 * bounds.half_diagonal())
+}
+
+/// An axis-aligned box.
+pub(crate) struct Bounds {
+    least: Point3<f64>,
+    most: Point3<f64>,
+}
+
+impl Bounds {
+    fn of(points: impl Iterator<Item = Point3<f64>>) -> Option<Bounds> {
+        points.fold(None, |bounds: Option<Bounds>, point| {
+            let (least, most) = bounds.map_or((point, point), |b| (b.least, b.most));
+            Some(Bounds {
+                least: least.inf(&point),
+                most: most.sup(&point),
+            })
+        })
+    }
+
+    /// Around all bodies at their starting poses, world axes; `None` without bodies.
+    pub(crate) fn of_bodies(scene: &MonitorScene) -> Option<Bounds> {
+        Bounds::of(scene.bodies.iter().flat_map(|body| {
+            body.vertices
+                .iter()
+                .map(move |vertex| body.pose * point(*vertex))
+        }))
+    }
+
+    pub(crate) fn centre(&self) -> Point3<f64> {
+        nalgebra::center(&self.least, &self.most)
+    }
+
+    pub(crate) fn half_diagonal(&self) -> f64 {
+        0.5 * (self.most - self.least).norm()
+    }
+}
+
+/// Right-handed with the axis nearest to `up` as up.
+fn view_coordinates(up: &Vector3<f64>) -> ViewCoordinates {
+    let axis = up.iamax();
+    match (axis, up[axis] < 0.0) {
+        (0, false) => ViewCoordinates::RIGHT_HAND_X_UP(),
+        (0, true) => ViewCoordinates::RIGHT_HAND_X_DOWN(),
+        (1, false) => ViewCoordinates::RIGHT_HAND_Y_UP(),
+        (1, true) => ViewCoordinates::RIGHT_HAND_Y_DOWN(),
+        (_, false) => ViewCoordinates::RIGHT_HAND_Z_UP(),
+        (_, true) => ViewCoordinates::RIGHT_HAND_Z_DOWN(),
+    }
+}
+
+fn transform(pose: &Pose) -> Transform3D {
+    let rotation = pose.rotation.coords.map(|x| x as f32); // x, y, z, w
+    Transform3D::from_translation_rotation(
+        to_vector(pose.translation.vector),
+        Quaternion::from_xyzw(rotation.into()),
+    )
+}
+
+fn is_finite(pose: &Pose) -> bool {
+    let numbers = pose.translation.vector.iter();
+    numbers
+        .chain(pose.rotation.coords.iter())
+        .all(|x| x.is_finite())
+}
+
+fn point(vertex: [f32; 3]) -> Point3<f64> {
+    Point3::from(vertex.map(f64::from))
+}
+
+fn to_array(point: Point3<f64>) -> [f32; 3] {
+    to_vector(point.coords)
+}
+
+fn to_vector(vector: Vector3<f64>) -> [f32; 3] {
+    vector.map(|x| x as f32).into()
+}

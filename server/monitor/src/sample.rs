@@ -1,0 +1,163 @@
+//! What the monitor is told many times a second: one `Copy` value, no heap.
+
+use nalgebra::{Point3, Vector3, Vector6};
+
+use crate::scene::Pose;
+
+/// Most contacts that one sample carries; the others are counted, not drawn.
+pub const MAX_SHOWN_CONTACTS: usize = 64;
+
+/// The state of the three loops at one instant.
+///
+/// Times of loops are in microseconds because that is what the plots show; all else is SI.
+#[derive(Clone, Copy, Debug)]
+pub struct MonitorSample {
+    /// Session time in nanoseconds since the server started.
+    pub session_time_ns: u64,
+    /// Pose of the god-object.
+    pub god_object_pose: Pose,
+    /// Pose of the device, possibly inside an obstacle.
+    pub device_pose: Pose,
+    /// Pose of the viewer's head, if it is tracked.
+    pub head_pose: Option<Pose>,
+    /// Wrench on the user's hand at the reference point: force (N) then torque (N m), world axes.
+    pub wrench: Vector6<f64>,
+    /// The contacts to draw.
+    pub contacts: ShownContacts,
+    /// Smallest gap between god-object and obstacles, metres; NaN when not known.
+    pub gap_min: f64,
+    /// Age of the constraint set that the force was computed from, microseconds.
+    pub constraint_age_us: f32,
+    /// Haptics loop (device rate): its period.
+    pub haptics_period: LoopTime,
+    /// God-object simulation: time of one update.
+    pub god_object_update: LoopTime,
+    /// Constraint-based coupling: time of one force.
+    pub force_update: LoopTime,
+    /// Pose datagrams sent since the start, all clients together.
+    pub packets_sent: u64,
+    /// Datagrams received and accepted since the start.
+    pub packets_received: u64,
+    /// Connected clients.
+    pub clients: u32,
+    /// Poses found to intersect an obstacle since the start; anything but 0 is a fault.
+    pub penetrations: u64,
+}
+
+impl MonitorSample {
+    /// A sample at this time with both poses at the origin, no force and no contact.
+    #[must_use]
+    pub fn at(session_time_ns: u64) -> MonitorSample {
+        MonitorSample {
+            session_time_ns,
+            god_object_pose: Pose::identity(),
+            device_pose: Pose::identity(),
+            head_pose: None,
+            wrench: Vector6::zeros(),
+            contacts: ShownContacts::default(),
+            gap_min: f64::NAN,
+            constraint_age_us: 0.0,
+            haptics_period: LoopTime::default(),
+            god_object_update: LoopTime::default(),
+            force_update: LoopTime::default(),
+            packets_sent: 0,
+            packets_received: 0,
+            clients: 0,
+            penetrations: 0,
+        }
+    }
+}
+
+/// A loop's time: the newest and the 99th percentile over the loop's recent past.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LoopTime {
+    /// The newest value, microseconds.
+    pub last_us: f32,
+    /// 99th percentile, microseconds.
+    pub p99_us: f32,
+}
+
+/// One contact as it is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShownContact {
+    /// Point on the obstacle, world axes, metres.
+    pub point: Point3<f64>,
+    /// Unit normal, obstacle → god-object, world axes.
+    pub normal: Vector3<f64>,
+    /// Gap, metres, ≥ 0.
+    pub gap: f64,
+}
+
+/// Up to [`MAX_SHOWN_CONTACTS`] contacts, and how many there were.
+#[derive(Clone, Copy, Debug)]
+pub struct ShownContacts {
+    shown: [ShownContact; MAX_SHOWN_CONTACTS],
+    total: u32,
+}
+
+impl ShownContacts {
+    /// Adds a contact; beyond [`MAX_SHOWN_CONTACTS`] it is only counted. No allocation.
+    pub fn push(&mut self, contact: ShownContact) {
+        if let Some(slot) = self.shown.get_mut(self.total as usize) {
+            *slot = contact;
+        }
+        self.total = self.total.saturating_add(1);
+    }
+
+    /// The contacts to draw.
+    #[must_use]
+    pub fn as_slice(&self) -> &[ShownContact] {
+        &self.shown[..(self.total as usize).min(MAX_SHOWN_CONTACTS)]
+    }
+
+    /// How many contacts there were, drawn or not.
+    #[must_use]
+    pub fn total(&self) -> u32 {
+        self.total
+    }
+}
+
+impl Default for ShownContacts {
+    fn default() -> ShownContacts {
+        let none = ShownContact {
+            point: Point3::origin(),
+            normal: Vector3::zeros(),
+            gap: 0.0,
+        };
+        ShownContacts {
+            shown: [none; MAX_SHOWN_CONTACTS],
+            total: 0,
+        }
+    }
+}
+
+impl FromIterator<ShownContact> for ShownContacts {
+    fn from_iter<I: IntoIterator<Item = ShownContact>>(contacts: I) -> ShownContacts {
+        let mut shown = ShownContacts::default();
+        for contact in contacts {
+            shown.push(contact);
+        }
+        shown
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contacts_beyond_the_capacity_are_counted_but_not_kept() {
+        let extra = 3;
+        let contacts: ShownContacts = (0..MAX_SHOWN_CONTACTS + extra)
+            .map(|i| ShownContact {
+                point: Point3::new(i as f64, 0.0, 0.0),
+                normal: Vector3::z(),
+                gap: 0.0,
+            })
+            .collect();
+        assert_eq!(contacts.as_slice().len(), MAX_SHOWN_CONTACTS);
+        assert_eq!(contacts.total() as usize, MAX_SHOWN_CONTACTS + extra);
+        let last = contacts.as_slice()[MAX_SHOWN_CONTACTS - 1];
+        assert_eq!(last.point.x, (MAX_SHOWN_CONTACTS - 1) as f64);
+    }
+}

@@ -1,0 +1,178 @@
+//! A recording, read back with rerun's own reader, holds what was shown.
+
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use taut_monitor::{
+    BodyRole, InspectError, LogLevel, Monitor, MonitorBody, MonitorError, MonitorOptions,
+    MonitorSample, MonitorScene, MonitorScreen, Pose, ShownContact, inspect,
+};
+
+/// Samples are one picture period and a bit apart, so that several pictures are drawn.
+const SAMPLES: u64 = 60;
+const SAMPLE_PERIOD_NS: u64 = 20_000_000;
+
+fn tetrahedron(name: &str, role: BodyRole) -> MonitorBody {
+    MonitorBody {
+        name: name.into(),
+        vertices: vec![
+            [0.0, 0.0, 0.0],
+            [0.1, 0.0, 0.0],
+            [0.0, 0.1, 0.0],
+            [0.0, 0.0, 0.1],
+        ],
+        normals: None,
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        colour: None,
+        role,
+        pose: Pose::identity(),
+    }
+}
+
+fn scene() -> MonitorScene {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
+    MonitorScene {
+        bodies: vec![
+            tetrahedron("tool", BodyRole::GodObject),
+            tetrahedron("left/hand wall, 100%", BodyRole::Obstacle),
+        ],
+        screens: vec![MonitorScreen {
+            name: "front".into(),
+            corners: corners.map(Point3::from),
+        }],
+        head: Some(Isometry3::translation(0.0, -0.5, 0.5)),
+        ..MonitorScene::new("two tetrahedra")
+    }
+}
+
+fn sample(index: u64) -> MonitorSample {
+    let mut sample = MonitorSample::at((index + 1) * SAMPLE_PERIOD_NS);
+    sample.god_object_pose = Isometry3::translation(0.001 * index as f64, 0.0, 0.2);
+    sample.device_pose = Isometry3::translation(0.001 * index as f64, 0.0, 0.19);
+    sample.wrench = Vector6::new(0.0, 0.0, 3.0, 0.0, 0.1, 0.0);
+    sample.contacts.push(ShownContact {
+        point: Point3::new(0.0, 0.0, 0.1),
+        normal: Vector3::z(),
+        gap: 0.0,
+    });
+    sample.packets_sent = 10 * index;
+    sample
+}
+
+fn recording_only(path: &std::path::Path) -> MonitorOptions {
+    MonitorOptions {
+        record: Some(path.to_owned()),
+        serve: false,
+        ..MonitorOptions::default()
+    }
+}
+
+#[test]
+fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
+    assert_eq!(monitor.address(), None);
+    for index in 0..SAMPLES {
+        assert!(sender.offer(sample(index)));
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    sender.log(SAMPLE_PERIOD_NS, LogLevel::Warn, "said by a loop");
+    monitor.log(LogLevel::Info, "said by the server");
+    let stats = monitor.stop().unwrap();
+    assert_eq!(stats.samples_shown, SAMPLES);
+    assert_eq!(stats.samples_dropped, 0);
+
+    let summary = inspect(&path).unwrap();
+    for entity in [
+        "/log",
+        "/plots/constraint_age",
+        "/plots/contacts",
+        "/plots/force",
+        "/plots/gap",
+        "/plots/loops",
+        "/plots/network",
+        "/plots/torque",
+        "/world",
+        "/world/contacts",
+        "/world/device",
+        "/world/device/tool",
+        "/world/force",
+        "/world/god_object",
+        "/world/god_object/tool",
+        "/world/head",
+        "/world/screens/front",
+    ] {
+        assert!(summary.rows.contains_key(entity), "no {entity} in {:?}", summary.entities);
+    }
+    let obstacles = summary.entities.iter().filter(|path| path.starts_with("/world/obstacles/"));
+    assert_eq!(obstacles.count(), 1, "{:?}", summary.entities);
+
+    // Every sample is a point in the plots, plus one row for the lines' names and colours.
+    assert_eq!(summary.rows["/plots/force"], SAMPLES + 1);
+    // The scene's line, the loop's, the server's.
+    assert_eq!(summary.rows["/log"], 3);
+    assert!(summary.rows["/world/god_object"] > 1);
+    assert_eq!(summary.timelines, ["session_time"]);
+    assert_eq!(summary.first_time_s, Some(0.0));
+    let last = SAMPLES * SAMPLE_PERIOD_NS;
+    assert_eq!(summary.last_time_s, Some(last as f64 * 1e-9));
+    assert_eq!(summary.blueprints, 1);
+}
+
+#[test]
+fn dropping_the_monitor_completes_the_recording_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
+    sender.offer(sample(0));
+    drop(monitor);
+    assert_eq!(inspect(&path).unwrap().rows["/plots/force"], 2);
+    assert!(sender.offer(sample(1)), "offering after the end does no harm");
+}
+
+#[test]
+fn a_sample_that_is_not_finite_leaves_the_picture_and_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
+    let mut broken = sample(0);
+    broken.god_object_pose.translation.vector.x = f64::NAN;
+    sender.offer(broken);
+    let stats = monitor.stop().unwrap();
+    assert_eq!(stats.samples_not_finite, 1);
+    let summary = inspect(&path).unwrap();
+    assert_eq!(summary.rows["/world/god_object"], 1, "only the first pose");
+    assert_eq!(summary.rows["/log"], 2, "the scene's line and one about the sample");
+}
+
+#[test]
+fn a_recording_that_cannot_be_written_is_an_error_that_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("missing").join("session.rrd");
+    let error = Monitor::start(&recording_only(&path), scene()).unwrap_err();
+    assert!(matches!(error, MonitorError::Record { .. }));
+    assert!(error.to_string().contains("session.rrd"), "{error}");
+}
+
+#[test]
+fn a_broken_mesh_is_an_error_that_names_the_body() {
+    let mut scene = scene();
+    scene.bodies[1].triangles[0][2] = 99;
+    let options = MonitorOptions {
+        serve: false,
+        ..MonitorOptions::default()
+    };
+    let error = Monitor::start(&options, scene).unwrap_err();
+    assert!(error.to_string().contains("left/hand wall"), "{error}");
+}
+
+#[test]
+fn a_file_that_is_no_recording_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("text.rrd");
+    std::fs::write(&path, "this is not a recording, but it is long enough to hold a header").unwrap();
+    let error = inspect(&path).unwrap_err();
+    assert!(matches!(error, InspectError::Decode { .. }), "{error}");
+    assert!(error.to_string().contains("text.rrd"), "{error}");
+    let missing = inspect(&folder.path().join("none.rrd")).unwrap_err();
+    assert!(matches!(missing, InspectError::Open { .. }), "{missing}");
+}

@@ -1,0 +1,97 @@
+//! The page and the stream are there while the monitor runs, and an occupied port is an error.
+
+use std::io::{Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::time::{Duration, Instant};
+
+use taut_monitor::{Monitor, MonitorError, MonitorOptions, MonitorSample, MonitorScene};
+
+fn on_free_ports() -> MonitorOptions {
+    MonitorOptions {
+        grpc_port: 0,
+        web_port: 0,
+        ..MonitorOptions::default()
+    }
+}
+
+/// `host:port` of a URL.
+fn host_of(url: &str) -> &str {
+    let rest = url.split_once("://").unwrap().1;
+    rest.split('/').next().unwrap()
+}
+
+fn request(host: &str, path: &str, origin: &str) -> String {
+    let mut connection = TcpStream::connect(host).unwrap();
+    connection
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    write!(
+        connection,
+        "OPTIONS {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\n\
+         Access-Control-Request-Method: POST\r\nConnection: close\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = Vec::new();
+    connection.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).to_lowercase()
+}
+
+#[test]
+fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
+    let scene = MonitorScene::new("empty");
+    let (monitor, mut sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = monitor.address().unwrap().to_owned();
+    let stream = monitor.stream_address().unwrap().to_owned();
+    let (page_host, stream_host) = (host_of(&page), host_of(&stream));
+    let stream_port = stream_host.rsplit(':').next().unwrap();
+    assert!(page.contains(&format!("%3A{stream_port}%2Fproxy")), "{page}");
+
+    // The page is there ...
+    let mut connection = TcpStream::connect(page_host).unwrap();
+    write!(connection, "GET / HTTP/1.1\r\nHost: {page_host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut html = Vec::new();
+    connection.read_to_end(&mut html).unwrap();
+    let html = String::from_utf8_lossy(&html);
+    assert!(html.starts_with("HTTP/1.1 200"), "{}", &html[..40.min(html.len())]);
+    assert!(html.contains("canvas"), "the viewer's page");
+
+    // ... may read the stream from a browser, and another site's page may not.
+    let path = "/rerun.sdk_comms.v1alpha1.MessageProxyService/ReadMessages";
+    let allowed = request(stream_host, path, &format!("http://{page_host}"));
+    assert!(allowed.contains("access-control-allow-origin"), "{allowed}");
+    let refused = request(stream_host, path, "http://example.org");
+    assert!(!refused.contains("access-control-allow-origin"), "{refused}");
+
+    assert!(sender.offer(MonitorSample::at(1)));
+    monitor.stop().unwrap();
+    for host in [page_host, stream_host] {
+        let start = Instant::now();
+        while TcpStream::connect(host).is_ok() {
+            assert!(start.elapsed() < Duration::from_secs(10), "{host} stays open");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+#[test]
+fn an_occupied_port_is_an_error_that_names_port_and_key() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    let stream_taken = MonitorOptions {
+        grpc_port: port,
+        ..on_free_ports()
+    };
+    let page_taken = MonitorOptions {
+        web_port: port,
+        ..on_free_ports()
+    };
+    for (options, key) in [
+        (stream_taken, "monitor.grpc_port"),
+        (page_taken, "monitor.web_port"),
+    ] {
+        let error = Monitor::start(&options, MonitorScene::new("empty")).unwrap_err();
+        assert!(matches!(error, MonitorError::Listen { .. }));
+        let text = error.to_string();
+        assert!(text.contains(&port.to_string()) && text.contains(key), "{text}");
+    }
+}

@@ -1,0 +1,328 @@
+//! One table of a document, read key by key. Every fault is noted, so that a file is judged whole.
+
+use std::cell::RefCell;
+
+use super::{At, Node, Value};
+use crate::problem::Problem;
+
+/// Similarity (Jaro-Winkler, 0 to 1) from which a known key is offered for an unknown one.
+const SUGGESTION_SIMILARITY: f64 = 0.7;
+
+/// Which numbers a key may hold. NaN and infinities are in none of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Range {
+    /// Any finite number.
+    Finite,
+    /// Above zero.
+    Positive,
+    /// Zero or above.
+    NotNegative,
+    /// Zero or below.
+    NotPositive,
+    /// Above zero, at most this.
+    PositiveUpTo(f64),
+    /// Zero to this, ends included.
+    UpTo(f64),
+}
+
+impl Range {
+    fn contains(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Finite => true,
+                Self::Positive => value > 0.0,
+                Self::NotNegative => value >= 0.0,
+                Self::NotPositive => value <= 0.0,
+                Self::PositiveUpTo(limit) => value > 0.0 && value <= limit,
+                Self::UpTo(limit) => (0.0..=limit).contains(&value),
+            }
+    }
+
+    fn wanted(self) -> String {
+        match self {
+            Self::Finite => "a finite number".into(),
+            Self::Positive => "a finite number greater than zero".into(),
+            Self::NotNegative => "a finite number not below zero".into(),
+            Self::NotPositive => "a finite number not above zero".into(),
+            Self::PositiveUpTo(limit) => format!("greater than zero and at most {limit}"),
+            Self::UpTo(limit) => format!("between 0 and {limit}"),
+        }
+    }
+}
+
+/// One table, the keys that were asked for, and where complaints go.
+pub(crate) struct Section<'a> {
+    /// `[coupling]`, `[god_object] shape`: the name in messages.
+    name: String,
+    entries: &'a [(String, Node)],
+    at: &'a At,
+    known: RefCell<Vec<&'static str>>,
+    problems: &'a RefCell<Vec<Problem>>,
+}
+
+impl<'a> Section<'a> {
+    /// The whole document.
+    pub(crate) fn root(node: &'a Node, problems: &'a RefCell<Vec<Problem>>) -> Self {
+        let entries: &[(String, Node)] = match &node.value {
+            Value::Table(entries) => entries,
+            _ => &[],
+        };
+        Self { name: "the file".into(), entries, at: &node.at, known: RefCell::default(), problems }
+    }
+
+    /// Where the table begins.
+    pub(crate) fn at(&self) -> &'a At {
+        self.at
+    }
+
+    /// The table's name in messages.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Notes a fault.
+    pub(crate) fn complain(&self, at: &At, text: impl Into<String>) {
+        self.problems.borrow_mut().push(at.problem(text));
+    }
+
+    /// The value of `key`, if it is there.
+    pub(crate) fn get(&self, key: &'static str) -> Option<&'a Node> {
+        self.known.borrow_mut().push(key);
+        self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+    }
+
+    /// Whether `key` is there.
+    pub(crate) fn has(&self, key: &'static str) -> bool {
+        self.get(key).is_some()
+    }
+
+    /// Notes that `key` is missing.
+    pub(crate) fn complain_missing(&self, key: &'static str, example: &str) {
+        self.complain(self.at, format!("`{key}` is missing in {}; add {example}", self.name));
+    }
+
+    fn wrong_kind(&self, key: &str, node: &Node, wanted: &str) {
+        self.complain(&node.at, format!("`{key}` in {} is {}, but must be {wanted}", self.name, node.value.kind()));
+    }
+
+    /// A number in its range; `None` if it is absent or, with a complaint, wrong.
+    pub(crate) fn number(&self, key: &'static str, range: Range) -> Option<f64> {
+        let node = self.get(key)?;
+        self.number_of(key, node, range)
+    }
+
+    fn number_of(&self, key: &str, node: &Node, range: Range) -> Option<f64> {
+        let Some(value) = as_number(node) else {
+            self.wrong_kind(key, node, &range.wanted());
+            return None;
+        };
+        if !range.contains(value) {
+            self.complain(&node.at, format!("`{key}` in {} is {value}, but must be {}", self.name, range.wanted()));
+            return None;
+        }
+        Some(value)
+    }
+
+    /// A number in its range, or `default`.
+    pub(crate) fn number_or(&self, key: &'static str, range: Range, default: f64) -> f64 {
+        self.number(key, range).unwrap_or(default)
+    }
+
+    /// A number that must be there.
+    pub(crate) fn required_number(&self, key: &'static str, range: Range, example: &str) -> Option<f64> {
+        if !self.has(key) {
+            self.complain_missing(key, example);
+        }
+        self.number(key, range)
+    }
+
+    /// An integer between `low` and `high`, ends included.
+    pub(crate) fn integer(&self, key: &'static str, low: i64, high: i64) -> Option<i64> {
+        let node = self.get(key)?;
+        match node.value {
+            Value::Integer(value) if (low..=high).contains(&value) => Some(value),
+            Value::Integer(value) => {
+                let text = format!("`{key}` in {} is {value}, but must be between {low} and {high}", self.name);
+                self.complain(&node.at, text);
+                None
+            }
+            _ => {
+                self.wrong_kind(key, node, &format!("an integer between {low} and {high}"));
+                None
+            }
+        }
+    }
+
+    /// A text.
+    pub(crate) fn text(&self, key: &'static str) -> Option<&'a str> {
+        let node = self.get(key)?;
+        match &node.value {
+            Value::Text(text) => Some(text),
+            _ => {
+                self.wrong_kind(key, node, "a text in quotes");
+                None
+            }
+        }
+    }
+
+    /// A text that must be there and not be empty.
+    pub(crate) fn required_text(&self, key: &'static str, example: &str) -> Option<&'a str> {
+        if !self.has(key) {
+            self.complain_missing(key, example);
+        }
+        let text = self.text(key)?;
+        if text.is_empty() {
+            let at = self.get(key).map_or(self.at, |node| &node.at);
+            self.complain(at, format!("`{key}` in {} is empty; write {example}", self.name));
+            return None;
+        }
+        Some(text)
+    }
+
+    /// A truth value.
+    pub(crate) fn boolean(&self, key: &'static str) -> Option<bool> {
+        let node = self.get(key)?;
+        match node.value {
+            Value::Boolean(value) => Some(value),
+            _ => {
+                self.wrong_kind(key, node, "true or false");
+                None
+            }
+        }
+    }
+
+    /// One of several words.
+    pub(crate) fn choice<T: Copy>(&self, key: &'static str, choices: &[(&str, T)]) -> Option<T> {
+        let node = self.get(key)?;
+        let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();
+        let Value::Text(text) = &node.value else {
+            self.wrong_kind(key, node, &listed(&names));
+            return None;
+        };
+        let found = choices.iter().find(|(name, _)| name == text);
+        if found.is_none() {
+            let hint = nearest(text, names.iter().copied());
+            let text = format!("`{key}` in {} is \"{text}\", but must be {}{hint}", self.name, listed(&names));
+            self.complain(&node.at, text);
+        }
+        found.map(|(_, value)| *value)
+    }
+
+    /// `N` finite numbers.
+    pub(crate) fn numbers<const N: usize>(&self, key: &'static str, range: Range) -> Option<[f64; N]> {
+        let node = self.get(key)?;
+        let Value::Array(items) = &node.value else {
+            self.wrong_kind(key, node, &format!("an array of {N} numbers"));
+            return None;
+        };
+        if items.len() != N {
+            let text = format!("`{key}` in {} has {} numbers, but must have {N}", self.name, items.len());
+            self.complain(&node.at, text);
+            return None;
+        }
+        let mut numbers = [0.0; N];
+        for (number, item) in numbers.iter_mut().zip(items) {
+            *number = self.number_of(key, item, range)?;
+        }
+        Some(numbers)
+    }
+
+    /// A list of texts.
+    pub(crate) fn texts(&self, key: &'static str) -> Option<Vec<(&'a str, &'a At)>> {
+        let node = self.get(key)?;
+        let Value::Array(items) = &node.value else {
+            self.wrong_kind(key, node, "an array of texts");
+            return None;
+        };
+        let mut texts = Vec::new();
+        for item in items {
+            let Value::Text(text) = &item.value else {
+                self.wrong_kind(key, item, "an array of texts");
+                return None;
+            };
+            texts.push((text.as_str(), &item.at));
+        }
+        Some(texts)
+    }
+
+    /// A table.
+    pub(crate) fn section(&self, key: &'static str) -> Option<Section<'a>> {
+        let node = self.get(key)?;
+        self.table(key, node, self.child_name(key))
+    }
+
+    /// A list of tables; absent is empty.
+    pub(crate) fn sections(&self, key: &'static str) -> Vec<Section<'a>> {
+        let Some(node) = self.get(key) else { return Vec::new() };
+        match &node.value {
+            Value::Array(items) => items.iter().filter_map(|item| self.table(key, item, format!("[[{key}]]"))).collect(),
+            _ => {
+                self.wrong_kind(key, node, &format!("a list of tables; write [[{key}]]"));
+                Vec::new()
+            }
+        }
+    }
+
+    fn child_name(&self, key: &str) -> String {
+        if self.name == "the file" { format!("[{key}]") } else { format!("{} {key}", self.name) }
+    }
+
+    fn table(&self, key: &str, node: &'a Node, name: String) -> Option<Section<'a>> {
+        match &node.value {
+            Value::Table(entries) => {
+                Some(Section { name, entries, at: &node.at, known: RefCell::default(), problems: self.problems })
+            }
+            _ => {
+                self.wrong_kind(key, node, "a table");
+                None
+            }
+        }
+    }
+
+    /// Complains of every key that was never asked for, with the nearest one that was.
+    pub(crate) fn finish(self) {
+        let known = self.known.borrow();
+        for (key, node) in self.entries {
+            if !known.contains(&key.as_str()) {
+                let hint = nearest(key, known.iter().copied());
+                let hint = if hint.is_empty() { format!("; known keys: {}", comma_list(&known)) } else { hint };
+                self.complain(&node.at, format!("unknown key `{key}` in {}{hint}", self.name));
+            }
+        }
+    }
+}
+
+fn as_number(node: &Node) -> Option<f64> {
+    match node.value {
+        Value::Float(value) => Some(value),
+        #[allow(clippy::cast_precision_loss, reason = "an integer where a measure is meant; 2^53 m is out of range anyway")]
+        Value::Integer(value) => Some(value as f64),
+        _ => None,
+    }
+}
+
+/// `; did you mean ...?`, or nothing if no name is near.
+fn nearest<'n>(wrong: &str, names: impl Iterator<Item = &'n str>) -> String {
+    let best = names
+        .map(|name| (strsim::jaro_winkler(wrong, name), name))
+        .filter(|(similarity, _)| *similarity >= SUGGESTION_SIMILARITY)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(String::new, |(_, name)| format!("; did you mean `{name}`?"))
+}
+
+fn comma_list(known: &[&str]) -> String {
+    let mut names = known.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+/// `"a"`, `"a" or "b"`, `"a", "b" or "c"`.
+fn listed(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+    match quoted.split_last() {
+        None => String::new(),
+        Some((last, [])) => last.clone(),
+        Some((last, rest)) => format!("{} or {last}", rest.join(", ")),
+    }
+}

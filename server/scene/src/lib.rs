@@ -1,0 +1,40 @@
+//! Scenes, workbenches, traces and meshes as files: reading, checking, generating.
+//!
+//! A fault in a file is a sentence that names the file, the line and what to do ([`Problem`]); a file's faults are
+//! reported together ([`FileError`]). SI units and quaternions `w x y z` in every file.
+#![forbid(unsafe_code)]
+
+mod check;
+mod document;
+mod files;
+mod mesh_file;
+mod problem;
+mod rotation;
+mod scene;
+pub mod shapes;
+mod trace;
+mod workbench;
+
+pub use check::{FileKind, FileReport, MeshFigures, check};
+pub use document::Document;
+pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file};
+pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, write_ply};
+pub use problem::{FileError, Problem};
+pub use rotation::{NORM_TOLERANCE, unit_quaternion};
+pub use scene::{
+    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltScene, CouplingSpec, GOD_OBJECT_NAME, HandPathSpec, HandPreset,
+    LimitSpec, MassSpec, MethodSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
+    shipped_scene_text,
+};
+pub use trace::{DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS, TraceSample};
+pub use workbench::{
+    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH, Screen, Show, Stereo,
+    TransportKind, Viewer, Window, Workbench,
+};
+
+/// Why a scene could not be used.
+pub type SceneError = FileError;
+/// Why a trace could not be used.
+pub type TraceFileError = FileError;
+/// Why a workbench file could not be used.
+pub type WorkbenchError = FileError;

@@ -1,0 +1,62 @@
+//! Vertices and triangles as a file gives them, before anything is known about the surface they make.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+
+/// Vertices and triangles, not yet checked for being a closed surface.
+///
+/// Whoever holds one from this crate may rely on: all coordinates finite, all indices in range.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawMesh {
+    /// Corners, m, in the mesh's own frame.
+    pub vertices: Vec<Point3<f64>>,
+    /// Three places in `vertices` each, anticlockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl RawMesh {
+    /// The same mesh with every coordinate multiplied by `factor`, which must be positive.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        for vertex in &mut self.vertices {
+            vertex.coords *= factor;
+        }
+        self
+    }
+
+    /// Smallest and largest corner of the box around the mesh; `None` if it has no vertex.
+    pub fn bounds(&self) -> Option<(Point3<f64>, Point3<f64>)> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))))
+    }
+
+    /// Appends a polygon as a fan of triangles around its first corner.
+    pub(crate) fn push_polygon(&mut self, corners: &[u32]) {
+        for pair in corners.windows(2).skip(1) {
+            self.triangles.push([corners[0], pair[0], pair[1]]);
+        }
+    }
+
+    /// Merges vertices whose coordinates are exactly equal (+0 and -0 are equal), in order of first appearance.
+    ///
+    /// No tolerance: formats without indices repeat a corner's digits exactly, and a tolerance would close holes that
+    /// are there or tear fine features.
+    #[must_use]
+    pub(crate) fn welded(self) -> Self {
+        let mut places: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.vertices.len());
+        let mut vertices = Vec::new();
+        let mut new_place = Vec::with_capacity(self.vertices.len());
+        for vertex in &self.vertices {
+            let key = [vertex.x, vertex.y, vertex.z].map(|c| (c + 0.0).to_bits());
+            let next = vertices.len() as u32; // at most the old count, which was a u32
+            let place = *places.entry(key).or_insert(next);
+            if place == next {
+                vertices.push(*vertex);
+            }
+            new_place.push(place);
+        }
+        let triangles = self.triangles.iter().map(|t| t.map(|i| new_place[i as usize])).collect();
+        Self { vertices, triangles }
+    }
+}

@@ -1,0 +1,129 @@
+//! Reading a mesh file of any known format.
+
+use std::path::Path;
+
+use super::{RawMesh, gltf, obj, ply, stl};
+use crate::files::{MAX_MESH_BYTES, read_bytes};
+use crate::problem::{FileError, Problem};
+
+/// What is wrong with a mesh's bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Fault {
+    /// Line, from 1, of a text format.
+    pub(crate) line: Option<usize>,
+    /// What and what to do.
+    pub(crate) text: String,
+}
+
+impl Fault {
+    /// A fault without a line.
+    pub(crate) fn new(text: impl Into<String>) -> Self {
+        Self { line: None, text: text.into() }
+    }
+
+    /// A fault in a line.
+    pub(crate) fn at(line: usize, text: impl Into<String>) -> Self {
+        Self { line: Some(line), text: text.into() }
+    }
+
+    fn in_file(self, path: &Path) -> Problem {
+        Problem { file: path.display().to_string(), line: self.line, text: self.text }
+    }
+}
+
+/// Whether the name ends like a mesh file that [`read_mesh`] knows.
+pub fn is_mesh_path(path: &Path) -> bool {
+    matches!(extension(path).as_str(), "ply" | "obj" | "stl" | "glb" | "gltf")
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// Reads a mesh; the format follows from the name: .ply .obj .stl .glb .gltf.
+///
+/// Polygons become fans of triangles; formats without shared indices (STL, glTF) are welded where coordinates are
+/// exactly equal. All coordinates are finite and all indices in range. Whether the surface is closed is another
+/// question: `god_object::Mesh` answers it.
+pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
+    if !is_mesh_path(path) {
+        let text = "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf";
+        return Err(Problem::of_file(path.display(), text).into());
+    }
+    let bytes = read_bytes(path, MAX_MESH_BYTES)?;
+    parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path).into())
+}
+
+/// Reads a mesh from bytes; `path` gives the format and where a .gltf finds its buffers.
+fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
+    let mesh = match extension(path).as_str() {
+        "ply" => ply::parse(bytes),
+        "obj" => obj::parse(bytes),
+        "stl" => stl::parse(bytes),
+        "glb" | "gltf" => gltf::parse(bytes, path.parent()),
+        _ => Err(Fault::new("is no known mesh format; use .ply, .obj, .stl, .glb or .gltf")),
+    }?;
+    if mesh.triangles.is_empty() {
+        return Err(Fault::new("has no faces; export it as a triangle mesh"));
+    }
+    Ok(mesh)
+}
+
+/// A vertex with finite coordinates, or which coordinate is not. `number` counts from 0, as the formats' indices do.
+pub(crate) fn finite_vertex(number: usize, coordinates: [f64; 3]) -> Result<nalgebra::Point3<f64>, String> {
+    match coordinates.iter().position(|c| !c.is_finite()) {
+        None => Ok(coordinates.into()),
+        Some(axis) => Err(format!(
+            "vertex {number} has {} = {}, but coordinates must be finite; repair the mesh",
+            ["x", "y", "z"][axis],
+            coordinates[axis]
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh_file::write_ply;
+    use crate::shapes::cuboid;
+    use proptest::prelude::*;
+
+    const HEADS: [&str; 5] = [
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+        "v 0 0 0\nf ",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex ",
+        "{\"asset\":{\"version\":\"2.0\"},\"meshes\":[",
+        "glTF\u{2}\0\0\0",
+    ];
+
+    proptest! {
+        #[test]
+        fn arbitrary_bytes_never_panic(head in 0usize..5, tail in prop::collection::vec(any::<u8>(), 0..400)) {
+            let bytes = [HEADS[head].as_bytes(), &tail].concat();
+            for name in ["a.ply", "a.obj", "a.stl", "a.glb", "a.gltf"] {
+                let _ = parse_mesh(Path::new(name), &bytes);
+                let _ = parse_mesh(Path::new(name), &tail);
+            }
+        }
+
+        #[test]
+        fn a_damaged_file_is_read_or_refused_but_indices_stay_in_range(place in 0usize..600, value: u8, cut in 0usize..600) {
+            let mut bytes = write_ply(&cuboid([1.0, 2.0, 3.0]));
+            let place = place % bytes.len();
+            bytes[place] = value;
+            bytes.truncate(bytes.len().saturating_sub(cut % 3));
+            if let Ok(mesh) = parse_mesh(Path::new("a.ply"), &bytes) {
+                prop_assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
+                prop_assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
+            }
+        }
+    }
+
+    #[test]
+    fn a_missing_file_and_an_unknown_ending_are_explained() {
+        let text = read_mesh(Path::new("nowhere/a.ply")).unwrap_err().to_string();
+        assert!(text.starts_with("nowhere/a.ply: cannot be opened ("), "{text}");
+        let text = read_mesh(Path::new("a.step")).unwrap_err().to_string();
+        assert_eq!(text, "a.step: is no known mesh format; use .ply, .obj, .stl, .glb or .gltf");
+    }
+}

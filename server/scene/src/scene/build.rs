@@ -1,0 +1,213 @@
+//! From a scene to what the method works on: meshes loaded or generated, masses, settings.
+
+use god_object::geometry::mass_properties;
+use god_object::{Body, Mesh, Obstacle, Pose, Settings, World};
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use super::load::Scene;
+use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
+use crate::document::At;
+use crate::mesh_file::RawMesh;
+use crate::problem::{FileError, Problem};
+use crate::shapes;
+use crate::trace::DeviceTrace;
+
+/// The god-object's name among the bodies.
+pub const GOD_OBJECT_NAME: &str = "god-object";
+
+/// A body as it is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuiltBody {
+    /// `god-object`, or the obstacle's name.
+    pub name: String,
+    /// Vertices and triangles in the body's own frame.
+    pub mesh: RawMesh,
+    /// World from body, at the start.
+    pub pose: Pose,
+}
+
+/// The hand's intention.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuiltHand {
+    /// Via points.
+    pub path: DeviceTrace,
+    /// Begin again at the end.
+    pub repeat: bool,
+    /// The hand's impedance.
+    pub preset: HandPreset,
+}
+
+/// A scene ready to run.
+#[derive(Clone, Debug)]
+pub struct BuiltScene {
+    /// The scene's name.
+    pub name: String,
+    /// The body in the hand and all that it can touch.
+    pub world: World,
+    /// Gains, limits and lengths: defaults for the body's size, then what the scene says.
+    pub settings: Settings,
+    /// Where the god-object starts.
+    pub start: Pose,
+    /// The hand's intention, if the scene has one.
+    pub hand: Option<BuiltHand>,
+    /// What is drawn: the god-object first, then the obstacles in order.
+    pub bodies: Vec<BuiltBody>,
+    /// How the scene stands on the workbench.
+    pub view: View,
+    /// Longest side of the box around the god-object, m.
+    pub size: f64,
+}
+
+impl Scene {
+    /// Loads and generates the meshes and checks that the method can work on them. All faults are reported.
+    pub fn build(&self) -> Result<BuiltScene, FileError> {
+        let mut problems = Vec::new();
+        let spec = &self.spec;
+        let body_mesh = self.mesh(&spec.god_object.shape, &spec.god_object.shape_at, &mut problems);
+        let obstacle_meshes: Vec<Option<Mesh>> =
+            spec.obstacles.iter().map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems)).collect();
+        let hand_path = self.hand_path().unwrap_or_else(|error| {
+            problems.extend(error.into_problems());
+            None
+        });
+        FileError::unless_empty(problems)?;
+
+        let Some(mesh) = body_mesh else { return Err(self.document_start().problem("has no god-object mesh").into()) };
+        let [low, high] = mesh.bounding_box();
+        let size = (high - low).max();
+        let body = self.body(mesh)?;
+        let settings = self.settings(size)?;
+        if body.metric(settings.rotation_metric, &spec.god_object.pose).is_none() {
+            let text = "the mass or inertia of the god-object is out of range; check mass, density and the mesh's size (metres)";
+            return Err(spec.god_object.at.problem(text).into());
+        }
+        let obstacles: Vec<Obstacle> = spec
+            .obstacles
+            .iter()
+            .zip(obstacle_meshes)
+            .filter_map(|(o, mesh)| Some(Obstacle { name: o.name.clone(), mesh: mesh?, pose: o.pose, surface: o.surface }))
+            .collect();
+        let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, spec.god_object.pose)];
+        bodies.extend(obstacles.iter().map(|o| drawn(&o.name, &o.mesh, o.pose)));
+        let hand = spec.hand.as_ref().zip(hand_path);
+        Ok(BuiltScene {
+            name: spec.name.clone(),
+            world: World { body, obstacles },
+            settings,
+            start: spec.god_object.pose,
+            hand: hand.map(|(hand, path)| BuiltHand { path, repeat: hand.repeat, preset: hand.preset }),
+            bodies,
+            view: spec.view,
+            size,
+        })
+    }
+
+    fn mesh(&self, shape: &Shape, at: &At, problems: &mut Vec<Problem>) -> Option<Mesh> {
+        let raw = match self.raw_mesh(shape, at) {
+            Ok(raw) => raw,
+            Err(error) => {
+                problems.extend(error.into_problems());
+                return None;
+            }
+        };
+        let name = match shape {
+            Shape::Mesh { path, .. } => format!("the mesh \"{path}\""),
+            _ => "the shape".to_owned(),
+        };
+        Mesh::new(raw.vertices, raw.triangles)
+            .map_err(|error| problems.push(at.problem(format!("{name} cannot be used: {error}"))))
+            .ok()
+    }
+
+    /// The surface of a shape of this scene, not yet checked for being closed.
+    pub(crate) fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<RawMesh, FileError> {
+        Ok(match *shape {
+            Shape::Mesh { ref path, scale } => self.mesh_file(path, at)?.scaled(scale),
+            Shape::Sphere { radius, subdivisions } => shapes::sphere(radius, subdivisions),
+            Shape::Box { half_extents } => shapes::cuboid(half_extents),
+            Shape::Capsule { radius, half_length, facets, axis } => shapes::capsule(radius, half_length, facets, axis),
+            Shape::Cylinder { radius, half_length, facets, axis } => shapes::cylinder(radius, half_length, facets, axis),
+            Shape::BoxWithHole { half_extents, radius, facets, axis } => {
+                shapes::box_with_hole(half_extents, radius, facets, axis)
+            }
+            Shape::Plane { size, thickness, axis } => shapes::plane(size, thickness, axis),
+        })
+    }
+
+    fn body(&self, mesh: Mesh) -> Result<Body, FileError> {
+        let spec = &self.spec.god_object;
+        let properties = mass_properties(&mesh);
+        let mass = match spec.mass {
+            MassSpec::Mass(mass) => mass,
+            MassSpec::Density(density) => density * properties.volume,
+        };
+        let usable = mass.is_finite() && mass > 0.0; // false for NaN
+        if !usable {
+            return Err(spec.at.problem(format!("the god-object's mass comes to {mass} kg; check density and scale")).into());
+        }
+        let reference_point = match spec.reference_point {
+            ReferencePoint::CenterOfMass => properties.centroid,
+            ReferencePoint::At(point) => point,
+        };
+        let about_centroid = properties.inertia_per_density * (mass / properties.volume);
+        let inertia = about_centroid + displaced_inertia(mass, &(properties.centroid - reference_point));
+        Ok(Body { mesh, mass, inertia, reference_point })
+    }
+
+    /// Defaults for the body's size, then `[coupling]`, `[limits]` and `[method]`.
+    fn settings(&self, size: f64) -> Result<Settings, FileError> {
+        let (coupling, limits, method) = (&self.spec.coupling, &self.spec.limits, &self.spec.method);
+        let defaults = Settings::for_size(size);
+        let settings = Settings {
+            k_s: coupling.k_s.unwrap_or(defaults.k_s),
+            k_h: coupling.k_h.unwrap_or(defaults.k_h),
+            rotation_metric: coupling.rotation_metric.unwrap_or(defaults.rotation_metric),
+            adaptation: match coupling.adaptation {
+                None => defaults.adaptation,
+                Some(AdaptationSpec::Off) => None,
+                Some(AdaptationSpec::On(adaptation)) => Some(adaptation),
+            },
+            look_ahead: coupling.look_ahead.unwrap_or(defaults.look_ahead),
+            force_limit: limits.force.unwrap_or(defaults.force_limit),
+            torque_limit: limits.torque.unwrap_or(defaults.torque_limit),
+            rest_distance: method.rest_distance.unwrap_or(defaults.rest_distance),
+            minimum_gap: method.minimum_gap.unwrap_or(defaults.minimum_gap),
+            gap_tolerance: method.gap_tolerance.unwrap_or(defaults.gap_tolerance),
+            activation_distance: method.activation_distance.unwrap_or(defaults.activation_distance),
+            motion_tolerance: method.motion_tolerance.unwrap_or(defaults.motion_tolerance),
+            max_constraints: method.max_constraints.unwrap_or(defaults.max_constraints),
+            max_substeps: method.max_substeps.unwrap_or(defaults.max_substeps),
+            max_advancement_steps: method.max_advancement_steps.unwrap_or(defaults.max_advancement_steps),
+            work_budget: method.work_budget.or(defaults.work_budget),
+            solver: method.solver.unwrap_or(defaults.solver),
+            ..defaults
+        };
+        settings.validate().map_err(|error| {
+            let text = format!("the settings for a body of {size} m do not fit together: {error}; check [coupling], [limits] and [method]");
+            self.document_start().problem(text)
+        })?;
+        Ok(settings)
+    }
+}
+
+fn drawn(name: &str, mesh: &Mesh, pose: Pose) -> BuiltBody {
+    let raw = RawMesh { vertices: mesh.vertices().to_vec(), triangles: mesh.triangles().to_vec() };
+    BuiltBody { name: name.to_owned(), mesh: raw, pose }
+}
+
+/// What a mass adds to the inertia about a point `offset` away (parallel axes).
+fn displaced_inertia(mass: f64, offset: &Vector3<f64>) -> Matrix3<f64> {
+    (Matrix3::identity() * offset.norm_squared() - offset * offset.transpose()) * mass
+}
+
+impl BuiltScene {
+    /// The reference point G in the god-object's frame, m.
+    pub fn reference_point(&self) -> Point3<f64> {
+        self.world.body.reference_point
+    }
+
+    /// The translational stiffness that the hand feels, N/m.
+    pub fn stiffness(&self) -> f64 {
+        self.settings.stiffness(self.world.body.mass)
+    }
+}

@@ -1,0 +1,17 @@
+//! Scenes: what the hand holds, what it may touch, how it feels.
+
+mod build;
+mod load;
+mod parse;
+mod parse_shape;
+mod shipped;
+mod spec;
+
+pub(crate) use parse_shape::pose_of;
+pub use build::{BuiltBody, BuiltHand, BuiltScene, GOD_OBJECT_NAME};
+pub use load::Scene;
+pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
+pub use spec::{
+    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, ObstacleSpec,
+    ReferencePoint, Shape, View,
+};

@@ -1,0 +1,237 @@
+//! A scene as it was written, checked value by value but without its meshes. SI units.
+
+use god_object::{Pose, RotationMetric, SolverKind, Surface};
+use nalgebra::{Point3, UnitQuaternion};
+
+use crate::document::At;
+use crate::shapes::Axis;
+
+/// The form of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// A mesh file, relative to the scene file, else to the data directory.
+    Mesh {
+        /// As written.
+        path: String,
+        /// Factor on all coordinates.
+        scale: f64,
+    },
+    /// An icosphere.
+    Sphere {
+        /// m.
+        radius: f64,
+        /// 20 · 4^subdivisions triangles.
+        subdivisions: u32,
+    },
+    /// A box.
+    Box {
+        /// m.
+        half_extents: [f64; 3],
+    },
+    /// A capsule.
+    Capsule {
+        /// m.
+        radius: f64,
+        /// Origin to the centre of either half sphere, m.
+        half_length: f64,
+        /// Meridians.
+        facets: usize,
+        /// Its axis.
+        axis: Axis,
+    },
+    /// A prism.
+    Cylinder {
+        /// Of the vertices, m.
+        radius: f64,
+        /// m.
+        half_length: f64,
+        /// Sides.
+        facets: usize,
+        /// Its axis.
+        axis: Axis,
+    },
+    /// A box with a hole right through.
+    BoxWithHole {
+        /// m.
+        half_extents: [f64; 3],
+        /// Apothem of the hole, m.
+        radius: f64,
+        /// Sides of the hole.
+        facets: usize,
+        /// The hole's axis.
+        axis: Axis,
+    },
+    /// A bounded plane: a big box of this thickness whose upper face holds the origin.
+    Plane {
+        /// Length of either side, m.
+        size: f64,
+        /// m.
+        thickness: f64,
+        /// The normal.
+        axis: Axis,
+    },
+}
+
+/// How heavy the god-object is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MassSpec {
+    /// kg.
+    Mass(f64),
+    /// kg/m^3.
+    Density(f64),
+}
+
+/// The point G, at which motion is split and wrenches act.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ReferencePoint {
+    /// The centre of mass.
+    CenterOfMass,
+    /// In the body's frame, m.
+    At(Point3<f64>),
+}
+
+/// The body in the user's hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodySpec {
+    /// Its form.
+    pub shape: Shape,
+    /// Its mass.
+    pub mass: MassSpec,
+    /// Start pose.
+    pub pose: Pose,
+    /// Where forces act.
+    pub reference_point: ReferencePoint,
+    pub(crate) at: At,
+    pub(crate) shape_at: At,
+}
+
+/// A body that stands still.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObstacleSpec {
+    /// Unique in the scene.
+    pub name: String,
+    /// Its form.
+    pub shape: Shape,
+    /// World from obstacle.
+    pub pose: Pose,
+    /// How it feels.
+    pub surface: Surface,
+    pub(crate) shape_at: At,
+}
+
+/// Constraint adaptation as written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AdaptationSpec {
+    /// `adaptation = false`.
+    Off,
+    /// `{ duration, threshold }`.
+    On(god_object::Adaptation),
+}
+
+/// `[coupling]`; what is `None` keeps the method's default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CouplingSpec {
+    /// Share of the pose difference covered in one update.
+    pub k_s: Option<f64>,
+    /// Coupling constant, 1/s^2.
+    pub k_h: Option<f64>,
+    /// The rotational part of the metric.
+    pub rotation_metric: Option<RotationMetric>,
+    /// Constraint adaptation.
+    pub adaptation: Option<AdaptationSpec>,
+    /// Contacts before they touch.
+    pub look_ahead: Option<bool>,
+}
+
+/// `[limits]`; what is `None` keeps the method's default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LimitSpec {
+    /// N.
+    pub force: Option<f64>,
+    /// N m.
+    pub torque: Option<f64>,
+}
+
+/// `[method]`: lengths and limits of the method; what is `None` keeps the method's default for the body's size.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MethodSpec {
+    /// m.
+    pub rest_distance: Option<f64>,
+    /// m.
+    pub minimum_gap: Option<f64>,
+    /// m.
+    pub gap_tolerance: Option<f64>,
+    /// m.
+    pub activation_distance: Option<f64>,
+    /// m.
+    pub motion_tolerance: Option<f64>,
+    /// Rows in the constraint set.
+    pub max_constraints: Option<usize>,
+    /// Repetitions within one update.
+    pub max_substeps: Option<u32>,
+    /// Evaluations in one collision search.
+    pub max_advancement_steps: Option<u32>,
+    /// Advancement steps of one update.
+    pub work_budget: Option<u64>,
+    /// Solver of the projections.
+    pub solver: Option<SolverKind>,
+}
+
+/// How the simulated hand holds the grip.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HandPreset {
+    /// No hand.
+    Released,
+    /// A light pinch.
+    #[default]
+    Light,
+    /// A firm grip.
+    Firm,
+    /// The whole arm.
+    Arm,
+}
+
+impl HandPreset {
+    /// All, with their names in files.
+    pub const NAMED: [(&'static str, Self); 4] =
+        [("released", Self::Released), ("light", Self::Light), ("firm", Self::Firm), ("arm", Self::Arm)];
+
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Released => "released",
+            Self::Light => "light",
+            Self::Firm => "firm",
+            Self::Arm => "arm",
+        }
+    }
+}
+
+/// `[hand]`: what the simulated hand intends.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandPathSpec {
+    /// Via points in the trace format, relative to the scene file, else to the data directory.
+    pub path: String,
+    /// Begin again at the end.
+    pub repeat: bool,
+    /// The hand's impedance.
+    pub preset: HandPreset,
+    pub(crate) at: At,
+}
+
+/// `[view]`: how the scene stands on the workbench.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Magnification of what is drawn.
+    pub display_scale: f64,
+    /// Where the scene's origin lies, workbench frame, m; `None` leaves it to the workbench.
+    pub origin: Option<Point3<f64>>,
+    /// Workbench from scene; `None` leaves it to the workbench.
+    pub rotation: Option<UnitQuaternion<f64>>,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { display_scale: 1.0, origin: None, rotation: None }
+    }
+}

@@ -1,0 +1,7 @@
+//! Traces as CSV: device poses over time in, what the method made of them out.
+
+mod device_trace;
+mod replay_output;
+
+pub use device_trace::{DeviceTrace, MAX_TRACE_TIME, TraceSample};
+pub use replay_output::{REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS};

@@ -1,0 +1,215 @@
+//! A workbench as it was written, checked value by value. SI units, workbench frame: right-handed, z up.
+
+use std::net::IpAddr;
+use std::path::PathBuf;
+
+use god_object::Pose;
+use nalgebra::Point3;
+
+use crate::scene::HandPreset;
+
+/// A flat screen by three of its corners, m, workbench frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Screen {
+    /// Unique.
+    pub name: String,
+    /// As the viewer sees it.
+    pub lower_left: Point3<f64>,
+    /// As the viewer sees it.
+    pub lower_right: Point3<f64>,
+    /// As the viewer sees it.
+    pub upper_left: Point3<f64>,
+}
+
+/// How a node shows two eyes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stereo {
+    /// One view from between the eyes.
+    #[default]
+    Mono,
+    /// Left eye in the left half.
+    SideBySide,
+    /// Left eye in the upper half.
+    TopBottom,
+    /// Red and cyan.
+    Anaglyph,
+    /// A window for each eye.
+    TwoWindows,
+}
+
+impl Stereo {
+    /// All, with their names in files.
+    pub const NAMED: [(&'static str, Self); 5] = [
+        ("mono", Self::Mono),
+        ("side-by-side", Self::SideBySide),
+        ("top-bottom", Self::TopBottom),
+        ("anaglyph", Self::Anaglyph),
+        ("two-windows", Self::TwoWindows),
+    ];
+}
+
+/// A node's window, one per screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Without frame, over the whole output.
+    pub fullscreen: bool,
+}
+
+/// One render client.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Unique; what `taut render --node` takes.
+    pub name: String,
+    /// Names of the screens that it draws, at least one.
+    pub screens: Vec<String>,
+    /// How two eyes are shown.
+    pub stereo: Stereo,
+    /// One per screen.
+    pub window: Window,
+}
+
+/// Where the viewer's head comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HeadTracking {
+    /// It stays where the file says.
+    Fixed,
+    /// It sways from side to side, as people do who stand and look.
+    Sway {
+        /// m.
+        amplitude: f64,
+        /// s.
+        period: f64,
+    },
+}
+
+/// The viewer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewer {
+    /// Distance between the pupils, m.
+    pub eye_separation: f64,
+    /// Between the eyes: x to the right ear, y up, -z ahead.
+    pub head: Pose,
+    /// Whether it moves.
+    pub tracking: HeadTracking,
+    /// Near clip plane, m.
+    pub near: f64,
+    /// Far clip plane, m.
+    pub far: f64,
+}
+
+/// The haptic device.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Device {
+    /// A simulated device in a simulated hand.
+    Simulated {
+        /// The hand; `None` is the scene's.
+        hand: Option<HandPreset>,
+        /// Via points; `None` is the scene's.
+        path: Option<PathBuf>,
+        /// Tremor, m rms.
+        tremor: f64,
+        /// Of the tremor.
+        seed: u64,
+    },
+    /// A recorded trace; forces go nowhere.
+    Trace {
+        /// CSV.
+        path: PathBuf,
+        /// Begin again at the end.
+        repeat: bool,
+    },
+    /// `taut bridge`, over the network.
+    Remote,
+}
+
+/// How poses travel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TransportKind {
+    /// UDP datagrams.
+    #[default]
+    Udp,
+    /// QUIC datagrams: one port, for networks that let no other through.
+    QuicDatagram,
+}
+
+/// Addresses, ports and rates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    /// Interface to listen on.
+    pub bind: IpAddr,
+    /// UDP port of QUIC; 0 takes a free one.
+    pub quic_port: u16,
+    /// UDP port of the pose stream; 0 takes a free one.
+    pub udp_port: u16,
+    /// What render nodes use.
+    pub transport: TransportKind,
+    /// The cluster key; `None` leaves it to `--key` or TAUT_KEY_FILE.
+    pub key_file: Option<PathBuf>,
+    /// Poses per second to each render node.
+    pub broadcast_rate: f64,
+    /// Most clients at a time.
+    pub max_clients: usize,
+}
+
+/// The rerun stream.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Monitoring {
+    /// Whether there is any.
+    pub enabled: bool,
+    /// Interface of both ports.
+    pub bind: IpAddr,
+    /// TCP port of the stream; 0 takes a free one.
+    pub grpc_port: u16,
+    /// TCP port of the web viewer; 0 takes a free one.
+    pub web_port: u16,
+    /// Also write an .rrd file here.
+    pub record: Option<PathBuf>,
+    /// Most memory that the hosted stream keeps, bytes.
+    pub memory_limit: u64,
+}
+
+/// What to do where the system refuses real-time scheduling.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RealTimeMode {
+    /// Do not start without.
+    Enforce,
+    /// Go on, and say so.
+    #[default]
+    Waive,
+}
+
+/// Scheduling of the loops. A core that is `None` is the system's choice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RealTime {
+    /// Where the system refuses.
+    pub mode: RealTimeMode,
+    /// SCHED_FIFO, 1 to 99.
+    pub haptics_priority: u8,
+    /// SCHED_FIFO, 1 to 99.
+    pub coupling_priority: u8,
+    /// SCHED_FIFO, 1 to 99; `None` is normal scheduling.
+    pub god_object_priority: Option<u8>,
+    /// Core of the haptics loop.
+    pub haptics_core: Option<usize>,
+    /// Core of the coupling loop.
+    pub coupling_core: Option<usize>,
+    /// Core of the god-object loop.
+    pub god_object_core: Option<usize>,
+    /// Most god-object updates per second; `None` is as many as there can be.
+    pub god_object_rate: Option<f64>,
+}
+
+/// What render nodes draw beside the god-object and the obstacles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Show {
+    /// The device's own pose, translucent.
+    pub ghost: bool,
+    /// Contact points.
+    pub contacts: bool,
+    /// The force arrow.
+    pub force: bool,
+}

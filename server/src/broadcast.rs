@@ -1,0 +1,250 @@
+//! The broadcaster: the newest shared data as one state, 1000 times a second, to every client.
+//!
+//! On a thread of its own: a slow socket costs the loops nothing. Here the method's types end and the wire's begin.
+
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
+
+use god_object::nalgebra::{Point3, Vector3};
+use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
+use god_object::{ConstraintSet, NonPenetrationConstraint};
+use taut_proto::state::{
+    ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState, TOOL_DEVICE_SILENT,
+    TOOL_FORCE_LIMITED, ToolState, event_code,
+};
+use taut_link::Broadcaster;
+use taut_proto::wrench::WRENCH_PAUSED;
+use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
+
+use crate::clock::{SessionClock, nanoseconds};
+use crate::head::Head;
+use crate::loops::shell::run_at_deadlines;
+use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::device_state::DeviceState;
+use crate::shared::fanout::Subscriber;
+use crate::shared::wrench_command::WrenchCommand;
+use crate::shutdown::Shutdown;
+
+/// Buttons of a device, one bit each.
+const BUTTONS: u32 = u16::BITS;
+/// The number of a button in an event's code.
+const BUTTON_SHIFT: u32 = 16;
+
+/// Sends states, and the wrenches of a remote device, until the end is asked for.
+pub fn run(
+    mut states: StateWriter,
+    mut broadcaster: Broadcaster,
+    mut bridge_commands: Option<triple_buffer::Output<WireWrench>>,
+    clock: SessionClock,
+    period: Duration,
+    shutdown: &Shutdown,
+) {
+    // A state that comes late is followed by the next one; nothing is owed to anybody.
+    let late = AtomicU64::new(0);
+    run_at_deadlines(clock, period, shutdown, &late, |now| {
+        if let Some(commands) = &mut bridge_commands
+            && commands.update()
+        {
+            broadcaster.send_wrench(commands.peek_output_buffer());
+        }
+        if let Some(state) = states.newest(now) {
+            // What could not be sent is counted by the link.
+            let _ = broadcaster.send(state);
+        }
+    });
+    if bridge_commands.is_some() {
+        broadcaster.send_wrench(&WireWrench {
+            time_ns: nanoseconds(clock.now()),
+            input_index: 0,
+            wrench: [0.0; 6],
+            flags: WRENCH_PAUSED,
+        });
+    }
+}
+
+/// Reads the shared data and keeps the state that is sent. No allocation.
+#[derive(Debug)]
+pub struct StateWriter {
+    device: Subscriber<DeviceState>,
+    contacts: Subscriber<ContactSnapshot>,
+    wrench: Subscriber<WrenchCommand>,
+    head: Head,
+    reference_point: Point3<f64>,
+    scene_revision: u32,
+    state: HotState,
+    motion: MotionEstimate,
+    events: EventTrail,
+}
+
+impl StateWriter {
+    /// A writer of states of one scene.
+    pub fn new(
+        device: Subscriber<DeviceState>,
+        contacts: Subscriber<ContactSnapshot>,
+        wrench: Subscriber<WrenchCommand>,
+        head: Head,
+        reference_point: &Point3<f64>,
+        scene_revision: u32,
+    ) -> Self {
+        Self {
+            device,
+            contacts,
+            wrench,
+            head,
+            reference_point: *reference_point,
+            scene_revision,
+            state: HotState::empty(),
+            motion: MotionEstimate::default(),
+            events: EventTrail::default(),
+        }
+    }
+
+    /// The state now; `None` while the device has not been sampled since the last one.
+    pub fn newest(&mut self, now: Duration) -> Option<&HotState> {
+        if !self.device.refresh() {
+            return None;
+        }
+        let device = self.device.held();
+        let contacts = self.contacts.newest();
+        let wrench = self.wrench.newest();
+        self.motion.follow(contacts, &self.reference_point);
+        self.events.follow(device, contacts);
+
+        let state = &mut self.state;
+        state.sample_time_ns = nanoseconds(device.time);
+        state.tick = device.sequence;
+        state.scene_revision = self.scene_revision;
+        state.run = if device.faulty { RunState::Fault } else { RunState::Running };
+        state.constraint_age_us = u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
+        state.head = head_state(&self.head, now, device.time);
+        state.tools.clear();
+        state.tools.push(tool_state(device, contacts, wrench, &self.motion.velocity));
+        nearest_contacts(&contacts.set, &mut state.contacts);
+        state.events.clone_from(&self.events.recent);
+        Some(&self.state)
+    }
+}
+
+fn head_state(head: &Head, now: Duration, sampled: Duration) -> HeadState {
+    let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
+    HeadState {
+        pose: PoseF32::from_isometry(&head.pose(now)),
+        age_us: i32::try_from(older / 1000).unwrap_or(i32::MIN),
+        eye_separation: head.eye_separation as f32,
+        flags: if head.moves() { HEAD_TRACKED } else { 0 },
+    }
+}
+
+fn tool_state(
+    device: &DeviceState,
+    contacts: &ContactSnapshot,
+    wrench: &WrenchCommand,
+    velocity: &Vector6,
+) -> ToolState {
+    let limited = if wrench.saturated { TOOL_FORCE_LIMITED } else { 0 };
+    let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
+    ToolState {
+        god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
+        device: PoseF32::from_isometry(&device.pose),
+        linear_velocity: single(&linear(velocity)),
+        angular_velocity: single(&angular(velocity)),
+        force: single(&linear(&wrench.wrench)),
+        torque: single(&angular(&wrench.wrench)),
+        buttons: device.buttons,
+        flags: limited | silent,
+        id: 0,
+    }
+}
+
+/// The contacts with the smallest gaps, nearest first. Forces of single contacts are not unique and not told.
+fn nearest_contacts(
+    set: &ConstraintSet,
+    nearest: &mut taut_proto::ArrayVec<ContactState, MAX_CONTACTS>,
+) {
+    nearest.clear();
+    for constraint in &set.constraints {
+        let contact = contact_state(constraint);
+        let place = nearest.iter().take_while(|other| other.gap <= contact.gap).count();
+        if place < MAX_CONTACTS {
+            if nearest.is_full() {
+                nearest.pop();
+            }
+            nearest.insert(place, contact);
+        }
+    }
+}
+
+fn contact_state(constraint: &NonPenetrationConstraint) -> ContactState {
+    ContactState {
+        pair: [0, u16::try_from(constraint.features.obstacle).unwrap_or(u16::MAX)],
+        point: single(&constraint.point.coords),
+        normal: single(&constraint.normal),
+        force: 0.0,
+        gap: constraint.gap as f32,
+    }
+}
+
+fn single(vector: &Vector3<f64>) -> [f32; 3] {
+    [vector.x as f32, vector.y as f32, vector.z as f32]
+}
+
+/// Velocity of the god-object at the reference point, from its last two poses.
+#[derive(Debug, Default)]
+struct MotionEstimate {
+    last: Option<(Duration, Pose)>,
+    velocity: Vector6,
+}
+
+impl MotionEstimate {
+    fn follow(&mut self, contacts: &ContactSnapshot, reference_point: &Point3<f64>) {
+        let pose = at_reference_point(&contacts.set.god_object_pose, reference_point);
+        match &self.last {
+            Some((time, _)) if *time >= contacts.published => return,
+            Some((time, last)) => {
+                let passed = (contacts.published - *time).as_secs_f64();
+                self.velocity = pose_difference(&pose, last, &Vector3::zeros()) / passed;
+            }
+            None => {}
+        }
+        self.last = Some((contacts.published, pose));
+    }
+}
+
+/// The last discrete events, repeated in every state so that a lost datagram loses none.
+#[derive(Debug, Default)]
+struct EventTrail {
+    recent: taut_proto::ArrayVec<EventRecord, MAX_EVENTS>,
+    count: u32,
+    touching: bool,
+    buttons: u16,
+    faulty: bool,
+}
+
+impl EventTrail {
+    fn follow(&mut self, device: &DeviceState, contacts: &ContactSnapshot) {
+        let tick = device.sequence as u32;
+        let touching = contacts.report.active > 0;
+        if touching != self.touching {
+            let code = if touching { event_code::CONTACT_ON } else { event_code::CONTACT_OFF };
+            self.push(tick, code);
+        }
+        for button in (0..BUTTONS).filter(|button| (device.buttons ^ self.buttons) >> button & 1 == 1) {
+            let down = device.buttons >> button & 1 == 1;
+            let code = if down { event_code::BUTTON_DOWN } else { event_code::BUTTON_UP };
+            self.push(tick, code | button << BUTTON_SHIFT);
+        }
+        if device.faulty != self.faulty {
+            let code = if device.faulty { event_code::FAULT } else { event_code::RESUMED };
+            self.push(tick, code);
+        }
+        (self.touching, self.buttons, self.faulty) = (touching, device.buttons, device.faulty);
+    }
+
+    fn push(&mut self, tick: u32, code: u32) {
+        if self.recent.is_full() {
+            self.recent.remove(0);
+        }
+        self.count = self.count.wrapping_add(1);
+        self.recent.push(EventRecord { id: self.count, tick, code });
+    }
+}

@@ -1,0 +1,136 @@
+//! Does the god-object really never penetrate? Asked by code that shares nothing with the method.
+//!
+//! Published poses are sampled on a thread of low priority; every pair of triangles whose boxes overlap is tested by parry's
+//! triangle-triangle intersection. A pose that fails is counted, and told once.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use god_object::spatial::Pose;
+use god_object::{Mesh, World};
+use parry3d_f64::bounding_volume::BoundingVolume;
+use parry3d_f64::math;
+use parry3d_f64::partitioning::BvhNode;
+use parry3d_f64::query::intersection_test;
+use parry3d_f64::shape::{TriMesh, Triangle};
+
+use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::fanout::Subscriber;
+use crate::shutdown::Shutdown;
+
+/// Time between two checks: the sampling leaves the processor to others.
+const CHECK_PERIOD: Duration = Duration::from_millis(20);
+
+/// Checks published poses until the end is asked for.
+pub fn run(
+    checker: &PenetrationChecker,
+    mut contacts: Subscriber<ContactSnapshot>,
+    counts: &CheckCounts,
+    shutdown: &Shutdown,
+) {
+    let mut told = false;
+    while !shutdown.is_asked() {
+        if let Some(obstacle) = checker.check_newest(&mut contacts, counts)
+            && !told
+        {
+            tracing::error!("the god-object penetrates \"{obstacle}\": please report this, with scene and device trace");
+            told = true;
+        }
+        std::thread::sleep(CHECK_PERIOD);
+    }
+}
+
+/// The meshes once more, in parry's form.
+pub struct PenetrationChecker {
+    body: TriMesh,
+    obstacles: Vec<CheckedObstacle>,
+}
+
+struct CheckedObstacle {
+    name: String,
+    mesh: TriMesh,
+    world_from_obstacle: Pose,
+}
+
+/// How many poses were looked at and how many intersected. One writer: the checker's thread.
+#[derive(Debug, Default)]
+pub struct CheckCounts {
+    /// Poses checked.
+    pub checks: AtomicU64,
+    /// Poses at which a triangle of the body intersected one of an obstacle.
+    pub penetrations: AtomicU64,
+}
+
+impl PenetrationChecker {
+    /// Builds the trees. `None` when parry refuses a mesh, which a closed manifold never is.
+    pub fn new(world: &World) -> Option<Self> {
+        let obstacles = world.obstacles.iter().map(|obstacle| {
+            Some(CheckedObstacle {
+                name: obstacle.name.clone(),
+                mesh: parry_mesh(&obstacle.mesh)?,
+                world_from_obstacle: obstacle.pose,
+            })
+        });
+        Some(Self {
+            body: parry_mesh(&world.body.mesh)?,
+            obstacles: obstacles.collect::<Option<_>>()?,
+        })
+    }
+
+    /// The name of an obstacle that the body intersects at `world_from_body`, if there is one.
+    pub fn penetrated_obstacle(&self, world_from_body: &Pose) -> Option<&str> {
+        self.obstacles
+            .iter()
+            .find(|obstacle| {
+                let body_from_obstacle = world_from_body.inverse() * obstacle.world_from_obstacle;
+                intersects(&self.body, &obstacle.mesh, &parry_pose(&body_from_obstacle))
+            })
+            .map(|obstacle| obstacle.name.as_str())
+    }
+
+    /// Checks the newest published pose, if there is a new one; the obstacle's name when it is penetrated.
+    pub fn check_newest(
+        &self,
+        contacts: &mut Subscriber<ContactSnapshot>,
+        counts: &CheckCounts,
+    ) -> Option<&str> {
+        if !contacts.refresh() {
+            return None;
+        }
+        let penetrated = self.penetrated_obstacle(&contacts.held().set.god_object_pose);
+        counts.checks.fetch_add(1, Ordering::Relaxed);
+        if penetrated.is_some() {
+            counts.penetrations.fetch_add(1, Ordering::Relaxed);
+        }
+        penetrated
+    }
+}
+
+/// Whether any triangle of `a` intersects any of `b`.
+fn intersects(a: &TriMesh, b: &TriMesh, a_from_b: &math::Pose) -> bool {
+    let overlapping = |node_a: &BvhNode, node_b: &BvhNode| {
+        node_a.aabb().intersects(&node_b.aabb().transform_by(a_from_b))
+    };
+    a.bvh().leaf_pairs(b.bvh(), overlapping).any(|(index_a, index_b)| {
+        triangles_intersect(&a.triangle(index_a), &b.triangle(index_b).transformed(a_from_b))
+    })
+}
+
+fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
+    let identity = math::Pose::IDENTITY;
+    // parry answers every pair of convex shapes; should it not, that counts as a penetration.
+    intersection_test(&identity, a, &identity, b).map_or(true, |found| found.intersecting)
+}
+
+fn parry_mesh(mesh: &Mesh) -> Option<TriMesh> {
+    let vertices = mesh.vertices().iter().map(|v| math::Vector::new(v.x, v.y, v.z)).collect();
+    TriMesh::new(vertices, mesh.triangles().to_vec()).ok()
+}
+
+fn parry_pose(pose: &Pose) -> math::Pose {
+    let (p, q) = (pose.translation.vector, pose.rotation.coords);
+    math::Pose::from_parts(
+        math::Vector::new(p.x, p.y, p.z),
+        math::Rotation::from_xyzw(q.x, q.y, q.z, q.w),
+    )
+}

@@ -1,0 +1,308 @@
+//! The command line of `taut`: one sub-command per role; none is `demo`.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Six-degree-of-freedom haptics for a cluster of screens.
+#[derive(Debug, Parser)]
+#[command(
+    name = "taut",
+    version,
+    about = "Six-degree-of-freedom god-object haptics for a cluster of screens",
+    after_help = "Without a command it is `taut demo`: the whole workbench on this machine.\n\nExample: taut demo --duration 20"
+)]
+pub struct Cli {
+    /// The role.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// The roles.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The whole workbench on this machine, with a simulated device and hand
+    Demo(DemoArgs),
+    /// The haptic PC: three loops, broadcast, monitoring
+    Serve(ServeArgs),
+    /// One node of the render cluster
+    #[cfg(feature = "render")]
+    Render(taut_render::RenderArgs),
+    /// The device side, on this or another PC
+    Bridge(taut_bridge::BridgeArgs),
+    /// Runs the method offline on a device trace; the same input gives the same bytes
+    Replay(ReplayArgs),
+    /// Takes a live session's device trace, to be replayed
+    Record(RecordArgs),
+    /// Says everything that is wrong with configurations, scenes, meshes and traces
+    Check(CheckArgs),
+    /// Says what this machine lacks for real time and for rendering
+    Doctor(DoctorArgs),
+    /// Makes a cluster key, the secret that all machines of a workbench share
+    Keys(KeysArgs),
+}
+
+/// `taut demo`.
+#[derive(Clone, Debug, Default, Args)]
+#[command(after_help = "Example: taut demo --scene two-bunnies --duration 30 --headless --json")]
+pub struct DemoArgs {
+    /// A shipped scene by its name, or a scene file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scene: Option<String>,
+    /// End after this many seconds (default: at Ctrl-C)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub duration: Option<f64>,
+    /// Draw off-screen even where there is a display
+    #[arg(long)]
+    pub headless: bool,
+    /// How poses reach the render clients
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: TransportChoice,
+    /// Put the simulated device in a process of its own
+    #[arg(long)]
+    pub bridge: bool,
+    /// Also write what the monitor shows to this file
+    #[arg(long, value_name = "FILE.rrd")]
+    pub record: Option<PathBuf>,
+    /// Do without the monitor and its web viewer
+    #[arg(long)]
+    pub no_monitor: bool,
+    /// Let each headless render client write this many pictures
+    #[arg(long, value_name = "N", requires = "out")]
+    pub frames: Option<u32>,
+    /// Where the render clients write their pictures
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the end report on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `taut serve`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut serve --config workbench.toml --key cluster.key")]
+pub struct ServeArgs {
+    /// The workbench file
+    #[arg(long, value_name = "F")]
+    pub config: PathBuf,
+    /// The cluster key; else TAUT_KEY_FILE or the workbench file names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// Instead of the workbench file's scene: a shipped scene by its name, or a scene file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scene: Option<String>,
+    /// Instead of the workbench file's address of the control plane
+    #[arg(long, value_name = "HOST:PORT")]
+    pub quic: Option<SocketAddr>,
+    /// Instead of the workbench file's address of the state plane
+    #[arg(long, value_name = "HOST:PORT")]
+    pub udp: Option<SocketAddr>,
+    /// End after this many seconds (default: at Ctrl-C)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub duration: Option<f64>,
+    /// Also write what the monitor shows to this file
+    #[arg(long, value_name = "FILE.rrd")]
+    pub record: Option<PathBuf>,
+    /// Do without the monitor, whatever the workbench file says
+    #[arg(long)]
+    pub no_monitor: bool,
+    /// Print the end report on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `taut replay`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0")]
+pub struct ReplayArgs {
+    /// A shipped scene by its name, or a scene file
+    #[arg(long, value_name = "F")]
+    pub scene: String,
+    /// The device trace
+    #[arg(long, value_name = "T")]
+    pub trace: PathBuf,
+    /// Where the answer goes, a CSV file
+    #[arg(long, value_name = "O")]
+    pub out: PathBuf,
+    /// Virtual rate of the god-object loop (default: once per row of the trace)
+    #[arg(long, value_name = "HZ", value_parser = positive_rate)]
+    pub god_object_rate: Option<f64>,
+    /// Work per god-object update, in nominal microseconds: counted in iterations, so that it stays deterministic
+    #[arg(long, value_name = "U", value_parser = clap::value_parser!(u64).range(1..))]
+    pub budget_us: Option<u64>,
+    /// Solver of the projections (default: the scene's)
+    #[arg(long, value_enum)]
+    pub solver: Option<SolverChoice>,
+    /// The method
+    #[arg(long, value_enum, default_value_t)]
+    pub method: MethodChoice,
+    /// Any key of the scene file, such as coupling.k_s=1.0; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+    /// Add the columns update_us and force_us, the only ones that differ from run to run
+    #[arg(long)]
+    pub timings: bool,
+    /// Print the end report on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `taut record`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut record --server haptic-pc:4857 --key cluster.key --out hand.csv --duration 60")]
+pub struct RecordArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// Where the trace goes, a CSV file
+    #[arg(long, value_name = "T")]
+    pub out: PathBuf,
+    /// The cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// How states come here
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: TransportChoice,
+    /// End after this many seconds (default: at Ctrl-C, or with the session)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub duration: Option<f64>,
+}
+
+/// `taut check`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut check workbench.toml scene.toml part.ply hand.csv")]
+pub struct CheckArgs {
+    /// Workbench files, scenes, meshes, traces
+    #[arg(required = true, value_name = "F")]
+    pub files: Vec<PathBuf>,
+    /// Print the findings as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `taut doctor`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut doctor --json")]
+pub struct DoctorArgs {
+    /// Print the findings as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `taut keys`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut keys --out cluster.key, then copy cluster.key to every machine of the workbench")]
+pub struct KeysArgs {
+    /// The file to make; an existing one is never overwritten
+    #[arg(long, value_name = "FILE", default_value = "cluster.key")]
+    pub out: PathBuf,
+}
+
+/// How poses reach a client.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum TransportChoice {
+    /// Sealed UDP: the fast way on a wired network
+    #[default]
+    Udp,
+    /// QUIC datagrams: one port, through firewalls
+    Quic,
+}
+
+impl TransportChoice {
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Udp => "udp",
+            Self::Quic => "quic",
+        }
+    }
+}
+
+impl From<TransportChoice> for taut_link::Transport {
+    fn from(choice: TransportChoice) -> Self {
+        match choice {
+            TransportChoice::Udp => Self::Udp,
+            TransportChoice::Quic => Self::QuicDatagram,
+        }
+    }
+}
+
+/// Solver of the projections.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SolverChoice {
+    /// Dual active set, warm-started: the fast one
+    ActiveSet,
+    /// Interior point: the accuracy reference
+    Clarabel,
+    /// Projected Gauss-Seidel, as game engines use it: for comparison
+    Pgs,
+}
+
+impl From<SolverChoice> for god_object::SolverKind {
+    fn from(choice: SolverChoice) -> Self {
+        match choice {
+            SolverChoice::ActiveSet => Self::ActiveSet,
+            SolverChoice::Clarabel => Self::Clarabel,
+            SolverChoice::Pgs => Self::ProjectedGaussSeidel,
+        }
+    }
+}
+
+/// Method of haptic display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MethodChoice {
+    /// Six-degree-of-freedom god-object, Ortega et al. 2007
+    #[default]
+    GodObject,
+}
+
+/// A day is longer than any session; NaN and infinity are no durations.
+const MAX_SECONDS: f64 = 86_400.0;
+/// No loop turns faster.
+const MAX_RATE_HZ: f64 = 1e6;
+
+fn positive_seconds(text: &str) -> Result<f64, String> {
+    positive(text, MAX_SECONDS, "seconds")
+}
+
+fn positive_rate(text: &str) -> Result<f64, String> {
+    positive(text, MAX_RATE_HZ, "Hz")
+}
+
+fn positive(text: &str, limit: f64, unit: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= limit => Ok(value),
+        _ => Err(format!("give a number of {unit} above 0 and up to {limit}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent_and_every_command_shows_an_example() {
+        let mut cli = Cli::command();
+        cli.build();
+        cli.clone().debug_assert();
+        for command in cli.get_subcommands().filter(|command| command.get_name() != "help") {
+            let example = command.clone().render_help().to_string();
+            assert!(example.contains("Example"), "{} has no example", command.get_name());
+        }
+    }
+
+    #[test]
+    fn no_argument_is_the_demo() {
+        assert!(Cli::try_parse_from(["taut"]).is_ok_and(|cli| cli.command.is_none()));
+    }
+
+    #[test]
+    fn durations_and_rates_must_be_positive_numbers() {
+        for bad in ["0", "-1", "nan", "inf", "x"] {
+            assert!(Cli::try_parse_from(["taut", "demo", "--duration", bad]).is_err(), "{bad}");
+        }
+        assert!(Cli::try_parse_from(["taut", "demo", "--duration", "0.5"]).is_ok());
+    }
+}

@@ -1,0 +1,188 @@
+//! What the clients of a session reported, for the end report.
+//!
+//! A client reports about once a second. Its distributions here are made of those reports: the median of the seconds' medians, the
+//! largest of the seconds' 99th percentiles, and the largest of all for p99.9 and max.
+
+use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
+
+use crate::report::ClientReport;
+use crate::timing::{Distribution, distribution_of};
+
+const MICROSECONDS_PER_MILLISECOND: f64 = 1e3;
+
+/// Every client that ever was there, by name.
+#[derive(Debug, Default)]
+pub struct ClientLedger {
+    clients: Vec<ClientRecord>,
+}
+
+#[derive(Debug)]
+struct ClientRecord {
+    node: String,
+    role: Role,
+    transport: Transport,
+    newest: ClientStats,
+    state_hash_mismatches: u64,
+    age_medians_ms: Vec<f64>,
+    age_p99_ms: f64,
+    age_max_ms: f64,
+    skew_medians_us: Vec<f64>,
+    skew_max_us: f64,
+}
+
+impl ClientLedger {
+    /// Notes an event; the line that tells it, if it is worth one.
+    pub fn follow(&mut self, event: &LinkEvent) -> Option<String> {
+        match event {
+            LinkEvent::Joined(status) => {
+                self.note(status);
+                Some(format!("{} joined from {}", status.node, status.address))
+            }
+            LinkEvent::Left { status, reason } => {
+                self.note(status);
+                Some(format!("{} left: {reason}", status.node))
+            }
+            LinkEvent::Refused { address, text, .. } => Some(format!("a client at {address} was refused: {text}")),
+            LinkEvent::Stats { node, stats } => {
+                self.follow_stats(node, stats);
+                None
+            }
+            LinkEvent::Log { node, event } => Some(format!("{node}: {}", event.text)),
+        }
+    }
+
+    /// Notes how the clients are now.
+    pub fn look_at(&mut self, clients: &[ClientStatus]) {
+        for status in clients {
+            self.note(status);
+        }
+    }
+
+    fn note(&mut self, status: &ClientStatus) {
+        let index = self.clients.iter().position(|client| client.node == status.node).unwrap_or_else(|| {
+            self.clients.push(ClientRecord::new(status));
+            self.clients.len() - 1
+        });
+        let client = &mut self.clients[index];
+        client.state_hash_mismatches = status.state_hash_mismatches;
+        client.transport = status.transport;
+        if let Some(stats) = &status.stats {
+            client.newest = stats.clone();
+        }
+    }
+
+    fn follow_stats(&mut self, node: &str, stats: &ClientStats) {
+        let Some(client) = self.clients.iter_mut().find(|client| client.node == node) else {
+            return;
+        };
+        client.newest = stats.clone();
+        client.age_medians_ms.push(f64::from(stats.pose_age_ms_p50));
+        client.age_p99_ms = client.age_p99_ms.max(f64::from(stats.pose_age_ms_p99));
+        client.age_max_ms = client.age_max_ms.max(f64::from(stats.pose_age_ms_max));
+        client.skew_medians_us.push(f64::from(stats.swap_skew_ms_p50) * MICROSECONDS_PER_MILLISECOND);
+        client.skew_max_us =
+            client.skew_max_us.max(f64::from(stats.swap_skew_ms_max) * MICROSECONDS_PER_MILLISECOND);
+    }
+
+    /// One report per render node or bridge, in the order in which they joined, and the number of observers.
+    pub fn reports(&self) -> (Vec<ClientReport>, u64) {
+        let observes = |client: &&ClientRecord| matches!(client.role, Role::Observer | Role::Operator);
+        let reports = self.clients.iter().filter(|client| !observes(client)).map(ClientRecord::report).collect();
+        (reports, self.clients.iter().filter(observes).count() as u64)
+    }
+}
+
+impl ClientRecord {
+    fn new(status: &ClientStatus) -> Self {
+        Self {
+            node: status.node.clone(),
+            role: status.role,
+            transport: status.transport,
+            newest: ClientStats::default(),
+            state_hash_mismatches: 0,
+            age_medians_ms: Vec::new(),
+            age_p99_ms: 0.0,
+            age_max_ms: 0.0,
+            skew_medians_us: Vec::new(),
+            skew_max_us: 0.0,
+        }
+    }
+
+    fn report(&self) -> ClientReport {
+        let frames = self.newest.frames;
+        let of_reports = |medians: &[f64], p99: f64, max: f64| Distribution {
+            p50: distribution_of(medians).p50,
+            p99,
+            p999: max,
+            max,
+            count: frames,
+        };
+        ClientReport {
+            node: self.node.clone(),
+            transport: match self.transport {
+                Transport::Udp => "udp".into(),
+                Transport::QuicDatagram => "quic".into(),
+            },
+            frames,
+            fps: f64::from(self.newest.fps),
+            pose_age_ms: of_reports(&self.age_medians_ms, self.age_p99_ms, self.age_max_ms),
+            swap_skew_us: of_reports(&self.skew_medians_us, self.skew_max_us, self.skew_max_us),
+            packets_lost: self.newest.packets_lost,
+            state_hash_mismatches: self.state_hash_mismatches,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn joined(node: &str, role: Role) -> LinkEvent {
+        LinkEvent::Joined(ClientStatus {
+            session: 1,
+            node: node.into(),
+            role,
+            transport: Transport::QuicDatagram,
+            rate_hz: 0,
+            address: ([127, 0, 0, 1], 1000).into(),
+            udp_address: None,
+            joined_ns: 0,
+            last_heard_ns: 0,
+            round_trip_us: 0,
+            packets_sent: 0,
+            bytes_sent: 0,
+            send_errors: 0,
+            stats: None,
+            state_hash_matches: 0,
+            state_hash_mismatches: 3,
+        })
+    }
+
+    fn stats(node: &str, frames: u64, age_ms: f32) -> LinkEvent {
+        let stats = ClientStats {
+            frames,
+            fps: 60.0,
+            pose_age_ms_p50: age_ms,
+            pose_age_ms_p99: 2.0 * age_ms,
+            pose_age_ms_max: 3.0 * age_ms,
+            ..ClientStats::default()
+        };
+        LinkEvent::Stats { node: node.into(), stats }
+    }
+
+    #[test]
+    fn a_client_is_reported_from_all_its_reports_even_after_it_left() {
+        let mut ledger = ClientLedger::default();
+        assert!(ledger.follow(&joined("left", Role::Render)).is_some_and(|line| line.contains("left joined")));
+        ledger.follow(&joined("watcher", Role::Observer));
+        for (frames, age) in [(60, 8.0), (120, 9.0), (180, 20.0)] {
+            assert_eq!(ledger.follow(&stats("left", frames, age)), None);
+        }
+        let (reports, observers) = ledger.reports();
+        assert_eq!(observers, 1);
+        assert_eq!(reports.len(), 1);
+        let report = &reports[0];
+        assert_eq!((report.frames, report.transport.as_str(), report.state_hash_mismatches), (180, "quic", 3));
+        assert_eq!(report.pose_age_ms, Distribution { p50: 9.0, p99: 40.0, p999: 60.0, max: 60.0, count: 180 });
+    }
+}

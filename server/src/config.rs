@@ -1,0 +1,119 @@
+//! From the workbench file to what a session is made of.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use taut_bridge::SafetySettings;
+use taut_link::ClusterKey;
+use taut_scene::{HeadTracking, Monitoring, RealTime, RealTimeMode, Scene, Viewer, Workbench};
+
+use crate::content::content;
+use crate::devices::device;
+use crate::failure::Failure;
+use crate::head::{Head, Sway};
+use crate::monitor::MonitorSettings;
+use crate::realtime::RealtimePolicy;
+use crate::session::{LinkSettings, RealtimeSettings, SessionSetup};
+
+/// Period of the haptics loop: the device's rate, 1 kHz.
+const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
+/// God-object updates per second unless the workbench says otherwise: more than the device's rate brings nothing new.
+const GOD_OBJECT_RATE_HZ: f64 = 1000.0;
+/// Real-time priority of the broadcaster: below the coupling, above all normal work.
+const BROADCAST_PRIORITY: u8 = 50;
+
+/// What the command line says instead of the workbench file.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// A shipped scene's name, or a scene file.
+    pub scene: Option<String>,
+    /// Address of the control plane.
+    pub quic: Option<SocketAddr>,
+    /// Address of the state plane.
+    pub udp: Option<SocketAddr>,
+    /// Without monitor.
+    pub no_monitor: bool,
+    /// Where the monitor records.
+    pub record: Option<PathBuf>,
+}
+
+/// Puts the session together. Files are read and checked, nothing is started.
+pub fn session_setup(workbench: &Workbench, key: ClusterKey, overrides: &Overrides) -> Result<SessionSetup, Failure> {
+    let scene = match &overrides.scene {
+        Some(named) => Scene::named_or_file(named)?,
+        None => workbench.load_scene()?,
+    };
+    let built = scene.build()?;
+    let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
+    let network = &workbench.network;
+    let link = LinkSettings {
+        quic: overrides.quic.unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
+        udp: overrides.udp.unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        key,
+        max_clients: network.max_clients,
+    };
+    let safety = SafetySettings {
+        max_force: built.settings.force_limit,
+        max_torque: built.settings.torque_limit,
+        ..SafetySettings::default()
+    };
+    Ok(SessionSetup {
+        device: device(&workbench.device, &built)?,
+        settings: built.settings,
+        start: built.start,
+        world: Arc::new(built.world),
+        safety,
+        head: head(&workbench.viewer),
+        content,
+        link,
+        broadcast_period: Duration::from_secs_f64(network.broadcast_rate.recip()),
+        realtime: realtime(&workbench.realtime),
+        monitor: monitor(&workbench.monitoring, overrides),
+    })
+}
+
+fn head(viewer: &Viewer) -> Head {
+    Head {
+        rest: viewer.head,
+        eye_separation: viewer.eye_separation,
+        sway: match viewer.tracking {
+            HeadTracking::Fixed => None,
+            HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
+        },
+    }
+}
+
+fn realtime(wanted: &RealTime) -> RealtimeSettings {
+    let god_object_rate = wanted.god_object_rate.unwrap_or(GOD_OBJECT_RATE_HZ);
+    RealtimeSettings {
+        policy: match wanted.mode {
+            RealTimeMode::Enforce => RealtimePolicy::Enforce,
+            RealTimeMode::Waive => RealtimePolicy::Waive,
+        },
+        haptics_period: HAPTICS_PERIOD,
+        god_object_period: Duration::from_secs_f64(god_object_rate.recip()),
+        haptics_priority: wanted.haptics_priority,
+        coupling_priority: wanted.coupling_priority,
+        broadcast_priority: BROADCAST_PRIORITY,
+        god_object_priority: wanted.god_object_priority,
+        haptics_core: wanted.haptics_core,
+        coupling_core: wanted.coupling_core,
+        god_object_core: wanted.god_object_core,
+        lock_memory: true,
+    }
+}
+
+fn monitor(wanted: &Monitoring, overrides: &Overrides) -> Option<MonitorSettings> {
+    let record = overrides.record.clone().or_else(|| wanted.record.clone());
+    let serve = wanted.enabled && !overrides.no_monitor;
+    (serve || overrides.record.is_some()).then_some(MonitorSettings {
+        bind: wanted.bind,
+        grpc_port: wanted.grpc_port,
+        web_port: wanted.web_port,
+        record,
+        memory_limit_bytes: wanted.memory_limit,
+        serve,
+    })
+}

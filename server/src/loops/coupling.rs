@@ -1,0 +1,102 @@
+//! Loop 2, constraint-based coupling: the force on the hand, microseconds after each device sample and each constraint set.
+//!
+//! Reads [`device_state`](crate::shared::device_state) and [`contact_snapshot`](crate::shared::contact_snapshot); writes
+//! [`wrench_command`](crate::shared::wrench_command) and [`shaded_acceleration`](crate::shared::shaded_acceleration).
+//! A tick neither allocates nor waits. Source: Ortega et al. 2007, Section 5.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use god_object::{Coupling, ProjectionStatus, ShadedAcceleration};
+use crate::realtime::thread_cpu_time;
+
+use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::device_state::DeviceState;
+use crate::shared::fanout::{Publisher, Subscriber};
+use crate::shared::wrench_command::WrenchCommand;
+use crate::timing::Histogram;
+
+/// Loop 2 with its ends of the shared data.
+#[derive(Debug)]
+pub struct CouplingLoop {
+    coupling: Coupling,
+    device: Subscriber<DeviceState>,
+    contacts: Subscriber<ContactSnapshot>,
+    wrench: Publisher<WrenchCommand>,
+    shaded: Publisher<Option<ShadedAcceleration>>,
+    /// The last pass of force shading was a real one: its end must be told once.
+    shading: bool,
+    sequence: u64,
+    statistics: Arc<CouplingStatistics>,
+}
+
+/// What loop 2 says about itself.
+#[derive(Debug, Default)]
+pub struct CouplingStatistics {
+    /// Thread CPU time of one force.
+    pub force: Histogram,
+    /// Age of the constraint set that a force rests on.
+    pub constraint_age: Histogram,
+}
+
+impl CouplingLoop {
+    /// Puts the method's coupling between its shared data.
+    pub fn new(
+        coupling: Coupling,
+        device: Subscriber<DeviceState>,
+        contacts: Subscriber<ContactSnapshot>,
+        wrench: Publisher<WrenchCommand>,
+        shaded: Publisher<Option<ShadedAcceleration>>,
+    ) -> Self {
+        Self {
+            coupling,
+            device,
+            contacts,
+            wrench,
+            shaded,
+            shading: false,
+            sequence: 0,
+            statistics: Arc::default(),
+        }
+    }
+
+    /// The counters that this loop writes.
+    pub fn statistics(&self) -> Arc<CouplingStatistics> {
+        self.statistics.clone()
+    }
+
+    /// Answers a new device sample or a new constraint set; false when there was neither.
+    pub fn tick(&mut self, now: Duration) -> bool {
+        let new_sample = self.device.refresh();
+        let new_constraints = self.contacts.refresh();
+        if !new_sample && !new_constraints {
+            return false;
+        }
+        let device = self.device.held();
+        let contacts = self.contacts.held();
+
+        let before = thread_cpu_time();
+        let output = self.coupling.step(now.as_secs_f64(), &device.pose, &contacts.set);
+        self.statistics.force.record_time(thread_cpu_time().saturating_sub(before));
+
+        let constraint_age = now.saturating_sub(contacts.published);
+        self.statistics.constraint_age.record_time(constraint_age);
+        self.sequence += 1;
+        self.wrench.publish(&WrenchCommand {
+            sequence: self.sequence,
+            time: now,
+            wrench: output.wrench,
+            constraint_sequence: contacts.set.sequence,
+            constraint_age,
+            active: output.active,
+            kkt: output.kkt,
+            solved: output.status == ProjectionStatus::Solved,
+            saturated: output.saturated,
+        });
+        if self.shading || output.shaded.is_some() {
+            self.shaded.publish(&output.shaded);
+            self.shading = output.shaded.is_some();
+        }
+        true
+    }
+}

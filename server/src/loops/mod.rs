@@ -1,0 +1,14 @@
+//! The three loops of Figure 3, one file each: a step of the method between shared data in and shared data out.
+//!
+//! | loop | file           | rate                                  | calls                      |
+//! |------|----------------|---------------------------------------|----------------------------|
+//! | 1    | [`god_object`] | milliseconds                          | `god_object::GodObject`    |
+//! | 2    | [`coupling`]   | every device sample, constraint set   | `god_object::Coupling`     |
+//! | 3    | [`haptics`]    | the device's, 1 kHz                   | `taut_bridge::Device`      |
+//!
+//! Each is a struct whose `tick(now)` does one round, so that a virtual clock can drive it; a thread of [`shell`] does it in time.
+
+pub mod coupling;
+pub mod god_object;
+pub mod haptics;
+pub mod shell;

@@ -1,0 +1,170 @@
+//! What the threads of the server ask of the operating system, and what came of it.
+//!
+//! A request that is refused is written down; with [`RealtimePolicy::Enforce`] the server does not start without it.
+//! Requests that other roles need too are in `taut_bridge::realtime`; here are the server's own.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use taut_bridge::realtime::{RealtimeGrant, request_fifo, sharpen_timers};
+
+use crate::report::RealtimeReport;
+
+/// How a refusal by the operating system is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RealtimePolicy {
+    /// It stops the start.
+    Enforce,
+    /// It is reported, and the work goes on without.
+    Waive,
+}
+
+/// How a thread wants to be scheduled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheduling {
+    /// Real-time class, first in first out, with this priority; timers as sharp as they get either way.
+    Fifo(u8),
+    /// The normal class, with sharp timers.
+    Normal,
+    /// The normal class, behind everybody else.
+    Background,
+}
+
+/// What was asked of the operating system so far, and the answers. Written at the start of each thread, never in a loop.
+#[derive(Clone, Debug, Default)]
+pub struct RealtimeLedger(Arc<Mutex<RealtimeReport>>);
+
+impl RealtimeLedger {
+    /// Schedules the calling thread and notes the answer under the thread's `name`; false when it was refused.
+    pub fn schedule(&self, name: &str, scheduling: Scheduling) -> bool {
+        match scheduling {
+            Scheduling::Fifo(priority) => {
+                let granted = self.note(name, request_fifo(priority));
+                if !granted {
+                    // Without the real-time class the sharpness of timers matters; with it, it is given.
+                    self.note(name, sharpen_timers());
+                }
+                granted
+            }
+            Scheduling::Normal => self.note(name, sharpen_timers()),
+            Scheduling::Background => os::be_nice(),
+        }
+    }
+
+    /// Writes an answer down; whether it was granted.
+    pub fn note(&self, name: &str, grant: RealtimeGrant) -> bool {
+        let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match grant {
+            RealtimeGrant::Granted { what } => {
+                report.enforced.push(format!("{name}: {what}"));
+                true
+            }
+            RealtimeGrant::Waived { what, why } => {
+                report.waived.push(format!("{name}: {what}: {why}"));
+                false
+            }
+        }
+    }
+
+    /// Everything noted so far, in the order of names.
+    pub fn report(&self) -> RealtimeReport {
+        let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        report.enforced.sort();
+        report.waived.sort();
+        report
+    }
+}
+
+/// CPU time that the calling thread has used: what its work costs, whoever else is running.
+#[inline]
+pub fn thread_cpu_time() -> Duration {
+    os::thread_cpu_time()
+}
+
+/// Lets a child process be killed by the system when this process dies, however it dies.
+pub fn die_with_parent(command: &mut std::process::Command) {
+    os::die_with_parent(command);
+}
+
+#[cfg(target_os = "linux")]
+#[allow(unsafe_code, reason = "thread clock, nice value and parent-death signal are system calls")]
+mod os {
+    use std::os::unix::process::CommandExt;
+    use std::time::Duration;
+
+    /// Behind all normal work, before idle.
+    const BACKGROUND_NICE: libc::c_int = 15;
+
+    pub(super) fn thread_cpu_time() -> Duration {
+        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        // SAFETY: `time` is a valid timespec for the kernel to fill; the calling thread's clock always exists.
+        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+        Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
+    }
+
+    pub(super) fn be_nice() -> bool {
+        // SAFETY: takes integers only; 0 names the calling thread (on Linux the nice value is the thread's).
+        unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, BACKGROUND_NICE) == 0 }
+    }
+
+    pub(super) fn die_with_parent(command: &mut std::process::Command) {
+        let parent = std::process::id();
+        // SAFETY: between fork and exec only two system calls are made, both safe there; nothing is allocated or locked.
+        unsafe {
+            command.pre_exec(move || {
+                libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL as libc::c_ulong, 0, 0, 0);
+                // The parent may have died before the request.
+                if libc::getppid() as u32 == parent {
+                    Ok(())
+                } else {
+                    Err(std::io::Error::from_raw_os_error(libc::ESRCH))
+                }
+            });
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod os {
+    use std::sync::OnceLock;
+    use std::time::{Duration, Instant};
+
+    static START: OnceLock<Instant> = OnceLock::new();
+
+    pub(super) fn thread_cpu_time() -> Duration {
+        START.get_or_init(Instant::now).elapsed()
+    }
+
+    pub(super) fn be_nice() -> bool {
+        false
+    }
+
+    pub(super) fn die_with_parent(_command: &mut std::process::Command) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_takes_thread_time_and_sleep_does_not() {
+        let before = thread_cpu_time();
+        std::thread::sleep(Duration::from_millis(20));
+        let slept = thread_cpu_time() - before;
+        assert!(slept < Duration::from_millis(15), "{slept:?}");
+        let mut sum = 0u64;
+        while thread_cpu_time() - before < slept + Duration::from_micros(100) {
+            sum = std::hint::black_box(sum + 1);
+        }
+        assert!(sum > 0);
+    }
+
+    #[test]
+    fn what_is_refused_is_written_down_with_its_reason() {
+        let ledger = RealtimeLedger::default();
+        // Above the largest priority: refused to everybody.
+        assert!(!ledger.schedule("haptics", Scheduling::Fifo(200)));
+        let report = ledger.report();
+        assert!(report.waived.iter().any(|line| line.contains("haptics: SCHED_FIFO priority 200")));
+    }
+}

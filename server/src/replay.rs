@@ -1,0 +1,259 @@
+//! `taut replay`: the very same method code on a device trace, under a virtual clock; no network, no threads.
+//!
+//! Per row of the trace, in this order:
+//! 1. the device is at the row's pose, the virtual clock at the row's time;
+//! 2. loop 1 updates the god-object, as often as its virtual period has passed since its last update (by default: once);
+//! 3. loop 2 computes the force from the device pose and the newest constraint set.
+//!
+//! The shaded acceleration of a row reaches loop 1 at its next update. Everything is a function of scene, trace and options, so the same
+//! input gives the same bytes; only the columns of `--timings` are of this machine.
+
+use std::io::{self, IsTerminal};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use god_object::nalgebra::Vector3;
+use god_object::spatial::{Pose, linear};
+use god_object::{Coupling, GodObject, Settings, ShadedAcceleration, StartError, StepReport, World};
+use indicatif::ProgressBar;
+use taut_bridge::EnergyObserver;
+use taut_scene::{DeviceTrace, ReplayRow, ReplayWriter, Scene};
+
+use crate::cli::{MethodChoice, ReplayArgs};
+use crate::failure::Failure;
+use crate::finished_file::FinishedFile;
+use crate::realtime::thread_cpu_time;
+use crate::report::{ReplayReport, WorkReport};
+use crate::shutdown::Shutdown;
+use crate::signals;
+use crate::timing::distribution_of;
+
+/// A replay that takes longer shows its progress.
+const SILENT_TIME: Duration = Duration::from_secs(2);
+/// What `--budget-us` counts: steps of conservative advancement that a microsecond is taken to be good for.
+const ADVANCEMENT_STEPS_PER_MICROSECOND: u64 = 2;
+
+/// A share of the virtual period by which a row may come early and still trigger the update: traces are written in decimals.
+const EARLY_SHARE: f64 = 1e-6;
+
+/// `taut replay`: the trace through the scene, the answer into a file. Nothing is left of a replay that does not end.
+pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
+    let scene = Scene::named_or_file(&args.scene)?.with_overrides(&args.overrides)?;
+    let trace = DeviceTrace::load(&args.trace)?;
+    let built = scene.build()?;
+    let mut settings = built.settings;
+    if let Some(solver) = args.solver {
+        settings.solver = solver.into();
+    }
+    if let Some(microseconds) = args.budget_us {
+        settings.work_budget = Some(microseconds * ADVANCEMENT_STEPS_PER_MICROSECOND);
+    }
+    let MethodChoice::GodObject = args.method;
+    let mut replay = Replay::new(Arc::new(built.world), settings, built.start, args.god_object_rate)?;
+
+    let interrupted = signals::watch().map_err(Failure::failed)?;
+    let cannot_write = |error: io::Error| {
+        Failure::BadInput(format!(
+            "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",
+            args.out.display()
+        ))
+    };
+    let file = FinishedFile::create(&args.out).map_err(cannot_write)?;
+    let mut writer = ReplayWriter::new(file, args.timings).map_err(cannot_write)?;
+    write_answers(&mut replay, &trace, &mut writer, &interrupted).map_err(cannot_write)?;
+    if interrupted.is_asked() {
+        return Err(Failure::Failed(format!(
+            "the replay was interrupted, and {} was not written",
+            args.out.display()
+        )));
+    }
+    writer.finish().and_then(FinishedFile::finish).map_err(cannot_write)?;
+    Ok(replay.report())
+}
+
+fn write_answers(
+    replay: &mut Replay,
+    trace: &DeviceTrace,
+    writer: &mut ReplayWriter<FinishedFile>,
+    interrupted: &Shutdown,
+) -> io::Result<()> {
+    let started = Instant::now();
+    let mut progress = None;
+    for (done, sample) in trace.samples().iter().enumerate() {
+        if interrupted.is_asked() {
+            break;
+        }
+        writer.write(&replay.row(sample.time, &sample.pose))?;
+        if progress.is_none() && started.elapsed() > SILENT_TIME && io::stderr().is_terminal() {
+            progress = Some(ProgressBar::new(trace.samples().len() as u64));
+        }
+        if let Some(bar) = &progress {
+            bar.set_position(done as u64 + 1);
+        }
+    }
+    if let Some(bar) = progress {
+        bar.finish_and_clear();
+    }
+    Ok(())
+}
+
+/// The two loops of the method under a virtual clock, and what they were seen to do.
+#[derive(Debug)]
+pub struct Replay {
+    god_object: GodObject,
+    coupling: Coupling,
+    clock: UpdateClock,
+    shaded: Option<ShadedAcceleration>,
+    energy: EnergyObserver,
+    last_force: Option<Vector3<f64>>,
+    seen: Seen,
+}
+
+/// When loop 1 updates.
+#[derive(Clone, Copy, Debug)]
+struct UpdateClock {
+    /// Virtual period, s; `None` updates once per row.
+    period: Option<f64>,
+    start: Option<f64>,
+    /// Updates made.
+    updates: u64,
+    /// Virtual time of the last update.
+    last: f64,
+}
+
+/// Everything that the report sums up.
+#[derive(Debug, Default)]
+struct Seen {
+    update_us: Vec<f64>,
+    force_us: Vec<f64>,
+    contacts: Vec<f64>,
+    active: Vec<f64>,
+    gap_min: f64,
+    report: ReplayReport,
+}
+
+impl Replay {
+    /// The scene at its start. `god_object_rate` in Hz; `None` updates once per row.
+    pub fn new(
+        world: Arc<World>,
+        settings: Settings,
+        start: Pose,
+        god_object_rate: Option<f64>,
+    ) -> Result<Self, StartError> {
+        let coupling = Coupling::new(&world, &settings);
+        let energy = EnergyObserver::new(world.body.reference_point);
+        Ok(Self {
+            god_object: GodObject::new(world, settings, start)?,
+            coupling,
+            clock: UpdateClock {
+                period: god_object_rate.map(f64::recip),
+                start: None,
+                updates: 0,
+                last: 0.0,
+            },
+            shaded: None,
+            energy,
+            last_force: None,
+            seen: Seen { gap_min: f64::INFINITY, ..Seen::default() },
+        })
+    }
+
+    /// One row of the trace: the device is at `device_pose` at `time`, s; times never run back.
+    pub fn row(&mut self, time: f64, device_pose: &Pose) -> ReplayRow {
+        let mut update_time = Duration::ZERO;
+        while self.clock.is_due(time) {
+            let before = thread_cpu_time();
+            let report = self.god_object.step(device_pose, self.shaded.as_ref());
+            let took = thread_cpu_time().saturating_sub(before);
+            update_time += took;
+            self.seen.update(&report, took);
+            self.clock.updated(time);
+        }
+
+        let set = self.god_object.constraint_set();
+        let before = thread_cpu_time();
+        let output = self.coupling.step(time, device_pose, set);
+        let force_time = thread_cpu_time().saturating_sub(before);
+        self.shaded = output.shaded;
+
+        let answer = ReplayRow {
+            time,
+            device_pose: *device_pose,
+            god_object_pose: set.god_object_pose,
+            wrench: output.wrench,
+            contacts: set.constraints.len(),
+            active: output.active,
+            gap_min: set.gap_min,
+            kkt: output.kkt,
+            stale: time - self.clock.last,
+            timings_us: (microseconds(update_time), microseconds(force_time)),
+        };
+        self.energy.step(device_pose, &output.wrench);
+        self.observe(&answer);
+        answer
+    }
+
+    fn observe(&mut self, answer: &ReplayRow) {
+        let force = linear(&answer.wrench);
+        let report = &mut self.seen.report;
+        report.steps += 1;
+        report.kkt_max = report.kkt_max.max(answer.kkt);
+        report.max_force_n = report.max_force_n.max(force.norm());
+        if let Some(last) = self.last_force.replace(force) {
+            report.max_force_step_n = report.max_force_step_n.max((force - last).norm());
+        }
+        self.seen.gap_min = self.seen.gap_min.min(answer.gap_min);
+        self.seen.force_us.push(answer.timings_us.1);
+        self.seen.contacts.push(answer.contacts as f64);
+        self.seen.active.push(answer.active as f64);
+    }
+
+    /// What was seen so far.
+    pub fn report(&self) -> ReplayReport {
+        ReplayReport {
+            update_us: distribution_of(&self.seen.update_us),
+            force_us: distribution_of(&self.seen.force_us),
+            contacts: distribution_of(&self.seen.contacts),
+            active: distribution_of(&self.seen.active),
+            gap_min_m: self.seen.gap_min.is_finite().then_some(self.seen.gap_min),
+            energy_injected_j: self.energy.injected(),
+            ..self.seen.report.clone()
+        }
+    }
+}
+
+impl UpdateClock {
+    fn is_due(&mut self, time: f64) -> bool {
+        let Some(period) = self.period else {
+            // Once per row: `updated` notes the row's time; a second question about the same row is answered with no.
+            return self.start.is_none() || time > self.last;
+        };
+        let start = *self.start.get_or_insert(time);
+        time >= start + (self.updates as f64 - EARLY_SHARE) * period
+    }
+
+    fn updated(&mut self, time: f64) {
+        self.start.get_or_insert(time);
+        self.last = time;
+        self.updates += 1;
+    }
+}
+
+impl Seen {
+    fn update(&mut self, step: &StepReport, took: Duration) {
+        self.update_us.push(microseconds(took));
+        self.report.solver_fallbacks += u64::from(step.solver_fallbacks);
+        let work = &mut self.report.work;
+        *work = WorkReport {
+            node_pairs: work.node_pairs + step.work.node_pairs,
+            triangle_pairs: work.triangle_pairs + step.work.triangle_pairs,
+            feature_pairs: work.feature_pairs + step.work.feature_pairs,
+            advancement_steps: work.advancement_steps + step.work.advancement_steps,
+            projections: work.projections + step.work.projections,
+        };
+    }
+}
+
+fn microseconds(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e6
+}

@@ -1,0 +1,182 @@
+//! The end reports that `--json` prints. Their keys are an interface: they may grow, and keep their meaning.
+//!
+//! A name carries its unit; a [`Distribution`] is `{ p50, p99, p999, max, count }`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::timing::Distribution;
+
+/// What `taut demo` and `taut serve` measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SessionReport {
+    /// How long the loops ran, s.
+    pub duration_s: f64,
+    /// Ticks of the haptics loop per second.
+    pub haptics_hz: f64,
+    /// Time between two ticks of the haptics loop.
+    pub haptics_period_us: Distribution,
+    /// Deadlines of the haptics loop that passed without a tick in their period.
+    pub deadline_misses: u64,
+    /// Thread CPU time of one god-object update.
+    pub god_object_update_us: Distribution,
+    /// God-object updates per second.
+    pub god_object_hz: f64,
+    /// Thread CPU time of one force.
+    pub force_us: Distribution,
+    /// Age of the constraint set that a force rests on.
+    pub constraint_age_us: Distribution,
+    /// Rows in the constraint set, over the updates.
+    pub contacts: Distribution,
+    /// Published poses at which the bodies intersect, by a check that shares no code with the method.
+    pub penetrations: u64,
+    /// Published poses that were checked.
+    pub penetration_checks: u64,
+    /// What real-time measures are in force.
+    pub realtime: RealtimeReport,
+    /// Datagrams sent to all clients together.
+    pub packets_sent: u64,
+    /// Datagrams that were refused: broken, foreign, replayed.
+    pub packets_refused: u64,
+    /// Times at which the safety stage or a device fault changed the force.
+    pub safety_events: u64,
+    /// Energy given to the hand beyond what it had put in, J.
+    pub energy_injected_j: f64,
+    /// Projections that the chosen solver did not certify and another one answered.
+    pub solver_fallbacks: u64,
+    /// Samples that the monitor had no room for.
+    pub monitor_dropped: u64,
+    /// One entry per client that was there, render nodes and bridges.
+    pub clients: Vec<ClientReport>,
+    /// Clients that looked on as observers.
+    pub observers: u64,
+}
+
+/// What was enforced of the operating system, and what was not, and why.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RealtimeReport {
+    /// In force.
+    pub enforced: Vec<String>,
+    /// Not in force, with the reason.
+    pub waived: Vec<String>,
+}
+
+/// What one client of the cluster reported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ClientReport {
+    /// Its name in the workbench.
+    pub node: String,
+    /// How poses reach it: `udp` or `quic`.
+    pub transport: String,
+    /// Frames drawn.
+    pub frames: u64,
+    /// Frames per second.
+    pub fps: f64,
+    /// Age of the pose at the frame that showed it.
+    pub pose_age_ms: Distribution,
+    /// Difference of the swap times between nodes.
+    pub swap_skew_us: Distribution,
+    /// Datagrams that never arrived.
+    pub packets_lost: u64,
+    /// Frames whose state differed from another node's.
+    pub state_hash_mismatches: u64,
+}
+
+/// What `taut replay` measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReplayReport {
+    /// Rows of the trace.
+    pub steps: u64,
+    /// Thread CPU time of one god-object update.
+    pub update_us: Distribution,
+    /// Thread CPU time of one force.
+    pub force_us: Distribution,
+    /// Rows in the constraint set, over the rows of the trace.
+    pub contacts: Distribution,
+    /// Rows in the active set of the force's projection, over the rows of the trace.
+    pub active: Distribution,
+    /// Smallest distance between the bodies, m; `null` when they never came near.
+    pub gap_min_m: Option<f64>,
+    /// Largest relative KKT residual of a projection.
+    pub kkt_max: f64,
+    /// Projections that the chosen solver did not certify and another one answered.
+    pub solver_fallbacks: u64,
+    /// Energy given to the hand beyond what it had put in, J.
+    pub energy_injected_j: f64,
+    /// Largest change of the force from one row to the next, N.
+    pub max_force_step_n: f64,
+    /// Largest force, N.
+    pub max_force_n: f64,
+    /// What the god-object loop did, counted.
+    pub work: WorkReport,
+}
+
+/// Counts of the god-object loop's work: the same on every machine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WorkReport {
+    /// Pairs of boxes tested.
+    pub node_pairs: u64,
+    /// Pairs of triangles reached.
+    pub triangle_pairs: u64,
+    /// Pairs of vertex and face or of two edges examined.
+    pub feature_pairs: u64,
+    /// Steps of conservative advancement.
+    pub advancement_steps: u64,
+    /// Projections solved.
+    pub projections: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys(value: &impl Serialize) -> Vec<String> {
+        match serde_json::to_value(value) {
+            Ok(serde_json::Value::Object(map)) => map.keys().cloned().collect(),
+            other => panic!("a report is an object, not {other:?}"),
+        }
+    }
+
+    fn has_all(keys: &[String], wanted: &[&str]) {
+        for key in wanted {
+            assert!(keys.iter().any(|k| k == key), "{key} is missing in {keys:?}");
+        }
+    }
+
+    #[test]
+    fn the_session_report_has_the_keys_that_scripts_rely_on() {
+        let report = SessionReport { clients: vec![ClientReport::default()], ..Default::default() };
+        has_all(
+            &keys(&report),
+            &[
+                "duration_s", "haptics_hz", "haptics_period_us", "deadline_misses", "god_object_update_us",
+                "force_us", "constraint_age_us", "contacts", "penetrations", "penetration_checks", "realtime",
+                "packets_sent", "safety_events", "energy_injected_j", "clients", "observers",
+            ],
+        );
+        has_all(
+            &keys(&report.clients[0]),
+            &[
+                "node", "transport", "frames", "fps", "pose_age_ms", "swap_skew_us", "packets_lost",
+                "state_hash_mismatches",
+            ],
+        );
+        has_all(&keys(&report.force_us), &["p50", "p99", "p999", "max", "count"]);
+        has_all(&keys(&report.realtime), &["enforced", "waived"]);
+    }
+
+    #[test]
+    fn the_replay_report_has_the_keys_that_scripts_rely_on() {
+        let report = ReplayReport::default();
+        has_all(
+            &keys(&report),
+            &[
+                "steps", "update_us", "force_us", "contacts", "active", "gap_min_m", "kkt_max", "solver_fallbacks",
+                "energy_injected_j", "max_force_step_n", "work",
+            ],
+        );
+        has_all(
+            &keys(&report.work),
+            &["node_pairs", "triangle_pairs", "feature_pairs", "advancement_steps", "projections"],
+        );
+    }
+}

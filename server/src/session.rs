@@ -1,0 +1,480 @@
+//! One session of the server: Figure 3 in code, and what stands around it.
+//!
+//! Started in this order, so that each thing finds what it reads: shared data and loops (not yet running), network, monitor,
+//! coupling, god-object, checker, broadcast, and the haptics loop last, which sets everything moving. Stopped the other way round. A
+//! start that fails on the way leaves nothing running.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use god_object::spatial::linear;
+use god_object::{Coupling, GodObject, Pose, Settings, World};
+use taut_bridge::realtime::{lock_memory, pin_to_core};
+use taut_bridge::{Device, DeviceLimits, EnergyObserver, RemoteDevice, Safety, SafetySettings};
+use taut_link::{ClusterKey, Content, LinkEvent, ServerLink, ServerOptions, proto};
+use tokio::runtime::Runtime;
+
+use crate::broadcast::{self, StateWriter};
+use crate::checker::{self, PenetrationChecker};
+use crate::clients::ClientLedger;
+use crate::clock::SessionClock;
+use crate::failure::Failure;
+use crate::head::Head;
+use crate::loops::coupling::CouplingLoop;
+use crate::loops::god_object::GodObjectLoop;
+use crate::loops::haptics::HapticsLoop;
+use crate::loops::shell::{Waker, run_at_deadlines, spawn};
+use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
+use crate::realtime::{RealtimeLedger, RealtimePolicy, Scheduling};
+use crate::report::SessionReport;
+use crate::shared::fanout::Subscriber;
+use crate::shared::wrench_command::WrenchCommand;
+use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
+use crate::shutdown::Shutdown;
+use crate::statistics::Statistics;
+use crate::terminal::Terminal;
+
+/// The coupling looks at the shared data at least this often, should nobody wake it.
+const COUPLING_TIMEOUT: Duration = Duration::from_millis(10);
+/// How long a session waits for the threads to ask the system for their scheduling.
+const SCHEDULING_TIME: Duration = Duration::from_millis(200);
+/// Threads of the network runtime: one for packets, one for joins.
+const NETWORK_THREADS: usize = 2;
+
+/// Everything that a session is made of.
+pub struct SessionSetup {
+    /// Bodies.
+    pub world: Arc<World>,
+    /// Of the method.
+    pub settings: Settings,
+    /// Where god-object and device start.
+    pub start: Pose,
+    /// What moves the god-object.
+    pub device: DeviceSource,
+    /// Limits and times of the force.
+    pub safety: SafetySettings,
+    /// The viewer.
+    pub head: Head,
+    /// What clients fetch at join.
+    pub content: Content,
+    /// Addresses, key and limits of the network.
+    pub link: LinkSettings,
+    /// Time between two states to a client.
+    pub broadcast_period: Duration,
+    /// Rates and scheduling.
+    pub realtime: RealtimeSettings,
+    /// Where the monitor is served; `None` does without.
+    pub monitor: Option<MonitorSettings>,
+}
+
+/// What moves the god-object.
+pub enum DeviceSource {
+    /// A device on this machine, in the haptics loop.
+    Local(Box<dyn Device>),
+    /// A device behind a bridge.
+    Remote {
+        /// What the device there can bear.
+        limits: DeviceLimits,
+        /// Silence after which it counts as lost.
+        max_age: Duration,
+    },
+}
+
+/// Addresses, key and limits of the network.
+#[derive(Clone, Debug)]
+pub struct LinkSettings {
+    /// Of the control plane.
+    pub quic: std::net::SocketAddr,
+    /// Of the state plane.
+    pub udp: std::net::SocketAddr,
+    /// The cluster key.
+    pub key: ClusterKey,
+    /// Most clients at a time.
+    pub max_clients: usize,
+}
+
+/// Rates and scheduling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RealtimeSettings {
+    /// What a refusal by the system means.
+    pub policy: RealtimePolicy,
+    /// Period of the haptics loop.
+    pub haptics_period: Duration,
+    /// Shortest period of the god-object loop.
+    pub god_object_period: Duration,
+    /// Real-time priority of the haptics loop.
+    pub haptics_priority: u8,
+    /// Real-time priority of the coupling; below that of the haptics loop.
+    pub coupling_priority: u8,
+    /// Real-time priority of the broadcaster; below that of the coupling.
+    pub broadcast_priority: u8,
+    /// Real-time priority of the god-object loop; `None` is the normal class, because an update may take long.
+    pub god_object_priority: Option<u8>,
+    /// Core of the haptics loop; `None` is the system's choice.
+    pub haptics_core: Option<usize>,
+    /// Core of the coupling.
+    pub coupling_core: Option<usize>,
+    /// Core of the god-object loop.
+    pub god_object_core: Option<usize>,
+    /// Keep all memory in RAM.
+    pub lock_memory: bool,
+}
+
+/// A running session. Dropped, it ends.
+pub struct Session {
+    clock: SessionClock,
+    started: Duration,
+    shutdown: Shutdown,
+    ledger: RealtimeLedger,
+    statistics: Statistics,
+    wrench: Subscriber<WrenchCommand>,
+    network: Arc<NetworkCounts>,
+    clients: ClientLedger,
+    /// In the order of their start.
+    threads: Vec<JoinHandle<()>>,
+    monitor: Option<MonitorFeed>,
+    link: Option<ServerLink>,
+    runtime: Runtime,
+}
+
+impl Session {
+    /// Builds and starts everything.
+    pub fn start(setup: SessionSetup) -> Result<Self, Failure> {
+        let SessionSetup { world, settings, start, device, safety, head, content, link, broadcast_period, realtime, monitor } = setup;
+        let reference_point = world.body.reference_point;
+
+        // The arrows of Figure 3.
+        let (states, state_readers) = device_state::channel(&start);
+        let (contacts, contact_readers) = contact_snapshot::channel(&start, settings.max_constraints);
+        let (wrenches, wrench_readers) = wrench_command::channel();
+        let (shaded, shaded_reader) = shaded_acceleration::channel();
+
+        // The boxes, as far as they do not depend on the network.
+        let god_object = GodObject::new(world.clone(), settings, start)?;
+        let coupling = Coupling::new(&world, &settings);
+        let checker = PenetrationChecker::new(&world).ok_or_else(|| {
+            Failure::bad_input("a mesh of the scene cannot be checked for penetration: run `taut check` on it")
+        })?;
+        let mut god_object_loop = GodObjectLoop::new(god_object, state_readers.god_object, shaded_reader, contacts);
+        let mut coupling_loop =
+            CouplingLoop::new(coupling, state_readers.coupling, contact_readers.coupling, wrenches, shaded);
+
+        // The network, whose clock is everybody's.
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(NETWORK_THREADS)
+            .thread_name("network")
+            .enable_all()
+            .build()
+            .map_err(|error| Failure::failed(format!("the network's threads cannot be started ({error})")))?;
+        let clock = SessionClock::start();
+        let screens = content.description.screens.clone();
+        let picture = monitor.is_some().then(|| MonitorPicture {
+            name: content.description.name.clone(),
+            world: world.clone(),
+            start,
+            screens,
+            workbench_from_scene: content.description.scene_origin.to_isometry().unwrap_or_else(Pose::identity),
+            display_scale: content.description.display_scale,
+            head,
+        });
+        let scene_revision = content.description.revision;
+        let options = ServerOptions {
+            quic: link.quic,
+            udp: link.udp,
+            max_clients: link.max_clients,
+            clock: clock.for_link(),
+            ..ServerOptions::new(link.key)
+        };
+        let link = runtime.block_on(taut_link::serve(options, content))?;
+
+        // The device, which may be behind the network.
+        let (device, bridge_commands) = match device {
+            DeviceSource::Local(device) => (device, None),
+            DeviceSource::Remote { limits, max_age } => {
+                let inputs = link.device_inputs().ok_or_else(|| {
+                    Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
+                })?;
+                let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
+                (Box::new(device) as Box<dyn Device>, Some(commands))
+            }
+        };
+        let waker = Waker::default();
+        let mut haptics_loop = HapticsLoop::new(
+            device,
+            Safety::new(safety),
+            EnergyObserver::new(reference_point),
+            &start,
+            wrench_readers.haptics,
+            states,
+            waker.clone(),
+        );
+        let statistics = Statistics {
+            haptics: haptics_loop.statistics(),
+            coupling: coupling_loop.statistics(),
+            god_object: god_object_loop.statistics(),
+            ..Statistics::default()
+        };
+
+        let mut session = Self {
+            clock,
+            started: clock.now(),
+            shutdown: Shutdown::default(),
+            ledger: RealtimeLedger::default(),
+            statistics: statistics.clone(),
+            wrench: wrench_readers.status,
+            network: Arc::default(),
+            clients: ClientLedger::default(),
+            threads: Vec::new(),
+            monitor: None,
+            link: Some(link),
+            runtime,
+        };
+
+        // From here on a failure drops the session, which ends what was started.
+        if let (Some(settings), Some(picture)) = (&monitor, &picture) {
+            let sources = MonitorSources {
+                device: state_readers.monitor,
+                contacts: contact_readers.monitor,
+                wrench: wrench_readers.monitor,
+                statistics: statistics.clone(),
+                clock,
+            };
+            let feed = MonitorFeed::start(settings, picture, sources, session.network.clone(), &session.shutdown)?;
+            session.monitor = Some(feed);
+        }
+        if realtime.lock_memory {
+            session.ledger.note("process", lock_memory());
+        }
+
+        let shutdown = session.shutdown.clone();
+        let coupling_waker = waker.clone();
+        session.start_thread("coupling", Scheduling::Fifo(realtime.coupling_priority), realtime.coupling_core, move || {
+            while !shutdown.is_asked() {
+                if !coupling_loop.tick(clock.now()) {
+                    coupling_waker.wait(COUPLING_TIMEOUT);
+                }
+            }
+        })?;
+
+        let shutdown = session.shutdown.clone();
+        let god_object_scheduling = realtime.god_object_priority.map_or(Scheduling::Normal, Scheduling::Fifo);
+        session.start_thread("god-object", god_object_scheduling, realtime.god_object_core, move || {
+            // Updates that take longer than a period are no fault: the next one starts at once.
+            let late = std::sync::atomic::AtomicU64::new(0);
+            run_at_deadlines(clock, realtime.god_object_period, &shutdown, &late, |_| {
+                god_object_loop.tick(|| clock.now());
+                waker.wake();
+            });
+        })?;
+
+        let shutdown = session.shutdown.clone();
+        let counts = statistics.checks.clone();
+        session.start_thread("checker", Scheduling::Background, None, move || {
+            checker::run(&checker, contact_readers.checker, &counts, &shutdown);
+        })?;
+
+        let shutdown = session.shutdown.clone();
+        let writer = StateWriter::new(
+            state_readers.broadcast,
+            contact_readers.broadcast,
+            wrench_readers.broadcast,
+            head,
+            &reference_point,
+            scene_revision,
+        );
+        if let Some(link) = &session.link {
+            let broadcaster = link.broadcaster();
+            session.start_thread("broadcast", Scheduling::Fifo(realtime.broadcast_priority), None, move || {
+                broadcast::run(writer, broadcaster, bridge_commands, clock, broadcast_period, &shutdown);
+            })?;
+        }
+
+        let shutdown = session.shutdown.clone();
+        let haptics = statistics.haptics.clone();
+        session.started = clock.now();
+        session.start_thread("haptics", Scheduling::Fifo(realtime.haptics_priority), realtime.haptics_core, move || {
+            let ticked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+                run_at_deadlines(clock, realtime.haptics_period, &shutdown, &haptics.deadline_misses, |now| {
+                    haptics_loop.tick(now);
+                });
+            }));
+            // Whatever ended the loop: no force is left on the hand.
+            haptics_loop.release(clock.now());
+            if let Err(cause) = ticked {
+                std::panic::resume_unwind(cause);
+            }
+        })?;
+        session.enforce(realtime.policy)?;
+        Ok(session)
+    }
+
+    fn start_thread(
+        &mut self,
+        name: &'static str,
+        scheduling: Scheduling,
+        core: Option<usize>,
+        body: impl FnOnce() + Send + 'static,
+    ) -> Result<(), Failure> {
+        let ledger = self.ledger.clone();
+        let thread = spawn(name, &self.shutdown, move || {
+            ledger.schedule(name, scheduling);
+            if let Some(core) = core {
+                ledger.note(name, pin_to_core(core));
+            }
+            body();
+        });
+        self.threads.push(thread.map_err(|error| {
+            Failure::failed(format!("the thread {name} cannot be started ({error}); check the limit on processes (ulimit -u)"))
+        })?);
+        Ok(())
+    }
+
+    /// Waits for the answers of the system, and takes a refusal as the policy says.
+    fn enforce(&self, policy: RealtimePolicy) -> Result<(), Failure> {
+        std::thread::sleep(SCHEDULING_TIME);
+        match (policy, self.ledger.report().waived.first()) {
+            (RealtimePolicy::Enforce, Some(refused)) => Err(Failure::BadInput(format!(
+                "the workbench file enforces real time, but the system refused ({refused}); grant it, or set realtime.mode = \"waive\""
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Address of the control plane, with the port that it got.
+    pub fn quic_address(&self) -> Option<std::net::SocketAddr> {
+        self.link.as_ref().map(ServerLink::quic_addr)
+    }
+
+    /// Address of the state plane, with the port that it got.
+    pub fn udp_address(&self) -> Option<std::net::SocketAddr> {
+        self.link.as_ref().map(ServerLink::udp_addr)
+    }
+
+    /// The running monitor.
+    pub fn monitor(&self) -> Option<&MonitorFeed> {
+        self.monitor.as_ref()
+    }
+
+    /// What the system granted and refused.
+    pub fn realtime(&self) -> crate::report::RealtimeReport {
+        self.ledger.report()
+    }
+
+    /// How long the loops have run.
+    pub fn age(&self) -> Duration {
+        self.clock.now().saturating_sub(self.started)
+    }
+
+    /// Whether the session asked for its own end, because something broke.
+    pub fn is_ending(&self) -> bool {
+        self.shutdown.is_asked()
+    }
+
+    /// Runs what may wait on the network's threads.
+    pub fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
+    /// Tells what happened on the network since the last time; call it a few times a second.
+    pub fn follow_network(&mut self, terminal: &Terminal) {
+        let Some(link) = &self.link else {
+            return;
+        };
+        let mut lines = Vec::new();
+        while let Some(event) = link.try_event() {
+            lines.extend(self.clients.follow(&event).map(|line| (severity(&event), line)));
+        }
+        for (severity, line) in lines {
+            if severity != Severity::Info {
+                terminal.say(&format!("taut: {line}"));
+            }
+            if let Some(monitor) = &self.monitor {
+                monitor.log(severity, &line);
+            }
+        }
+        let clients = link.clients();
+        self.clients.look_at(&clients);
+        let counters = link.counters();
+        self.network.packets_sent.store(counters.packets_sent, Ordering::Relaxed);
+        self.network.packets_received.store(counters.packets_received, Ordering::Relaxed);
+        self.network.clients.store(u32::try_from(clients.len()).unwrap_or(u32::MAX), Ordering::Relaxed);
+    }
+
+    /// One line of what goes on.
+    pub fn status_line(&mut self) -> String {
+        let statistics = &self.statistics;
+        let seconds = self.age().as_secs_f64();
+        let period = statistics.haptics.period.distribution_us();
+        let update = statistics.god_object.update.distribution_us();
+        let force = linear(&self.wrench.newest().wrench).norm();
+        let checks = &statistics.checks;
+        format!(
+            "{seconds:5.0} s  haptics {:.0} Hz, p99 {:.2} ms  god-object p99 {:.2} ms  contacts {}  force {force:.2} N  clients {}  penetrations {} of {}",
+            period.count as f64 / seconds.max(f64::MIN_POSITIVE),
+            period.p99 * 1e-3,
+            update.p99 * 1e-3,
+            statistics.god_object.contacts.newest(),
+            self.network.clients.load(Ordering::Relaxed),
+            checks.penetrations.load(Ordering::Relaxed),
+            checks.checks.load(Ordering::Relaxed),
+        )
+    }
+
+    /// Ends everything and says what was measured; the failure, if something broke.
+    pub fn stop(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+        self.follow_network(terminal);
+        let duration = self.age();
+        let mut report = self.statistics.report(duration);
+        if let Some(link) = &self.link {
+            let counters = link.counters();
+            report.packets_sent = counters.packets_sent;
+            report.packets_refused =
+                counters.garbage + counters.wrong_version + counters.forged + counters.replayed + counters.inputs_refused;
+        }
+        let mut failure = self.shutdown.failure().map(|sentence| Failure::Failed(sentence.to_owned()));
+        match self.end() {
+            Ok(dropped) => report.monitor_dropped = dropped,
+            Err(error) => failure = failure.or(Some(error)),
+        }
+        report.realtime = self.ledger.report();
+        (report.clients, report.observers) = self.clients.reports();
+        (report, failure)
+    }
+
+    /// Ends what runs; how many samples the monitor dropped. A second time it does nothing.
+    fn end(&mut self) -> Result<u64, Failure> {
+        self.shutdown.ask();
+        for thread in self.threads.drain(..).rev() {
+            // A thread that panicked has said so by `Shutdown::fail`.
+            let _ = thread.join();
+        }
+        let monitor = self.monitor.take().map(MonitorFeed::stop);
+        if let Some(link) = self.link.take() {
+            self.runtime.block_on(link.shutdown());
+        }
+        monitor.unwrap_or(Ok(0))
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        if let Err(error) = self.end() {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+fn severity(event: &LinkEvent) -> Severity {
+    use proto::control::LogLevel;
+    match event {
+        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
+        LinkEvent::Refused { .. } => Severity::Warning,
+        LinkEvent::Log { event, .. } => match event.level {
+            LogLevel::Info => Severity::Info,
+            LogLevel::Warning => Severity::Warning,
+            LogLevel::Error => Severity::Error,
+        },
+    }
+}

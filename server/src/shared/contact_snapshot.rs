@@ -1,0 +1,89 @@
+//! God-object loop → coupling: the god-object pose and the constraints that hold there, as one value.
+//!
+//! * Writer: the god-object loop, once per update (at most `god_object_rate`).
+//! * Readers: coupling, broadcast, monitor, checker.
+//! * Stale: the update is taking long. The constraints still hold as planes; `published` gives their age, which the coupling
+//!   reports and the haptics loop's safety limits.
+//!
+//! Source: Ortega et al. 2007, Section 5 and Figure 3.
+
+use std::time::Duration;
+
+use god_object::StepReport;
+use god_object::constraint::ConstraintSet;
+use god_object::spatial::Pose;
+
+use super::fanout::{Publisher, Subscriber, fanout};
+
+/// One answer of the god-object loop. Its sequence number is that of the constraint set.
+#[derive(Debug)]
+pub struct ContactSnapshot {
+    /// God-object pose and constraints.
+    pub set: ConstraintSet,
+    /// Session time at which it was published.
+    pub published: Duration,
+    /// Session time of the device sample that it answers.
+    pub device_time: Duration,
+    /// Counts of the update that made it.
+    pub report: StepReport,
+}
+
+impl ContactSnapshot {
+    /// The god-object at its start, nothing touched, with room for `capacity` constraints.
+    pub fn at_start(pose: &Pose, capacity: usize) -> Self {
+        let mut set = ConstraintSet::with_capacity(capacity);
+        set.god_object_pose = *pose;
+        Self {
+            set,
+            published: Duration::ZERO,
+            device_time: Duration::ZERO,
+            report: StepReport::default(),
+        }
+    }
+}
+
+// By hand for `clone_from`: publishing copies into buffers that are there already.
+impl Clone for ContactSnapshot {
+    fn clone(&self) -> Self {
+        Self {
+            set: self.set.clone(),
+            ..*self
+        }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        self.set.clone_from(&source.set);
+        self.published = source.published;
+        self.device_time = source.device_time;
+        self.report = source.report;
+    }
+}
+
+/// The reading ends, one per reader.
+#[derive(Debug)]
+pub struct ContactSnapshotReaders {
+    /// For loop 2.
+    pub coupling: Subscriber<ContactSnapshot>,
+    /// For the broadcaster.
+    pub broadcast: Subscriber<ContactSnapshot>,
+    /// For the monitor.
+    pub monitor: Subscriber<ContactSnapshot>,
+    /// For the checker.
+    pub checker: Subscriber<ContactSnapshot>,
+}
+
+/// The arrow from the god-object loop, with room for `capacity` constraints in every buffer.
+pub fn channel(
+    start: &Pose,
+    capacity: usize,
+) -> (Publisher<ContactSnapshot>, ContactSnapshotReaders) {
+    let (publisher, [coupling, broadcast, monitor, checker]) =
+        fanout(&ContactSnapshot::at_start(start, capacity));
+    let readers = ContactSnapshotReaders {
+        coupling,
+        broadcast,
+        monitor,
+        checker,
+    };
+    (publisher, readers)
+}

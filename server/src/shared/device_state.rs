@@ -1,0 +1,69 @@
+//! Haptics loop → god-object loop, coupling: where the hand is, and when that was.
+//!
+//! * Writer: the haptics loop, once per period (1 kHz).
+//! * Readers: god-object loop, coupling, broadcast, monitor.
+//! * Stale: the device has not answered since `time`. Loops go on with the last pose; the haptics loop alone decides
+//!   when the force must fade.
+
+use std::time::Duration;
+
+use god_object::spatial::{Pose, Vector6};
+
+use super::fanout::{Publisher, Subscriber, fanout};
+
+/// One sample of the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeviceState {
+    /// Counts the samples; 0 is the pose at the start, before the device was read.
+    pub sequence: u64,
+    /// Session time at which the device was there.
+    pub time: Duration,
+    /// The device pose x_h, as the pose of the body's own frame.
+    pub pose: Pose,
+    /// Velocity of the reference point and angular velocity, m/s and rad/s, world axes.
+    pub velocity: Vector6,
+    /// Pressed buttons, one bit each.
+    pub buttons: u16,
+    /// The device does not answer; the pose is the last good one.
+    pub faulty: bool,
+}
+
+impl DeviceState {
+    /// The device at rest at `pose`, before the first sample.
+    pub fn at_start(pose: &Pose) -> Self {
+        Self {
+            sequence: 0,
+            time: Duration::ZERO,
+            pose: *pose,
+            velocity: Vector6::zeros(),
+            buttons: 0,
+            faulty: false,
+        }
+    }
+}
+
+/// The reading ends, one per reader.
+#[derive(Debug)]
+pub struct DeviceStateReaders {
+    /// For loop 1.
+    pub god_object: Subscriber<DeviceState>,
+    /// For loop 2.
+    pub coupling: Subscriber<DeviceState>,
+    /// For the broadcaster.
+    pub broadcast: Subscriber<DeviceState>,
+    /// For the monitor.
+    pub monitor: Subscriber<DeviceState>,
+}
+
+/// The arrow from the haptics loop.
+pub fn channel(start: &Pose) -> (Publisher<DeviceState>, DeviceStateReaders) {
+    let (publisher, [god_object, coupling, broadcast, monitor]) =
+        fanout(&DeviceState::at_start(start));
+    let readers = DeviceStateReaders {
+        god_object,
+        coupling,
+        broadcast,
+        monitor,
+    };
+    (publisher, readers)
+}

@@ -1,0 +1,76 @@
+//! Coupling → haptics loop: the wrench that the hand should feel.
+//!
+//! * Writer: the coupling, once per device sample and per constraint set.
+//! * Readers: haptics loop, broadcast, monitor, status line.
+//! * Stale: the coupling did not answer the last sample. The haptics loop's safety holds the wrench for a while, then lets it fade.
+
+use std::time::Duration;
+
+use god_object::spatial::Vector6;
+
+use super::fanout::{Publisher, Subscriber, fanout};
+
+/// One answer of the coupling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WrenchCommand {
+    /// Counts the answers; 0 is the zero wrench at the start.
+    pub sequence: u64,
+    /// Session time at which it was computed.
+    pub time: Duration,
+    /// Force and torque on the hand at the reference point, N and N m, world axes.
+    pub wrench: Vector6,
+    /// Sequence number of the constraint set that it rests on.
+    pub constraint_sequence: u64,
+    /// How old that constraint set was.
+    pub constraint_age: Duration,
+    /// Rows in the active set.
+    pub active: usize,
+    /// Relative KKT residual of the projection.
+    pub kkt: f64,
+    /// Whether the projection was solved; if not, the wrench is zero.
+    pub solved: bool,
+    /// Whether a limit on force or torque was at work.
+    pub saturated: bool,
+}
+
+impl WrenchCommand {
+    /// No force.
+    pub fn at_start() -> Self {
+        Self {
+            sequence: 0,
+            time: Duration::ZERO,
+            wrench: Vector6::zeros(),
+            constraint_sequence: 0,
+            constraint_age: Duration::ZERO,
+            active: 0,
+            kkt: 0.0,
+            solved: true,
+            saturated: false,
+        }
+    }
+}
+
+/// The reading ends, one per reader.
+#[derive(Debug)]
+pub struct WrenchCommandReaders {
+    /// For loop 3.
+    pub haptics: Subscriber<WrenchCommand>,
+    /// For the broadcaster.
+    pub broadcast: Subscriber<WrenchCommand>,
+    /// For the monitor.
+    pub monitor: Subscriber<WrenchCommand>,
+    /// For the status line.
+    pub status: Subscriber<WrenchCommand>,
+}
+
+/// The arrow from the coupling to the hand.
+pub fn channel() -> (Publisher<WrenchCommand>, WrenchCommandReaders) {
+    let (publisher, [haptics, broadcast, monitor, status]) = fanout(&WrenchCommand::at_start());
+    let readers = WrenchCommandReaders {
+        haptics,
+        broadcast,
+        monitor,
+        status,
+    };
+    (publisher, readers)
+}

@@ -1,0 +1,51 @@
+//! The counters of all threads in one place, for status line, monitor and end report.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use crate::checker::CheckCounts;
+use crate::loops::coupling::CouplingStatistics;
+use crate::loops::god_object::GodObjectStatistics;
+use crate::loops::haptics::HapticsStatistics;
+use crate::report::SessionReport;
+
+/// Handles on what each thread counts. Clones read the same counters.
+#[derive(Clone, Debug, Default)]
+pub struct Statistics {
+    /// Loop 3.
+    pub haptics: Arc<HapticsStatistics>,
+    /// Loop 2.
+    pub coupling: Arc<CouplingStatistics>,
+    /// Loop 1.
+    pub god_object: Arc<GodObjectStatistics>,
+    /// The checker.
+    pub checks: Arc<CheckCounts>,
+}
+
+impl Statistics {
+    /// The loops' part of the end report, after they ran for `duration`.
+    pub fn report(&self, duration: Duration) -> SessionReport {
+        let duration_s = duration.as_secs_f64();
+        let per_second = |count: u64| if duration_s > 0.0 { count as f64 / duration_s } else { 0.0 };
+        let haptics_period_us = self.haptics.period.distribution_us();
+        let god_object_update_us = self.god_object.update.distribution_us();
+        SessionReport {
+            duration_s,
+            haptics_hz: per_second(haptics_period_us.count),
+            haptics_period_us,
+            deadline_misses: self.haptics.deadline_misses.load(Ordering::Relaxed),
+            god_object_hz: per_second(god_object_update_us.count),
+            god_object_update_us,
+            force_us: self.coupling.force.distribution_us(),
+            constraint_age_us: self.coupling.constraint_age.distribution_us(),
+            contacts: self.god_object.contacts.distribution(),
+            penetrations: self.checks.penetrations.load(Ordering::Relaxed),
+            penetration_checks: self.checks.checks.load(Ordering::Relaxed),
+            safety_events: self.haptics.safety_events.load(Ordering::Relaxed),
+            energy_injected_j: self.haptics.energy_injected(),
+            solver_fallbacks: self.god_object.solver_fallbacks.load(Ordering::Relaxed),
+            ..SessionReport::default()
+        }
+    }
+}
