@@ -97,7 +97,9 @@ impl ClockFilter {
         };
 
         // A disagreement that no error explains: the clocks were stepped, what was known is void.
-        if self.locked && (exchange.offset - self.applied).abs() - round_trip / 2 > STEP_THRESHOLD_NS {
+        if self.locked
+            && (exchange.offset - self.applied).abs() - round_trip / 2 > STEP_THRESHOLD_NS
+        {
             *self = ClockFilter {
                 steps: self.steps + 1,
                 ..ClockFilter::default()
@@ -133,7 +135,9 @@ impl ClockFilter {
 
     /// Session time − client time as given out now, ns; `None` until locked.
     pub fn offset_ns(&self, now: u64) -> Option<i64> {
-        plausible(now).filter(|_| self.locked).map(|now| self.offset_at(now))
+        plausible(now)
+            .filter(|_| self.locked)
+            .map(|now| self.offset_at(now))
     }
 
     /// Smallest round trip in the window, ns.

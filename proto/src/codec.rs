@@ -73,7 +73,9 @@ pub enum DecodeError {
     #[error("a message holds a number that is not finite: the sender is broken")]
     NotFinite,
     /// A count is above its limit or above the bytes left.
-    #[error("a message claims {what} of {len}, more than the {max} possible: the sender or the network is broken")]
+    #[error(
+        "a message claims {what} of {len}, more than the {max} possible: the sender or the network is broken"
+    )]
     TooLong {
         /// "text", "list" or "message".
         what: &'static str,
@@ -97,7 +99,9 @@ pub enum DecodeError {
     #[error("a message is not of taut: another program speaks to this port")]
     WrongMagic,
     /// The peer speaks another version.
-    #[error("the peer speaks protocol version {theirs}, this program speaks {ours}: install the same release on both")]
+    #[error(
+        "the peer speaks protocol version {theirs}, this program speaks {ours}: install the same release on both"
+    )]
     WrongVersion {
         /// Version of the peer.
         theirs: u8,

@@ -159,6 +159,10 @@ pub struct Bye {
 /// Everything that is said on a control stream.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs, reason = "each variant is documented at its struct")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "the large one is the scene, made once per join"
+)]
 pub enum ControlMessage {
     Refused(Refusal),
     Hello(Hello),
@@ -262,9 +266,25 @@ wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
 wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
-wire_struct!(Hello { node, role, transport, rate_hz, proof });
-wire_struct!(Welcome { proof, session, epoch, udp_port, session_time_ns });
-wire_struct!(Refusal { code, version, text });
+wire_struct!(Hello {
+    node,
+    role,
+    transport,
+    rate_hz,
+    proof
+});
+wire_struct!(Welcome {
+    proof,
+    session,
+    epoch,
+    udp_port,
+    session_time_ns
+});
+wire_struct!(Refusal {
+    code,
+    version,
+    text
+});
 wire_struct!(MeshRequest { hash });
 wire_struct!(MeshHeader { hash, length });
 wire_struct!(LogEvent { level, text });

@@ -22,4 +22,11 @@ pub struct InputSample {
 /// [`InputSample::flags`]: the device reports a fault.
 pub const INPUT_FAULT: u16 = 1;
 
-wire_struct!(InputSample { sample_time_ns, index, pose, velocity, buttons, flags });
+wire_struct!(InputSample {
+    sample_time_ns,
+    index,
+    pose,
+    velocity,
+    buttons,
+    flags
+});

@@ -18,7 +18,9 @@ const SERVER_LABEL: &[u8] = b"taut server proof 1";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
     /// Not 64 hexadecimal digits.
-    #[error("a cluster key is 64 hexadecimal digits, this has {found} usable ones: copy the server's key file again")]
+    #[error(
+        "a cluster key is 64 hexadecimal digits, this has {found} usable ones: copy the server's key file again"
+    )]
     Malformed {
         /// Hexadecimal digits before the first other character.
         found: usize,
@@ -67,26 +69,51 @@ impl ClusterKey {
 
     /// The 64 digits, for the key file. Show it to nobody else.
     pub fn to_hex(&self) -> String {
-        self.bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+        self.bytes
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect()
     }
 
     /// What a client shows to prove the key.
-    pub fn client_proof(&self, exporter: &[u8; EXPORTER_BYTES], role: Role, node: &str) -> [u8; 32] {
+    pub fn client_proof(
+        &self,
+        exporter: &[u8; EXPORTER_BYTES],
+        role: Role,
+        node: &str,
+    ) -> [u8; 32] {
         self.proof(&message(CLIENT_LABEL, exporter, role, node))
     }
 
     /// What the server shows to prove the key.
-    pub fn server_proof(&self, exporter: &[u8; EXPORTER_BYTES], role: Role, node: &str) -> [u8; 32] {
+    pub fn server_proof(
+        &self,
+        exporter: &[u8; EXPORTER_BYTES],
+        role: Role,
+        node: &str,
+    ) -> [u8; 32] {
         self.proof(&message(SERVER_LABEL, exporter, role, node))
     }
 
     /// Whether `proof` is a client's; constant time.
-    pub fn verify_client(&self, proof: &[u8; 32], exporter: &[u8; EXPORTER_BYTES], role: Role, node: &str) -> bool {
+    pub fn verify_client(
+        &self,
+        proof: &[u8; 32],
+        exporter: &[u8; EXPORTER_BYTES],
+        role: Role,
+        node: &str,
+    ) -> bool {
         self.verify(proof, &message(CLIENT_LABEL, exporter, role, node))
     }
 
     /// Whether `proof` is the server's; constant time.
-    pub fn verify_server(&self, proof: &[u8; 32], exporter: &[u8; EXPORTER_BYTES], role: Role, node: &str) -> bool {
+    pub fn verify_server(
+        &self,
+        proof: &[u8; 32],
+        exporter: &[u8; EXPORTER_BYTES],
+        role: Role,
+        node: &str,
+    ) -> bool {
         self.verify(proof, &message(SERVER_LABEL, exporter, role, node))
     }
 
@@ -121,6 +148,12 @@ fn hex_digit(digit: u8) -> u8 {
     match digit {
         b'0'..=b'9' => digit - b'0',
         b'a'..=b'f' => digit - b'a' + 10,
-        _ => digit.to_ascii_lowercase().wrapping_sub(b'a').wrapping_add(10) & 0x0f,
+        _ => {
+            digit
+                .to_ascii_lowercase()
+                .wrapping_sub(b'a')
+                .wrapping_add(10)
+                & 0x0f
+        }
     }
 }

@@ -18,6 +18,7 @@ pub mod header;
 pub mod input;
 pub mod key;
 pub mod mesh_blob;
+mod octahedral;
 pub mod pose;
 pub mod replay;
 pub mod scene;

@@ -41,7 +41,9 @@ impl MeshHash {
 
 impl std::fmt::Display for MeshHash {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.bytes.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+        self.bytes
+            .iter()
+            .try_for_each(|byte| write!(f, "{byte:02x}"))
     }
 }
 
@@ -98,13 +100,28 @@ impl MeshBlob {
         if !(finite && normals_finite) {
             return Err(DecodeError::NotFinite);
         }
-        if triangles.iter().flatten().any(|index| *index as usize >= positions.len()) {
-            return Err(DecodeError::Inconsistent { what: "vertex index" });
+        if triangles
+            .iter()
+            .flatten()
+            .any(|index| *index as usize >= positions.len())
+        {
+            return Err(DecodeError::Inconsistent {
+                what: "vertex index",
+            });
         }
-        if normals.as_ref().is_some_and(|normals| normals.len() != positions.len()) {
-            return Err(DecodeError::Inconsistent { what: "normal count" });
+        if normals
+            .as_ref()
+            .is_some_and(|normals| normals.len() != positions.len())
+        {
+            return Err(DecodeError::Inconsistent {
+                what: "normal count",
+            });
         }
-        Ok(MeshBlob { positions, triangles, normals })
+        Ok(MeshBlob {
+            positions,
+            triangles,
+            normals,
+        })
     }
 
     /// Positions in the precision of the source.
@@ -145,9 +162,14 @@ impl MeshBlob {
             Positions::F32(_) => (0, 12),
             Positions::F64(_) => (LAYOUT_F64, 24),
         };
-        let normals = if self.normals.is_some() { LAYOUT_NORMALS } else { 0 };
+        let normals = if self.normals.is_some() {
+            LAYOUT_NORMALS
+        } else {
+            0
+        };
         let normal_bytes = if self.normals.is_some() { 12 } else { 0 };
-        let len = PREFIX_BYTES + vertices * (position_bytes + normal_bytes) + self.triangles.len() * 12;
+        let len =
+            PREFIX_BYTES + vertices * (position_bytes + normal_bytes) + self.triangles.len() * 12;
         if len > MAX_MESH_BYTES {
             return Err(EncodeError::TooLong {
                 what: "mesh",
@@ -161,11 +183,24 @@ impl MeshBlob {
         bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
         match &self.positions {
-            Positions::F32(list) => list.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes())),
-            Positions::F64(list) => list.iter().flatten().for_each(|x| bytes.extend(x.to_le_bytes())),
+            Positions::F32(list) => list
+                .iter()
+                .flatten()
+                .for_each(|x| bytes.extend(x.to_le_bytes())),
+            Positions::F64(list) => list
+                .iter()
+                .flatten()
+                .for_each(|x| bytes.extend(x.to_le_bytes())),
         }
-        self.triangles.iter().flatten().for_each(|i| bytes.extend(i.to_le_bytes()));
-        self.normals.iter().flatten().flatten().for_each(|x| bytes.extend(x.to_le_bytes()));
+        self.triangles
+            .iter()
+            .flatten()
+            .for_each(|i| bytes.extend(i.to_le_bytes()));
+        self.normals
+            .iter()
+            .flatten()
+            .flatten()
+            .for_each(|x| bytes.extend(x.to_le_bytes()));
         Ok(bytes)
     }
 
@@ -174,12 +209,32 @@ impl MeshBlob {
         let Some((prefix, body)) = bytes.split_first_chunk::<PREFIX_BYTES>() else {
             return Err(DecodeError::Truncated);
         };
-        let [m0, m1, m2, m3, layout, r0, r1, r2, v0, v1, v2, v3, t0, t1, t2, t3] = *prefix;
+        let [
+            m0,
+            m1,
+            m2,
+            m3,
+            layout,
+            r0,
+            r1,
+            r2,
+            v0,
+            v1,
+            v2,
+            v3,
+            t0,
+            t1,
+            t2,
+            t3,
+        ] = *prefix;
         if [m0, m1, m2, m3] != BLOB_MAGIC {
             return Err(DecodeError::WrongMagic);
         }
         if layout & !(LAYOUT_F64 | LAYOUT_NORMALS) != 0 || [r0, r1, r2] != [0; 3] {
-            return Err(DecodeError::UnknownTag { what: "mesh layout", tag: layout });
+            return Err(DecodeError::UnknownTag {
+                what: "mesh layout",
+                tag: layout,
+            });
         }
         let vertices = u64::from(u32::from_le_bytes([v0, v1, v2, v3]));
         let triangles = u64::from(u32::from_le_bytes([t0, t1, t2, t3]));
@@ -191,7 +246,9 @@ impl MeshBlob {
         let triangle_len = triangles * 12;
         let normal_len = if with_normals { vertices * 12 } else { 0 };
         if position_len + triangle_len + normal_len != body.len() as u64 {
-            return Err(DecodeError::Inconsistent { what: "mesh length" });
+            return Err(DecodeError::Inconsistent {
+                what: "mesh length",
+            });
         }
         let (positions, rest) = body.split_at(position_len as usize);
         let (triangles, normals) = rest.split_at(triangle_len as usize);

@@ -1,19 +1,20 @@
 //! Replay window: which sequence numbers of a sender have been seen, the last 1024 of them.
 //!
-//! Source: RFC 6479 (the sliding window of IPsec without bit shifting), with the window a power of two.
+//! Source: RFC 6479 (the sliding window of IPsec without bit shifting), its redundant word included.
 
 /// Sequence numbers remembered. At 1 kHz a packet may come a second late and still count.
 pub const WINDOW: u64 = 1024;
 
 const WORD: u64 = 64;
-const WORDS: usize = (WINDOW / WORD) as usize;
+/// One word more than the window: the newest word is cleared as a whole, while the oldest numbers still count.
+const WORDS: usize = (WINDOW / WORD) as usize + 1;
 
 /// The window. A new one accepts any number.
 #[derive(Clone, Debug, Default)]
 pub struct ReplayWindow {
     /// One past the highest number seen; 0 for none.
     next: u64,
-    /// Bit of number n: word (n / 64) mod 16, bit n mod 64.
+    /// Bit of number n: word (n / 64) mod 17, bit n mod 64.
     seen: [u64; WORDS],
 }
 
@@ -45,7 +46,7 @@ impl ReplayWindow {
         }
     }
 
-    /// Marks an authenticated number as seen. At most 16 steps.
+    /// Marks an authenticated number as seen. At most 17 steps.
     pub fn mark(&mut self, sequence: u64) {
         if sequence == u64::MAX || self.check(sequence) == Freshness::TooOld {
             return; // senders stop long before the last number

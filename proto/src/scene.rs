@@ -115,11 +115,47 @@ pub struct ShowOptions {
 }
 
 wire_struct!(SceneDescription {
-    name, revision, god_object, obstacles, reference_point, scene_origin, display_scale, screens, nodes, viewer, eye_separation, near, far, show,
+    name,
+    revision,
+    god_object,
+    obstacles,
+    reference_point,
+    scene_origin,
+    display_scale,
+    screens,
+    nodes,
+    viewer,
+    eye_separation,
+    near,
+    far,
+    show,
 });
-wire_struct!(BodyDescription { name, mesh, pose, colour });
-wire_struct!(ScreenDescription { name, lower_left, lower_right, upper_left });
-wire_struct!(NodeDescription { name, screens, stereo, window });
-wire_struct!(WindowDescription { width, height, fullscreen });
-wire_struct!(ShowOptions { ghost, contacts, force });
+wire_struct!(BodyDescription {
+    name,
+    mesh,
+    pose,
+    colour
+});
+wire_struct!(ScreenDescription {
+    name,
+    lower_left,
+    lower_right,
+    upper_left
+});
+wire_struct!(NodeDescription {
+    name,
+    screens,
+    stereo,
+    window
+});
+wire_struct!(WindowDescription {
+    width,
+    height,
+    fullscreen
+});
+wire_struct!(ShowOptions {
+    ghost,
+    contacts,
+    force
+});
 wire_tag!(Stereo, "stereo mode" { Mono = 0, SideBySide = 1, TopBottom = 2, Anaglyph = 3, TwoWindows = 4 });

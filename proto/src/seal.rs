@@ -34,7 +34,9 @@ pub enum OpenError {
     #[error(transparent)]
     Header(DecodeError),
     /// The seal is broken: another key, another epoch or sender, or changed bytes.
-    #[error("a datagram is not sealed by this session's key: it is forged, damaged or of an earlier session")]
+    #[error(
+        "a datagram is not sealed by this session's key: it is forged, damaged or of an earlier session"
+    )]
     Forged,
     /// Seen before, or too old to tell.
     #[error("a datagram was seen before: it is a duplicate or replayed")]

@@ -14,8 +14,9 @@
 
 use crate::{
     DecodeError, EncodeError, PoseF32,
-    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_struct, wire_tag},
+    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_struct},
     header::MAX_PAYLOAD_BYTES,
+    octahedral::{normal_from_octahedral, octahedral_from_normal},
 };
 use arrayvec::ArrayVec;
 
@@ -225,9 +226,47 @@ pub fn payload_hash(payload: &[u8]) -> u64 {
     u64::from_le_bytes(first)
 }
 
-wire_tag!(RunState, "run state" { Waiting = 0, Running = 1, Paused = 2, Fault = 3 });
-wire_struct!(HeadState { pose, age_us, eye_separation, flags });
-wire_struct!(ToolState { god_object, device, linear_velocity, angular_velocity, force, torque, buttons, flags, id });
+impl RunState {
+    fn code(self) -> u8 {
+        match self {
+            RunState::Waiting => 0,
+            RunState::Running => 1,
+            RunState::Paused => 2,
+            RunState::Fault => 3,
+        }
+    }
+
+    fn from_code(tag: u8) -> Result<RunState, DecodeError> {
+        match tag {
+            0 => Ok(RunState::Waiting),
+            1 => Ok(RunState::Running),
+            2 => Ok(RunState::Paused),
+            3 => Ok(RunState::Fault),
+            tag => Err(DecodeError::UnknownTag {
+                what: "run state",
+                tag,
+            }),
+        }
+    }
+}
+
+wire_struct!(HeadState {
+    pose,
+    age_us,
+    eye_separation,
+    flags
+});
+wire_struct!(ToolState {
+    god_object,
+    device,
+    linear_velocity,
+    angular_velocity,
+    force,
+    torque,
+    buttons,
+    flags,
+    id
+});
 wire_struct!(BodyState { id, flags, pose });
 wire_struct!(EventRecord { id, tick, code });
 
@@ -236,26 +275,18 @@ impl Wire for HotState {
         self.sample_time_ns.write(to)?;
         self.tick.write(to)?;
         self.scene_revision.write(to)?;
-        for len in [
-            self.tools.len(),
-            self.bodies.len(),
-            self.contacts.len(),
-        ] {
+        for len in [self.tools.len(), self.bodies.len(), self.contacts.len()] {
             (len as u8).write(to)?; // capacities are far below 256
         }
         // Four bits each: one byte for the run state and the number of events.
-        let run = match self.run {
-            RunState::Waiting => 0_u8,
-            RunState::Running => 1,
-            RunState::Paused => 2,
-            RunState::Fault => 3,
-        };
-        (run | (self.events.len() as u8) << 4).write(to)?;
+        (self.run.code() | (self.events.len() as u8) << 4).write(to)?;
         self.constraint_age_us.write(to)?;
         self.head.write(to)?;
         self.tools.iter().try_for_each(|tool| tool.write(to))?;
         self.bodies.iter().try_for_each(|body| body.write(to))?;
-        self.contacts.iter().try_for_each(|contact| contact.write(to))?;
+        self.contacts
+            .iter()
+            .try_for_each(|contact| contact.write(to))?;
         self.events.iter().try_for_each(|event| event.write(to))
     }
 
@@ -264,18 +295,7 @@ impl Wire for HotState {
         let tick = Wire::read(from)?;
         let scene_revision = Wire::read(from)?;
         let [tools, bodies, contacts, packed] = <[u8; 4]>::read(from)?;
-        let run = match packed & 0x0f {
-            0 => RunState::Waiting,
-            1 => RunState::Running,
-            2 => RunState::Paused,
-            3 => RunState::Fault,
-            tag => {
-                return Err(DecodeError::UnknownTag {
-                    what: "run state",
-                    tag,
-                });
-            }
-        };
+        let run = RunState::from_code(packed & 0x0f)?;
         Ok(HotState {
             sample_time_ns,
             tick,
@@ -310,61 +330,5 @@ impl Wire for ContactState {
             force: Wire::read(from)?,
             gap: Wire::read(from)?,
         })
-    }
-}
-
-/// Largest value of a coordinate of the octahedral map: the square's half side.
-const OCTAHEDRAL_SCALE: f32 = i16::MAX as f32;
-
-/// Folds a direction onto a square: |x| + |y| + |z| = 1, lower half turned outwards. `None` if it has no direction.
-///
-/// Source: Cigolle et al. 2014, "Survey of efficient representations for independent unit vectors".
-fn octahedral_from_normal([x, y, z]: [f32; 3]) -> Option<[i16; 2]> {
-    let sum = x.abs() + y.abs() + z.abs();
-    let usable = sum > 0.0 && sum.is_finite(); // false for NaN
-    if !usable {
-        return None;
-    }
-    let (u, v) = (x / sum, y / sum);
-    let (u, v) = if z >= 0.0 { (u, v) } else { fold(u, v) };
-    Some([u, v].map(|coordinate| (coordinate * OCTAHEDRAL_SCALE).round() as i16))
-}
-
-fn normal_from_octahedral(coordinates: [i16; 2]) -> [f32; 3] {
-    let [u, v] = coordinates.map(|value| (f32::from(value) / OCTAHEDRAL_SCALE).max(-1.0));
-    let z = 1.0 - u.abs() - v.abs();
-    let (x, y) = if z >= 0.0 { (u, v) } else { fold(u, v) };
-    let norm = (x * x + y * y + z * z).sqrt(); // at least 1/√3
-    [x / norm, y / norm, z / norm]
-}
-
-fn fold(u: f32, v: f32) -> (f32, f32) {
-    (
-        (1.0 - v.abs()) * 1.0_f32.copysign(u),
-        (1.0 - u.abs()) * 1.0_f32.copysign(v),
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_normal_comes_back_within_a_ten_thousandth_of_a_radian() {
-        for i in 0..50 {
-            for j in 0..100 {
-                let (polar, azimuth) = (i as f32 / 49.0 * std::f32::consts::PI, j as f32 / 100.0 * std::f32::consts::TAU);
-                let normal = [polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos()];
-                let back = octahedral_from_normal(normal).map(normal_from_octahedral).unwrap_or_default();
-                let off: f32 = normal.iter().zip(back).map(|(a, b)| (a - b).powi(2)).sum();
-                assert!(off.sqrt() < 1e-4, "{normal:?} became {back:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_normal_without_direction_is_not_sent() {
-        assert_eq!(octahedral_from_normal([0.0; 3]), None);
-        assert_eq!(octahedral_from_normal([f32::NAN, 0.0, 1.0]), None);
     }
 }

@@ -9,7 +9,7 @@ pub struct ClientStats {
     pub frames: u64,
     /// Frames per second since the last report.
     pub fps: f32,
-    /// Median age of the drawn state when the frame was presented, ms.
+    /// Median age of the drawn state when it was taken to be drawn, ms.
     pub pose_age_ms_p50: f32,
     /// 99th percentile of the same, ms.
     pub pose_age_ms_p99: f32,
@@ -39,6 +39,16 @@ pub struct DrawnState {
 }
 
 wire_struct!(ClientStats {
-    frames, fps, pose_age_ms_p50, pose_age_ms_p99, pose_age_ms_max, swap_skew_ms_p50, swap_skew_ms_max, packets_lost, packets_received, clock_uncertainty_ns, drawn,
+    frames,
+    fps,
+    pose_age_ms_p50,
+    pose_age_ms_p99,
+    pose_age_ms_max,
+    swap_skew_ms_p50,
+    swap_skew_ms_max,
+    packets_lost,
+    packets_received,
+    clock_uncertainty_ns,
+    drawn,
 });
 wire_struct!(DrawnState { tick, state_hash });

@@ -30,4 +30,8 @@ pub struct TimeResponse {
 }
 
 wire_struct!(TimeRequest { client_sent });
-wire_struct!(TimeResponse { client_sent, server_received, server_sent });
+wire_struct!(TimeResponse {
+    client_sent,
+    server_received,
+    server_sent
+});

@@ -18,4 +18,9 @@ pub struct WrenchCommand {
 /// [`WrenchCommand::flags`]: paused.
 pub const WRENCH_PAUSED: u16 = 1;
 
-wire_struct!(WrenchCommand { time_ns, input_index, wrench, flags });
+wire_struct!(WrenchCommand {
+    time_ns,
+    input_index,
+    wrench,
+    flags
+});

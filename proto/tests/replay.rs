@@ -17,7 +17,19 @@ fn a_number_counts_once() {
     assert_eq!(window.check(2_001), Freshness::Newest);
 }
 
+#[test]
+fn the_oldest_numbers_are_remembered_while_the_newest_word_is_half_full() {
+    let mut window = ReplayWindow::default();
+    for number in 0..WINDOW {
+        window.mark(number);
+    }
+    window.mark(WINDOW); // begins a new word; 1 .. 63 share their place with it, were there no word to spare
+    assert_eq!(window.check(63), Freshness::Duplicate);
+}
+
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn the_window_agrees_with_a_set(steps in prop::collection::vec((0_u64..3_000, prop::bool::ANY), 1..400)) {
         let mut window = ReplayWindow::default();

@@ -2,11 +2,13 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, HotState, InputSample, Kind, Payload, PoseF64,
+    ArrayVec, DecodeError, HotState, InputSample, Kind, Payload, PoseF32, PoseF64,
     header::{HEADER_BYTES, MAX_DATAGRAM_BYTES},
     seal::{DatagramBuffer, OpenError, Opener, Sealer},
-    state::{BodyState, ContactState, EventRecord, HeadState, MAX_BODIES, MAX_CONTACTS, MAX_EVENTS, MAX_TOOLS, RunState, ToolState},
-    DecodeError, PoseF32,
+    state::{
+        BodyState, ContactState, EventRecord, HeadState, MAX_BODIES, MAX_CONTACTS, MAX_EVENTS,
+        MAX_TOOLS, RunState, ToolState,
+    },
 };
 
 const MATERIAL: [u8; 28] = [0x5a; 28];
@@ -14,7 +16,10 @@ const EPOCH: u32 = 77;
 const SENDER: u16 = 3;
 
 fn pair() -> (Sealer, Opener) {
-    (Sealer::new(&MATERIAL, EPOCH, SENDER), Opener::new(&MATERIAL, EPOCH, SENDER))
+    (
+        Sealer::new(&MATERIAL, EPOCH, SENDER),
+        Opener::new(&MATERIAL, EPOCH, SENDER),
+    )
 }
 
 fn buffer() -> DatagramBuffer {
@@ -49,9 +54,29 @@ fn fullest() -> HotState {
         constraint_age_us: u32::MAX,
         head: HeadState::default(),
         tools: ArrayVec::from([ToolState::default(); MAX_TOOLS]),
-        bodies: ArrayVec::from([BodyState { id: 1, flags: 0, pose: PoseF32::IDENTITY }; MAX_BODIES]),
-        contacts: ArrayVec::from([ContactState { pair: [0, 1], point: [0.0; 3], normal: [0.0, 0.0, 1.0], force: 1.0, gap: 0.0 }; MAX_CONTACTS]),
-        events: ArrayVec::from([EventRecord { id: 1, tick: 2, code: 3 }; MAX_EVENTS]),
+        bodies: ArrayVec::from(
+            [BodyState {
+                id: 1,
+                flags: 0,
+                pose: PoseF32::IDENTITY,
+            }; MAX_BODIES],
+        ),
+        contacts: ArrayVec::from(
+            [ContactState {
+                pair: [0, 1],
+                point: [0.0; 3],
+                normal: [0.0, 0.0, 1.0],
+                force: 1.0,
+                gap: 0.0,
+            }; MAX_CONTACTS],
+        ),
+        events: ArrayVec::from(
+            [EventRecord {
+                id: 1,
+                tick: 2,
+                code: 3,
+            }; MAX_EVENTS],
+        ),
     }
 }
 
@@ -62,7 +87,9 @@ fn the_fullest_state_fits_a_quic_datagram_at_the_smallest_mtu() {
     let datagram = sealed(&sealer, &Payload::Hot(state.clone()));
     assert_eq!(datagram.len(), 1036);
     assert!(datagram.len() <= MAX_DATAGRAM_BYTES);
-    let opened = opener.open(&datagram).unwrap_or_else(|error| panic!("{error}"));
+    let opened = opener
+        .open(&datagram)
+        .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(opened.payload, Payload::Hot(state.clone()));
     assert_eq!(Ok(opened.state_hash), state.hash());
 }
@@ -79,7 +106,11 @@ fn a_datagram_opens_once() {
 fn sequence_numbers_grow_and_gaps_can_be_seen() {
     let (sealer, mut opener) = pair();
     let datagrams: Vec<_> = (0..4).map(|index| sealed(&sealer, &input(index))).collect();
-    let mut open = |at: usize| opener.open(&datagrams[at]).map(|opened| (opened.header.sequence, opened.expected));
+    let mut open = |at: usize| {
+        opener
+            .open(&datagrams[at])
+            .map(|opened| (opened.header.sequence, opened.expected))
+    };
     assert_eq!(open(0), Ok((0, 0)));
     assert_eq!(open(3), Ok((3, 1)), "two are missing");
     assert_eq!(open(2), Ok((2, 4)), "one comes late");
@@ -100,7 +131,10 @@ fn every_flipped_bit_and_every_truncation_is_refused() {
     let mut longer = datagram.clone();
     longer.push(0);
     assert!(opener.open(&longer).is_err());
-    assert!(opener.open(&datagram).is_ok(), "and the forgeries did not use up its number");
+    assert!(
+        opener.open(&datagram).is_ok(),
+        "and the forgeries did not use up its number"
+    );
 }
 
 #[test]
@@ -125,7 +159,10 @@ fn another_version_is_named() {
     let (sealer, mut opener) = pair();
     let mut datagram = sealed(&sealer, &input(1));
     datagram[2] = 9;
-    let wrong = DecodeError::WrongVersion { theirs: 9, ours: taut_proto::PROTOCOL_VERSION };
+    let wrong = DecodeError::WrongVersion {
+        theirs: 9,
+        ours: taut_proto::PROTOCOL_VERSION,
+    };
     assert_eq!(opener.open(&datagram), Err(OpenError::Header(wrong)));
 }
 
@@ -133,8 +170,13 @@ fn another_version_is_named() {
 fn a_good_seal_on_nonsense_is_an_error_of_the_payload() {
     let (sealer, mut opener) = pair();
     let mut buffer = buffer();
-    let datagram = sealer.seal_bytes(Kind::Input, &[0xff; 3], &mut buffer).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(opener.open(datagram), Err(OpenError::Payload(DecodeError::Truncated)));
+    let datagram = sealer
+        .seal_bytes(Kind::Input, &[0xff; 3], &mut buffer)
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(
+        opener.open(datagram),
+        Err(OpenError::Payload(DecodeError::Truncated))
+    );
 }
 
 #[test]
@@ -142,11 +184,19 @@ fn the_payload_is_not_readable_on_the_way() {
     let (sealer, _) = pair();
     let mut buffer = buffer();
     let secret = [0x42; 64];
-    let datagram = sealer.seal_bytes(Kind::Hot, &secret, &mut buffer).unwrap_or_else(|error| panic!("{error}"));
-    assert!(!datagram[HEADER_BYTES..].windows(4).any(|window| window == [0x42; 4]));
+    let datagram = sealer
+        .seal_bytes(Kind::Hot, &secret, &mut buffer)
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert!(
+        !datagram[HEADER_BYTES..]
+            .windows(4)
+            .any(|window| window == [0x42; 4])
+    );
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn arbitrary_bytes_are_refused_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..1400)) {
         let (_, mut opener) = pair();

@@ -1,4 +1,4 @@
-// The far surroundings, drawn first over the whole view.
+// The far surroundings, drawn where no body is.
 
 struct Fragment {
     @builtin(position) clip: vec4<f32>,

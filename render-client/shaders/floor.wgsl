@@ -34,7 +34,7 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let line = max(0.35 * lines(place, 0.2 * frame.grid.x, 0.0), lines(place, frame.grid.x, 0.02 * frame.grid.x));
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
-    let light = surface_light(in.position, normal, colour, vec2(0.02, 20.0));
+    let light = MATT_SHARE * colour * falling_light(in.position, normal).rgb;
     let alpha = 1.0 - smoothstep(0.35, 1.0, from_middle);
     return vec4(shown(light), alpha);
 }

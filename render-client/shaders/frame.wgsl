@@ -15,13 +15,14 @@ struct Frame {
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
 
-const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.60;
+const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.75;
 const FILL_COLOUR = vec3<f32>(0.62, 0.76, 1.0) * 0.26;
 const FILL_DIRECTION = vec3<f32>(0.80, -0.52, 0.30); // unit, to the light: low, from the right
 const SKY_COLOUR = vec3<f32>(0.44, 0.52, 0.64) * 0.55;
+const MATT_SHARE = 0.80;         // of the light, the rest goes into the shine
 const GROUND_COLOUR = vec3<f32>(0.30, 0.27, 0.25) * 0.40;
 
-// Share of the key light that reaches a point: 3 x 3 samples, each filtered over 2 x 2 texels.
+// Share of the key light that reaches a point: 2 x 2 samples, each filtered over 2 x 2 texels.
 fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
     let off_surface = position + normal * (1.6 * frame.key.w);
     let clip = frame.shadow_from_workbench * vec4(off_surface, 1.0);
@@ -31,39 +32,51 @@ fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
     }
     let texel = 1.0 / f32(textureDimensions(shadow_map).x);
     var lit = 0.0;
-    for (var y = -1; y <= 1; y++) {
-        for (var x = -1; x <= 1; x++) {
-            let tap = place + vec2(f32(x), f32(y)) * (1.4 * texel);
-            lit += textureSampleCompareLevel(shadow_map, shadow_sampler, tap, clip.z);
-        }
+    for (var i = 0; i < 4; i++) {
+        let corner = vec2(f32(i & 1), f32(i >> 1u)) - 0.5;
+        lit += textureSampleCompareLevel(shadow_map, shadow_sampler, place + corner * (1.6 * texel), clip.z);
     }
-    return lit / 9.0;
+    return 0.25 * lit;
 }
 
-fn ambient(normal: vec3<f32>) -> vec3<f32> {
-    return mix(GROUND_COLOUR, SKY_COLOUR, 0.5 + 0.5 * normal.z);
+// Light from all around: less of it near the floor, which hides half of the surroundings.
+fn ambient(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+    let height = (position.z - frame.floor.z) / (0.28 * frame.floor.w);
+    let open = mix(0.55, 1.0, smoothstep(0.0, 1.0, height + 0.5 * max(normal.z, 0.0)));
+    return open * mix(GROUND_COLOUR, SKY_COLOUR, 0.5 + 0.5 * normal.z);
+}
+
+// The key light is strongest over the middle of the scene.
+fn key_pool(position: vec3<f32>) -> f32 {
+    let away = distance(position.xy, frame.floor.xy) / frame.floor.w;
+    return mix(0.25, 1.0, 1.0 - smoothstep(0.12, 0.85, away));
+}
+
+// Light that falls on a surface; its share of the key light, for the highlight, in w.
+fn falling_light(position: vec3<f32>, normal: vec3<f32>) -> vec4<f32> {
+    let to_key = dot(normal, frame.key.xyz);
+    let key_share = lit_by_key(position, normal) * smoothstep(0.0, 0.12, to_key) * key_pool(position);
+    let light = ambient(position, normal)
+        + KEY_COLOUR * (key_share * max(to_key, 0.0))
+        + FILL_COLOUR * max(dot(normal, FILL_DIRECTION), 0.0);
+    return vec4(light, key_share);
 }
 
 // Light leaving a surface towards the eye. `gloss`: x strength, y exponent of the highlight.
 fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, gloss: vec2<f32>) -> vec3<f32> {
     let to_eye = normalize(frame.eye.xyz - position);
-    let key = frame.key.xyz;
-    let key_share = lit_by_key(position, normal) * smoothstep(0.0, 0.12, dot(normal, key));
-    let diffuse = ambient(normal)
-        + KEY_COLOUR * (key_share * max(dot(normal, key), 0.0))
-        + FILL_COLOUR * max(dot(normal, FILL_DIRECTION), 0.0);
-
-    let facing = max(dot(normal, to_eye), 0.0);
-    let rim = pow(1.0 - facing, 4.0);
-    let highlight = pow(max(dot(normal, normalize(key + to_eye)), 0.0), gloss.y);
-    let shine = KEY_COLOUR * (key_share * highlight) + SKY_COLOUR * (0.9 * rim);
-    return colour * diffuse * 0.80 + gloss.x * shine;
+    let falling = falling_light(position, normal);
+    let away = 1.0 - max(dot(normal, to_eye), 0.0);
+    let rim = away * away * away * away;
+    let highlight = pow(max(dot(normal, normalize(frame.key.xyz + to_eye)), 0.0), gloss.y);
+    let shine = KEY_COLOUR * (falling.w * highlight) + SKY_COLOUR * (0.9 * rim);
+    return MATT_SHARE * colour * falling.rgb + gloss.x * shine;
 }
 
 // Keeps bright parts from clipping and their hue from turning: about linear below 0.6.
 fn tone(light: vec3<f32>) -> vec3<f32> {
     let peak = max(max(light.r, light.g), max(light.b, 1e-4));
-    let kept = peak / pow(1.0 + peak * peak * peak, 1.0 / 3.0);
+    let kept = peak / sqrt(sqrt(1.0 + peak * peak * peak * peak));
     return mix(light / peak, vec3(1.0), 0.6 * smoothstep(1.2, 4.0, peak)) * kept;
 }
 

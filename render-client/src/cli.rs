@@ -17,8 +17,12 @@ use crate::stereo::Stereo;
 use crate::timeline::Timeline;
 use crate::{headless, window};
 
-/// Frames per second without a window: enough to follow, and cheap in software.
+/// Frames per second without a window.
 const HEADLESS_FPS: f64 = 20.0;
+
+/// The same where the processor draws, which the haptic loops may need: a frame of two eyes takes
+/// it about 30 ms.
+const SOFTWARE_FPS: f64 = 10.0;
 
 /// Frames per second in a window, at most; the monitor may take fewer.
 const WINDOW_FPS: f64 = 120.0;
@@ -53,7 +57,7 @@ pub struct RenderArgs {
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     pub duration: Option<f64>,
-    /// Most frames per second [default: 20 off-screen, 120 in windows].
+    /// Most frames per second [default: 20 off-screen, 120 in windows; 10 without a graphics card].
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
     /// Draw these too, whatever the server says.
@@ -68,6 +72,9 @@ pub struct RenderArgs {
     /// Height of a view in pixels.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub height: Option<u32>,
+    /// Which monitor the first full-screen window covers, from 0; further windows take the next.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub monitor: usize,
     /// Draw the world of this many milliseconds ago, so that late states can be interpolated.
     #[arg(long, value_name = "MS", default_value_t = 2.0)]
     pub delay_ms: f64,
@@ -116,17 +123,33 @@ pub enum StereoArg {
 /// because it owns one.
 pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let delay_ns = (1e6 * within("--delay-ms", args.delay_ms, 0.0, MAX_DELAY_MS)?) as u64;
-    let default_fps = if args.headless { HEADLESS_FPS } else { WINDOW_FPS };
-    let fps = within("--fps", args.fps.unwrap_or(default_fps), 0.01, 1000.0)?;
-    let frame_time = Duration::from_secs_f64(1.0 / fps);
+    let fps = args
+        .fps
+        .map(|fps| within("--fps", fps, 0.01, 1000.0))
+        .transpose()?;
     let longest = 1e9;
-    let duration = args.duration.map(|s| within("--duration", s, 0.0, longest)).transpose()?;
+    let duration = args
+        .duration
+        .map(|s| within("--duration", s, 0.0, longest))
+        .transpose()?;
     let duration = duration.map(Duration::from_secs_f64);
 
     // Without an adapter there is no use in joining the server.
-    let gpu = if args.headless { Some(Gpu::open()?) } else { None };
+    let gpu = if args.headless {
+        Some(Gpu::open()?)
+    } else {
+        None
+    };
+    let default_fps = match &gpu {
+        None => WINDOW_FPS,
+        Some(gpu) if gpu.is_software() => SOFTWARE_FPS,
+        Some(_) => HEADLESS_FPS,
+    };
+    let fps = fps.unwrap_or(default_fps);
+    let frame_time = Duration::from_secs_f64(1.0 / fps);
     let key = read_key_file(&args.key)?;
-    let mut options = ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
+    let mut options =
+        ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
     options.transport = args.transport.into();
     let mut session = Session::join(options)?;
     let overrides = Overrides {
@@ -150,14 +173,25 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             out: args.out.clone().map(|folder| (folder, args.node.clone())),
             show,
         };
-        headless::run(&mut session, &mut canvas, &mut timeline, &mut statistics, &plan)
-            .map(|ended| (ended, adapter))
+        headless::run(
+            &mut session,
+            &mut canvas,
+            &mut timeline,
+            &mut statistics,
+            &plan,
+        )
+        .map(|ended| (ended, adapter))
     } else {
         let plan = window::Plan {
             frames: args.frames,
             duration,
             frame_time,
+            software_frame_time: match args.fps {
+                Some(_) => frame_time,
+                None => Duration::from_secs_f64(1.0 / SOFTWARE_FPS),
+            },
             fullscreen: session.fullscreen(),
+            monitor: args.monitor,
             show,
         };
         window::run(&mut session, stage, &mut timeline, &mut statistics, plan)
@@ -243,7 +277,15 @@ mod tests {
     }
 
     fn parse(rest: &[&str]) -> Result<RenderArgs, clap::Error> {
-        let always = ["taut-render", "--server", "h:1", "--node", "n", "--key", "k"];
+        let always = [
+            "taut-render",
+            "--server",
+            "h:1",
+            "--node",
+            "n",
+            "--key",
+            "k",
+        ];
         Line::try_parse_from(always.iter().chain(rest)).map(|line| line.args)
     }
 
@@ -262,7 +304,12 @@ mod tests {
 
     #[test]
     fn numbers_that_make_no_sense_are_refused_by_the_option_s_name() {
-        for (option, value) in [("--fps", "0"), ("--fps", "NaN"), ("--delay-ms", "-1"), ("--duration", "inf")] {
+        for (option, value) in [
+            ("--fps", "0"),
+            ("--fps", "NaN"),
+            ("--delay-ms", "-1"),
+            ("--duration", "inf"),
+        ] {
             let args = parse(&[&format!("{option}={value}"), "--headless"]).expect("a number");
             let error = run(args).expect_err("out of range").to_string();
             assert!(error.starts_with(option), "{error}");

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use nalgebra::{Point3, Similarity3};
-use taut_proto::scene::{BodyDescription, NodeDescription, ScreenDescription, SceneDescription};
+use taut_proto::scene::{BodyDescription, NodeDescription, SceneDescription, ScreenDescription};
 use taut_proto::{MeshBlob, PoseF64, scene};
 
 use crate::error::RenderError;
 use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
 use crate::stereo::Stereo;
-use crate::view::Screen;
+use crate::view::{ClipPlanes, Screen};
 
 /// Id of the god-object among the bodies; obstacles are numbered from 0.
 const GOD_OBJECT_ID: u16 = u16::MAX;
@@ -37,7 +37,11 @@ pub(crate) fn find_node<'a>(
         node: node.to_owned(),
         known: match description.nodes.as_slice() {
             [] => "none".to_owned(),
-            nodes => nodes.iter().map(|n| n.name.as_str()).collect::<Vec<_>>().join(", "),
+            nodes => nodes
+                .iter()
+                .map(|n| n.name.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
         },
     })
 }
@@ -51,11 +55,22 @@ pub(crate) fn stage(
 ) -> Result<Stage, RenderError> {
     let bad = |what: String| RenderError::BadScene { what };
     let pose = |pose: &PoseF64, whose: &str| {
-        pose.to_isometry().ok_or_else(|| bad(format!("the pose of {whose} is not a rigid motion")))
+        pose.to_isometry()
+            .ok_or_else(|| bad(format!("the pose of {whose} is not a rigid motion")))
     };
     let positive = description.display_scale.is_finite() && description.display_scale > 0.0;
     if !positive {
-        return Err(bad(format!("its display_scale is {}", description.display_scale)));
+        return Err(bad(format!(
+            "its display_scale is {}",
+            description.display_scale
+        )));
+    }
+    let (near, far) = (description.near, description.far);
+    let in_order = 0.0 < near && near < far && far.is_finite();
+    if !in_order {
+        return Err(bad(format!(
+            "it is to be cut off at {near} m and {far} m from the eye"
+        )));
     }
     let origin = pose(&description.scene_origin, "the scene on the workbench")?;
     let body = |id, mesh, described: &BodyDescription| -> Result<StageBody, RenderError> {
@@ -70,7 +85,10 @@ pub(crate) fn stage(
     };
     let obstacle = |(index, described)| body(index as u16, index + 1, described);
     let screens = node.screens.iter().map(|name| {
-        let found = description.screens.iter().find(|screen| screen.name == *name);
+        let found = description
+            .screens
+            .iter()
+            .find(|screen| screen.name == *name);
         let described = found.ok_or_else(|| RenderError::UnknownScreen {
             node: node.name.clone(),
             screen: name.clone(),
@@ -81,11 +99,20 @@ pub(crate) fn stage(
         screens: screens.collect::<Result<_, _>>()?,
         head: pose(&description.viewer, "the viewer")?,
         eye_separation: description.eye_separation,
+        clip_planes: ClipPlanes {
+            near: description.near,
+            far: description.far,
+        },
         workbench_from_scene: Similarity3::from_isometry(origin, description.display_scale),
         meshes: meshes.iter().map(|blob| Arc::new(mesh_of(blob))).collect(),
         god_object: body(GOD_OBJECT_ID, 0, &description.god_object)?,
         reference_point: Point3::from(description.reference_point),
-        obstacles: description.obstacles.iter().enumerate().map(obstacle).collect::<Result<_, _>>()?,
+        obstacles: description
+            .obstacles
+            .iter()
+            .enumerate()
+            .map(obstacle)
+            .collect::<Result<_, _>>()?,
     })
 }
 
@@ -103,8 +130,12 @@ fn stage_screen(
     node: &NodeDescription,
     overrides: &Overrides,
 ) -> Result<StageScreen, RenderError> {
-    let [lower_left, lower_right, upper_left] =
-        [described.lower_left, described.lower_right, described.upper_left].map(Point3::from);
+    let [lower_left, lower_right, upper_left] = [
+        described.lower_left,
+        described.lower_right,
+        described.upper_left,
+    ]
+    .map(Point3::from);
     let screen = Screen::from_corners(lower_left, lower_right, upper_left).map_err(|source| {
         RenderError::BadScreen {
             screen: described.name.clone(),
@@ -145,4 +176,3 @@ fn mesh_of(blob: &MeshBlob) -> TriangleMesh {
         triangles: blob.triangles().to_vec(),
     }
 }
-

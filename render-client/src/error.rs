@@ -17,7 +17,9 @@ pub enum RenderError {
     )]
     NoGpu,
     /// There is an adapter, and it does not work.
-    #[error("the graphics adapter {adapter} cannot be used: {reason}; update its driver, or take another with WGPU_ADAPTER_NAME")]
+    #[error(
+        "the graphics adapter {adapter} cannot be used: {reason}; update its driver, or take another with WGPU_ADAPTER_NAME"
+    )]
     Gpu {
         /// Name of the adapter.
         adapter: String,
@@ -25,7 +27,9 @@ pub enum RenderError {
         reason: String,
     },
     /// Windows were asked for where there is no display.
-    #[error("no display can be opened ({reason}); set DISPLAY or WAYLAND_DISPLAY, or draw off-screen with --headless")]
+    #[error(
+        "no display can be opened ({reason}); set DISPLAY or WAYLAND_DISPLAY, or draw off-screen with --headless"
+    )]
     NoDisplay {
         /// What the window system said.
         reason: String,
@@ -42,7 +46,9 @@ pub enum RenderError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The server was there and is not any more.
-    #[error("the server {server} was lost: {reason}; see whether it still runs, then start this node again")]
+    #[error(
+        "the server {server} was lost: {reason}; see whether it still runs, then start this node again"
+    )]
     ServerLost {
         /// Its address.
         server: String,
@@ -50,7 +56,9 @@ pub enum RenderError {
         reason: String,
     },
     /// The workbench file has no such node.
-    #[error("the workbench has no render node named \"{node}\"; it has {known}: give one of them with --node")]
+    #[error(
+        "the workbench has no render node named \"{node}\"; it has {known}: give one of them with --node"
+    )]
     UnknownNode {
         /// The name given.
         node: String,
@@ -58,7 +66,9 @@ pub enum RenderError {
         known: String,
     },
     /// A node names a screen that the workbench has not.
-    #[error("render node {node} is to draw the screen \"{screen}\", which the workbench has not; correct the workbench file on the server")]
+    #[error(
+        "render node {node} is to draw the screen \"{screen}\", which the workbench has not; correct the workbench file on the server"
+    )]
     UnknownScreen {
         /// The node.
         node: String,
@@ -66,7 +76,9 @@ pub enum RenderError {
         screen: String,
     },
     /// A screen cannot be drawn on.
-    #[error("the screen \"{screen}\" cannot be drawn on: {source}; correct the workbench file on the server")]
+    #[error(
+        "the screen \"{screen}\" cannot be drawn on: {source}; correct the workbench file on the server"
+    )]
     BadScreen {
         /// Its name.
         screen: String,
@@ -74,7 +86,9 @@ pub enum RenderError {
         source: ScreenError,
     },
     /// The scene's description has a value that cannot be drawn.
-    #[error("the server's scene cannot be drawn: {what}; correct the scene or workbench file on the server")]
+    #[error(
+        "the server's scene cannot be drawn: {what}; correct the scene or workbench file on the server"
+    )]
     BadScene {
         /// What is wrong.
         what: String,

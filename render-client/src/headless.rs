@@ -50,7 +50,10 @@ pub(crate) fn run(
             Some(Ending::Lost(reason)) => return Err(session.lost(reason)),
             None => {}
         }
-        if plan.duration.is_some_and(|duration| start.elapsed() >= duration) {
+        if plan
+            .duration
+            .is_some_and(|duration| start.elapsed() >= duration)
+        {
             return Ok(Ended::Duration);
         }
         if let Some(stats) = statistics.report(false) {
@@ -69,7 +72,10 @@ pub(crate) fn run(
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched.state, latched.stale, taken_ns, drawn_ns);
                 write_pictures(canvas, plan, statistics.frames)?;
-                if plan.frames.is_some_and(|frames| statistics.frames >= frames) {
+                if plan
+                    .frames
+                    .is_some_and(|frames| statistics.frames >= frames)
+                {
                     return Ok(Ended::Frames);
                 }
             }
@@ -78,7 +84,11 @@ pub(crate) fn run(
         }
         let left = next_frame.saturating_duration_since(Instant::now());
         // Nothing to draw yet: look again soon, but not at once.
-        let rest = if left.is_zero() { Duration::from_millis(2) } else { left };
+        let rest = if left.is_zero() {
+            Duration::from_millis(2)
+        } else {
+            left
+        };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
     }
 }
@@ -101,7 +111,9 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
 /// A file name without characters that a file system or a shell might take for something else.
 fn plain(name: &str) -> String {
     let keep = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
-    name.chars().map(|c| if keep(c) { c } else { '_' }).collect()
+    name.chars()
+        .map(|c| if keep(c) { c } else { '_' })
+        .collect()
 }
 
 #[cfg(test)]
@@ -110,6 +122,9 @@ mod tests {
 
     #[test]
     fn a_picture_stays_in_its_folder_whatever_its_screen_is_called() {
-        assert_eq!(plain("left-../../wall 1-00001.png"), "left-.._.._wall_1-00001.png");
+        assert_eq!(
+            plain("left-../../wall 1-00001.png"),
+            "left-.._.._wall_1-00001.png"
+        );
     }
 }

@@ -9,7 +9,10 @@ use tracing_subscriber::EnvFilter;
 
 /// Draws one node of a taut workbench.
 #[derive(Parser)]
-#[command(version, after_help = "Example: taut-render --server haptic-pc:4857 --node wall --key cluster.key")]
+#[command(
+    version,
+    after_help = "Example: taut-render --server haptic-pc:4857 --node wall --key cluster.key"
+)]
 struct CommandLine {
     #[command(flatten)]
     args: RenderArgs,
@@ -19,7 +22,10 @@ fn main() -> ExitCode {
     let command_line = CommandLine::parse();
     let filter = EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| EnvFilter::new("warn,taut_render=info"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .init();
     match run(command_line.args) {
         Ok(report) => {
             println!("{report}");

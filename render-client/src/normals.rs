@@ -63,10 +63,17 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
                 .filter(|(face, _)| faces[*face as usize].dot(own) >= smooth)
                 .map(|(face, weight)| faces[*face as usize] * *weight)
                 .sum::<Vector3<f32>>();
-            let normal: [f32; 3] = if sum.norm_squared() > 0.0 { direction(sum) } else { *own }.into();
+            let normal: [f32; 3] = if sum.norm_squared() > 0.0 {
+                direction(sum)
+            } else {
+                *own
+            }
+            .into();
             let key = (place, normal.map(f32::to_bits));
             let index = *places.entry(key).or_insert_with(|| {
-                shaded.vertices.push((mesh.vertices[place as usize], normal));
+                shaded
+                    .vertices
+                    .push((mesh.vertices[place as usize], normal));
                 (shaded.vertices.len() - 1) as u32
             });
             shaded.indices.push(index);
@@ -123,8 +130,15 @@ mod tests {
     fn repeated_vertices_are_smoothed_like_shared_ones() {
         let mesh = shapes::sphere(1.0, 16);
         let loose = TriangleMesh {
-            vertices: mesh.triangles.iter().flatten().map(|&i| mesh.vertices[i as usize]).collect(),
-            triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            vertices: mesh
+                .triangles
+                .iter()
+                .flatten()
+                .map(|&i| mesh.vertices[i as usize])
+                .collect(),
+            triangles: (0..mesh.triangles.len() as u32)
+                .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+                .collect(),
         };
         for (position, normal) in &shade(&loose).vertices {
             assert!(Vector3::from(*position).dot(&Vector3::from(*normal)) > 0.99);

@@ -77,13 +77,18 @@ impl Session {
 
     /// Whether the scene's window is to cover its monitor.
     pub(crate) fn fullscreen(&self) -> bool {
-        description::find_node(self.link.description(), &self.node).is_ok_and(|node| node.window.fullscreen)
+        description::find_node(self.link.description(), &self.node)
+            .is_ok_and(|node| node.window.fullscreen)
     }
 
     /// Moves the states that have arrived to the timeline.
     pub(crate) fn take_states(&mut self, timeline: &mut Timeline) {
         self.link.drain_states(&mut self.received);
-        for state in self.received.drain(..).filter_map(|received| read_state(&received)) {
+        for state in self
+            .received
+            .drain(..)
+            .filter_map(|received| read_state(&received))
+        {
             timeline.push(state);
         }
     }
@@ -98,7 +103,10 @@ impl Session {
         let counters = self.link.counters();
         stats.packets_lost = counters.lost;
         stats.packets_received = counters.states;
-        stats.clock_uncertainty_ns = self.link.session_now().map_or(0, |time| time.uncertainty_ns);
+        stats.clock_uncertainty_ns = self
+            .link
+            .session_now()
+            .map_or(0, |time| time.uncertainty_ns);
         if !self.link.post_stats(stats) {
             tracing::debug!("a report was not sent");
         }
@@ -118,7 +126,11 @@ impl Session {
     /// Why the session is over, if it is.
     pub(crate) fn ending(&self) -> Option<Ending> {
         let reason = self.link.is_closed()?;
-        Some(if reason.contains(STOP_REASON) { Ending::Told } else { Ending::Lost(reason) })
+        Some(if reason.contains(STOP_REASON) {
+            Ending::Told
+        } else {
+            Ending::Lost(reason)
+        })
     }
 
     /// The error that says that the server was lost.
@@ -170,7 +182,10 @@ fn watch_signals(
 fn read_state(received: &ReceivedState) -> Option<State> {
     let hot = &received.state;
     let tool = hot.tools.first()?;
-    let bodies = hot.bodies.iter().map(|body| Some((body.id, body.pose.to_isometry()?)));
+    let bodies = hot
+        .bodies
+        .iter()
+        .map(|body| Some((body.id, body.pose.to_isometry()?)));
     let tracked = hot.head.flags & HEAD_TRACKED != 0;
     let head = || {
         Some(Head {

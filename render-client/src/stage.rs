@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Similarity3};
 
 use crate::stereo::Stereo;
-use crate::view::Screen;
+use crate::view::{ClipPlanes, Screen};
 
 /// Everything that stays the same over a session.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub struct Stage {
     pub head: Isometry3<f64>,
     /// Distance between the viewer's eyes, in metres.
     pub eye_separation: f64,
+    /// What is nearer to the eye or farther from it than these is not drawn.
+    pub clip_planes: ClipPlanes,
     /// Places the scene on the workbench.
     pub workbench_from_scene: Similarity3<f64>,
     /// Meshes, each named by its place in this list.

@@ -223,7 +223,13 @@ mod tests {
         assert!((taken.max - 3.0).abs() < 0.01 && (drawn.max - 13.0).abs() < 0.02);
         let report = statistics.report(true).expect("asked for");
         assert_eq!(report.frames, 1);
-        assert_eq!(report.drawn, [DrawnState { tick: 1_000_000, state_hash: 7 }]);
+        assert_eq!(
+            report.drawn,
+            [DrawnState {
+                tick: 1_000_000,
+                state_hash: 7
+            }]
+        );
         assert!((report.pose_age_ms_max - 3.0).abs() < 0.01);
     }
 

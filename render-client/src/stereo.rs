@@ -114,7 +114,10 @@ mod tests {
         for mode in ALL {
             let (width, height) = mode.picture_size((480, 320));
             for (_, part) in mode.pictures().iter().flat_map(|p| &p.views) {
-                assert_eq!((part.width * width as f32, part.height * height as f32), (480.0, 320.0));
+                assert_eq!(
+                    (part.width * width as f32, part.height * height as f32),
+                    (480.0, 320.0)
+                );
             }
         }
     }
@@ -123,7 +126,11 @@ mod tests {
     fn every_stereo_mode_shows_each_eye_once() {
         for mode in &ALL[1..] {
             let pictures = mode.pictures();
-            let eyes: Vec<Eye> = pictures.iter().flat_map(|p| &p.views).map(|(eye, _)| *eye).collect();
+            let eyes: Vec<Eye> = pictures
+                .iter()
+                .flat_map(|p| &p.views)
+                .map(|(eye, _)| *eye)
+                .collect();
             assert_eq!(eyes, [Eye::Left, Eye::Right]);
         }
     }

@@ -86,8 +86,13 @@ impl Timeline {
 
     /// Takes a received state in; any order, duplicates and those older than all kept are dropped.
     pub fn push(&mut self, mut state: State) {
-        let after = self.states.partition_point(|kept| kept.time_ns < state.time_ns);
-        let duplicate = self.states.get(after).is_some_and(|kept| kept.time_ns == state.time_ns);
+        let after = self
+            .states
+            .partition_point(|kept| kept.time_ns < state.time_ns);
+        let duplicate = self
+            .states
+            .get(after)
+            .is_some_and(|kept| kept.time_ns == state.time_ns);
         let too_old = after == 0 && !self.states.is_empty();
         if duplicate || too_old {
             return;
@@ -158,7 +163,10 @@ fn interpolate(from: &State, to: &State, time_ns: u64) -> State {
     let fraction = (time_ns - from.time_ns) as f64 / (to.time_ns - from.time_ns) as f64;
     let bodies = from.bodies.iter().map(|(id, pose)| {
         let next = to.bodies.iter().find(|(known, _)| known == id);
-        (*id, next.map_or(*pose, |(_, next)| between(pose, next, fraction)))
+        (
+            *id,
+            next.map_or(*pose, |(_, next)| between(pose, next, fraction)),
+        )
     });
     State {
         time_ns,
@@ -175,7 +183,8 @@ fn interpolate(from: &State, to: &State, time_ns: u64) -> State {
 /// Straight in position, along the shorter arc in rotation.
 fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, fraction: f64) -> Isometry3<f64> {
     // Opposite rotations have no shorter arc: keep the earlier pose rather than fail.
-    from.try_lerp_slerp(to, fraction, f64::EPSILON).unwrap_or(*from)
+    from.try_lerp_slerp(to, fraction, f64::EPSILON)
+        .unwrap_or(*from)
 }
 
 #[cfg(test)]
@@ -207,7 +216,11 @@ mod tests {
         timeline.push(state(11 * MS, 1.0));
         let latched = timeline.latch(12 * MS + MS / 2).expect("a state");
         assert!((latched.state.god_object.translation.x - 0.5).abs() < 1e-12);
-        let turned = latched.state.god_object.rotation.angle_to(&UnitQuaternion::identity());
+        let turned = latched
+            .state
+            .god_object
+            .rotation
+            .angle_to(&UnitQuaternion::identity());
         assert!((turned - 0.5).abs() < 1e-12);
         assert!(!latched.held && !latched.stale);
         assert_eq!(latched.state.time_ns, 10 * MS + MS / 2);
@@ -222,7 +235,9 @@ mod tests {
         let soon = timeline.latch(100 * MS).expect("a state");
         assert_eq!(soon.state, state(11 * MS, 1.0));
         assert!(soon.held && !soon.stale);
-        let late = timeline.latch(11 * MS + STALE_AFTER_NS + 1).expect("a state");
+        let late = timeline
+            .latch(11 * MS + STALE_AFTER_NS + 1)
+            .expect("a state");
         assert_eq!(late.state, state(11 * MS, 1.0));
         assert!(late.held && late.stale);
     }

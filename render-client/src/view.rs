@@ -330,7 +330,8 @@ mod tests {
 
     #[test]
     fn eyes_lie_on_the_x_axis_of_a_turned_head() {
-        let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        let quarter =
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
         let head = Isometry3::from_parts(Translation3::new(1.0, 2.0, 3.0), quarter);
         let eyes = Eyes::of_head(&head, 0.06);
         assert!((eyes.left - Point3::new(1.0, 1.97, 3.0)).norm() < ROUNDING);

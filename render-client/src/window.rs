@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
-use winit::dpi::PhysicalSize;
+use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
@@ -28,7 +28,11 @@ pub(crate) struct Plan {
     pub(crate) frames: Option<u64>,
     pub(crate) duration: Option<Duration>,
     pub(crate) frame_time: Duration,
+    /// Least time between frames where the processor draws.
+    pub(crate) software_frame_time: Duration,
     pub(crate) fullscreen: bool,
+    /// The monitor of the first window; the others follow.
+    pub(crate) monitor: usize,
     pub(crate) show: Show,
 }
 
@@ -58,7 +62,9 @@ pub(crate) fn run(
         result: None,
     };
     events.run_app(&mut app).map_err(no_display)?;
-    let adapter = app.screen.map_or_else(String::new, |screen| screen.gpu.summary().to_string());
+    let adapter = app
+        .screen
+        .map_or_else(String::new, |screen| screen.gpu.summary().to_string());
     match app.result {
         Some(Ok(ended)) => Ok((ended, adapter)),
         Some(Err(error)) => Err(error),
@@ -105,8 +111,14 @@ impl ApplicationHandler for App<'_> {
         if self.screen.is_some() {
             return;
         }
-        match Display::open(events, &self.stage, self.plan.fullscreen) {
-            Ok(screen) => self.screen = Some(screen),
+        match Display::open(events, &self.stage, &self.plan) {
+            Ok(screen) => {
+                if screen.gpu.is_software() {
+                    let slower = self.plan.software_frame_time;
+                    self.plan.frame_time = self.plan.frame_time.max(slower);
+                }
+                self.screen = Some(screen);
+            }
             Err(error) => self.end(events, Err(error)),
         }
     }
@@ -176,7 +188,11 @@ impl App<'_> {
             Some(Ending::Lost(reason)) => return Err(self.session.lost(reason)),
             None => {}
         }
-        if self.plan.duration.is_some_and(|duration| self.start.elapsed() >= duration) {
+        if self
+            .plan
+            .duration
+            .is_some_and(|duration| self.start.elapsed() >= duration)
+        {
             return Ok(Some(Ended::Duration));
         }
         if let Some(stats) = self.statistics.report(false) {
@@ -191,7 +207,8 @@ impl App<'_> {
         let Some(taken_ns) = self.session.now_ns() else {
             return Ok(None);
         };
-        let (Some(latched), Some(screen)) = (self.timeline.latch(taken_ns), &mut self.screen) else {
+        let (Some(latched), Some(screen)) = (self.timeline.latch(taken_ns), &mut self.screen)
+        else {
             return Ok(None);
         };
         let drawn = Some((latched.state.time_ns, latched.stale));
@@ -231,27 +248,39 @@ impl App<'_> {
         gpu.finish()?;
         self.last_drawn = drawn;
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
-        self.statistics.frame(&latched.state, latched.stale, taken_ns, drawn_ns);
-        let enough = self.plan.frames.is_some_and(|frames| self.statistics.frames >= frames);
+        self.statistics
+            .frame(&latched.state, latched.stale, taken_ns, drawn_ns);
+        let enough = self
+            .plan
+            .frames
+            .is_some_and(|frames| self.statistics.frames >= frames);
         Ok(enough.then_some(Ended::Frames))
     }
 }
 
 impl Display {
-    fn open(events: &ActiveEventLoop, stage: &Stage, fullscreen: bool) -> Result<Self, RenderError> {
+    fn open(events: &ActiveEventLoop, stage: &Stage, plan: &Plan) -> Result<Self, RenderError> {
         let no_display = |error: &dyn std::fmt::Display| RenderError::NoDisplay {
             reason: error.to_string(),
         };
         let instance = new_instance(Some(events.owned_display_handle()));
         let mut opened = Vec::new();
+        let mut below = 0;
         for (index, screen) in stage.screens.iter().enumerate() {
             for picture in screen.stereo.pictures() {
                 let (width, height) = screen.pixels;
+                // On one monitor the windows stand in a column, the first screen above.
+                let monitor = events.available_monitors().nth(plan.monitor + opened.len());
+                let cover = || Fullscreen::Borderless(monitor);
                 let attributes = Window::default_attributes()
                     .with_title(format!("taut: {}{}", screen.name, picture.suffix))
                     .with_inner_size(PhysicalSize::new(width, height))
-                    .with_fullscreen(fullscreen.then_some(Fullscreen::Borderless(None)));
-                let window = events.create_window(attributes).map_err(|error| no_display(&error))?;
+                    .with_position(PhysicalPosition::new(0, below))
+                    .with_fullscreen(plan.fullscreen.then(cover));
+                below += height;
+                let window = events
+                    .create_window(attributes)
+                    .map_err(|error| no_display(&error))?;
                 let window = Arc::new(window);
                 let surface = instance
                     .create_surface(Arc::clone(&window))
@@ -296,7 +325,10 @@ impl Display {
 
     fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {
         let hidden = size.width == 0 || size.height == 0;
-        let pane = self.panes.iter_mut().find(|pane| pane.window.id() == id && !hidden);
+        let pane = self
+            .panes
+            .iter_mut()
+            .find(|pane| pane.window.id() == id && !hidden);
         if let Some(pane) = pane {
             (pane.config.width, pane.config.height) = (size.width, size.height);
             pane.surface.configure(&self.gpu.device, &pane.config);
@@ -311,12 +343,16 @@ impl Pane {
         match self.surface.get_current_texture() {
             wgpu::CurrentSurfaceTexture::Success(texture) => Ok(Some(texture)),
             wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Ok(Some(texture)),
-            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => Ok(None),
+            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
+                Ok(None)
+            }
             wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
                 self.surface.configure(&gpu.device, &self.config);
                 Ok(None)
             }
-            wgpu::CurrentSurfaceTexture::Validation => Err(gpu.broken(&"the window's surface is invalid")),
+            wgpu::CurrentSurfaceTexture::Validation => {
+                Err(gpu.broken(&"the window's surface is invalid"))
+            }
         }
     }
 }
@@ -333,7 +369,10 @@ fn configuration(
         .get_default_config(&gpu.adapter, width, height)
         .ok_or_else(|| gpu.broken(&"it cannot show pictures in this window"))?;
     let formats = surface.get_capabilities(&gpu.adapter).formats;
-    config.format = formats.into_iter().find(wgpu::TextureFormat::is_srgb).unwrap_or(config.format);
+    config.format = formats
+        .into_iter()
+        .find(wgpu::TextureFormat::is_srgb)
+        .unwrap_or(config.format);
     let drawn = config.format.add_srgb_suffix();
     if drawn != config.format {
         config.view_formats.push(drawn);
@@ -346,7 +385,7 @@ fn configuration(
 fn toggle_fullscreen(window: &Window) {
     let now = match window.fullscreen() {
         Some(_) => None,
-        None => Some(Fullscreen::Borderless(None)),
+        None => Some(Fullscreen::Borderless(window.current_monitor())),
     };
     window.set_fullscreen(now);
 }

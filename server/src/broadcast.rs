@@ -19,9 +19,9 @@ use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 use crate::clock::{SessionClock, nanoseconds};
 use crate::head::Head;
 use crate::loops::shell::run_at_deadlines;
+use crate::loops::wiring::SharedView;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
-use crate::shared::fanout::Subscriber;
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shutdown::Shutdown;
 
@@ -30,11 +30,14 @@ const BUTTONS: u32 = u16::BITS;
 /// The number of a button in an event's code.
 const BUTTON_SHIFT: u32 = 16;
 
+/// The wrenches for a remote device, newest wins.
+pub type BridgeCommands = triple_buffer::Output<WireWrench>;
+
 /// Sends states, and the wrenches of a remote device, until the end is asked for.
 pub fn run(
     mut states: StateWriter,
     mut broadcaster: Broadcaster,
-    mut bridge_commands: Option<triple_buffer::Output<WireWrench>>,
+    mut bridge_commands: Option<BridgeCommands>,
     clock: SessionClock,
     period: Duration,
     shutdown: &Shutdown,
@@ -45,7 +48,7 @@ pub fn run(
         if let Some(commands) = &mut bridge_commands
             && commands.update()
         {
-            broadcaster.send_wrench(commands.peek_output_buffer());
+            broadcaster.send_wrench(commands.output_buffer());
         }
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
@@ -65,9 +68,7 @@ pub fn run(
 /// Reads the shared data and keeps the state that is sent. No allocation.
 #[derive(Debug)]
 pub struct StateWriter {
-    device: Subscriber<DeviceState>,
-    contacts: Subscriber<ContactSnapshot>,
-    wrench: Subscriber<WrenchCommand>,
+    shared: SharedView,
     head: Head,
     reference_point: Point3<f64>,
     scene_revision: u32,
@@ -78,18 +79,9 @@ pub struct StateWriter {
 
 impl StateWriter {
     /// A writer of states of one scene.
-    pub fn new(
-        device: Subscriber<DeviceState>,
-        contacts: Subscriber<ContactSnapshot>,
-        wrench: Subscriber<WrenchCommand>,
-        head: Head,
-        reference_point: &Point3<f64>,
-        scene_revision: u32,
-    ) -> Self {
+    pub fn new(shared: SharedView, head: Head, reference_point: &Point3<f64>, scene_revision: u32) -> Self {
         Self {
-            device,
-            contacts,
-            wrench,
+            shared,
             head,
             reference_point: *reference_point,
             scene_revision,
@@ -101,12 +93,12 @@ impl StateWriter {
 
     /// The state now; `None` while the device has not been sampled since the last one.
     pub fn newest(&mut self, now: Duration) -> Option<&HotState> {
-        if !self.device.refresh() {
+        if !self.shared.device.refresh() {
             return None;
         }
-        let device = self.device.held();
-        let contacts = self.contacts.newest();
-        let wrench = self.wrench.newest();
+        let device = self.shared.device.held();
+        let contacts = self.shared.contacts.newest();
+        let wrench = self.shared.wrench.newest();
         self.motion.follow(contacts, &self.reference_point);
         self.events.follow(device, contacts);
 
@@ -176,7 +168,7 @@ fn nearest_contacts(
 
 fn contact_state(constraint: &NonPenetrationConstraint) -> ContactState {
     ContactState {
-        pair: [0, u16::try_from(constraint.features.obstacle).unwrap_or(u16::MAX)],
+        pair: [0, constraint.features.obstacle],
         point: single(&constraint.point.coords),
         normal: single(&constraint.normal),
         force: 0.0,
@@ -228,7 +220,8 @@ impl EventTrail {
             let code = if touching { event_code::CONTACT_ON } else { event_code::CONTACT_OFF };
             self.push(tick, code);
         }
-        for button in (0..BUTTONS).filter(|button| (device.buttons ^ self.buttons) >> button & 1 == 1) {
+        let changed = device.buttons ^ self.buttons;
+        for button in (0..BUTTONS).filter(|button| changed >> button & 1 == 1) {
             let down = device.buttons >> button & 1 == 1;
             let code = if down { event_code::BUTTON_DOWN } else { event_code::BUTTON_UP };
             self.push(tick, code | button << BUTTON_SHIFT);
@@ -246,5 +239,91 @@ impl EventTrail {
         }
         self.count = self.count.wrapping_add(1);
         self.recent.push(EventRecord { id: self.count, tick, code });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::{contact_snapshot, device_state, wrench_command};
+    use god_object::constraint::{Feature, FeaturePair};
+
+    fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
+        NonPenetrationConstraint {
+            features: FeaturePair {
+                obstacle,
+                on_body: Feature::Vertex(0),
+                on_obstacle: Feature::Face(u32::from(obstacle)),
+            },
+            point: Point3::new(gap, 0.0, 0.0),
+            normal: Vector3::z(),
+            gap,
+            shading_normal: None,
+        }
+    }
+
+    #[test]
+    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let (mut states, state_readers) = device_state::channel(&start);
+        let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
+        let (mut wrenches, wrench_readers) = wrench_command::channel();
+        let head = Head { rest: Pose::translation(0.0, -1.0, 1.0), eye_separation: 0.064, sway: None };
+        let shared = SharedView {
+            device: state_readers.broadcast,
+            contacts: contact_readers.broadcast,
+            wrench: wrench_readers.broadcast,
+        };
+        let mut writer = StateWriter::new(shared, head, &Point3::origin(), 7);
+        assert!(writer.newest(Duration::ZERO).is_none(), "no sample yet");
+
+        let device = DeviceState {
+            sequence: 5,
+            time: Duration::from_millis(5),
+            pose: Pose::translation(0.0, 0.0, 0.05),
+            buttons: 0b10,
+            ..DeviceState::at_start(&start)
+        };
+        states.publish(&device);
+        let mut snapshot = ContactSnapshot::at_start(&start, 32);
+        snapshot.set.constraints.extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
+        snapshot.published = Duration::from_millis(6);
+        snapshot.report.active = 1;
+        contacts.publish(&snapshot);
+        let wrench = WrenchCommand {
+            wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
+            saturated: true,
+            constraint_age: Duration::from_micros(250),
+            ..WrenchCommand::at_start()
+        };
+        wrenches.publish(&wrench);
+
+        let Some(state) = writer.newest(Duration::from_millis(7)) else {
+            panic!("a sample was published");
+        };
+        assert_eq!((state.tick, state.sample_time_ns, state.scene_revision), (5, 5_000_000, 7));
+        assert_eq!((state.run, state.constraint_age_us), (RunState::Running, 250));
+        let tool = &state.tools[0];
+        assert_eq!((tool.device.position[2], tool.god_object.position[2]), (0.05, 0.1));
+        assert_eq!((tool.force[2], tool.torque[0], tool.flags), (3.0, 0.1, TOOL_FORCE_LIMITED));
+        let obstacles: Vec<u16> = state.contacts.iter().map(|contact| contact.pair[1]).collect();
+        assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
+        let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
+        assert_eq!(codes, [event_code::CONTACT_ON, event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT]);
+        assert_eq!(state.head.age_us, -2000);
+        assert!(writer.newest(Duration::from_millis(8)).is_none(), "nothing new");
+
+        // The god-object moves 2 mm in 2 ms.
+        snapshot.set.god_object_pose = Pose::translation(0.0, 0.0, 0.098);
+        snapshot.published = Duration::from_millis(8);
+        contacts.publish(&snapshot);
+        states.publish(&DeviceState { sequence: 6, faulty: true, ..device });
+        let Some(state) = writer.newest(Duration::from_millis(9)) else {
+            panic!("a sample was published");
+        };
+        assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
+        assert_eq!(state.run, RunState::Fault);
+        assert_eq!(state.tools[0].flags & TOOL_DEVICE_SILENT, TOOL_DEVICE_SILENT);
+        assert_eq!(state.events.last().map(|event| event.code), Some(event_code::FAULT));
     }
 }

@@ -134,3 +134,49 @@ fn parry_pose(pose: &Pose) -> math::Pose {
         math::Rotation::from_xyzw(q.x, q.y, q.z, q.w),
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use god_object::nalgebra::Vector3;
+    use taut_scene::Scene;
+
+    fn checker() -> PenetrationChecker {
+        let built = Scene::named_or_file("peg-in-a-hole").and_then(|scene| scene.build());
+        match built.map(|scene| PenetrationChecker::new(&scene.world)) {
+            Ok(Some(checker)) => checker,
+            other => panic!("{:?}", other.err()),
+        }
+    }
+
+    #[test]
+    fn a_peg_fits_into_its_hole_up_to_the_clearance_and_no_further() {
+        // Peg: vertices at 10 mm. Hole: faces at 10.5 mm from its axis.
+        let checker = checker();
+        for turn in 0..16 {
+            let angle = std::f64::consts::TAU * f64::from(turn) / 16.0;
+            let aside = |distance: f64| {
+                let offset = Vector3::new(angle.cos(), 0.0, angle.sin()) * distance;
+                Pose::translation(offset.x, 0.01, offset.z)
+            };
+            assert_eq!(checker.penetrated_obstacle(&aside(0.00049)), None, "turn {turn}");
+            assert_eq!(checker.penetrated_obstacle(&aside(0.00055)), Some("box"), "turn {turn}");
+        }
+    }
+
+    #[test]
+    fn a_flat_rest_a_micrometre_above_the_surface_is_no_penetration() {
+        let checker = checker();
+        // Upright, its cap parallel to the box's top at z = 30 mm; the peg is 30 mm long to either side.
+        let upright = Vector3::x() * std::f64::consts::FRAC_PI_2;
+        for (gap, penetrated) in [(1e-6, None), (1e-5, None), (-1e-6, Some("box"))] {
+            let pose = Pose::new(Vector3::new(0.0, 0.012, 0.06 + gap), upright);
+            assert_eq!(checker.penetrated_obstacle(&pose), penetrated, "gap {gap}");
+        }
+    }
+
+    #[test]
+    fn a_body_far_away_intersects_nothing() {
+        assert_eq!(checker().penetrated_obstacle(&Pose::translation(0.0, 0.0, 1.0)), None);
+    }
+}

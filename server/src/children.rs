@@ -5,6 +5,8 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -19,28 +21,34 @@ const LOOK_PERIOD: Duration = Duration::from_millis(20);
 pub struct NamedChild {
     name: String,
     process: Child,
+    /// Set when what it says is no longer of interest.
+    muted: Arc<AtomicBool>,
     /// Passes its lines on; ends with the process.
     reader: Option<JoinHandle<()>>,
     ended: Option<ExitStatus>,
 }
 
 impl NamedChild {
-    /// Starts `command` under `name`.
+    /// Starts `command` under `name`. It lives no longer than the calling thread.
     pub fn start(name: &str, mut command: Command, terminal: &Terminal) -> std::io::Result<Self> {
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
         die_with_parent(&mut command);
         let mut process = command.spawn()?;
+        let muted = Arc::new(AtomicBool::new(false));
         let reader = process.stderr.take().map(|stderr| {
-            let terminal = terminal.clone();
+            let (terminal, muted) = (terminal.clone(), muted.clone());
             std::thread::Builder::new().name(format!("lines of {name}")).spawn(move || {
                 for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                    terminal.say_once(&line);
+                    if !muted.load(Ordering::Relaxed) {
+                        terminal.say_once(&line);
+                    }
                 }
             })
         });
         Ok(Self {
             name: name.to_owned(),
             process,
+            muted,
             reader: reader.and_then(Result::ok),
             ended: None,
         })
@@ -49,6 +57,11 @@ impl NamedChild {
     /// The name that it was started under.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// No longer passes on what it writes: it is about to be told to end, and would complain.
+    pub fn mute(&self) {
+        self.muted.store(true, Ordering::Relaxed);
     }
 
     /// Its exit status, the first time after it ended.

@@ -27,8 +27,8 @@ pub enum Command {
     /// The haptic PC: three loops, broadcast, monitoring
     Serve(ServeArgs),
     /// One node of the render cluster
-    #[cfg(feature = "render")]
-    Render(taut_render::RenderArgs),
+    #[command(after_help = "Example: taut render --server haptic-pc:4857 --node front --key cluster.key")]
+    Render(crate::rendering::RenderArgs),
     /// The device side, on this or another PC
     Bridge(taut_bridge::BridgeArgs),
     /// Runs the method offline on a device trace; the same input gives the same bytes

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use taut_bridge::SafetySettings;
 use taut_link::ClusterKey;
-use taut_scene::{HeadTracking, Monitoring, RealTime, RealTimeMode, Scene, Viewer, Workbench};
+use taut_scene::{HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
 
 use crate::content::content;
 use crate::devices::device;
@@ -23,6 +23,9 @@ const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
 const GOD_OBJECT_RATE_HZ: f64 = 1000.0;
 /// Real-time priority of the broadcaster: below the coupling, above all normal work.
 const BROADCAST_PRIORITY: u8 = 50;
+
+/// Real-time priority of the network's threads, below the broadcaster: a bridge's samples must not wait for pictures.
+const NETWORK_PRIORITY: u8 = 40;
 
 /// What the command line says instead of the workbench file.
 #[derive(Clone, Debug, Default)]
@@ -68,8 +71,7 @@ pub fn session_setup(workbench: &Workbench, key: ClusterKey, overrides: &Overrid
         head: head(&workbench.viewer),
         content,
         link,
-        broadcast_period: Duration::from_secs_f64(network.broadcast_rate.recip()),
-        realtime: realtime(&workbench.realtime),
+        realtime: realtime(workbench),
         monitor: monitor(&workbench.monitoring, overrides),
     })
 }
@@ -85,7 +87,8 @@ fn head(viewer: &Viewer) -> Head {
     }
 }
 
-fn realtime(wanted: &RealTime) -> RealtimeSettings {
+fn realtime(workbench: &Workbench) -> RealtimeSettings {
+    let wanted = &workbench.realtime;
     let god_object_rate = wanted.god_object_rate.unwrap_or(GOD_OBJECT_RATE_HZ);
     RealtimeSettings {
         policy: match wanted.mode {
@@ -94,9 +97,11 @@ fn realtime(wanted: &RealTime) -> RealtimeSettings {
         },
         haptics_period: HAPTICS_PERIOD,
         god_object_period: Duration::from_secs_f64(god_object_rate.recip()),
+        broadcast_period: Duration::from_secs_f64(workbench.network.broadcast_rate.recip()),
         haptics_priority: wanted.haptics_priority,
         coupling_priority: wanted.coupling_priority,
         broadcast_priority: BROADCAST_PRIORITY,
+        network_priority: NETWORK_PRIORITY,
         god_object_priority: wanted.god_object_priority,
         haptics_core: wanted.haptics_core,
         coupling_core: wanted.coupling_core,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use god_object::nalgebra::Point3;
 use taut_bridge::{
-    AtEnd, Device, DeviceLimits, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow, Tremor, ViaPoint,
+    AtEnd, DeviceLimits, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow, Tremor, ViaPoint,
 };
 use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
 

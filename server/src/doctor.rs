@@ -1,5 +1,6 @@
 //! `taut doctor`: what this machine lacks for real time and for rendering, with the command that mends each.
 
+use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -50,6 +51,19 @@ impl Finding {
 
     fn lacking(what: &'static str, found: impl Into<String>, mend: impl Into<String>) -> Self {
         Self { what, good: false, found: found.into(), mend: Some(mend.into()) }
+    }
+}
+
+impl fmt::Display for DoctorReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, finding) in self.findings.iter().enumerate() {
+            let (newline, mark) = (if index > 0 { "\n" } else { "" }, if finding.good { "ok" } else { "--" });
+            write!(f, "{newline}{mark}  {}: {}", finding.what, finding.found)?;
+            if let Some(mend) = &finding.mend {
+                write!(f, "\n    mend: {mend}")?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -158,24 +172,16 @@ fn limit_of(name: &str) -> Option<String> {
     line.split_whitespace().next().map(str::to_owned)
 }
 
-#[cfg(feature = "render")]
 fn rendering() -> Option<Finding> {
     const WHAT: &str = "rendering";
-    let adapters = taut_render::adapters();
-    Some(if adapters.is_empty() {
-        Finding::lacking(
+    Some(match crate::rendering::adapter()? {
+        Ok(adapter) => Finding::good(WHAT, format!("draws with {adapter}")),
+        Err(reason) => Finding::lacking(
             WHAT,
-            "no graphics driver that can draw",
+            reason,
             "sudo apt-get install libvulkan1 mesa-vulkan-drivers  # software; or the driver of your graphics card",
-        )
-    } else {
-        Finding::good(WHAT, adapters.join("; "))
+        ),
     })
-}
-
-#[cfg(not(feature = "render"))]
-fn rendering() -> Option<Finding> {
-    None
 }
 
 #[cfg(test)]

@@ -1,1 +1,44 @@
-//! Skeleton.
+//! The program `taut`: three asynchronous loops around the god-object method, broadcast to a cluster, monitoring.
+//!
+//! Begin with [`session`]: Figure 3 of the paper in code. [`loops`] holds its boxes, [`shared`] its arrows.
+//!
+//! | role          | module      |                                                              |
+//! |---------------|-------------|--------------------------------------------------------------|
+//! | `taut demo`   | [`demo`]    | the whole workbench on one machine                           |
+//! | `taut serve`  | [`serve`]   | the haptic PC                                                |
+//! | `taut replay` | [`replay`]  | the same method code on a trace, under a virtual clock       |
+//! | `taut record` | [`record`]  | the device trace of a live session                           |
+//! | `taut doctor` | [`doctor`]  | what this machine lacks                                      |
+//!
+//! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
+
+pub mod broadcast;
+pub mod checker;
+pub mod children;
+pub mod cli;
+pub mod clients;
+pub mod clock;
+pub mod config;
+pub mod content;
+pub mod demo;
+pub mod devices;
+pub mod doctor;
+pub mod failure;
+pub mod finished_file;
+pub mod head;
+pub mod key;
+pub mod loops;
+pub mod monitor;
+pub mod realtime;
+pub mod record;
+pub mod rendering;
+pub mod replay;
+pub mod report;
+pub mod serve;
+pub mod session;
+pub mod shared;
+pub mod shutdown;
+pub mod signals;
+pub mod statistics;
+pub mod terminal;
+pub mod timing;

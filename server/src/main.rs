@@ -1,2 +1,114 @@
-//! taut
-fn main(){}
+//! The binary `taut`: one sub-command per role.
+
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use serde::Serialize;
+use taut::cli::{CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs};
+use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
+use taut::report::{ReplayReport, SessionReport};
+use taut::terminal::Terminal;
+use taut::{demo, doctor, record, rendering, replay, serve};
+use tracing_subscriber::EnvFilter;
+
+/// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
+const LOG_VARIABLE: &str = "TAUT_LOG";
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("taut: {error:#}");
+            ExitCode::from(error.downcast_ref::<Failure>().map_or(EXIT_FAILED, Failure::exit_code))
+        }
+    }
+}
+
+fn run(command: Command) -> Result<ExitCode> {
+    let terminal = Terminal::standard_error();
+    match command {
+        Command::Demo(args) => end_session(demo::run(&args, &terminal)?, args.json),
+        Command::Serve(args) => end_session(serve::run(&args, &terminal)?, args.json),
+        Command::Render(args) => {
+            rendering::run(args)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Bridge(args) => Ok(taut_bridge::execute(&args)),
+        Command::Replay(args) => replay_command(&args),
+        Command::Record(args) => record_command(&args),
+        Command::Check(args) => check_command(&args),
+        Command::Doctor(args) => doctor_command(&args),
+        Command::Keys(args) => keys_command(&args),
+    }
+}
+
+fn end_session((report, failure): (SessionReport, Option<Failure>), json: bool) -> Result<ExitCode> {
+    if json {
+        print_json(&report)?;
+    } else {
+        println!("{report}");
+    }
+    match failure {
+        Some(failure) => Err(failure.into()),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
+    let report: ReplayReport = replay::run(args)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        println!("{report}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn record_command(args: &RecordArgs) -> Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("the network's threads cannot be started")?;
+    let rows = runtime.block_on(record::run(args))?;
+    println!("{}: {rows} samples", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn check_command(args: &CheckArgs) -> Result<ExitCode> {
+    let reports = taut_scene::check(&args.files);
+    if args.json {
+        print_json(&reports)?;
+    } else {
+        for report in &reports {
+            println!("{report}");
+        }
+    }
+    let good = reports.iter().all(taut_scene::FileReport::is_good);
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(EXIT_BAD_INPUT) })
+}
+
+fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
+    let report = doctor::examine().context("this machine cannot be examined")?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        println!("{report}");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
+    taut_link::create_key_file(&args.out).map_err(Failure::from)?;
+    println!("{}: copy it to every machine of the workbench, and show it to nobody else", args.out.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_json(value: &impl Serialize) -> Result<()> {
+    println!("{}", serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?);
+    Ok(())
+}

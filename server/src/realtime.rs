@@ -56,11 +56,11 @@ impl RealtimeLedger {
         let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match grant {
             RealtimeGrant::Granted { what } => {
-                report.enforced.push(format!("{name}: {what}"));
+                note_once(&mut report.enforced, format!("{name}: {what}"));
                 true
             }
             RealtimeGrant::Waived { what, why } => {
-                report.waived.push(format!("{name}: {what}: {why}"));
+                note_once(&mut report.waived, format!("{name}: {what}: {why}"));
                 false
             }
         }
@@ -75,15 +75,27 @@ impl RealtimeLedger {
     }
 }
 
+/// Threads of one name have one answer.
+fn note_once(lines: &mut Vec<String>, line: String) {
+    if !lines.contains(&line) {
+        lines.push(line);
+    }
+}
+
 /// CPU time that the calling thread has used: what its work costs, whoever else is running.
 #[inline]
 pub fn thread_cpu_time() -> Duration {
     os::thread_cpu_time()
 }
 
-/// Lets a child process be killed by the system when this process dies, however it dies.
+/// Ties a child process to the calling thread: the system kills it when that ends, however it ends.
 pub fn die_with_parent(command: &mut std::process::Command) {
     os::die_with_parent(command);
+}
+
+/// Lets a child process work after this process's normal threads where both want a core.
+pub fn after_parent(command: &mut std::process::Command) {
+    os::after_parent(command);
 }
 
 #[cfg(target_os = "linux")]
@@ -94,6 +106,8 @@ mod os {
 
     /// Behind all normal work, before idle.
     const BACKGROUND_NICE: libc::c_int = 15;
+    /// Behind this process's normal threads, before background work.
+    const CHILD_NICE: libc::c_int = 5;
 
     pub(super) fn thread_cpu_time() -> Duration {
         let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -107,9 +121,20 @@ mod os {
         unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, BACKGROUND_NICE) == 0 }
     }
 
+    pub(super) fn after_parent(command: &mut std::process::Command) {
+        // SAFETY: between fork and exec only one system call is made, which is safe there; nothing is allocated or locked.
+        unsafe {
+            command.pre_exec(|| {
+                // A refusal costs smoothness only.
+                libc::setpriority(libc::PRIO_PROCESS, 0, CHILD_NICE);
+                Ok(())
+            });
+        }
+    }
+
     pub(super) fn die_with_parent(command: &mut std::process::Command) {
         let parent = std::process::id();
-        // SAFETY: between fork and exec only two system calls are made, both safe there; nothing is allocated or locked.
+        // SAFETY: between fork and exec only system calls are made that are safe there; nothing is allocated or locked.
         unsafe {
             command.pre_exec(move || {
                 libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL as libc::c_ulong, 0, 0, 0);
@@ -140,6 +165,8 @@ mod os {
     }
 
     pub(super) fn die_with_parent(_command: &mut std::process::Command) {}
+
+    pub(super) fn after_parent(_command: &mut std::process::Command) {}
 }
 
 #[cfg(test)]

@@ -25,7 +25,7 @@ use crate::finished_file::FinishedFile;
 use crate::realtime::thread_cpu_time;
 use crate::report::{ReplayReport, WorkReport};
 use crate::shutdown::Shutdown;
-use crate::signals;
+use crate::signals::BlockingEndSignal;
 use crate::timing::distribution_of;
 
 /// A replay that takes longer shows its progress.
@@ -51,7 +51,8 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
     let MethodChoice::GodObject = args.method;
     let mut replay = Replay::new(Arc::new(built.world), settings, built.start, args.god_object_rate)?;
 
-    let interrupted = signals::watch().map_err(Failure::failed)?;
+    let interrupted =
+        BlockingEndSignal::listen().and_then(BlockingEndSignal::into_request).map_err(Failure::failed)?;
     let cannot_write = |error: io::Error| {
         Failure::BadInput(format!(
             "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",
@@ -256,4 +257,36 @@ impl Seen {
 
 fn microseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e6
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn updates(rate: Option<f64>, rows: u32, row_period: f64) -> Vec<u64> {
+        let mut clock = UpdateClock { period: rate.map(f64::recip), start: None, updates: 0, last: 0.0 };
+        let mut counts = Vec::new();
+        for row in 0..rows {
+            let time = 3.0 + f64::from(row) * row_period;
+            let before = clock.updates;
+            while clock.is_due(time) {
+                clock.updated(time);
+            }
+            counts.push(clock.updates - before);
+        }
+        counts
+    }
+
+    #[test]
+    fn without_a_rate_there_is_one_update_per_row() {
+        assert_eq!(updates(None, 5, 0.001), [1; 5]);
+    }
+
+    #[test]
+    fn a_slow_loop_skips_rows_and_a_fast_one_updates_several_times() {
+        assert_eq!(updates(Some(250.0), 9, 0.001), [1, 0, 0, 0, 1, 0, 0, 0, 1]);
+        assert_eq!(updates(Some(3000.0), 3, 0.001), [1, 3, 3]);
+        assert_eq!(updates(Some(1000.0), 1000, 0.001).iter().sum::<u64>(), 1000);
+        assert_eq!(updates(Some(70.0), 1001, 0.001).iter().sum::<u64>(), 71);
+    }
 }

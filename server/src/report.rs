@@ -2,6 +2,8 @@
 //!
 //! A name carries its unit; a [`Distribution`] is `{ p50, p99, p999, max, count }`.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::timing::Distribution;
@@ -123,6 +125,40 @@ pub struct WorkReport {
     pub advancement_steps: u64,
     /// Projections solved.
     pub projections: u64,
+}
+
+impl fmt::Display for SessionReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (period, update, force, age) =
+            (&self.haptics_period_us, &self.god_object_update_us, &self.force_us, &self.constraint_age_us);
+        writeln!(f, "ran for             {:.1} s", self.duration_s)?;
+        writeln!(f, "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed", self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses)?;
+        writeln!(f, "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us", self.god_object_hz, update.p50, update.p99, update.max)?;
+        writeln!(f, "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us; constraints {:.0} us old at p99", force.p50, force.p99, force.max, age.p99)?;
+        writeln!(f, "contacts            p50 {:.0}, max {:.0}", self.contacts.p50, self.contacts.max)?;
+        writeln!(f, "penetrations        {} in {} poses checked", self.penetrations, self.penetration_checks)?;
+        writeln!(f, "safety events       {}, energy injected {:.2e} J", self.safety_events, self.energy_injected_j)?;
+        write!(f, "datagrams           {} sent, {} refused", self.packets_sent, self.packets_refused)?;
+        for client in &self.clients {
+            write!(f, "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old (p99 {:.1} ms), {} lost, by {}", client.node, client.frames, client.fps, client.pose_age_ms.p50, client.pose_age_ms.p99, client.packets_lost, client.transport)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for ReplayReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "rows                {}", self.steps)?;
+        writeln!(f, "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us", self.update_us.p50, self.update_us.p99, self.update_us.max)?;
+        writeln!(f, "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us", self.force_us.p50, self.force_us.p99, self.force_us.max)?;
+        writeln!(f, "contacts            p50 {:.0}, max {:.0}; active max {:.0}", self.contacts.p50, self.contacts.max, self.active.max)?;
+        match self.gap_min_m {
+            Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
+            None => writeln!(f, "smallest gap        never near")?,
+        }
+        writeln!(f, "largest force       {:.2} N, largest change per row {:.3} N", self.max_force_n, self.max_force_step_n)?;
+        write!(f, "KKT residual        {:.1e}, {} solver fallbacks; energy injected {:.2e} J", self.kkt_max, self.solver_fallbacks, self.energy_injected_j)
+    }
 }
 
 #[cfg(test)]

@@ -1,22 +1,24 @@
 //! One session of the server: Figure 3 in code, and what stands around it.
 //!
-//! Started in this order, so that each thing finds what it reads: shared data and loops (not yet running), network, monitor,
-//! coupling, god-object, checker, broadcast, and the haptics loop last, which sets everything moving. Stopped the other way round. A
-//! start that fails on the way leaves nothing running.
+//! Started in this order, so that each thing finds what it reads: network, loops and shared data (not yet running), monitor,
+//! then the threads: coupling, god-object, checker, broadcast, and haptics last, which sets everything moving. Stopped the other way
+//! round. A start that fails on the way leaves nothing running.
 
+use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use god_object::spatial::linear;
-use god_object::{Coupling, GodObject, Pose, Settings, World};
+use god_object::{GodObject, Pose, Settings, World};
 use taut_bridge::realtime::{lock_memory, pin_to_core};
-use taut_bridge::{Device, DeviceLimits, EnergyObserver, RemoteDevice, Safety, SafetySettings};
-use taut_link::{ClusterKey, Content, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_bridge::{Device, DeviceLimits, RemoteDevice, SafetySettings};
+use taut_link::{Broadcaster, ClusterKey, Content, LinkEvent, ServerLink, ServerOptions, proto};
 use tokio::runtime::Runtime;
 
-use crate::broadcast::{self, StateWriter};
+use crate::broadcast::{self, BridgeCommands, StateWriter};
 use crate::checker::{self, PenetrationChecker};
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
@@ -26,12 +28,13 @@ use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
 use crate::loops::shell::{Waker, run_at_deadlines, spawn};
+use crate::loops::wiring::WiredLoops;
 use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
 use crate::realtime::{RealtimeLedger, RealtimePolicy, Scheduling};
-use crate::report::SessionReport;
+use crate::report::{RealtimeReport, SessionReport};
+use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::fanout::Subscriber;
 use crate::shared::wrench_command::WrenchCommand;
-use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
 use crate::shutdown::Shutdown;
 use crate::statistics::Statistics;
 use crate::terminal::Terminal;
@@ -61,8 +64,6 @@ pub struct SessionSetup {
     pub content: Content,
     /// Addresses, key and limits of the network.
     pub link: LinkSettings,
-    /// Time between two states to a client.
-    pub broadcast_period: Duration,
     /// Rates and scheduling.
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.
@@ -86,9 +87,9 @@ pub enum DeviceSource {
 #[derive(Clone, Debug)]
 pub struct LinkSettings {
     /// Of the control plane.
-    pub quic: std::net::SocketAddr,
+    pub quic: SocketAddr,
     /// Of the state plane.
-    pub udp: std::net::SocketAddr,
+    pub udp: SocketAddr,
     /// The cluster key.
     pub key: ClusterKey,
     /// Most clients at a time.
@@ -104,12 +105,16 @@ pub struct RealtimeSettings {
     pub haptics_period: Duration,
     /// Shortest period of the god-object loop.
     pub god_object_period: Duration,
+    /// Time between two states to a client.
+    pub broadcast_period: Duration,
     /// Real-time priority of the haptics loop.
     pub haptics_priority: u8,
     /// Real-time priority of the coupling; below that of the haptics loop.
     pub coupling_priority: u8,
     /// Real-time priority of the broadcaster; below that of the coupling.
     pub broadcast_priority: u8,
+    /// Real-time priority of the network's threads; below that of the broadcaster.
+    pub network_priority: u8,
     /// Real-time priority of the god-object loop; `None` is the normal class, because an update may take long.
     pub god_object_priority: Option<u8>,
     /// Core of the haptics loop; `None` is the system's choice.
@@ -142,88 +147,38 @@ pub struct Session {
 impl Session {
     /// Builds and starts everything.
     pub fn start(setup: SessionSetup) -> Result<Self, Failure> {
-        let SessionSetup { world, settings, start, device, safety, head, content, link, broadcast_period, realtime, monitor } = setup;
-        let reference_point = world.body.reference_point;
-
-        // The arrows of Figure 3.
-        let (states, state_readers) = device_state::channel(&start);
-        let (contacts, contact_readers) = contact_snapshot::channel(&start, settings.max_constraints);
-        let (wrenches, wrench_readers) = wrench_command::channel();
-        let (shaded, shaded_reader) = shaded_acceleration::channel();
-
-        // The boxes, as far as they do not depend on the network.
-        let god_object = GodObject::new(world.clone(), settings, start)?;
-        let coupling = Coupling::new(&world, &settings);
-        let checker = PenetrationChecker::new(&world).ok_or_else(|| {
+        // What the scene can be wrong in, before anything is opened.
+        let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
+        let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
             Failure::bad_input("a mesh of the scene cannot be checked for penetration: run `taut check` on it")
         })?;
-        let mut god_object_loop = GodObjectLoop::new(god_object, state_readers.god_object, shaded_reader, contacts);
-        let mut coupling_loop =
-            CouplingLoop::new(coupling, state_readers.coupling, contact_readers.coupling, wrenches, shaded);
 
-        // The network, whose clock is everybody's.
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(NETWORK_THREADS)
-            .thread_name("network")
-            .enable_all()
-            .build()
-            .map_err(|error| Failure::failed(format!("the network's threads cannot be started ({error})")))?;
+        // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
-        let screens = content.description.screens.clone();
-        let picture = monitor.is_some().then(|| MonitorPicture {
-            name: content.description.name.clone(),
-            world: world.clone(),
-            start,
-            screens,
-            workbench_from_scene: content.description.scene_origin.to_isometry().unwrap_or_else(Pose::identity),
-            display_scale: content.description.display_scale,
-            head,
-        });
-        let scene_revision = content.description.revision;
+        let ledger = RealtimeLedger::default();
+        let runtime = network_runtime(&ledger, setup.realtime.network_priority)?;
+        let picture = picture(&setup);
+        let scene_revision = setup.content.description.revision;
         let options = ServerOptions {
-            quic: link.quic,
-            udp: link.udp,
-            max_clients: link.max_clients,
+            quic: setup.link.quic,
+            udp: setup.link.udp,
+            max_clients: setup.link.max_clients,
             clock: clock.for_link(),
-            ..ServerOptions::new(link.key)
+            ..ServerOptions::new(setup.link.key)
         };
-        let link = runtime.block_on(taut_link::serve(options, content))?;
+        let link = runtime.block_on(taut_link::serve(options, setup.content))?;
+        let (device, bridge_commands) = connect_device(setup.device, &link)?;
 
-        // The device, which may be behind the network.
-        let (device, bridge_commands) = match device {
-            DeviceSource::Local(device) => (device, None),
-            DeviceSource::Remote { limits, max_age } => {
-                let inputs = link.device_inputs().ok_or_else(|| {
-                    Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
-                })?;
-                let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
-                (Box::new(device) as Box<dyn Device>, Some(commands))
-            }
-        };
-        let waker = Waker::default();
-        let mut haptics_loop = HapticsLoop::new(
-            device,
-            Safety::new(safety),
-            EnergyObserver::new(reference_point),
-            &start,
-            wrench_readers.haptics,
-            states,
-            waker.clone(),
-        );
-        let statistics = Statistics {
-            haptics: haptics_loop.statistics(),
-            coupling: coupling_loop.statistics(),
-            god_object: god_object_loop.statistics(),
-            ..Statistics::default()
-        };
-
+        // Figure 3.
+        let loops = WiredLoops::new(&setup.world, &setup.settings, god_object, device, setup.safety);
+        let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
             started: clock.now(),
             shutdown: Shutdown::default(),
-            ledger: RealtimeLedger::default(),
-            statistics: statistics.clone(),
-            wrench: wrench_readers.status,
+            ledger,
+            statistics: loops.statistics.clone(),
+            wrench: loops.observers.status,
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -233,81 +188,91 @@ impl Session {
         };
 
         // From here on a failure drops the session, which ends what was started.
-        if let (Some(settings), Some(picture)) = (&monitor, &picture) {
+        if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
-                device: state_readers.monitor,
-                contacts: contact_readers.monitor,
-                wrench: wrench_readers.monitor,
-                statistics: statistics.clone(),
+                shared: loops.observers.monitor,
+                statistics: loops.statistics.clone(),
                 clock,
             };
-            let feed = MonitorFeed::start(settings, picture, sources, session.network.clone(), &session.shutdown)?;
+            let feed = MonitorFeed::start(settings, &picture, sources, session.network.clone(), &session.shutdown)?;
             session.monitor = Some(feed);
         }
-        if realtime.lock_memory {
+        if setup.realtime.lock_memory {
             session.ledger.note("process", lock_memory());
         }
-
-        let shutdown = session.shutdown.clone();
-        let coupling_waker = waker.clone();
-        session.start_thread("coupling", Scheduling::Fifo(realtime.coupling_priority), realtime.coupling_core, move || {
-            while !shutdown.is_asked() {
-                if !coupling_loop.tick(clock.now()) {
-                    coupling_waker.wait(COUPLING_TIMEOUT);
-                }
-            }
-        })?;
-
-        let shutdown = session.shutdown.clone();
-        let god_object_scheduling = realtime.god_object_priority.map_or(Scheduling::Normal, Scheduling::Fifo);
-        session.start_thread("god-object", god_object_scheduling, realtime.god_object_core, move || {
-            // Updates that take longer than a period are no fault: the next one starts at once.
-            let late = std::sync::atomic::AtomicU64::new(0);
-            run_at_deadlines(clock, realtime.god_object_period, &shutdown, &late, |_| {
-                god_object_loop.tick(|| clock.now());
-                waker.wake();
-            });
-        })?;
-
-        let shutdown = session.shutdown.clone();
-        let counts = statistics.checks.clone();
-        session.start_thread("checker", Scheduling::Background, None, move || {
-            checker::run(&checker, contact_readers.checker, &counts, &shutdown);
-        })?;
-
-        let shutdown = session.shutdown.clone();
-        let writer = StateWriter::new(
-            state_readers.broadcast,
-            contact_readers.broadcast,
-            wrench_readers.broadcast,
-            head,
-            &reference_point,
+        let states = StateWriter::new(
+            loops.observers.broadcast,
+            setup.head,
+            &setup.world.body.reference_point,
             scene_revision,
         );
-        if let Some(link) = &session.link {
-            let broadcaster = link.broadcaster();
-            session.start_thread("broadcast", Scheduling::Fifo(realtime.broadcast_priority), None, move || {
-                broadcast::run(writer, broadcaster, bridge_commands, clock, broadcast_period, &shutdown);
-            })?;
-        }
+        session.start_coupling(loops.coupling, loops.coupling_waker.clone(), &setup.realtime)?;
+        session.start_god_object(loops.god_object, loops.coupling_waker, &setup.realtime)?;
+        session.start_checker(checker, loops.observers.checker)?;
+        session.start_broadcast(states, broadcaster, bridge_commands, &setup.realtime)?;
+        session.start_haptics(loops.haptics, &setup.realtime)?;
+        session.enforce(setup.realtime.policy)?;
+        Ok(session)
+    }
 
-        let shutdown = session.shutdown.clone();
-        let haptics = statistics.haptics.clone();
-        session.started = clock.now();
-        session.start_thread("haptics", Scheduling::Fifo(realtime.haptics_priority), realtime.haptics_core, move || {
-            let ticked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                run_at_deadlines(clock, realtime.haptics_period, &shutdown, &haptics.deadline_misses, |now| {
-                    haptics_loop.tick(now);
-                });
+    fn start_coupling(&mut self, mut coupling: CouplingLoop, waker: Waker, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        self.start_thread("coupling", Scheduling::Fifo(realtime.coupling_priority), realtime.coupling_core, move || {
+            while !shutdown.is_asked() {
+                if !coupling.tick(clock.now()) {
+                    waker.wait(COUPLING_TIMEOUT);
+                }
+            }
+        })
+    }
+
+    fn start_god_object(&mut self, mut god_object: GodObjectLoop, waker: Waker, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.god_object_period);
+        let scheduling = realtime.god_object_priority.map_or(Scheduling::Normal, Scheduling::Fifo);
+        self.start_thread("god-object", scheduling, realtime.god_object_core, move || {
+            // Updates that take longer than a period are no fault: the next one starts at once.
+            let late = AtomicU64::new(0);
+            run_at_deadlines(clock, period, &shutdown, &late, |_| {
+                god_object.tick(|| clock.now());
+                waker.wake();
+            });
+        })
+    }
+
+    fn start_checker(&mut self, checker: PenetrationChecker, contacts: Subscriber<ContactSnapshot>) -> Result<(), Failure> {
+        let (counts, shutdown) = (self.statistics.checks.clone(), self.shutdown.clone());
+        self.start_thread("checker", Scheduling::Background, None, move || {
+            checker::run(&checker, contacts, &counts, &shutdown);
+        })
+    }
+
+    fn start_broadcast(
+        &mut self,
+        states: StateWriter,
+        broadcaster: Broadcaster,
+        bridge_commands: Option<BridgeCommands>,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.broadcast_period);
+        self.start_thread("broadcast", Scheduling::Fifo(realtime.broadcast_priority), None, move || {
+            broadcast::run(states, broadcaster, bridge_commands, clock, period, &shutdown);
+        })
+    }
+
+    fn start_haptics(&mut self, mut haptics: HapticsLoop, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.haptics_period);
+        let statistics = self.statistics.haptics.clone();
+        self.started = clock.now();
+        self.start_thread("haptics", Scheduling::Fifo(realtime.haptics_priority), realtime.haptics_core, move || {
+            let ticked = catch_unwind(AssertUnwindSafe(|| {
+                run_at_deadlines(clock, period, &shutdown, &statistics.deadline_misses, |now| haptics.tick(now));
             }));
             // Whatever ended the loop: no force is left on the hand.
-            haptics_loop.release(clock.now());
+            haptics.release(clock.now());
             if let Err(cause) = ticked {
-                std::panic::resume_unwind(cause);
+                resume_unwind(cause);
             }
-        })?;
-        session.enforce(realtime.policy)?;
-        Ok(session)
+        })
     }
 
     fn start_thread(
@@ -343,12 +308,12 @@ impl Session {
     }
 
     /// Address of the control plane, with the port that it got.
-    pub fn quic_address(&self) -> Option<std::net::SocketAddr> {
+    pub fn quic_address(&self) -> Option<SocketAddr> {
         self.link.as_ref().map(ServerLink::quic_addr)
     }
 
     /// Address of the state plane, with the port that it got.
-    pub fn udp_address(&self) -> Option<std::net::SocketAddr> {
+    pub fn udp_address(&self) -> Option<SocketAddr> {
         self.link.as_ref().map(ServerLink::udp_addr)
     }
 
@@ -358,7 +323,7 @@ impl Session {
     }
 
     /// What the system granted and refused.
-    pub fn realtime(&self) -> crate::report::RealtimeReport {
+    pub fn realtime(&self) -> RealtimeReport {
         self.ledger.report()
     }
 
@@ -372,12 +337,8 @@ impl Session {
         self.shutdown.is_asked()
     }
 
-    /// Runs what may wait on the network's threads.
-    pub fn runtime(&self) -> &Runtime {
-        &self.runtime
-    }
-
-    /// Tells what happened on the network since the last time; call it a few times a second.
+    /// Tells what happened on the network since the last time: errors here, everything to monitor and log. Call it a few times a
+    /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
         let Some(link) = &self.link else {
             return;
@@ -387,9 +348,10 @@ impl Session {
             lines.extend(self.clients.follow(&event).map(|line| (severity(&event), line)));
         }
         for (severity, line) in lines {
-            if severity != Severity::Info {
+            if severity == Severity::Error {
                 terminal.say(&format!("taut: {line}"));
             }
+            tracing::info!("{line}");
             if let Some(monitor) = &self.monitor {
                 monitor.log(severity, &line);
             }
@@ -466,11 +428,54 @@ impl Drop for Session {
     }
 }
 
+/// The threads that receive: device samples come this way, so they go before normal work.
+fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Failure> {
+    let ledger = ledger.clone();
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(NETWORK_THREADS)
+        .thread_name("network")
+        .on_thread_start(move || {
+            ledger.schedule("network", Scheduling::Fifo(priority));
+        })
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::failed(format!("the network's threads cannot be started ({error})")))
+}
+
+/// The device, and the commands that go to its bridge if it is behind the network.
+fn connect_device(source: DeviceSource, link: &ServerLink) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
+    match source {
+        DeviceSource::Local(device) => Ok((device, None)),
+        DeviceSource::Remote { limits, max_age } => {
+            let inputs = link.device_inputs().ok_or_else(|| {
+                Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
+            })?;
+            let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
+            Ok((Box::new(device), Some(commands)))
+        }
+    }
+}
+
+/// What the monitor draws once.
+fn picture(setup: &SessionSetup) -> MonitorPicture {
+    let description = &setup.content.description;
+    MonitorPicture {
+        name: description.name.clone(),
+        world: setup.world.clone(),
+        start: setup.start,
+        screens: description.screens.clone(),
+        workbench_from_scene: description.scene_origin.to_isometry().unwrap_or_else(Pose::identity),
+        display_scale: description.display_scale,
+        head: setup.head,
+    }
+}
+
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
         LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
-        LinkEvent::Refused { .. } => Severity::Warning,
+        // Whoever stands at the haptic PC should know that somebody knocked.
+        LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {
             LogLevel::Info => Severity::Info,
             LogLevel::Warning => Severity::Warning,

@@ -34,7 +34,11 @@ impl Cell {
 
     /// One less, where something counted as lost turns up late.
     pub(crate) fn take_one(&self) {
-        let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |count| count.checked_sub(1));
+        let _ = self
+            .0
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |count| {
+                count.checked_sub(1)
+            });
     }
 
     pub(crate) fn get(&self) -> u64 {

@@ -7,7 +7,9 @@ use taut_proto::control::RefusalCode;
 #[derive(Debug, thiserror::Error)]
 pub enum LinkError {
     /// Another program has the port.
-    #[error("cannot listen on {address} ({plane}): the port is in use; stop the other server or choose another port")]
+    #[error(
+        "cannot listen on {address} ({plane}): the port is in use; stop the other server or choose another port"
+    )]
     PortInUse {
         /// Address asked for.
         address: SocketAddr,
@@ -25,13 +27,17 @@ pub enum LinkError {
         source: io::Error,
     },
     /// Not `host:port`.
-    #[error("\"{server}\" is no server address: write host:port, such as haptic-pc:4857 or [::1]:4857")]
+    #[error(
+        "\"{server}\" is no server address: write host:port, such as haptic-pc:4857 or [::1]:4857"
+    )]
     BadAddress {
         /// What was given.
         server: String,
     },
     /// The name does not resolve.
-    #[error("the server name in \"{server}\" is unknown: {reason}; check the spelling or give a numeric address")]
+    #[error(
+        "the server name in \"{server}\" is unknown: {reason}; check the spelling or give a numeric address"
+    )]
     UnknownHost {
         /// What was given.
         server: String,
@@ -39,7 +45,9 @@ pub enum LinkError {
         reason: String,
     },
     /// Nobody answers.
-    #[error("no server answers at {server} within {seconds:.0} s: check that it runs, the address, and that the firewall lets UDP through")]
+    #[error(
+        "no server answers at {server} within {seconds:.0} s: check that it runs, the address, and that the firewall lets UDP through"
+    )]
     Unreachable {
         /// What was given.
         server: String,
@@ -47,13 +55,17 @@ pub enum LinkError {
         seconds: f64,
     },
     /// Either end does not hold the other's key.
-    #[error("the server at {server} does not hold the same cluster key: give this node the server's key file (--key)")]
+    #[error(
+        "the server at {server} does not hold the same cluster key: give this node the server's key file (--key)"
+    )]
     WrongKey {
         /// What was given.
         server: String,
     },
     /// Either end is of another release.
-    #[error("the server at {server} speaks protocol version {theirs}, this program speaks {ours}: install the same release on both")]
+    #[error(
+        "the server at {server} speaks protocol version {theirs}, this program speaks {ours}: install the same release on both"
+    )]
     WrongVersion {
         /// What was given.
         server: String,

@@ -7,7 +7,9 @@ use std::{
     time::{Duration, Instant},
 };
 use support::*;
-use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, serve, transport};
+use taut_link::{
+    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, serve, transport,
+};
 use taut_proto::{
     PROTOCOL_VERSION,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
@@ -46,14 +48,25 @@ async fn a_wrong_key_is_refused_with_a_sentence() {
 /// A peer that speaks QUIC but says `frame` first; returns what the server answers.
 async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
     let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
-    let config = transport::client_config(Duration::from_secs(5)).unwrap_or_else(|error| fail(&error));
+    let config =
+        transport::client_config(Duration::from_secs(5)).unwrap_or_else(|error| fail(&error));
     let any = SocketAddr::from(([127, 0, 0, 1], 0));
     let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
-    let connecting = endpoint.connect_with(config, server, "taut").unwrap_or_else(|error| fail(&error));
+    let connecting = endpoint
+        .connect_with(config, server, "taut")
+        .unwrap_or_else(|error| fail(&error));
     let connection = connecting.await.unwrap_or_else(|error| fail(&error));
-    let (mut send, mut recv) = connection.open_bi().await.unwrap_or_else(|error| fail(&error));
-    send.write_all(frame).await.unwrap_or_else(|error| fail(&error));
-    let answer = recv.read_to_end(4096).await.unwrap_or_else(|error| fail(&error));
+    let (mut send, mut recv) = connection
+        .open_bi()
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    send.write_all(frame)
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    let answer = recv
+        .read_to_end(4096)
+        .await
+        .unwrap_or_else(|error| fail(&error));
     ControlMessage::from_frame_body(&answer[LENGTH_BYTES..]).unwrap_or_else(|error| fail(&error))
 }
 
@@ -90,7 +103,10 @@ async fn a_hello_without_proof_or_sense_is_refused() {
     for (frame, code) in [
         (hello(), RefusalCode::WrongKey),
         (b"GET / HTTP/1.1\r\n\r\n".to_vec(), RefusalCode::BadHello),
-        (vec![8, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8], RefusalCode::BadHello),
+        (
+            vec![8, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8],
+            RefusalCode::BadHello,
+        ),
     ] {
         match answer_to(server.quic_addr(), &frame).await {
             ControlMessage::Refused(refusal) => assert_eq!(refusal.code, code),
@@ -106,9 +122,15 @@ async fn a_second_node_of_one_name_is_refused_and_the_first_stays() {
     let server = server().await;
     let first = client(&server, Role::Render, "left").await;
     match error_of(options(&server, Role::Render, "left")).await {
-        error @ LinkError::Refused { code: RefusalCode::NameTaken, .. } => {
+        error @ LinkError::Refused {
+            code: RefusalCode::NameTaken,
+            ..
+        } => {
             let text = error.to_string();
-            assert!(text.contains("a node named \"left\" is connected already"), "{text}");
+            assert!(
+                text.contains("a node named \"left\" is connected already"),
+                "{text}"
+            );
         }
         other => panic!("{other}"),
     }
@@ -128,7 +150,16 @@ async fn a_full_server_says_so() {
     .await;
     let _first = client(&server, Role::Render, "left").await;
     let error = error_of(options(&server, Role::Render, "right")).await;
-    assert!(matches!(error, LinkError::Refused { code: RefusalCode::Full, .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            LinkError::Refused {
+                code: RefusalCode::Full,
+                ..
+            }
+        ),
+        "{error}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -136,7 +167,16 @@ async fn names_that_cannot_be_shown_are_refused() {
     let server = server().await;
     for name in ["", "  ", "a\nb", &"x".repeat(65)] {
         let error = error_of(options(&server, Role::Render, name)).await;
-        assert!(matches!(error, LinkError::Refused { code: RefusalCode::BadHello, .. }), "{name:?}: {error}");
+        assert!(
+            matches!(
+                error,
+                LinkError::Refused {
+                    code: RefusalCode::BadHello,
+                    ..
+                }
+            ),
+            "{name:?}: {error}"
+        );
     }
 }
 
@@ -144,8 +184,16 @@ async fn names_that_cannot_be_shown_are_refused() {
 async fn a_port_in_use_is_named() {
     let first = server().await;
     for (quic, udp, busy) in [
-        (first.quic_addr(), SocketAddr::from(([127, 0, 0, 1], 0)), first.quic_addr()),
-        (SocketAddr::from(([127, 0, 0, 1], 0)), first.udp_addr(), first.udp_addr()),
+        (
+            first.quic_addr(),
+            SocketAddr::from(([127, 0, 0, 1], 0)),
+            first.quic_addr(),
+        ),
+        (
+            SocketAddr::from(([127, 0, 0, 1], 0)),
+            first.udp_addr(),
+            first.udp_addr(),
+        ),
     ] {
         let options = ServerOptions {
             quic,
@@ -164,7 +212,9 @@ async fn a_port_in_use_is_named() {
 async fn an_unreachable_server_is_given_up_in_time() {
     // A port that was free a moment ago, where nobody listens.
     let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap_or_else(|error| panic!("{error}"));
-    let address = socket.local_addr().unwrap_or_else(|error| panic!("{error}"));
+    let address = socket
+        .local_addr()
+        .unwrap_or_else(|error| panic!("{error}"));
     drop(socket);
     let start = Instant::now();
     let error = error_of(ClientOptions {
@@ -181,7 +231,10 @@ async fn an_unreachable_server_is_given_up_in_time() {
 async fn what_is_no_address_is_said_to_be_none() {
     for bad in ["", "host:", "host:99999", ":4857", "host:0"] {
         let error = error_of(ClientOptions::new(bad, key('a'), Role::Observer, "o")).await;
-        assert!(matches!(error, LinkError::BadAddress { .. }), "{bad:?}: {error}");
+        assert!(
+            matches!(error, LinkError::BadAddress { .. }),
+            "{bad:?}: {error}"
+        );
     }
 }
 
@@ -191,7 +244,10 @@ fn a_key_file_is_made_once_private_and_read_again() {
     let path = folder.path().join("cluster.key");
     let made = taut_link::create_key_file(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(taut_link::read_key_file(&path).ok(), Some(made));
-    assert!(matches!(taut_link::create_key_file(&path), Err(LinkError::KeyFile { .. })));
+    assert!(matches!(
+        taut_link::create_key_file(&path),
+        Err(LinkError::KeyFile { .. })
+    ));
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -201,7 +257,10 @@ fn a_key_file_is_made_once_private_and_read_again() {
     let short = folder.path().join("short.key");
     assert!(std::fs::write(&short, "abc").is_ok());
     for bad in [short, folder.path().join("missing.key")] {
-        let error = taut_link::read_key_file(&bad).err().map(|error| error.to_string()).unwrap_or_default();
+        let error = taut_link::read_key_file(&bad)
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default();
         assert!(error.contains(&bad.display().to_string()), "{error}");
     }
 }

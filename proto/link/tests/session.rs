@@ -23,10 +23,19 @@ async fn states_arrive_over(transport: Transport) {
     assert_eq!(client.description(), &content().description);
     for mesh in content().meshes {
         let hash = hash_of(&mesh);
-        let fetched = client.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
+        let fetched = client
+            .mesh(hash)
+            .await
+            .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(*fetched, mesh);
-        let again = client.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
-        assert!(std::sync::Arc::ptr_eq(&fetched, &again), "the second time it comes from memory");
+        let again = client
+            .mesh(hash)
+            .await
+            .unwrap_or_else(|error| panic!("{error}"));
+        assert!(
+            std::sync::Arc::ptr_eq(&fetched, &again),
+            "the second time it comes from memory"
+        );
     }
 
     let mut broadcaster = server.broadcaster();
@@ -39,7 +48,10 @@ async fn states_arrive_over(transport: Transport) {
     assert_in_order(&states);
     assert_eq!(server.counters().garbage + server.counters().forged, 0);
     let status = &server.clients()[0];
-    assert_eq!((status.node.as_str(), status.role, status.transport), ("left", Role::Render, transport));
+    assert_eq!(
+        (status.node.as_str(), status.role, status.transport),
+        ("left", Role::Render, transport)
+    );
     assert!(status.packets_sent >= 500);
     assert_eq!(status.udp_address.is_some(), transport == Transport::Udp);
     client.close().await;
@@ -71,7 +83,10 @@ async fn a_node_that_joins_late_gets_everything() {
     let late = client(&server, Role::Observer, "late").await;
     assert_eq!(late.description(), first.description());
     let hash = late.description().obstacles[0].mesh;
-    let mesh = late.mesh(hash).await.unwrap_or_else(|error| panic!("{error}"));
+    let mesh = late
+        .mesh(hash)
+        .await
+        .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(mesh.triangles().len(), 27_000);
     let (mut of_first, mut of_late) = (Vec::new(), Vec::new());
     broadcast_until(&mut broadcaster, tick, || {
@@ -84,7 +99,10 @@ async fn a_node_that_joins_late_gets_everything() {
 
     // The same ticks are the same states on both.
     for received in &of_late {
-        if let Some(other) = of_first.iter().find(|other| other.state.tick == received.state.tick) {
+        if let Some(other) = of_first
+            .iter()
+            .find(|other| other.state.tick == received.state.tick)
+        {
             assert_eq!(other.state_hash, received.state_hash);
         }
     }
@@ -108,7 +126,10 @@ async fn a_client_gets_no_more_states_than_it_asked_for() {
     .await;
     assert_in_order(&states);
     for pair in states.windows(2) {
-        assert!(pair[1].state.tick - pair[0].state.tick >= 9, "100 of 1000 states per second");
+        assert!(
+            pair[1].state.tick - pair[0].state.tick >= 9,
+            "100 of 1000 states per second"
+        );
     }
 }
 
@@ -146,7 +167,10 @@ async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
         bridge.latest_wrench().is_some()
     })
     .await;
-    assert_eq!(bridge.latest_wrench().map(|wrench| wrench.command), Some(command));
+    assert_eq!(
+        bridge.latest_wrench().map(|wrench| wrench.command),
+        Some(command)
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -183,7 +207,11 @@ async fn a_device_pose_that_is_no_pose_never_reaches_the_loop() {
     nan.pose.position[0] = f64::NAN;
     let errors = bridge.counters().send_errors;
     bridge.send_input(&nan);
-    assert_eq!(bridge.counters().send_errors, errors + 1, "NaN does not even leave");
+    assert_eq!(
+        bridge.counters().send_errors,
+        errors + 1,
+        "NaN does not even leave"
+    );
     assert_eq!(*inputs.read(), None);
 }
 
@@ -192,7 +220,11 @@ async fn there_is_one_device_bridge() {
     let server = server().await;
     let _bridge = client(&server, Role::Device, "bridge").await;
     match taut_link::connect(options(&server, Role::Device, "second")).await {
-        Err(LinkError::Refused { code: RefusalCode::DeviceTaken, text, .. }) => assert!(text.contains("\"bridge\""), "{text}"),
+        Err(LinkError::Refused {
+            code: RefusalCode::DeviceTaken,
+            text,
+            ..
+        }) => assert!(text.contains("\"bridge\""), "{text}"),
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("two bridges"),
     }
@@ -216,12 +248,21 @@ async fn session_time_is_within_its_stated_uncertainty() {
                 panic!("a locked clock stays locked");
             };
             let after = server.clock().now_ns();
-            assert!(time.ns + time.uncertainty_ns >= before, "{time:?} is before {before}");
-            assert!(time.ns <= after + time.uncertainty_ns, "{time:?} is after {after}");
+            assert!(
+                time.ns + time.uncertainty_ns >= before,
+                "{time:?} is before {before}"
+            );
+            assert!(
+                time.ns <= after + time.uncertainty_ns,
+                "{time:?} is after {after}"
+            );
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
         let round_trip = client.round_trip().unwrap_or(PATIENCE);
-        assert!(round_trip < Duration::from_millis(50), "loopback takes {round_trip:?}");
+        assert!(
+            round_trip < Duration::from_millis(50),
+            "loopback takes {round_trip:?}"
+        );
     }
 }
 
@@ -243,17 +284,30 @@ async fn reports_and_log_lines_reach_the_server_and_drawn_states_are_compared() 
     let stats = ClientStats {
         frames: 60,
         fps: 59.9,
-        drawn: vec![drawn(&states[0], 0), drawn(&states[1], 0), drawn(&states[2], 1)],
+        drawn: vec![
+            drawn(&states[0], 0),
+            drawn(&states[1], 0),
+            drawn(&states[2], 1),
+        ],
         ..ClientStats::default()
     };
-    client.send_stats(stats.clone()).await.unwrap_or_else(|error| panic!("{error}"));
+    client
+        .send_stats(stats.clone())
+        .await
+        .unwrap_or_else(|error| panic!("{error}"));
     assert!(client.post_log(LogLevel::Warning, "software rendering".to_owned()));
     event(&server, "log", |event| matches!(event, LinkEvent::Log { node, event } if node == "left" && event.level == LogLevel::Warning)).await;
     let status = &server.clients()[0];
     assert_eq!(status.stats.as_ref(), Some(&stats));
-    assert_eq!((status.state_hash_matches, status.state_hash_mismatches), (2, 1));
+    assert_eq!(
+        (status.state_hash_matches, status.state_hash_mismatches),
+        (2, 1)
+    );
     client.close().await;
-    let left = event(&server, "leaving", |event| matches!(event, LinkEvent::Left { .. })).await;
+    let left = event(&server, "leaving", |event| {
+        matches!(event, LinkEvent::Left { .. })
+    })
+    .await;
     let LinkEvent::Left { status, reason } = left else {
         panic!("it was just matched");
     };
@@ -278,8 +332,16 @@ async fn a_mesh_that_the_server_lacks_is_an_error_and_the_link_lives_on() {
     let server = server().await;
     let client = client(&server, Role::Render, "left").await;
     let missing = MeshHash::of(b"no mesh");
-    assert!(matches!(client.mesh(missing).await, Err(LinkError::NoSuchMesh { .. })));
-    assert!(client.mesh(client.description().god_object.mesh).await.is_ok());
+    assert!(matches!(
+        client.mesh(missing).await,
+        Err(LinkError::NoSuchMesh { .. })
+    ));
+    assert!(
+        client
+            .mesh(client.description().god_object.mesh)
+            .await
+            .is_ok()
+    );
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

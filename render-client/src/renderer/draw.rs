@@ -16,9 +16,6 @@ use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
 use crate::view::{ClipPlanes, Eyes, Screen};
 
-/// Nothing nearer to the eye than this, in metres, is drawn: two eyes could not fuse it.
-const NEAR: f64 = 0.02;
-
 /// Everything on the graphics card that does not depend on the size of a picture.
 #[derive(Debug)]
 pub struct Renderer {
@@ -32,6 +29,7 @@ pub struct Renderer {
     god_object_box: (Point3<f64>, Point3<f64>),
     instances: wgpu::Buffer,
     floor: Floor,
+    clip_planes: ClipPlanes,
     plan: Plan,
 }
 
@@ -70,8 +68,11 @@ impl Renderer {
             mesh: mesh::pipeline(device, &layout, output),
             ghost: ghost::pipeline(device, &layout, output),
         };
-        let mut meshes: Vec<MeshBuffers> =
-            stage.meshes.iter().map(|mesh| MeshBuffers::new(device, mesh)).collect();
+        let mut meshes: Vec<MeshBuffers> = stage
+            .meshes
+            .iter()
+            .map(|mesh| MeshBuffers::new(device, mesh))
+            .collect();
         meshes.push(MeshBuffers::new(device, &shapes::sphere(1.0, 20)));
         meshes.push(MeshBuffers::new(device, &shapes::arrow(0.06, 0.25, 24)));
         let mesh_bounds: Vec<Bounds> = stage.meshes.iter().map(|mesh| mesh.bounds()).collect();
@@ -96,6 +97,7 @@ impl Renderer {
             god_object_box: stage.meshes[stage.god_object.mesh].corners(),
             instances,
             floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
+            clip_planes: stage.clip_planes,
             plan: Plan {
                 light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
                 stale: true,
@@ -143,9 +145,12 @@ impl Renderer {
             let mark = force::instance(stage, pose, &state.force, &self.god_object_box, radius);
             marks.push(list.batch(arrow, mark));
         }
-        let ghost = show
-            .ghost
-            .then(|| list.batch(stage.god_object.mesh, [ghost::instance(stage, &state.device)]));
+        let ghost = show.ghost.then(|| {
+            list.batch(
+                stage.god_object.mesh,
+                [ghost::instance(stage, &state.device)],
+            )
+        });
 
         self.plan = Plan {
             light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
@@ -154,7 +159,8 @@ impl Renderer {
             marks,
             ghost,
         };
-        gpu.queue.write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
+        gpu.queue
+            .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
         self.shadow.aim(&gpu.queue, &self.plan.light);
     }
 
@@ -197,17 +203,13 @@ impl Renderer {
     /// Writes a view's uniform; `false` where this eye does not see the screen.
     fn set_view(&self, gpu: &Gpu, screen: &Screen, eyes: &Eyes, view: &ViewTarget) -> bool {
         let eye = eyes.position(view.eye);
-        let reach = (eye - self.floor.center).norm() + 2.0 * self.floor.radius;
-        let planes = ClipPlanes {
-            near: NEAR,
-            far: reach.max(10.0 * NEAR),
-        };
-        let Some(clip) = screen.clip_from_workbench(&eye, &planes) else {
+        let Some(clip) = screen.clip_from_workbench(&eye, &self.clip_planes) else {
             return false;
         };
         let Plan { light, stale, .. } = &self.plan;
         let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale);
-        gpu.queue.write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
+        gpu.queue
+            .write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
         true
     }
 
@@ -222,12 +224,12 @@ impl Renderer {
         pass.set_scissor_rect(x, y, width, height);
         pass.set_bind_group(0, &view.group, &[]);
 
-        pass.set_pipeline(&self.pipelines.background);
-        pass.draw(0..3, 0..1);
         pass.set_pipeline(&self.pipelines.mesh);
         pass.set_vertex_buffer(1, self.instances.slice(..));
         self.draw_batches(pass, &self.plan.casters);
         self.draw_batches(pass, &self.plan.marks);
+        pass.set_pipeline(&self.pipelines.background);
+        pass.draw(0..3, 0..1);
         pass.set_pipeline(&self.pipelines.floor);
         pass.draw(0..4, 0..1);
         if let Some(ghost) = &self.plan.ghost {
@@ -271,20 +273,29 @@ fn pose_of<'a>(body: &'a StageBody, state: &'a State) -> &'a Isometry3<f64> {
 /// The obstacles; the god-object where there are none.
 fn standing_bodies(stage: &Stage, mesh_bounds: &[Bounds]) -> Bounds {
     let bounds = |body: &StageBody| stage.body_bounds(body, &body.pose, &mesh_bounds[body.mesh]);
-    let all = stage.obstacles.iter().map(bounds).reduce(|a, b| a.union(&b));
+    let all = stage
+        .obstacles
+        .iter()
+        .map(bounds)
+        .reduce(|a, b| a.union(&b));
     all.unwrap_or_else(|| bounds(&stage.god_object))
 }
 
 /// Height of the lowest vertex of what stands on the workbench, in metres.
 fn lowest_point(stage: &Stage) -> f64 {
     let god_object = std::slice::from_ref(&stage.god_object);
-    let standing = if stage.obstacles.is_empty() { god_object } else { &stage.obstacles };
+    let standing = if stage.obstacles.is_empty() {
+        god_object
+    } else {
+        &stage.obstacles
+    };
     let height = |body: &StageBody| {
         let model = god_object::workbench_from_mesh(stage, body, &body.pose);
         let mesh = &stage.meshes[body.mesh];
-        let heights = mesh.vertices.iter().map(move |v| {
-            model.transform_point(&Point3::from(*v).cast::<f64>()).z
-        });
+        let heights = mesh
+            .vertices
+            .iter()
+            .map(move |v| model.transform_point(&Point3::from(*v).cast::<f64>()).z);
         heights.fold(f64::INFINITY, f64::min)
     };
     let lowest = standing.iter().map(height).fold(f64::INFINITY, f64::min);

@@ -42,7 +42,11 @@ pub(crate) fn instance(
     let along = pose.rotation.inverse() * force;
     let from_body = way_out(corners, &stage.reference_point, &along);
     let tail = stage.workbench_from_scene * (pose * (stage.reference_point + along * from_body));
-    arrow(&tail, &(stage.workbench_from_scene.isometry.rotation * force), radius)
+    arrow(
+        &tail,
+        &(stage.workbench_from_scene.isometry.rotation * force),
+        radius,
+    )
 }
 
 /// How often `along` leads from `inside` to the surface of a box; 0 where it does not leave it.
@@ -52,11 +56,21 @@ fn way_out(
     along: &Vector3<f64>,
 ) -> f64 {
     let times = (0..3).map(|axis| {
-        let wall = if along[axis] > 0.0 { high[axis] } else { low[axis] };
+        let wall = if along[axis] > 0.0 {
+            high[axis]
+        } else {
+            low[axis]
+        };
         (wall - inside[axis]) / along[axis] // infinite or NaN where it runs along the wall
     });
-    let first = times.filter(|time| time.is_finite()).fold(f64::INFINITY, f64::min);
-    if first.is_finite() { first.max(0.0) } else { 0.0 }
+    let first = times
+        .filter(|time| time.is_finite())
+        .fold(f64::INFINITY, f64::min);
+    if first.is_finite() {
+        first.max(0.0)
+    } else {
+        0.0
+    }
 }
 
 /// The arrow from `tail` along `force`, both in the workbench frame.
@@ -69,8 +83,9 @@ fn arrow(tail: &Point3<f64>, force: &Vector3<f64>, radius: f64) -> Option<Instan
     let length = (LENGTH_PER_NEWTON * strength).min(MAX_LENGTH) * radius;
     let thickness = (THICKNESS * radius).min(length);
     // The arrow mesh points along y; straight down has no unique turn, any will do.
-    let turn = UnitQuaternion::rotation_between(&Vector3::y(), force)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let turn = UnitQuaternion::rotation_between(&Vector3::y(), force).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    });
     let scale = Matrix4::new_nonuniform_scaling(&Vector3::new(thickness, length, thickness));
     let model = Matrix4::new_translation(&tail.coords) * turn.to_homogeneous() * scale;
     Some(Instance::new(&model, &MATERIAL))
@@ -82,7 +97,11 @@ mod tests {
 
     #[test]
     fn no_arrow_is_drawn_for_no_force_or_a_broken_one() {
-        for force in [Vector3::zeros(), Vector3::new(f64::NAN, 0.0, 0.0), Vector3::new(f64::INFINITY, 0.0, 0.0)] {
+        for force in [
+            Vector3::zeros(),
+            Vector3::new(f64::NAN, 0.0, 0.0),
+            Vector3::new(f64::INFINITY, 0.0, 0.0),
+        ] {
             assert_eq!(arrow(&Point3::origin(), &force, 0.03), None);
         }
     }
@@ -91,8 +110,14 @@ mod tests {
     fn the_arrow_begins_where_its_line_leaves_the_box() {
         let corners = (Point3::new(-1.0, -2.0, -3.0), Point3::new(1.0, 2.0, 3.0));
         let inside = Point3::new(0.5, 0.0, 0.0);
-        assert_eq!(way_out(&corners, &inside, &Vector3::new(0.25, 0.0, 0.0)), 2.0);
-        assert_eq!(way_out(&corners, &inside, &Vector3::new(0.0, -4.0, 1.0)), 0.5);
+        assert_eq!(
+            way_out(&corners, &inside, &Vector3::new(0.25, 0.0, 0.0)),
+            2.0
+        );
+        assert_eq!(
+            way_out(&corners, &inside, &Vector3::new(0.0, -4.0, 1.0)),
+            0.5
+        );
         assert_eq!(way_out(&corners, &inside, &Vector3::zeros()), 0.0);
     }
 }

@@ -57,13 +57,15 @@ impl KeyLight {
         let across = Vector3::z().cross(&to_light).normalize();
         let upward = to_light.cross(&across);
         // The middle of the map snaps to whole texels, for the same reason as the radius.
-        let snapped = |axis: &Vector3<f64>| (casters.center.coords.dot(axis) / texel).round() * texel;
+        let snapped =
+            |axis: &Vector3<f64>| (casters.center.coords.dot(axis) / texel).round() * texel;
         let middle = across * snapped(&across)
             + upward * snapped(&upward)
             + forward * casters.center.coords.dot(&forward);
         let eye = Point3::from(middle - forward * radius);
         let view = Matrix4::look_at_rh(&eye, &(eye + forward), &upward);
-        let planes = Orthographic3::new(-radius, radius, -radius, radius, 0.0, SHADOW_REACH * radius);
+        let planes =
+            Orthographic3::new(-radius, radius, -radius, radius, 0.0, SHADOW_REACH * radius);
         Self {
             shadow_from_workbench: depth_from_zero() * planes.to_homogeneous() * view,
             to_light,
@@ -89,7 +91,10 @@ impl Floor {
         // 1, 2 or 5 times a power of ten, two to five lines to a radius.
         let wanted = 0.5 * bodies.radius.max(1e-6);
         let decade = 10f64.powf(wanted.log10().floor());
-        let steps = [5.0, 2.0, 1.0].into_iter().find(|s| s * decade <= wanted).unwrap_or(1.0);
+        let steps = [5.0, 2.0, 1.0]
+            .into_iter()
+            .find(|s| s * decade <= wanted)
+            .unwrap_or(1.0);
         Self {
             center: Point3::new(bodies.center.x, bodies.center.y, lowest),
             radius: Self::REACH * bodies.radius,
@@ -107,7 +112,9 @@ impl FrameUniform {
         stale: bool,
     ) -> Self {
         let columns = |m: &Matrix4<f64>| -> [[f32; 4]; 4] { m.cast::<f32>().into() };
-        let inverse = clip_from_workbench.try_inverse().unwrap_or_else(Matrix4::identity);
+        let inverse = clip_from_workbench
+            .try_inverse()
+            .unwrap_or_else(Matrix4::identity);
         let vector = |v: &Vector3<f64>, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
         Self {
             clip_from_workbench: columns(clip_from_workbench),
@@ -135,8 +142,14 @@ mod tests {
             let light = KeyLight::fit(&casters, 1024);
             for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                 for side in [-radius, radius] {
-                    let clip = light.shadow_from_workbench * (casters.center + axis * side).to_homogeneous();
-                    assert!(clip.x.abs() < 1.01 && clip.y.abs() < 1.01 && clip.z > -0.01 && clip.z < 1.0);
+                    let clip = light.shadow_from_workbench
+                        * (casters.center + axis * side).to_homogeneous();
+                    assert!(
+                        clip.x.abs() < 1.01
+                            && clip.y.abs() < 1.01
+                            && clip.z > -0.01
+                            && clip.z < 1.0
+                    );
                 }
             }
             let nearer = casters.center + light.to_light * (0.5 * radius);

@@ -17,7 +17,10 @@ const MATERIAL: Material = Material {
 
 /// The ghost at the device's pose, scene frame.
 pub(crate) fn instance(stage: &Stage, device_pose: &Isometry3<f64>) -> Instance {
-    Instance::new(&workbench_from_mesh(stage, &stage.god_object, device_pose), &MATERIAL)
+    Instance::new(
+        &workbench_from_mesh(stage, &stage.god_object, device_pose),
+        &MATERIAL,
+    )
 }
 
 /// The pipeline of translucent bodies.

@@ -10,11 +10,14 @@ pub(crate) fn instance(stage: &Stage, pose: &Isometry3<f64>) -> Instance {
     let [red, green, blue] = stage.god_object.colour;
     let material = Material {
         colour: [red, green, blue, 1.0],
-        gloss: 0.34,
-        sharpness: 48.0,
+        gloss: 0.5,
+        sharpness: 36.0,
         own_light: 0.0,
     };
-    Instance::new(&workbench_from_mesh(stage, &stage.god_object, pose), &material)
+    Instance::new(
+        &workbench_from_mesh(stage, &stage.god_object, pose),
+        &material,
+    )
 }
 
 /// The map from a body's mesh to the workbench.

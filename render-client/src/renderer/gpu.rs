@@ -74,25 +74,31 @@ impl Gpu {
         instance: wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
     ) -> Result<Self, RenderError> {
-        let wanted = std::env::var("WGPU_ADAPTER_NAME").ok().map(|name| name.to_lowercase());
+        let wanted = std::env::var("WGPU_ADAPTER_NAME")
+            .ok()
+            .map(|name| name.to_lowercase());
         let mut adapters = adapters(&instance);
         adapters.retain(|adapter| surface.is_none_or(|s| adapter.is_surface_supported(s)));
         if let Some(wanted) = wanted {
             adapters.retain(|adapter| adapter.get_info().name.to_lowercase().contains(&wanted));
         }
-        let adapter = adapters.into_iter().min_by_key(rank).ok_or(RenderError::NoGpu)?;
+        let adapter = adapters
+            .into_iter()
+            .min_by_key(rank)
+            .ok_or(RenderError::NoGpu)?;
 
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("taut-render"),
             required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
-            RenderError::Gpu {
-                adapter: adapter.get_info().name,
-                reason: error.to_string(),
-            }
-        })?;
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+                RenderError::Gpu {
+                    adapter: adapter.get_info().name,
+                    reason: error.to_string(),
+                }
+            })?;
         let gpu = Self {
             instance,
             adapter,
@@ -120,15 +126,32 @@ impl Gpu {
         }
     }
 
+    /// Whether the processor draws, for want of a graphics card.
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Samples per pixel: 4 where the adapter can for this format, else 1.
     pub(crate) fn samples(&self, format: wgpu::TextureFormat) -> u32 {
-        let can = |format| self.adapter.get_texture_format_features(format).flags.sample_count_supported(4);
-        if can(format) && can(super::pipeline::DEPTH) { 4 } else { 1 }
+        let can = |format| {
+            self.adapter
+                .get_texture_format_features(format)
+                .flags
+                .sample_count_supported(4)
+        };
+        if can(format) && can(super::pipeline::DEPTH) {
+            4
+        } else {
+            1
+        }
     }
 
     /// Waits until everything submitted so far has been drawn.
     pub fn finish(&self) -> Result<(), RenderError> {
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ()).map_err(|error| self.broken(&error))
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(|_| ())
+            .map_err(|error| self.broken(&error))
     }
 
     /// The error that says that this adapter failed.

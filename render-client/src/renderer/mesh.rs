@@ -73,8 +73,16 @@ impl MeshBuffers {
         if vertices.is_empty() {
             vertices.push(Vertex::zeroed()); // a buffer has at least one element
         }
-        let indices = if shaded.indices.is_empty() { vec![0] } else { shaded.indices };
-        let count = if mesh.triangles.is_empty() { 0 } else { indices.len() as u32 };
+        let indices = if shaded.indices.is_empty() {
+            vec![0]
+        } else {
+            shaded.indices
+        };
+        let count = if mesh.triangles.is_empty() {
+            0
+        } else {
+            indices.len() as u32
+        };
         Self {
             vertices: filled(device, "vertices", &vertices, wgpu::BufferUsages::VERTEX),
             indices: filled(device, "indices", &indices, wgpu::BufferUsages::INDEX),
@@ -106,8 +114,16 @@ pub(crate) fn buffer_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2]
         })
     };
     [
-        layout(size_of::<Vertex>(), wgpu::VertexStepMode::Vertex, &VERTEX_ATTRIBUTES),
-        layout(size_of::<Instance>(), wgpu::VertexStepMode::Instance, &INSTANCE_ATTRIBUTES),
+        layout(
+            size_of::<Vertex>(),
+            wgpu::VertexStepMode::Vertex,
+            &VERTEX_ATTRIBUTES,
+        ),
+        layout(
+            size_of::<Instance>(),
+            wgpu::VertexStepMode::Instance,
+            &INSTANCE_ATTRIBUTES,
+        ),
     ]
 }
 

@@ -155,9 +155,10 @@ impl OffScreen {
     pub fn read(&self, gpu: &Gpu) -> Result<image::RgbaImage, RenderError> {
         let (width, height) = self.size;
         let (done, mapped) = std::sync::mpsc::channel();
-        self.readback.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _ = done.send(result); // nobody listens only if the wait below failed
-        });
+        self.readback
+            .map_async(wgpu::MapMode::Read, .., move |result| {
+                let _ = done.send(result); // nobody listens only if the wait below failed
+            });
         gpu.finish()?;
         match mapped.try_recv() {
             Ok(Ok(())) => {}
@@ -166,7 +167,10 @@ impl OffScreen {
         }
         let mut pixels = Vec::with_capacity(4 * width as usize * height as usize);
         {
-            let rows = self.readback.get_mapped_range(..).map_err(|error| gpu.broken(&error))?;
+            let rows = self
+                .readback
+                .get_mapped_range(..)
+                .map_err(|error| gpu.broken(&error))?;
             for row in rows.chunks(self.padded_row as usize) {
                 pixels.extend_from_slice(&row[..4 * width as usize]);
             }

@@ -23,7 +23,7 @@ pub(crate) enum Layer {
     Translucent,
     /// As `Translucent`, seen from both sides.
     Plane,
-    /// Behind everything.
+    /// As far away as can be: where nothing is yet.
     Background,
 }
 
@@ -113,7 +113,11 @@ impl FrameLayout {
         output: Output,
         parts: &PipelineParts<'_>,
     ) -> wgpu::RenderPipeline {
-        let source = format!("{}\n{}", include_str!("../../shaders/frame.wgsl"), parts.source);
+        let source = format!(
+            "{}\n{}",
+            include_str!("../../shaders/frame.wgsl"),
+            parts.source
+        );
         let module = shader(device, parts.label, source);
         let opaque = matches!(parts.layer, Layer::Opaque | Layer::Background);
         let one_sided = matches!(parts.layer, Layer::Opaque | Layer::Translucent);
@@ -136,7 +140,7 @@ impl FrameLayout {
                 format: DEPTH,
                 depth_write_enabled: Some(parts.layer == Layer::Opaque),
                 depth_compare: Some(if background {
-                    wgpu::CompareFunction::Always
+                    wgpu::CompareFunction::LessEqual
                 } else {
                     wgpu::CompareFunction::Less
                 }),

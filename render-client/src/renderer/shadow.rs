@@ -24,7 +24,13 @@ impl ShadowMap {
             samples: 1,
         };
         let size = (Self::TEXELS, Self::TEXELS);
-        let map = attachment(device, "shadow map", size, single, wgpu::TextureUsages::TEXTURE_BINDING);
+        let map = attachment(
+            device,
+            "shadow map",
+            size,
+            single,
+            wgpu::TextureUsages::TEXTURE_BINDING,
+        );
         let pipeline = pipeline(device);
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("shadow"),

@@ -45,10 +45,20 @@ pub fn arrow(shaft_radius: f32, head_length: f32, facets: u32) -> TriangleMesh {
 pub fn cuboid(half_extents: [f32; 3]) -> TriangleMesh {
     let sign = |bit: u32| if bit == 0 { -1.0 } else { 1.0 };
     let corner = |i: u32| [0, 1, 2].map(|axis| sign(i >> axis & 1) * half_extents[axis as usize]);
-    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
     TriangleMesh {
         vertices: (0..8).map(corner).collect(),
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        triangles: faces
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
     }
 }
 
@@ -81,7 +91,10 @@ fn revolve(profile: &[[f32; 2]], facets: u32) -> TriangleMesh {
             }
         }
     }
-    TriangleMesh { vertices, triangles }
+    TriangleMesh {
+        vertices,
+        triangles,
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +120,12 @@ mod tests {
 
     #[test]
     fn every_edge_of_a_shape_is_passed_once_each_way() {
-        for mesh in [sphere(1.0, 16), cylinder(1.0, 1.0, 8), arrow(0.1, 0.3, 8), cuboid([1.0; 3])] {
+        for mesh in [
+            sphere(1.0, 16),
+            cylinder(1.0, 1.0, 8),
+            arrow(0.1, 0.3, 8),
+            cuboid([1.0; 3]),
+        ] {
             let edges = |&[a, b, c]: &[u32; 3]| [(a, b), (b, c), (c, a)];
             let all: Vec<(u32, u32)> = mesh.triangles.iter().flat_map(edges).collect();
             for &(a, b) in &all {

@@ -9,7 +9,7 @@ use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::stereo::Stereo;
 use taut_render::timeline::{Latched, State};
-use taut_render::view::Screen;
+use taut_render::view::{ClipPlanes, Screen};
 
 /// Warm orange and light grey-blue, linear.
 pub(crate) const ORANGE: [f32; 3] = [0.86, 0.24, 0.035];
@@ -47,6 +47,10 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
             .collect(),
         head: Isometry3::translation(0.12, -1.1, 0.85),
         eye_separation: 0.065,
+        clip_planes: ClipPlanes {
+            near: 0.02,
+            far: 20.0,
+        },
         workbench_from_scene: Similarity3::from_parts(
             Translation3::new(0.0, -0.28, 0.22),
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -0.5),
@@ -64,13 +68,20 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
 
 /// A cube of these half extents with a round hole along y through its middle.
 pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh {
-    assert!(facets.is_multiple_of(8), "the corners of the square must be among the directions");
+    assert!(
+        facets.is_multiple_of(8),
+        "the corners of the square must be among the directions"
+    );
     let mut vertices = Vec::new();
     for y in [-half, half] {
         for on_square in [false, true] {
             vertices.extend((0..facets).map(|i| {
                 let (sine, cosine) = (std::f32::consts::TAU * i as f32 / facets as f32).sin_cos();
-                let reach = if on_square { half / sine.abs().max(cosine.abs()) } else { radius };
+                let reach = if on_square {
+                    half / sine.abs().max(cosine.abs())
+                } else {
+                    radius
+                };
                 [reach * sine, y, reach * cosine]
             }));
         }

@@ -53,8 +53,17 @@ pub struct GodObject {
     radius: f64,
     trust_length: f64,
     last_device: Option<Pose>,
-    /// How far the device may be from the god-object, beyond what the constraints hold back, before the next set is made.
-    reach: f64,
+    /// How far the present set looks ahead beyond the activation distance, m.
+    looks_ahead: f64,
+}
+
+/// How far the set that an update publishes must look ahead.
+#[derive(Clone, Copy, Debug)]
+struct LookAhead {
+    /// Path of the device since the last update, m: it may move as far again until the next.
+    device_moved: f64,
+    /// That, and what the body may still cover, m.
+    needed: f64,
 }
 
 /// What one update did.
@@ -138,9 +147,9 @@ impl GodObject {
             radius,
             trust_length: f64::INFINITY,
             last_device: None,
-            reach: 0.0,
+            looks_ahead: 0.0,
         };
-        god_object.collect(&mut Work::default());
+        god_object.collect(0.0, &mut Work::default());
         Ok(god_object)
     }
 
@@ -188,6 +197,7 @@ impl GodObject {
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
+        let mut plan = LookAhead { device_moved, needed: device_moved };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {
             let budget_left = self.settings.work_budget.is_none_or(|b| report.work.advancement_steps < b);
@@ -197,17 +207,22 @@ impl GodObject {
             report.substeps += 1;
             let left = pose_difference(&goal, &self.pose_at_reference_point(), &branch);
             branch = angular(&left);
-            if !self.substep(&left, device_moved, &mut report) {
+            if !self.substep(&left, &mut plan, &mut report) {
                 report.unfinished = false;
                 break;
             }
+        }
+        // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
+        let published = plan.needed.min(self.settings.look_ahead_limit);
+        if self.settings.look_ahead && self.looks_ahead < published {
+            self.collect(published, &mut report.work);
         }
         self.describe_set(&mut report);
         report
     }
 
     /// Project, move, collect, once. False when there was nothing left to move.
-    fn substep(&mut self, left: &Vector6, device_moved: f64, report: &mut StepReport) -> bool {
+    fn substep(&mut self, left: &Vector6, plan: &mut LookAhead, report: &mut StepReport) -> bool {
         let length = self.motion_length(left);
         let moves = length > self.settings.motion_tolerance; // false for NaN
         let eases = self.set.gap_min < self.settings.rest_distance - self.settings.motion_tolerance;
@@ -221,9 +236,8 @@ impl GodObject {
         };
         let covered = self.motion_length(&constrained);
         if report.substeps == 1 {
-            // This update covers the share k_s of what is free; the rest of it, and what the device moves meanwhile, must
-            // find its constraints in the set.
-            self.reach = covered * (1.0 - self.settings.k_s) / self.settings.k_s + device_moved;
+            // This update covers the share k_s of what is free, the next sets must serve the rest.
+            plan.needed = plan.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
         if !worth_moving {
@@ -243,8 +257,10 @@ impl GodObject {
             self.trust_length *= 2.0;
         }
 
-        // 5. Collect at the pose reached.
-        self.collect(&mut report.work);
+        // 5. Collect at the pose reached. A motion that arrived is likely the last of the update.
+        let arrived = time >= 1.0 && length <= self.trust_length;
+        let beyond = if arrived { plan.needed.min(self.settings.look_ahead_limit) } else { 0.0 };
+        self.collect(beyond, &mut report.work);
         true
     }
 
@@ -323,13 +339,15 @@ impl GodObject {
         free
     }
 
-    /// Replaces the constraint set by the one that holds at the present pose.
-    fn collect(&mut self, work: &mut Work) {
+    /// Replaces the constraint set by the one that holds at the present pose, with look-ahead `beyond` the activation
+    /// distance.
+    fn collect(&mut self, beyond: f64, work: &mut Work) {
         let distance = if self.settings.look_ahead {
-            self.settings.activation_distance + self.reach.min(self.settings.look_ahead_limit)
+            self.settings.activation_distance + beyond
         } else {
             TOUCHING_REST_DISTANCES * self.settings.rest_distance
         };
+        self.looks_ahead = beyond;
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;
         self.set.gap_min = f64::INFINITY;

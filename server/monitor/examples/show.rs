@@ -108,11 +108,21 @@ fn scene() -> MonitorScene {
         screens: vec![
             screen(
                 "vertical",
-                [[-0.7, 0.3, 0.0], [0.7, 0.3, 0.0], [0.7, 0.3, 1.0], [-0.7, 0.3, 1.0]],
+                [
+                    [-0.7, 0.3, 0.0],
+                    [0.7, 0.3, 0.0],
+                    [0.7, 0.3, 1.0],
+                    [-0.7, 0.3, 1.0],
+                ],
             ),
             screen(
                 "horizontal",
-                [[-0.7, -0.7, -0.1], [0.7, -0.7, -0.1], [0.7, 0.3, -0.1], [-0.7, 0.3, -0.1]],
+                [
+                    [-0.7, -0.7, -0.1],
+                    [0.7, -0.7, -0.1],
+                    [0.7, 0.3, -0.1],
+                    [-0.7, 0.3, -0.1],
+                ],
             ),
         ],
         head: Some(Isometry3::translation(0.0, -0.5, 0.45)),
@@ -149,7 +159,10 @@ fn sample_at(time: f64, index: u64) -> MonitorSample {
 
     let mut sample = MonitorSample::at((time * 1e9) as u64);
     let offset = god_object_pose.translation.vector - device_pose.translation.vector;
-    let turn = god_object_rotation.rotation_to(&tilt).inverse().scaled_axis();
+    let turn = god_object_rotation
+        .rotation_to(&tilt)
+        .inverse()
+        .scaled_axis();
     let (force, torque) = (STIFFNESS * offset, 2.0 * turn);
     sample.god_object_pose = god_object_pose;
     sample.device_pose = device_pose;
@@ -160,7 +173,11 @@ fn sample_at(time: f64, index: u64) -> MonitorSample {
         normal[axis] = push.signum();
         let mut point = Point3::new(0.0, along, 0.0);
         point[axis] = -HOLE * push.signum();
-        sample.contacts.push(ShownContact { point, normal, gap: 0.0 });
+        sample.contacts.push(ShownContact {
+            point,
+            normal,
+            gap: 0.0,
+        });
     };
     if inside {
         let tip = depth + PEG_LENGTH;

@@ -7,7 +7,9 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum MonitorError {
     /// Another program listens on the port already, or the address is not this machine's.
-    #[error("monitoring cannot listen on {address} ({source}); set {key} to a free port, or 0 to take any")]
+    #[error(
+        "monitoring cannot listen on {address} ({source}); set {key} to a free port, or 0 to take any"
+    )]
     Listen {
         /// Address and port asked for.
         address: SocketAddr,
@@ -17,7 +19,9 @@ pub enum MonitorError {
         source: std::io::Error,
     },
     /// The stream's server did not come up although its port was free.
-    #[error("the monitoring stream did not start on {address} within {waited_s} s; look for a rerun message above, or choose another monitor.grpc_port")]
+    #[error(
+        "the monitoring stream did not start on {address} within {waited_s} s; look for a rerun message above, or choose another monitor.grpc_port"
+    )]
     NoAnswer {
         /// Address and port asked for.
         address: SocketAddr,
@@ -49,14 +53,16 @@ pub enum MonitorError {
         reason: String,
     },
     /// The operating system gave no thread.
-    #[error("no thread for monitoring could be started ({0}); check the limit on processes (ulimit -u)")]
+    #[error(
+        "no thread for monitoring could be started ({0}); check the limit on processes (ulimit -u)"
+    )]
     Thread(std::io::Error),
     /// The monitoring thread ended early by a panic.
     #[error("the monitoring thread ended early; see the panic message above")]
     ThreadLost,
 }
 
-/// Why a recording could not be read back.
+/// Why a recording or a stream could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum InspectError {
     /// The file cannot be opened.
@@ -73,6 +79,16 @@ pub enum InspectError {
         /// The file asked for.
         path: PathBuf,
         /// What rerun's reader said.
+        reason: String,
+    },
+    /// The stream cannot be reached.
+    #[error(
+        "the stream at {address} cannot be read ({reason}); is the server running, and is this its address?"
+    )]
+    Connect {
+        /// The address asked for.
+        address: String,
+        /// What went wrong.
         reason: String,
     },
 }

@@ -1,17 +1,21 @@
-//! Reads a recording back with rerun's own reader: is it whole, and what is in it?
+//! Looks on with rerun's own reader: is a recording whole, does a stream arrive, and what is in it?
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
+use re_async::AsyncRuntimeHandle;
+use re_log_channel::{DataSourceMessage, RecvTimeoutError, SmartMessagePayload};
 use rerun::StoreKind;
 use rerun::external::re_log_encoding::DecoderApp;
+use rerun::external::{re_grpc_client, re_uri};
 use rerun::log::{Chunk, LogMsg};
 
 use crate::error::InspectError;
 
-/// What a recording holds, blueprints aside.
+/// What a recording or a stream holds, blueprints aside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RrdSummary {
     /// Entity paths, sorted.
@@ -24,7 +28,7 @@ pub struct RrdSummary {
     pub first_time_s: Option<f64>,
     /// Last session time of any row, seconds.
     pub last_time_s: Option<f64>,
-    /// Blueprints (layouts of the viewer) in the file.
+    /// Blueprints (layouts of the viewer).
     pub blueprints: usize,
 }
 
@@ -51,16 +55,52 @@ pub fn inspect(path: &Path) -> Result<RrdSummary, InspectError> {
         .map_err(|error| decode(error.to_string()))?;
     let mut contents = Contents::default();
     for message in messages {
-        match message.map_err(|error| decode(error.to_string()))? {
-            LogMsg::ArrowMsg(store, arrow) if store.kind() == StoreKind::Recording => {
-                let chunk =
-                    Chunk::from_arrow_msg(&arrow).map_err(|error| decode(error.to_string()))?;
-                contents.add(&chunk);
+        let message = message.map_err(|error| decode(error.to_string()))?;
+        contents.add(&message).map_err(decode)?;
+    }
+    Ok(contents.summary())
+}
+
+/// Looks on at a running session for a while, as a viewer on another machine does.
+///
+/// `stream_address` is what [`crate::Monitor::stream_address`] says. A stream that ends early is no error.
+pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, InspectError> {
+    let connect = |reason: String| InspectError::Connect {
+        address: stream_address.to_owned(),
+        reason,
+    };
+    let uri: re_uri::ProxyUri = stream_address
+        .parse()
+        .map_err(|error: re_uri::Error| connect(error.to_string()))?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("taut-observe")
+        .enable_all()
+        .build()
+        .map_err(|error| connect(error.to_string()))?;
+    let handle = AsyncRuntimeHandle::new_native(runtime.handle().clone());
+    let messages = re_grpc_client::stream(&handle, uri);
+
+    let mut contents = Contents::default();
+    let end = Instant::now() + duration;
+    loop {
+        let left = end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            break;
+        }
+        match messages.recv_timeout(left).map(|message| message.payload) {
+            Ok(SmartMessagePayload::Msg(DataSourceMessage::LogMsg(message))) => {
+                contents.add(&message).map_err(connect)?;
             }
-            LogMsg::BlueprintActivationCommand(_) => contents.blueprints += 1,
-            LogMsg::ArrowMsg(..) | LogMsg::SetStoreInfo(_) => {}
+            Ok(SmartMessagePayload::Msg(_) | SmartMessagePayload::Flush { .. }) => {}
+            Ok(SmartMessagePayload::Quit(Some(error))) if contents.rows.is_empty() => {
+                return Err(connect(error.to_string()));
+            }
+            Ok(SmartMessagePayload::Quit(_))
+            | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
         }
     }
+    runtime.shutdown_background();
     Ok(contents.summary())
 }
 
@@ -73,9 +113,23 @@ struct Contents {
 }
 
 impl Contents {
-    fn add(&mut self, chunk: &Chunk) {
-        *self.rows.entry(chunk.entity_path().to_string()).or_default() +=
-            chunk.num_rows() as u64;
+    fn add(&mut self, message: &LogMsg) -> Result<(), String> {
+        match message {
+            LogMsg::ArrowMsg(store, arrow) if store.kind() == StoreKind::Recording => {
+                let chunk = Chunk::from_arrow_msg(arrow).map_err(|error| error.to_string())?;
+                self.add_chunk(&chunk);
+            }
+            LogMsg::BlueprintActivationCommand(_) => self.blueprints += 1,
+            LogMsg::ArrowMsg(..) | LogMsg::SetStoreInfo(_) => {}
+        }
+        Ok(())
+    }
+
+    fn add_chunk(&mut self, chunk: &Chunk) {
+        *self
+            .rows
+            .entry(chunk.entity_path().to_string())
+            .or_default() += chunk.num_rows() as u64;
         for (name, column) in chunk.timelines() {
             self.timelines.insert(name.to_string());
             if name.as_str() == crate::stream::TIMELINE {

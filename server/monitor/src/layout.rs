@@ -16,11 +16,14 @@
 //! it would send are written here.
 
 use nalgebra::{Rotation3, Vector3};
-use rerun::blueprint::components::{BackgroundKind, ContainerKind, Corner2D, PanelState, PlayState};
+use rerun::blueprint::components::{
+    BackgroundKind, ContainerKind, Corner2D, PanelState, PlayState,
+};
 use rerun::external::re_log_types::{BlueprintActivationCommand, EntityPath};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis,
-    TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
+    TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+    VisibleTimeRanges,
 };
 use rerun::external::uuid::Uuid;
 use rerun::{AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult};
@@ -116,7 +119,8 @@ impl<'a> Layout<'a> {
         let below = self.container(
             ContainerKind::Horizontal,
             &[
-                self.view("TextLog", "Log", paths::LOG, &[paths::LOG], 1.7)?.1,
+                self.view("TextLog", "Log", paths::LOG, &[paths::LOG], 1.7)?
+                    .1,
                 self.plot("Contacts", &[paths::CONTACT_COUNT], 1.0)?,
                 self.plot("Smallest gap (mm)", &[paths::GAP], 1.0)?,
                 self.plot("Constraint age (µs)", &[paths::CONSTRAINT_AGE], 1.0)?,
@@ -137,8 +141,9 @@ impl<'a> Layout<'a> {
         self.property(id, "Background", &background)?;
         if let Some(bounds) = Bounds::of_bodies(scene) {
             let up = scene.up.try_normalize(0.0).unwrap_or_else(Vector3::z);
-            let turn = Rotation3::rotation_between(&Vector3::z(), &up)
-                .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+            let turn = Rotation3::rotation_between(&Vector3::z(), &up).unwrap_or_else(|| {
+                Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+            });
             let direction = (turn * Vector3::from(EYE_DIRECTION))
                 .try_normalize(0.0)
                 .unwrap_or_else(Vector3::x);
@@ -160,11 +165,18 @@ impl<'a> Layout<'a> {
         let legend = PlotLegend::new().with_corner(Corner2D::LeftTop);
         self.property(id, "PlotLegend", &legend)?;
         self.property(id, "ScalarAxis", &ScalarAxis::new().with_zoom_lock(true))?;
-        self.property(id, "TimeAxis", &TimeAxis::new().with_view_range(plot_window()))?;
-        let ranges = VisibleTimeRanges::new([rerun::external::re_sdk_types::datatypes::VisibleTimeRange {
-            timeline: TIMELINE.into(),
-            range: plot_window(),
-        }]);
+        self.property(
+            id,
+            "TimeAxis",
+            &TimeAxis::new().with_view_range(plot_window()),
+        )?;
+        let ranges =
+            VisibleTimeRanges::new(
+                [rerun::external::re_sdk_types::datatypes::VisibleTimeRange {
+                    timeline: TIMELINE.into(),
+                    range: plot_window(),
+                }],
+            );
         self.property(id, "VisibleTimeRanges", &ranges)?;
         Ok(placed)
     }
@@ -220,7 +232,9 @@ impl<'a> Layout<'a> {
 
 /// From [`PLOT_WINDOW_S`] before the time shown until then.
 fn plot_window() -> rerun::external::re_sdk_types::datatypes::TimeRange {
-    use rerun::external::re_sdk_types::datatypes::{TimeInt as RelativeTime, TimeRange, TimeRangeBoundary};
+    use rerun::external::re_sdk_types::datatypes::{
+        TimeInt as RelativeTime, TimeRange, TimeRangeBoundary,
+    };
     TimeRange {
         start: TimeRangeBoundary::CursorRelative(RelativeTime((-1e9 * PLOT_WINDOW_S) as i64)),
         end: TimeRangeBoundary::CursorRelative(RelativeTime(0)),

@@ -30,10 +30,12 @@ mod stream;
 const APPLICATION: &str = "taut";
 
 pub use error::{InspectError, MonitorError};
-pub use inspect::{RrdSummary, inspect};
+pub use inspect::{RrdSummary, inspect, observe};
 pub use log::{LogLevel, MonitorLog};
 pub use monitor::{Monitor, MonitorStats};
-pub use options::{DEFAULT_GRPC_PORT, DEFAULT_MEMORY_LIMIT_BYTES, DEFAULT_WEB_PORT, MonitorOptions};
+pub use options::{
+    DEFAULT_GRPC_PORT, DEFAULT_MEMORY_LIMIT_BYTES, DEFAULT_WEB_PORT, MonitorOptions,
+};
 pub use queue::MonitorSender;
 pub use sample::{LoopTime, MAX_SHOWN_CONTACTS, MonitorSample, ShownContact, ShownContacts};
 pub use scene::{BodyRole, MonitorBody, MonitorScene, MonitorScreen, Pose};

@@ -1,6 +1,7 @@
 //! The monitor: a thread that owns rerun.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -11,7 +12,9 @@ use rerun::grpc_server::GrpcServerSink;
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::{FileSink, FileSinkOptions, LogSink};
 use rerun::web_viewer::WebViewerConfig;
-use rerun::{MemoryLimit, PlaybackBehavior, RecordingStream, RecordingStreamBuilder, ServerOptions};
+use rerun::{
+    MemoryLimit, PlaybackBehavior, RecordingStream, RecordingStreamBuilder, ServerOptions,
+};
 
 use crate::error::MonitorError;
 use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel, MonitorLog};
@@ -27,11 +30,14 @@ use crate::{APPLICATION, picture};
 /// Time between two pictures: 30 a second, smooth enough to watch, cheap enough beside 1 kHz loops.
 const PICTURE_PERIOD: Duration = Duration::from_nanos(1_000_000_000 / 30);
 
-/// The plots are sent with every third picture: fewer, larger messages, which the viewer takes in faster.
-const PICTURES_PER_PLOT: u32 = 3;
+/// The plots are sent with every sixth picture: fewer, larger messages, which the viewer takes in faster.
+const PICTURES_PER_PLOT: u32 = 6;
 
 /// Most bytes on their way inside rerun; enough for the largest mesh, small beside the history.
 const BYTES_IN_FLIGHT: u64 = 32 * 1024 * 1024;
+
+/// Least history beside the meshes, bytes: the layout, and some seconds.
+const LEAST_HISTORY_BYTES: u64 = 1024 * 1024;
 
 /// A running monitor. Dropping it stops it as [`Monitor::stop`] does.
 #[derive(Debug)]
@@ -39,7 +45,8 @@ pub struct Monitor {
     log: MonitorLog,
     counters: Arc<Counters>,
     messages_dropped: Arc<AtomicU64>,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<JoinHandle<Result<(), String>>>,
+    recording: Option<PathBuf>,
     page: Option<String>,
     stream: Option<String>,
 }
@@ -75,13 +82,18 @@ impl Monitor {
         let messages_dropped = Arc::new(AtomicU64::new(0));
         let mut served = None;
         if options.serve {
-            let (server, sink) = Served::start(options, Arc::clone(&messages_dropped))?;
+            let (server, sink) = Served::start(options, &scene, Arc::clone(&messages_dropped))?;
             sinks.push(Box::new(sink));
             served = Some(server);
         }
         if let Some(path) = &options.record {
             // Without its footer a recording needs no memory that grows with its length; it opens just as well.
-            let file = FileSink::with_options(path, FileSinkOptions { write_footer: false });
+            let file = FileSink::with_options(
+                path,
+                FileSinkOptions {
+                    write_footer: false,
+                },
+            );
             sinks.push(Box::new(file.map_err(|error| MonitorError::Record {
                 path: path.clone(),
                 reason: error.to_string(),
@@ -104,8 +116,9 @@ impl Monitor {
         let thread = std::thread::Builder::new()
             .name("taut-monitor".to_owned())
             .spawn(move || {
-                run(stream, receiver, &command_queue);
+                let closed = run(stream, receiver, &command_queue);
                 drop(served); // The page goes last.
+                closed
             })
             .map_err(MonitorError::Thread)?;
 
@@ -117,6 +130,7 @@ impl Monitor {
             counters,
             messages_dropped,
             thread: Some(thread),
+            recording: options.record.clone(),
             page,
             stream: stream_url,
         };
@@ -171,7 +185,11 @@ impl Monitor {
         };
         // Fails only when the thread has ended already, which the join tells.
         let _ = self.log.commands.send(Command::Stop);
-        thread.join().map_err(|_| MonitorError::ThreadLost)
+        let closed = thread.join().map_err(|_| MonitorError::ThreadLost)?;
+        closed.map_err(|reason| MonitorError::Record {
+            path: self.recording.clone().unwrap_or_default(),
+            reason,
+        })
     }
 }
 
@@ -193,6 +211,7 @@ struct Served {
 impl Served {
     fn start(
         options: &MonitorOptions,
+        scene: &MonitorScene,
         messages_dropped: Arc<AtomicU64>,
     ) -> Result<(Served, ServedSink), MonitorError> {
         let bind = options.bind;
@@ -217,8 +236,9 @@ impl Served {
             &bracketed(bind),
             grpc_port,
             ServerOptions {
+                // Who joins late sees the present at once; the past follows.
                 playback_behavior: PlaybackBehavior::NewestFirst,
-                memory_limit: MemoryLimit::from_bytes(options.memory_limit_bytes),
+                memory_limit: MemoryLimit::from_bytes(history_bytes(options, scene)),
                 cors_allowed_origins: ports::allowed_origins(bind, web_port),
             },
         )
@@ -239,6 +259,15 @@ impl Served {
         };
         Ok((served, sink))
     }
+}
+
+/// The history's limit; never so small that rerun would have to throw the meshes away.
+fn history_bytes(options: &MonitorOptions, scene: &MonitorScene) -> u64 {
+    let bodies = scene.bodies.iter();
+    let meshes = bodies.map(|body| 24 * body.vertices.len() + 12 * body.triangles.len());
+    // Creases multiply vertices, and the god-object is there twice, as itself and as the ghost.
+    let at_least = LEAST_HISTORY_BYTES + 6 * meshes.sum::<usize>() as u64;
+    options.memory_limit_bytes.max(at_least)
 }
 
 /// rerun puts a colon and the port behind it, so an IPv6 address needs brackets.
@@ -269,7 +298,11 @@ fn recording_stream(
 }
 
 /// The thread: a picture every [`PICTURE_PERIOD`], the plots less often, lines in between, until told to stop.
-fn run(mut stream: Stream, mut receiver: MonitorReceiver, commands: &Receiver<Command>) {
+fn run(
+    mut stream: Stream,
+    mut receiver: MonitorReceiver,
+    commands: &Receiver<Command>,
+) -> Result<(), String> {
     let mut samples = Vec::with_capacity(SAMPLE_CAPACITY);
     let mut next_picture = Instant::now();
     let mut pictures = 0u32;
@@ -296,7 +329,7 @@ fn run(mut stream: Stream, mut receiver: MonitorReceiver, commands: &Receiver<Co
             break;
         }
     }
-    stream.close();
+    stream.close()
 }
 
 /// Empties both queues: the newest sample into the picture, all into `samples` for the plots.

@@ -21,7 +21,8 @@ pub struct MonitorOptions {
     pub web_port: u16,
     /// Also write everything to this `.rrd` file.
     pub record: Option<PathBuf>,
-    /// Most bytes of history kept for late observers; the oldest goes first, meshes stay.
+    /// Most bytes of history kept for late observers; the oldest goes first. Raised to
+    /// what the meshes need, if less.
     pub memory_limit_bytes: u64,
     /// Serve the stream and the web page. Without this and without `record` nothing is kept.
     pub serve: bool,

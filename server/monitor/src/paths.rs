@@ -1,7 +1,7 @@
 //! Entity paths: the names under which an observer finds things.
 
-use rerun::external::re_log_types::EntityPathPart;
 use rerun::EntityPath;
+use rerun::external::re_log_types::EntityPathPart;
 
 /// Origin of the 3D picture.
 pub(crate) const WORLD: &str = "world";

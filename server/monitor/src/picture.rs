@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 use rerun::{
-    Arrows3D, Ellipsoids3D, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
-    RecordingStream, RecordingStreamResult, Transform3D, ViewCoordinates,
+    Arrows3D, Ellipsoids3D, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, RecordingStream,
+    RecordingStreamResult, Transform3D, ViewCoordinates,
 };
 
 use crate::error::MonitorError;
@@ -12,12 +12,12 @@ use crate::scene::{BodyRole, MonitorBody, MonitorScene, Pose};
 use crate::{colours, paths, shading};
 
 /// Sizes of marks, as fractions of the god-object's diagonal.
-const CONTACT_RADIUS: f64 = 0.012;
-const NORMAL_LENGTH: f64 = 0.12;
-const NORMAL_RADIUS: f64 = 0.004;
+const CONTACT_RADIUS: f64 = 0.018;
+const NORMAL_LENGTH: f64 = 0.18;
+const NORMAL_RADIUS: f64 = 0.005;
 const FORCE_RADIUS: f64 = 0.012;
 /// A force of this many newtons is drawn as long as the god-object's diagonal, unless the scene says otherwise.
-const NEWTONS_PER_DIAGONAL: f64 = 5.0;
+const NEWTONS_PER_DIAGONAL: f64 = 8.0;
 /// Forces below this are not drawn, N: the arrow would be shorter than it is thick.
 const LEAST_DRAWN_FORCE: f64 = 0.01;
 /// Half sizes of the head, metres: width, depth, height.
@@ -139,7 +139,10 @@ impl Picture {
         stream: &RecordingStream,
         sample: &MonitorSample,
     ) -> RecordingStreamResult<()> {
-        let Some(pose) = sample.head_pose.or(self.head.as_ref().map(|head| head.pose)) else {
+        let Some(pose) = sample
+            .head_pose
+            .or(self.head.as_ref().map(|head| head.pose))
+        else {
             return Ok(());
         };
         let now_ns = sample.session_time_ns;
@@ -181,7 +184,10 @@ impl Picture {
             .with_origins(points())
             .with_colors([colours::NORMAL])
             .with_radii([(NORMAL_RADIUS * self.diagonal) as f32]);
-        stream.log(paths::CONTACTS, &[&dots as &dyn rerun::AsComponents, &arrows])
+        stream.log(
+            paths::CONTACTS,
+            &[&dots as &dyn rerun::AsComponents, &arrows],
+        )
     }
 
     fn show_force(
@@ -220,7 +226,12 @@ fn draw_body(stream: &RecordingStream, body: &MonitorBody) -> RecordingStreamRes
             let [r, g, b] = body.colour.unwrap_or(colours::OBSTACLE);
             let path = paths::named("world/obstacles", &body.name);
             stream.log_static(path.clone(), &transform(&body.pose))?;
-            stream.log_static(path, &mesh.with_albedo_factor([r, g, b, colours::OBSTACLE_OPACITY]).with_face_rendering(rerun::components::MeshFaceRendering::Front))
+            stream.log_static(
+                path,
+                &mesh
+                    .with_albedo_factor([r, g, b, colours::OBSTACLE_OPACITY])
+                    .with_face_rendering(rerun::components::MeshFaceRendering::Front),
+            )
         }
         BodyRole::GodObject => {
             let [r, g, b] = body.colour.unwrap_or(colours::GOD_OBJECT);

@@ -76,7 +76,7 @@ pub(crate) fn stream_url(host: IpAddr, grpc_port: u16) -> String {
 pub(crate) fn page_url(host: IpAddr, web_port: u16, stream_url: &str) -> String {
     let page = SocketAddr::new(host, web_port);
     format!(
-        "http://{page}/?hide_welcome_screen&theme=dark&url={}",
+        "http://{page}/?hide_welcome_screen&url={}",
         percent_encoded(stream_url)
     )
 }
@@ -134,7 +134,7 @@ mod tests {
         assert_eq!(stream, "rerun+http://127.0.0.1:9876/proxy");
         assert_eq!(
             page_url(LOCALHOST, 9090, &stream),
-            "http://127.0.0.1:9090/?hide_welcome_screen&theme=dark&url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A9876%2Fproxy"
+            "http://127.0.0.1:9090/?hide_welcome_screen&url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A9876%2Fproxy"
         );
     }
 

@@ -22,7 +22,7 @@ pub struct MonitorScene {
     pub reference_point: Point3<f64>,
     /// The direction that is up in the picture, world axes; need not be a unit vector.
     pub up: Vector3<f64>,
-    /// Length of the force arrow, metres per newton. `None`: 5 N is as long as the god-object's diagonal.
+    /// Length of the force arrow, metres per newton. `None`: 8 N is as long as the god-object's diagonal.
     pub arrow_metres_per_newton: Option<f64>,
 }
 

@@ -4,12 +4,11 @@
 //! thread of its own feeds it from a bounded queue; when an observer stalls (a laptop put to sleep), the queue fills,
 //! further messages are dropped and counted, and the rest goes on.
 
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use rerun::grpc_server::GrpcServerSink;
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
 
@@ -30,7 +29,7 @@ pub(crate) struct ServedSink {
 impl ServedSink {
     /// Starts the feeding thread; `dropped` counts the messages that no observer gets.
     pub(crate) fn new(
-        server: GrpcServerSink,
+        server: impl LogSink,
         dropped: Arc<AtomicU64>,
     ) -> Result<ServedSink, MonitorError> {
         let (messages, queued) = sync_channel::<LogMsg>(MESSAGE_CAPACITY);
@@ -77,5 +76,45 @@ impl Drop for ServedSink {
         if let Ok(drained) = self.drained.get_mut() {
             let _ = drained.recv_timeout(DRAIN_TIMEOUT);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A server whose only observer never reads.
+    struct Stalled;
+
+    impl LogSink for Stalled {
+        fn send(&self, _message: LogMsg) {
+            loop {
+                std::thread::park();
+            }
+        }
+
+        fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_stalled_observer_costs_messages_but_no_time() {
+        let (stream, stored) = rerun::RecordingStreamBuilder::new("test").memory().unwrap();
+        stream.log("text", &rerun::TextLog::new("text")).unwrap();
+        let message = stored.take().pop().unwrap();
+
+        let dropped = Arc::new(AtomicU64::new(0));
+        let sink = ServedSink::new(Stalled, Arc::clone(&dropped)).unwrap();
+        for _ in 0..2 * MESSAGE_CAPACITY {
+            sink.send(message.clone());
+        }
+        drop(sink); // Ends although the observer still does not read.
+        // One message is stuck in the server, the queue is full of others.
+        let stuck = dropped.load(Ordering::Relaxed) as usize + MESSAGE_CAPACITY;
+        assert!(
+            (2 * MESSAGE_CAPACITY - 1..=2 * MESSAGE_CAPACITY).contains(&stuck),
+            "{stuck}"
+        );
     }
 }

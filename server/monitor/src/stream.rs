@@ -43,16 +43,14 @@ impl Stream {
             plots: Plots::default(),
             newest_ns: 0,
         };
-        let scale = 1.0 / stream.picture.metres_per_newton();
-        stream.line(
-            0,
-            LogLevel::Info,
-            &format!(
-                "scene \"{}\": {} bodies; one metre of the yellow arrow is {scale:.0} N",
-                scene.name,
-                scene.bodies.len()
-            ),
-        )?;
+        let bodies = scene.bodies.len();
+        let newtons = 0.01 / stream.picture.metres_per_newton();
+        for text in [
+            format!("{bodies} bodies: {}", scene.name),
+            format!("force arrow: 1 cm is {newtons:.2} N"),
+        ] {
+            stream.line(0, LogLevel::Info, &text)?;
+        }
         Ok(stream)
     }
 
@@ -93,9 +91,12 @@ impl Stream {
         self.newest_ns
     }
 
-    /// Writes out everything and closes files and ports.
-    pub(crate) fn close(self) {
+    /// Writes out everything and closes files and ports; what went wrong, if the recording is not whole.
+    pub(crate) fn close(self) -> Result<(), String> {
+        // Only the recording can fail here: the served end never waits.
+        let flushed = self.rerun.flush_blocking();
         self.rerun.disconnect();
+        flushed.map_err(|error| error.to_string())
     }
 
     /// rerun keeps the time per thread, so it is set anew for every message.

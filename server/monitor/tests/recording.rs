@@ -28,7 +28,12 @@ fn tetrahedron(name: &str, role: BodyRole) -> MonitorBody {
 }
 
 fn scene() -> MonitorScene {
-    let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]];
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+    ];
     MonitorScene {
         bodies: vec![
             tetrahedron("tool", BodyRole::GodObject),
@@ -101,15 +106,22 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
         "/world/head",
         "/world/screens/front",
     ] {
-        assert!(summary.rows.contains_key(entity), "no {entity} in {:?}", summary.entities);
+        assert!(
+            summary.rows.contains_key(entity),
+            "no {entity} in {:?}",
+            summary.entities
+        );
     }
-    let obstacles = summary.entities.iter().filter(|path| path.starts_with("/world/obstacles/"));
+    let obstacles = summary
+        .entities
+        .iter()
+        .filter(|path| path.starts_with("/world/obstacles/"));
     assert_eq!(obstacles.count(), 1, "{:?}", summary.entities);
 
     // Every sample is a point in the plots, plus one row for the lines' names and colours.
     assert_eq!(summary.rows["/plots/force"], SAMPLES + 1);
-    // The scene's line, the loop's, the server's.
-    assert_eq!(summary.rows["/log"], 3);
+    // The scene's two lines, the loop's, the server's.
+    assert_eq!(summary.rows["/log"], 4);
     assert!(summary.rows["/world/god_object"] > 1);
     assert_eq!(summary.timelines, ["session_time"]);
     assert_eq!(summary.first_time_s, Some(0.0));
@@ -126,7 +138,10 @@ fn dropping_the_monitor_completes_the_recording_too() {
     sender.offer(sample(0));
     drop(monitor);
     assert_eq!(inspect(&path).unwrap().rows["/plots/force"], 2);
-    assert!(sender.offer(sample(1)), "offering after the end does no harm");
+    assert!(
+        sender.offer(sample(1)),
+        "offering after the end does no harm"
+    );
 }
 
 #[test]
@@ -141,7 +156,10 @@ fn a_sample_that_is_not_finite_leaves_the_picture_and_is_counted() {
     assert_eq!(stats.samples_not_finite, 1);
     let summary = inspect(&path).unwrap();
     assert_eq!(summary.rows["/world/god_object"], 1, "only the first pose");
-    assert_eq!(summary.rows["/log"], 2, "the scene's line and one about the sample");
+    assert_eq!(
+        summary.rows["/log"], 3,
+        "the scene's two lines and one about the sample"
+    );
 }
 
 #[test]
@@ -151,6 +169,23 @@ fn a_recording_that_cannot_be_written_is_an_error_that_names_the_file() {
     let error = Monitor::start(&recording_only(&path), scene()).unwrap_err();
     assert!(matches!(error, MonitorError::Record { .. }));
     assert!(error.to_string().contains("session.rrd"), "{error}");
+}
+
+#[test]
+fn a_full_disk_is_an_error_that_names_the_file() {
+    let full = std::path::Path::new("/dev/full"); // Linux: every write fails as on a full disk.
+    if !full.exists() {
+        println!("skipped: no /dev/full here");
+        return;
+    }
+    let outcome =
+        Monitor::start(&recording_only(full), scene()).and_then(|(monitor, mut sender)| {
+            sender.offer(sample(0));
+            monitor.stop()
+        });
+    let error = outcome.unwrap_err();
+    assert!(matches!(error, MonitorError::Record { .. }), "{error}");
+    assert!(error.to_string().contains("/dev/full"), "{error}");
 }
 
 #[test]
@@ -169,7 +204,11 @@ fn a_broken_mesh_is_an_error_that_names_the_body() {
 fn a_file_that_is_no_recording_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("text.rrd");
-    std::fs::write(&path, "this is not a recording, but it is long enough to hold a header").unwrap();
+    std::fs::write(
+        &path,
+        "this is not a recording, but it is long enough to hold a header",
+    )
+    .unwrap();
     let error = inspect(&path).unwrap_err();
     assert!(matches!(error, InspectError::Decode { .. }), "{error}");
     assert!(error.to_string().contains("text.rrd"), "{error}");

@@ -4,7 +4,10 @@ use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 
-use taut_monitor::{Monitor, MonitorError, MonitorOptions, MonitorSample, MonitorScene};
+use taut_monitor::{
+    BodyRole, InspectError, Monitor, MonitorBody, MonitorError, MonitorOptions, MonitorSample,
+    MonitorScene, Pose, observe,
+};
 
 fn on_free_ports() -> MonitorOptions {
     MonitorOptions {
@@ -44,15 +47,26 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
     let stream = monitor.stream_address().unwrap().to_owned();
     let (page_host, stream_host) = (host_of(&page), host_of(&stream));
     let stream_port = stream_host.rsplit(':').next().unwrap();
-    assert!(page.contains(&format!("%3A{stream_port}%2Fproxy")), "{page}");
+    assert!(
+        page.contains(&format!("%3A{stream_port}%2Fproxy")),
+        "{page}"
+    );
 
     // The page is there ...
     let mut connection = TcpStream::connect(page_host).unwrap();
-    write!(connection, "GET / HTTP/1.1\r\nHost: {page_host}\r\nConnection: close\r\n\r\n").unwrap();
+    write!(
+        connection,
+        "GET / HTTP/1.1\r\nHost: {page_host}\r\nConnection: close\r\n\r\n"
+    )
+    .unwrap();
     let mut html = Vec::new();
     connection.read_to_end(&mut html).unwrap();
     let html = String::from_utf8_lossy(&html);
-    assert!(html.starts_with("HTTP/1.1 200"), "{}", &html[..40.min(html.len())]);
+    assert!(
+        html.starts_with("HTTP/1.1 200"),
+        "{}",
+        &html[..40.min(html.len())]
+    );
     assert!(html.contains("canvas"), "the viewer's page");
 
     // ... may read the stream from a browser, and another site's page may not.
@@ -60,14 +74,20 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
     let allowed = request(stream_host, path, &format!("http://{page_host}"));
     assert!(allowed.contains("access-control-allow-origin"), "{allowed}");
     let refused = request(stream_host, path, "http://example.org");
-    assert!(!refused.contains("access-control-allow-origin"), "{refused}");
+    assert!(
+        !refused.contains("access-control-allow-origin"),
+        "{refused}"
+    );
 
     assert!(sender.offer(MonitorSample::at(1)));
     monitor.stop().unwrap();
     for host in [page_host, stream_host] {
         let start = Instant::now();
         while TcpStream::connect(host).is_ok() {
-            assert!(start.elapsed() < Duration::from_secs(10), "{host} stays open");
+            assert!(
+                start.elapsed() < Duration::from_secs(10),
+                "{host} stays open"
+            );
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -92,6 +112,67 @@ fn an_occupied_port_is_an_error_that_names_port_and_key() {
         let error = Monitor::start(&options, MonitorScene::new("empty")).unwrap_err();
         assert!(matches!(error, MonitorError::Listen { .. }));
         let text = error.to_string();
-        assert!(text.contains(&port.to_string()) && text.contains(key), "{text}");
+        assert!(
+            text.contains(&port.to_string()) && text.contains(key),
+            "{text}"
+        );
     }
+}
+
+#[test]
+fn an_observer_who_joins_late_gets_the_scene_the_layout_and_the_present() {
+    let tool = MonitorBody {
+        name: "tool".into(),
+        vertices: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]],
+        normals: None,
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        colour: None,
+        role: BodyRole::GodObject,
+        pose: Pose::identity(),
+    };
+    let scene = MonitorScene {
+        bodies: vec![tool],
+        ..MonitorScene::new("late")
+    };
+    let (monitor, mut sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let mut time_ns = 0;
+    let mut offer_for = |duration: Duration| {
+        let end = Instant::now() + duration;
+        while Instant::now() < end {
+            time_ns += 10_000_000;
+            sender.offer(MonitorSample::at(time_ns));
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        time_ns
+    };
+    let joined_at_ns = offer_for(Duration::from_secs(1));
+
+    let address = monitor.stream_address().unwrap().to_owned();
+    let observer = std::thread::Builder::new()
+        .name("observer".into())
+        .spawn(move || observe(&address, Duration::from_secs(3)))
+        .unwrap();
+    offer_for(Duration::from_secs(2));
+    let seen = observer.join().unwrap().unwrap();
+    monitor.stop().unwrap();
+
+    assert_eq!(seen.rows["/world/god_object/tool"], 1, "{seen:?}");
+    assert_eq!(seen.blueprints, 1);
+    let last_ns = seen.last_time_s.unwrap() * 1e9;
+    assert!(
+        last_ns > joined_at_ns as f64,
+        "nothing after joining: {seen:?}"
+    );
+}
+
+#[test]
+fn a_stream_that_is_not_there_is_an_error_that_names_the_address() {
+    // A port that was free a moment ago: nobody listens.
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    drop(listener);
+    let url = format!("rerun+http://{address}/proxy");
+    let error = observe(&url, Duration::from_secs(10)).unwrap_err();
+    assert!(matches!(error, InspectError::Connect { .. }));
+    assert!(error.to_string().contains(&url), "{error}");
 }

@@ -17,19 +17,24 @@ mod workbench;
 
 pub use check::{FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
-pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file};
+pub use files::{
+    DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file,
+};
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, write_ply};
 pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
-    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltScene, CouplingSpec, GOD_OBJECT_NAME, HandPathSpec, HandPreset,
-    LimitSpec, MassSpec, MethodSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
-    shipped_scene_text,
+    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltScene, CouplingSpec, GOD_OBJECT_NAME,
+    HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, ObstacleSpec, ReferencePoint,
+    SHIPPED_SCENES, Scene, Shape, ShippedScene, View, shipped_scene_text,
 };
-pub use trace::{DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS, TraceSample};
+pub use trace::{
+    DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,
+    TraceSample,
+};
 pub use workbench::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH, Screen, Show, Stereo,
-    TransportKind, Viewer, Window, Workbench,
+    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH,
+    Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
 };
 
 /// Why a scene could not be used.

@@ -18,12 +18,20 @@ pub struct Problem {
 impl Problem {
     /// A fault of a whole file.
     pub fn of_file(file: impl fmt::Display, text: impl Into<String>) -> Self {
-        Self { file: file.to_string(), line: None, text: text.into() }
+        Self {
+            file: file.to_string(),
+            line: None,
+            text: text.into(),
+        }
     }
 
     /// A fault in one line, counted from 1.
     pub fn at_line(file: impl fmt::Display, line: usize, text: impl Into<String>) -> Self {
-        Self { file: file.to_string(), line: Some(line), text: text.into() }
+        Self {
+            file: file.to_string(),
+            line: Some(line),
+            text: text.into(),
+        }
     }
 }
 
@@ -47,7 +55,11 @@ pub struct FileError {
 impl FileError {
     /// `Err` with all of them if there are any.
     pub(crate) fn unless_empty(problems: Vec<Problem>) -> Result<(), Self> {
-        if problems.is_empty() { Ok(()) } else { Err(Self { problems }) }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(Self { problems })
+        }
     }
 
     /// Every fault, the first one first.
@@ -63,13 +75,17 @@ impl FileError {
 
 impl From<Problem> for FileError {
     fn from(problem: Problem) -> Self {
-        Self { problems: vec![problem] }
+        Self {
+            problems: vec![problem],
+        }
     }
 }
 
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(first) = self.problems.first() else { return Ok(()) };
+        let Some(first) = self.problems.first() else {
+            return Ok(());
+        };
         write!(f, "{first}")?;
         match self.problems.len() {
             0 | 1 => Ok(()),

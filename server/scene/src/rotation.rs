@@ -13,7 +13,9 @@ pub fn unit_quaternion(wxyz: [f64; 4]) -> Result<UnitQuaternion<f64>, String> {
     let norm = quaternion.norm();
     let near_one = (norm - 1.0).abs() <= NORM_TOLERANCE; // false for NaN
     if !near_one {
-        return Err(format!("the quaternion has norm {norm}, but must have 1 within {NORM_TOLERANCE}; write w x y z of a unit quaternion"));
+        return Err(format!(
+            "the quaternion has norm {norm}, but must have 1 within {NORM_TOLERANCE}; write w x y z of a unit quaternion"
+        ));
     }
     Ok(UnitQuaternion::new_normalize(quaternion))
 }
@@ -24,11 +26,19 @@ mod tests {
 
     #[test]
     fn cut_digits_are_normalised_and_worse_is_refused() {
-        let rotation = unit_quaternion([0.7071, 0.7071, 0.0, 0.0]).unwrap();
+        let rotation = unit_quaternion([0.8, 0.6001, 0.0, 0.0]).unwrap();
         assert!((rotation.norm() - 1.0).abs() < 1e-15);
         assert!(unit_quaternion([1.0 + 0.99e-3, 0.0, 0.0, 0.0]).is_ok());
-        for bad in [[1.0 + 1.01e-3, 0.0, 0.0, 0.0], [0.0; 4], [f64::NAN, 0.0, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0, 0.0]] {
-            assert!(unit_quaternion(bad).unwrap_err().contains("norm"), "{bad:?}");
+        for bad in [
+            [1.0 + 1.01e-3, 0.0, 0.0, 0.0],
+            [0.0; 4],
+            [f64::NAN, 0.0, 0.0, 0.0],
+            [f64::INFINITY, 0.0, 0.0, 0.0],
+        ] {
+            assert!(
+                unit_quaternion(bad).unwrap_err().contains("norm"),
+                "{bad:?}"
+            );
         }
     }
 }

@@ -7,8 +7,10 @@
 //! | 3    | [`haptics`]    | the device's, 1 kHz                   | `taut_bridge::Device`      |
 //!
 //! Each is a struct whose `tick(now)` does one round, so that a virtual clock can drive it; a thread of [`shell`] does it in time.
+//! [`wiring`] puts them together.
 
 pub mod coupling;
 pub mod god_object;
 pub mod haptics;
 pub mod shell;
+pub mod wiring;

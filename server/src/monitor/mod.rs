@@ -22,10 +22,7 @@ use taut_proto::scene::ScreenDescription;
 
 use crate::clock::SessionClock;
 use crate::head::Head;
-use crate::shared::contact_snapshot::ContactSnapshot;
-use crate::shared::device_state::DeviceState;
-use crate::shared::fanout::Subscriber;
-use crate::shared::wrench_command::WrenchCommand;
+use crate::loops::wiring::SharedView;
 use crate::statistics::Statistics;
 
 /// Where the monitor is served and recorded.
@@ -67,12 +64,8 @@ pub struct MonitorPicture {
 /// The shared data that the monitor reads.
 #[derive(Debug)]
 pub struct MonitorSources {
-    /// From loop 3.
-    pub device: Subscriber<DeviceState>,
-    /// From loop 1.
-    pub contacts: Subscriber<ContactSnapshot>,
-    /// From loop 2.
-    pub wrench: Subscriber<WrenchCommand>,
+    /// What the loops publish.
+    pub shared: SharedView,
     /// All counters.
     pub statistics: Statistics,
     /// Session time.

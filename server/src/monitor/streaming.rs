@@ -189,9 +189,9 @@ fn feed(
 
 fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> MonitorSample {
     let now = sources.clock.now();
-    let device = *sources.device.newest();
-    let wrench = *sources.wrench.newest();
-    let contacts = sources.contacts.newest();
+    let device = *sources.shared.device.newest();
+    let wrench = *sources.shared.wrench.newest();
+    let contacts = sources.shared.contacts.newest();
     let gap_min = contacts.set.gap_min;
     MonitorSample {
         god_object_pose: contacts.set.god_object_pose,

@@ -68,7 +68,7 @@ impl<T: Send> Subscriber<T> {
     /// The value taken last.
     #[inline]
     pub fn held(&self) -> &T {
-        self.output.peek_output_buffer()
+        self.output.output_buffer()
     }
 }
 

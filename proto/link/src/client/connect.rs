@@ -34,8 +34,12 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         server: options.server.clone(),
         seconds: options.connect_timeout.as_secs_f64(),
     };
-    let addresses = timeout_at(deadline, resolve(&options.server)).await.map_err(|_| unreachable())??;
-    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses)).await.map_err(|_| unreachable())??;
+    let addresses = timeout_at(deadline, resolve(&options.server))
+        .await
+        .map_err(|_| unreachable())??;
+    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses))
+        .await
+        .map_err(|_| unreachable())??;
 
     let joining = timeout_at(deadline, join(&options, &connection));
     let (welcome, description, send) = match joining.await {
@@ -50,11 +54,21 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
     let (sealer, opener) = binding::client_keys(&connection, welcome.epoch, welcome.session)?;
     let path = match options.transport {
         Transport::QuicDatagram => Path::Quic,
-        Transport::Udp => Path::udp(SocketAddr::new(connection.remote_address().ip(), welcome.udp_port))?,
+        Transport::Udp => Path::udp(SocketAddr::new(
+            connection.remote_address().ip(),
+            welcome.udp_port,
+        ))?,
     };
     let hot = Arc::new(Hot::new(connection, sealer, Inbound::new(opener), path));
     hot.clone().start()?;
-    Ok(ClientLink::new(options.server, endpoint, hot, welcome.session, description, send))
+    Ok(ClientLink::new(
+        options.server,
+        endpoint,
+        hot,
+        welcome.session,
+        description,
+        send,
+    ))
 }
 
 /// Addresses of `host:port`, IPv4 first; without a port, the default one.
@@ -69,7 +83,11 @@ async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
         format!("{server}:{DEFAULT_QUIC_PORT}")
     } else {
         match server.rsplit_once(':') {
-            Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port != 0) => server.to_owned(),
+            Some((host, port))
+                if !host.is_empty() && port.parse::<u16>().is_ok_and(|port| port != 0) =>
+            {
+                server.to_owned()
+            }
             Some(_) => return Err(bad()),
             None if server.trim().is_empty() => return Err(bad()),
             None => format!("{server}:{DEFAULT_QUIC_PORT}"),
@@ -91,7 +109,10 @@ async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
 }
 
 /// Tries the addresses in turn, again and again; the caller sets the deadline. A server that just starts is reached too.
-async fn reach(options: &ClientOptions, addresses: &[SocketAddr]) -> Result<(Endpoint, Connection), LinkError> {
+async fn reach(
+    options: &ClientOptions,
+    addresses: &[SocketAddr],
+) -> Result<(Endpoint, Connection), LinkError> {
     let config = transport::client_config(options.idle_timeout)?;
     loop {
         let round = Instant::now();
@@ -103,7 +124,9 @@ async fn reach(options: &ClientOptions, addresses: &[SocketAddr]) -> Result<(End
             let Ok(endpoint) = Endpoint::client(any) else {
                 continue; // this machine has no such address family
             };
-            let Ok(connecting) = endpoint.connect_with(config.clone(), *address, transport::SERVER_NAME) else {
+            let Ok(connecting) =
+                endpoint.connect_with(config.clone(), *address, transport::SERVER_NAME)
+            else {
                 continue;
             };
             match connecting.await {
@@ -122,7 +145,10 @@ async fn reach(options: &ClientOptions, addresses: &[SocketAddr]) -> Result<(End
 }
 
 /// Hello to scene.
-async fn join(options: &ClientOptions, connection: &Connection) -> Result<(Welcome, SceneDescription, SendStream), LinkError> {
+async fn join(
+    options: &ClientOptions,
+    connection: &Connection,
+) -> Result<(Welcome, SceneDescription, SendStream), LinkError> {
     let lost = |error: ConnectionError| LinkError::Closed {
         server: options.server.clone(),
         reason: close_text(&error, "the server"),
@@ -134,36 +160,58 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<(Welco
         role: options.role,
         transport: options.transport,
         rate_hz: options.rate_hz,
-        proof: options.key.client_proof(&binding, options.role, &options.node),
+        proof: options
+            .key
+            .client_proof(&binding, options.role, &options.node),
     };
-    if write_message(&mut send, &ControlMessage::Hello(hello)).await.is_err() {
+    if write_message(&mut send, &ControlMessage::Hello(hello))
+        .await
+        .is_err()
+    {
         return Err(lost(connection.closed().await));
     }
     let welcome = match expect(options, connection, &mut recv).await? {
         ControlMessage::Welcome(welcome) => welcome,
         ControlMessage::Refused(refusal) => return Err(refused(options, refusal)),
-        other => return Err(protocol(options, format!("it answers Hello with {}", other.name()))),
+        other => {
+            return Err(protocol(
+                options,
+                format!("it answers Hello with {}", other.name()),
+            ));
+        }
     };
     // Now the server must prove the key: somebody in the middle would have ended here.
-    if !options.key.verify_server(&welcome.proof, &binding, options.role, &options.node) {
+    if !options
+        .key
+        .verify_server(&welcome.proof, &binding, options.role, &options.node)
+    {
         return Err(LinkError::WrongKey {
             server: options.server.clone(),
         });
     }
     match expect(options, connection, &mut recv).await? {
         ControlMessage::Scene(description) => Ok((welcome, description, send)),
-        other => Err(protocol(options, format!("it sends {} where the scene is due", other.name()))),
+        other => Err(protocol(
+            options,
+            format!("it sends {} where the scene is due", other.name()),
+        )),
     }
 }
 
-async fn expect(options: &ClientOptions, connection: &Connection, recv: &mut RecvStream) -> Result<ControlMessage, LinkError> {
+async fn expect(
+    options: &ClientOptions,
+    connection: &Connection,
+    recv: &mut RecvStream,
+) -> Result<ControlMessage, LinkError> {
     match read_message(recv, MAX_FRAME_BYTES).await {
         Ok(message) => Ok(message),
-        Err(ReadMessageError::Decode(DecodeError::WrongVersion { theirs, ours })) => Err(LinkError::WrongVersion {
-            server: options.server.clone(),
-            theirs,
-            ours,
-        }),
+        Err(ReadMessageError::Decode(DecodeError::WrongVersion { theirs, ours })) => {
+            Err(LinkError::WrongVersion {
+                server: options.server.clone(),
+                theirs,
+                ours,
+            })
+        }
         Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
         Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
             server: options.server.clone(),

@@ -13,12 +13,7 @@ use std::{
     },
     time::{Duration, Instant},
 };
-use taut_proto::{
-    Payload,
-    header::MAX_DATAGRAM_BYTES,
-    seal::Sealer,
-    time::TimeRequest,
-};
+use taut_proto::{Payload, header::MAX_DATAGRAM_BYTES, seal::Sealer, time::TimeRequest};
 
 /// Time requests at join, so that the clock is locked within 100 ms.
 const QUICK_REQUESTS: u32 = 16;
@@ -33,7 +28,10 @@ const SHORTEST_WAIT: Duration = Duration::from_millis(1);
 
 /// Where datagrams go.
 pub(crate) enum Path {
-    Udp { socket: UdpSocket, server: SocketAddr },
+    Udp {
+        socket: UdpSocket,
+        server: SocketAddr,
+    },
     Quic,
 }
 
@@ -82,8 +80,13 @@ impl Hot {
         let mut buffer = [0; MAX_DATAGRAM_BYTES];
         let sent = match (self.sealer.seal(payload, &mut buffer), &self.path) {
             (Err(_), _) => false,
-            (Ok(datagram), Path::Udp { socket, server }) => socket.send_to(datagram, server).is_ok(),
-            (Ok(datagram), Path::Quic) => self.connection.send_datagram(datagram.to_vec().into()).is_ok(),
+            (Ok(datagram), Path::Udp { socket, server }) => {
+                socket.send_to(datagram, server).is_ok()
+            }
+            (Ok(datagram), Path::Quic) => self
+                .connection
+                .send_datagram(datagram.to_vec().into())
+                .is_ok(),
         };
         let counters = &self.inbound.counters;
         if sent {
@@ -148,7 +151,11 @@ impl Hot {
             }
             match socket.recv(&mut buffer) {
                 Ok(length) => self.inbound.receive(&buffer[..length], Instant::now()),
-                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {}
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+                    ) => {}
                 // A datagram bounced, or a signal came: soft, but no reason to spin.
                 Err(_) => std::thread::sleep(SHORTEST_WAIT),
             }
@@ -186,7 +193,11 @@ impl Rhythm {
     }
 
     fn period(&self) -> Duration {
-        if self.quick_left > 0 { QUICK_PERIOD } else { PERIOD }
+        if self.quick_left > 0 {
+            QUICK_PERIOD
+        } else {
+            PERIOD
+        }
     }
 
     fn is_due(&mut self, now: Instant) -> bool {

@@ -57,7 +57,9 @@ impl Inbound {
         let mut inner = self.lock();
         let opened = match inner.opener.open(datagram) {
             Ok(opened) => opened,
-            Err(OpenError::Header(DecodeError::WrongVersion { .. })) => return counters.wrong_version.one(),
+            Err(OpenError::Header(DecodeError::WrongVersion { .. })) => {
+                return counters.wrong_version.one();
+            }
             Err(OpenError::Header(_) | OpenError::Payload(_)) => return counters.garbage.one(),
             Err(OpenError::Forged) => return counters.forged.one(),
             Err(OpenError::Replayed) => return counters.duplicates.one(),
@@ -95,7 +97,13 @@ impl Inbound {
 }
 
 impl Inner {
-    fn take(&mut self, opened: Opened, received: Instant, local_ns: u64, counters: &ClientCounterCells) {
+    fn take(
+        &mut self,
+        opened: Opened,
+        received: Instant,
+        local_ns: u64,
+        counters: &ClientCounterCells,
+    ) {
         let sequence = opened.header.sequence;
         match opened.payload {
             Payload::Hot(state) => {

@@ -67,7 +67,9 @@ impl ClientLink {
 
     /// The mesh of `hash`, from the server or, the second time, from memory. Its hash has been checked.
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
-        self.meshes.get(&self.hot.connection, &self.server, hash).await
+        self.meshes
+            .get(&self.hot.connection, &self.server, hash)
+            .await
     }
 
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
@@ -110,7 +112,12 @@ impl ClientLink {
             return Err(closed(reason));
         }
         let sent = self.outbox.send(ControlMessage::Stats(stats)).await;
-        sent.map_err(|_| closed(self.is_closed().unwrap_or_else(|| "reports are not taken any more".to_owned())))
+        sent.map_err(|_| {
+            closed(
+                self.is_closed()
+                    .unwrap_or_else(|| "reports are not taken any more".to_owned()),
+            )
+        })
     }
 
     /// Sends a report without waiting; `false` if earlier ones are not away yet or the link is closed.
@@ -160,7 +167,10 @@ impl ClientLink {
         }
         self.hot.stop();
         self.hot.connection.close(CLOSE_BYE, b"the node left");
-        if timeout(CLOSE_TIMEOUT, self.endpoint.wait_idle()).await.is_err() {
+        if timeout(CLOSE_TIMEOUT, self.endpoint.wait_idle())
+            .await
+            .is_err()
+        {
             tracing::debug!("the server did not hear the goodbye");
         }
     }

@@ -25,8 +25,18 @@ pub(crate) struct Meshes {
 
 impl Meshes {
     /// The mesh of `hash`, from here or from the server.
-    pub(crate) async fn get(&self, connection: &Connection, server: &str, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
-        if let Some(mesh) = self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&hash) {
+    pub(crate) async fn get(
+        &self,
+        connection: &Connection,
+        server: &str,
+        hash: MeshHash,
+    ) -> Result<Arc<MeshBlob>, LinkError> {
+        if let Some(mesh) = self
+            .known
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get(&hash)
+        {
             return Ok(mesh.clone());
         }
         let bytes = fetch(connection, server, hash).await?;
@@ -50,20 +60,41 @@ impl Meshes {
     }
 }
 
-async fn fetch(connection: &Connection, server: &str, hash: MeshHash) -> Result<Vec<u8>, LinkError> {
+async fn fetch(
+    connection: &Connection,
+    server: &str,
+    hash: MeshHash,
+) -> Result<Vec<u8>, LinkError> {
     let ended = |reason: String| LinkError::Closed {
         server: server.to_owned(),
         reason,
     };
-    let (mut send, mut recv) = connection.open_bi().await.map_err(|error| ended(error.to_string()))?;
-    write_message(&mut send, &ControlMessage::MeshRequest(MeshRequest { hash }))
+    let (mut send, mut recv) = connection
+        .open_bi()
         .await
         .map_err(|error| ended(error.to_string()))?;
+    write_message(
+        &mut send,
+        &ControlMessage::MeshRequest(MeshRequest { hash }),
+    )
+    .await
+    .map_err(|error| ended(error.to_string()))?;
     let _ = send.finish(); // fails only if the stream is gone, and then reading fails too
-    let answer = read_message(&mut recv, MAX_HEADER_BYTES).await.map_err(|error| ended(error.to_string()))?;
+    let answer = read_message(&mut recv, MAX_HEADER_BYTES)
+        .await
+        .map_err(|error| ended(error.to_string()))?;
     let length = match answer {
-        ControlMessage::MeshHeader(MeshHeader { hash: found, length }) if found == hash => length as usize,
-        other => return Err(bad_mesh(server, hash, format!("the answer is {}", other.name()))),
+        ControlMessage::MeshHeader(MeshHeader {
+            hash: found,
+            length,
+        }) if found == hash => length as usize,
+        other => {
+            return Err(bad_mesh(
+                server,
+                hash,
+                format!("the answer is {}", other.name()),
+            ));
+        }
     };
     if length == 0 {
         return Err(LinkError::NoSuchMesh {
@@ -76,9 +107,16 @@ async fn fetch(connection: &Connection, server: &str, hash: MeshHash) -> Result<
         return Err(bad_mesh(server, hash, reason));
     }
     // Memory grows with what arrives, up to the length announced.
-    let bytes = recv.read_to_end(length).await.map_err(|error| ended(error.to_string()))?;
+    let bytes = recv
+        .read_to_end(length)
+        .await
+        .map_err(|error| ended(error.to_string()))?;
     if bytes.len() != length {
-        return Err(bad_mesh(server, hash, format!("{} of {length} bytes came", bytes.len())));
+        return Err(bad_mesh(
+            server,
+            hash,
+            format!("{} of {length} bytes came", bytes.len()),
+        ));
     }
     Ok(bytes)
 }

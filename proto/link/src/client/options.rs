@@ -26,7 +26,12 @@ pub struct ClientOptions {
 
 impl ClientOptions {
     /// UDP, every state, 3 s to connect.
-    pub fn new(server: impl Into<String>, key: ClusterKey, role: Role, node: impl Into<String>) -> ClientOptions {
+    pub fn new(
+        server: impl Into<String>,
+        key: ClusterKey,
+        role: Role,
+        node: impl Into<String>,
+    ) -> ClientOptions {
         ClientOptions {
             server: server.into(),
             key,

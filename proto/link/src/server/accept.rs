@@ -4,19 +4,23 @@ use super::{
     LinkEvent,
     receive::receive,
     session::{Admitted, Session},
-    shared::Shared,
+    shared::{Admission, Refused, Shared},
 };
 use crate::{
     binding,
     framing::{
-        CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text, read_message, write_message,
+        CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text,
+        read_message, write_message,
     },
 };
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
     DecodeError, PROTOCOL_VERSION, Refusal, Transport,
-    control::{ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode, Welcome},
+    control::{
+        ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
+        Welcome,
+    },
 };
 use tokio::{sync::Semaphore, time::timeout};
 
@@ -50,7 +54,10 @@ pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
 }
 
 /// Hello to Welcome; `None` if the client is not let in.
-async fn join(shared: &Arc<Shared>, incoming: quinn::Incoming) -> Option<(Arc<Session>, SendStream, RecvStream)> {
+async fn join(
+    shared: &Arc<Shared>,
+    incoming: quinn::Incoming,
+) -> Option<(Arc<Session>, SendStream, RecvStream)> {
     let connection = incoming.await.ok()?;
     let (mut send, mut recv) = connection.accept_bi().await.ok()?;
     let mut node = String::new();
@@ -59,7 +66,10 @@ async fn join(shared: &Arc<Shared>, incoming: quinn::Incoming) -> Option<(Arc<Se
             node.clone_from(&hello.node);
             admit(shared, &connection, hello)
         }
-        Ok(other) => Err((RefusalCode::BadHello, format!("its first message is {}, not Hello", other.name()))),
+        Ok(other) => Err((
+            RefusalCode::BadHello,
+            format!("its first message is {}, not Hello", other.name()),
+        )),
         Err(ReadMessageError::Decode(error @ DecodeError::WrongVersion { .. })) => {
             shared.counters.wrong_version.one();
             Err((RefusalCode::WrongVersion, error.to_string()))
@@ -73,7 +83,9 @@ async fn join(shared: &Arc<Shared>, incoming: quinn::Incoming) -> Option<(Arc<Se
             return None;
         }
     };
-    let mut welcomed = write_message(&mut send, &ControlMessage::Welcome(welcome)).await.is_ok();
+    let mut welcomed = write_message(&mut send, &ControlMessage::Welcome(welcome))
+        .await
+        .is_ok();
     welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
     if !welcomed {
         shared.sessions.remove(session.number);
@@ -83,36 +95,56 @@ async fn join(shared: &Arc<Shared>, incoming: quinn::Incoming) -> Option<(Arc<Se
 }
 
 /// Checks a Hello and makes the session.
-fn admit(shared: &Arc<Shared>, connection: &Connection, hello: Hello) -> Result<(Arc<Session>, Welcome), (RefusalCode, String)> {
+fn admit(
+    shared: &Arc<Shared>,
+    connection: &Connection,
+    hello: Hello,
+) -> Result<(Arc<Session>, Welcome), Refused> {
     let bad = |text: String| (RefusalCode::BadHello, text);
     let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
-    if !shared.key.verify_client(&hello.proof, &binding, hello.role, &hello.node) {
+    if !shared
+        .key
+        .verify_client(&hello.proof, &binding, hello.role, &hello.node)
+    {
         shared.counters.wrong_key.one();
-        let text = "it does not hold the same cluster key: give this node the server's key file (--key)";
+        let text =
+            "it does not hold the same cluster key: give this node the server's key file (--key)";
         return Err((RefusalCode::WrongKey, text.to_owned()));
     }
     let printable = hello.node.chars().all(|c| !c.is_control());
     if hello.node.trim().is_empty() || hello.node.len() > MAX_NODE_NAME_BYTES || !printable {
-        let text = format!("a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)");
+        let text = format!(
+            "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
+        );
         return Err(bad(text));
     }
     let now_ns = shared.clock.now_ns();
-    let (session, replaced) = shared.sessions.admit(&hello.node, hello.role, now_ns, |number| {
-        let keys = binding::server_keys(connection, shared.epoch, number).map_err(|error| error.to_string())?;
-        let admitted = Admitted {
-            number,
-            node: hello.node.clone(),
-            role: hello.role,
-            transport: hello.transport,
-            rate_hz: hello.rate_hz,
-            joined_ns: now_ns,
-        };
-        Ok(Session::new(admitted, connection.clone(), keys))
-    })?;
+    let Admission { session, replaced } =
+        shared
+            .sessions
+            .admit(&hello.node, hello.role, now_ns, |number| {
+                let keys = binding::server_keys(connection, shared.epoch, number)
+                    .map_err(|error| error.to_string())?;
+                let admitted = Admitted {
+                    number,
+                    node: hello.node.clone(),
+                    role: hello.role,
+                    transport: hello.transport,
+                    rate_hz: hello.rate_hz,
+                    joined_ns: now_ns,
+                };
+                Ok(Session::new(admitted, connection.clone(), keys))
+            })?;
     if let Some(old) = replaced {
-        let reason = format!("a new node named \"{}\" took the place of this silent one", old.node);
+        let reason = format!(
+            "a new node named \"{}\" took the place of this silent one",
+            old.node
+        );
         old.connection.close(CLOSE_REPLACED, reason.as_bytes());
-        shared.tell(LinkEvent::Left { status: old.status(), reason });
+        shared.tell(LinkEvent::Left {
+            status: old.status(),
+            reason,
+        });
     }
     let welcome = Welcome {
         proof: shared.key.server_proof(&binding, hello.role, &hello.node),
@@ -124,7 +156,14 @@ fn admit(shared: &Arc<Shared>, connection: &Connection, hello: Hello) -> Result<
     Ok((session, welcome))
 }
 
-async fn refuse(shared: &Shared, connection: &Connection, mut send: SendStream, node: String, code: RefusalCode, text: String) {
+async fn refuse(
+    shared: &Shared,
+    connection: &Connection,
+    mut send: SendStream,
+    node: String,
+    code: RefusalCode,
+    text: String,
+) {
     shared.counters.refused.one();
     tracing::info!(address = %connection.remote_address(), node, ?code, "client refused: {text}");
     let refusal = Refusal {
@@ -139,7 +178,11 @@ async fn refuse(shared: &Shared, connection: &Connection, mut send: SendStream, 
         text: text.clone(),
     });
     let told = async {
-        if write_message(&mut send, &ControlMessage::Refused(refusal)).await.is_ok() && send.finish().is_ok() {
+        if write_message(&mut send, &ControlMessage::Refused(refusal))
+            .await
+            .is_ok()
+            && send.finish().is_ok()
+        {
             connection.closed().await; // the client closes when it has read why
         }
     };
@@ -150,7 +193,12 @@ async fn refuse(shared: &Shared, connection: &Connection, mut send: SendStream, 
 }
 
 /// The session from Welcome to the end.
-async fn attend(shared: &Arc<Shared>, session: Arc<Session>, _send: SendStream, mut recv: RecvStream) {
+async fn attend(
+    shared: &Arc<Shared>,
+    session: Arc<Session>,
+    _send: SendStream,
+    mut recv: RecvStream,
+) {
     shared.counters.joined.one();
     tracing::info!(node = session.node, role = ?session.role, transport = ?session.transport, "client joined");
     shared.tell(LinkEvent::Joined(session.status()));
@@ -218,7 +266,8 @@ async fn serve_meshes(shared: &Arc<Shared>, connection: &Connection) -> String {
 }
 
 async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream) {
-    let Ok(ControlMessage::MeshRequest(request)) = read_message(&mut recv, MAX_HELLO_BYTES).await else {
+    let Ok(ControlMessage::MeshRequest(request)) = read_message(&mut recv, MAX_HELLO_BYTES).await
+    else {
         return; // dropping the stream resets it
     };
     let mesh = shared.content.meshes.get(&request.hash);
@@ -226,7 +275,10 @@ async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream)
         hash: request.hash,
         length: mesh.map_or(0, |bytes| bytes.len() as u32), // MAX_MESH_BYTES is far below 2^32
     };
-    if write_message(&mut send, &ControlMessage::MeshHeader(header)).await.is_err() {
+    if write_message(&mut send, &ControlMessage::MeshHeader(header))
+        .await
+        .is_err()
+    {
         return;
     }
     if let Some(bytes) = mesh

@@ -53,8 +53,12 @@ impl Broadcaster {
             return report;
         };
         let payload = &self.payload[..length];
-        self.shared.sent_states.remember(state.tick, payload_hash(payload));
-        self.shared.sessions.refresh(&mut self.sessions, &mut self.generation);
+        self.shared
+            .sent_states
+            .remember(state.tick, payload_hash(payload));
+        self.shared
+            .sessions
+            .refresh(&mut self.sessions, &mut self.generation);
         for session in self.sessions.iter() {
             if !session.take_due(state.sample_time_ns) {
                 report.skipped += 1;
@@ -71,10 +75,14 @@ impl Broadcaster {
 
     /// Sends `wrench` to the device bridge; `false` if there is none or sending failed.
     pub fn send_wrench(&mut self, wrench: &WrenchCommand) -> bool {
-        self.shared.sessions.refresh(&mut self.sessions, &mut self.generation);
+        self.shared
+            .sessions
+            .refresh(&mut self.sessions, &mut self.generation);
         self.sessions
             .iter()
             .find(|session| session.role == Role::Device)
-            .is_some_and(|session| session.send(&Payload::Wrench(*wrench), &self.shared) == Sent::Yes)
+            .is_some_and(|session| {
+                session.send(&Payload::Wrench(*wrench), &self.shared) == Sent::Yes
+            })
     }
 }

@@ -9,10 +9,7 @@ use super::{
     shared::{Sessions, Shared},
 };
 use crate::{
-    Counters, LinkError, SessionClock,
-    counters::CounterCells,
-    framing::CLOSE_STOPPING,
-    transport,
+    Counters, LinkError, SessionClock, counters::CounterCells, framing::CLOSE_STOPPING, transport,
 };
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
@@ -53,7 +50,11 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let content = content.encode()?;
     let quic_socket = listen(options.quic, "control")?;
     let udp = listen(options.udp, "state")?;
-    let address_of = |socket: &UdpSocket| socket.local_addr().map_err(|error| system("read a socket's address", &error));
+    let address_of = |socket: &UdpSocket| {
+        socket
+            .local_addr()
+            .map_err(|error| system("read a socket's address", &error))
+    };
     let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
     let endpoint = quinn::Endpoint::new(
         quinn::EndpointConfig::default(),
@@ -124,7 +125,12 @@ impl ServerLink {
 
     /// The clients that are in.
     pub fn clients(&self) -> Vec<ClientStatus> {
-        self.shared.sessions.all().iter().map(|session| session.status()).collect()
+        self.shared
+            .sessions
+            .all()
+            .iter()
+            .map(|session| session.status())
+            .collect()
     }
 
     /// Next event, if there is one.
@@ -140,7 +146,10 @@ impl ServerLink {
     /// Tells the clients that the server stops, and stops it.
     pub async fn shutdown(self) {
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON);
-        if timeout(STOP_TIMEOUT, self.endpoint.wait_idle()).await.is_err() {
+        if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
+            .await
+            .is_err()
+        {
             tracing::debug!("some clients did not hear that the server stops");
         }
         self.shared.stopping.store(true, Ordering::Relaxed);
@@ -180,10 +189,12 @@ fn listen(address: SocketAddr, plane: &'static str) -> Result<UdpSocket, LinkErr
 /// A new incarnation has a new number, so that datagrams of an earlier one are told apart.
 fn random_epoch() -> Result<u32, LinkError> {
     let mut bytes = [0; 4];
-    SystemRandom::new().fill(&mut bytes).map_err(|_| LinkError::System {
-        what: "draw a random number",
-        reason: "the system gives none".to_owned(),
-    })?;
+    SystemRandom::new()
+        .fill(&mut bytes)
+        .map_err(|_| LinkError::System {
+            what: "draw a random number",
+            reason: "the system gives none".to_owned(),
+        })?;
     Ok(u32::from_le_bytes(bytes))
 }
 

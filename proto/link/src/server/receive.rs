@@ -1,18 +1,16 @@
 //! What clients send on the hot plane: time requests, signs of life, device readings. From the UDP thread and from QUIC datagrams.
 
-use super::{
-    DeviceInput,
-    device_input::Taken,
-    session::Session,
-    shared::Shared,
-};
+use super::{DeviceInput, device_input::Taken, session::Session, shared::Shared};
 use crate::readiness::wait_readable;
 use std::{
     net::SocketAddr,
     sync::{Arc, atomic::Ordering},
     time::Duration,
 };
-use taut_proto::{DecodeError, Header, Payload, Role, header::MAX_DATAGRAM_BYTES, seal::OpenError, time::TimeResponse};
+use taut_proto::{
+    DecodeError, Header, Payload, Role, header::MAX_DATAGRAM_BYTES, seal::OpenError,
+    time::TimeResponse,
+};
 
 /// Longest sleep of the receiving thread: how soon it notices that the server stops.
 const STOP_CHECK: Duration = Duration::from_millis(50);
@@ -44,7 +42,13 @@ fn receive_udp(shared: &Shared, datagram: &[u8], from: SocketAddr, now_ns: u64) 
 }
 
 /// Takes one datagram of `session` in, or counts why not. What is not authentic has no effect.
-pub(crate) fn receive(shared: &Shared, session: &Session, datagram: &[u8], from: Option<SocketAddr>, now_ns: u64) {
+pub(crate) fn receive(
+    shared: &Shared,
+    session: &Session,
+    datagram: &[u8],
+    from: Option<SocketAddr>,
+    now_ns: u64,
+) {
     let counters = &shared.counters;
     let opened = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,

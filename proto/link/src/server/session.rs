@@ -11,7 +11,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, Kind, Payload, Role, Transport,
-    seal::{DatagramBuffer, Opened, OpenError, Opener, Sealer},
+    seal::{DatagramBuffer, OpenError, Opened, Opener, Sealer},
 };
 
 pub(crate) struct Session {
@@ -95,13 +95,23 @@ impl Session {
         }
         // Keep the rhythm; after a pause start a new one instead of catching up.
         let next = due.saturating_add(period);
-        let next = if next > time_ns { next } else { time_ns.saturating_add(period) };
+        let next = if next > time_ns {
+            next
+        } else {
+            time_ns.saturating_add(period)
+        };
         self.due_ns.store(next, Ordering::Relaxed);
         true
     }
 
     /// Seals an encoded payload and sends it at once, or counts the failure. Never waits for the network.
-    pub(crate) fn send_bytes(&self, kind: Kind, payload: &[u8], buffer: &mut DatagramBuffer, shared: &Shared) -> Sent {
+    pub(crate) fn send_bytes(
+        &self,
+        kind: Kind,
+        payload: &[u8],
+        buffer: &mut DatagramBuffer,
+        shared: &Shared,
+    ) -> Sent {
         let address = match self.transport {
             Transport::QuicDatagram => None,
             Transport::Udp => match *lock(&self.udp_address) {
@@ -153,7 +163,12 @@ impl Session {
     }
 
     /// Opens a datagram; if authentic, notes the sign of life and where it came from.
-    pub(crate) fn open(&self, datagram: &[u8], from: Option<SocketAddr>, now_ns: u64) -> Result<Opened, OpenError> {
+    pub(crate) fn open(
+        &self,
+        datagram: &[u8],
+        from: Option<SocketAddr>,
+        now_ns: u64,
+    ) -> Result<Opened, OpenError> {
         let opened = lock(&self.opener).open(datagram)?;
         self.last_heard_ns.fetch_max(now_ns, Ordering::Relaxed);
         // Only the newest datagram may move the path: a late one tells where the client was.

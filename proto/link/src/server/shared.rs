@@ -49,6 +49,16 @@ pub(crate) struct Sessions {
     max_clients: usize,
 }
 
+/// A client that is let in.
+pub(crate) struct Admission {
+    pub(crate) session: Arc<Session>,
+    /// The silent client of the same name whose place it took.
+    pub(crate) replaced: Option<Arc<Session>>,
+}
+
+/// Why a client is not let in: for programs, for people.
+pub(crate) type Refused = (RefusalCode, String);
+
 struct Listed {
     sessions: Arc<[Arc<Session>]>,
     last_number: u16,
@@ -86,24 +96,27 @@ impl Sessions {
 
     pub(crate) fn by_number(&self, number: u16) -> Option<Arc<Session>> {
         let list = lock(&self.list);
-        list.sessions.iter().find(|session| session.number == number).cloned()
+        list.sessions
+            .iter()
+            .find(|session| session.number == number)
+            .cloned()
     }
 
     /// Lets a client in, if its name and role are free; `make` gets its session number.
-    ///
-    /// Returns the session, and the silent one whose place it took, if any.
     pub(crate) fn admit(
         &self,
         node: &str,
         role: Role,
         now_ns: u64,
         make: impl FnOnce(u16) -> Result<Session, String>,
-    ) -> Result<(Arc<Session>, Option<Arc<Session>>), (RefusalCode, String)> {
+    ) -> Result<Admission, Refused> {
         let mut list = lock(&self.list);
         let rival = list
             .sessions
             .iter()
-            .find(|other| other.node == node || (role == Role::Device && other.role == Role::Device))
+            .find(|other| {
+                other.node == node || (role == Role::Device && other.role == Role::Device)
+            })
             .cloned();
         let replaced = match rival {
             Some(rival) if rival.node == node && silent(&rival, now_ns) => Some(rival),
@@ -125,9 +138,16 @@ impl Sessions {
             None => None,
         };
         let gone = replaced.as_ref().map(|session| session.number);
-        let staying = || list.sessions.iter().filter(|session| Some(session.number) != gone);
+        let staying = || {
+            list.sessions
+                .iter()
+                .filter(|session| Some(session.number) != gone)
+        };
         if staying().count() >= self.max_clients {
-            let text = format!("it has its {} clients already: stop one, or raise its limit", self.max_clients);
+            let text = format!(
+                "it has its {} clients already: stop one, or raise its limit",
+                self.max_clients
+            );
             return Err((RefusalCode::Full, text));
         }
         let mut number = list.last_number;
@@ -144,14 +164,19 @@ impl Sessions {
         list.sessions = sessions;
         list.last_number = number;
         self.generation.fetch_add(1, Ordering::Release);
-        Ok((session, replaced))
+        Ok(Admission { session, replaced })
     }
 
     /// Lets a client go; `false` if it is gone already.
     pub(crate) fn remove(&self, number: u16) -> bool {
         let mut list = lock(&self.list);
         let before = list.sessions.len();
-        let staying: Arc<[_]> = list.sessions.iter().filter(|session| session.number != number).cloned().collect();
+        let staying: Arc<[_]> = list
+            .sessions
+            .iter()
+            .filter(|session| session.number != number)
+            .cloned()
+            .collect();
         let removed = staying.len() < before;
         list.sessions = staying;
         self.generation.fetch_add(1, Ordering::Release);

@@ -16,14 +16,16 @@ use taut_proto::{
     HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
     mesh_blob::Positions,
     scene::{
-        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo,
-        WindowDescription,
+        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
     state::{RunState, ToolState},
 };
 
 /// Long enough for the busiest machine; every wait ends as soon as its condition holds.
 pub const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Silence that a busy test machine may cause.
+pub const FORGIVING: Duration = Duration::from_secs(4);
 
 pub fn key(digit: char) -> ClusterKey {
     ClusterKey::parse(&digit.to_string().repeat(64)).unwrap_or_else(|error| panic!("{error}"))
@@ -91,7 +93,11 @@ pub fn content() -> Content {
 }
 
 pub async fn server() -> ServerLink {
-    server_with(ServerOptions::loopback(key('a'))).await
+    let options = ServerOptions {
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    };
+    server_with(options).await
 }
 
 pub async fn server_with(options: ServerOptions) -> ServerLink {
@@ -104,6 +110,7 @@ pub fn options(server: &ServerLink, role: Role, node: &str) -> ClientOptions {
     // A busy test machine may starve a client for longer than a workbench would forgive.
     ClientOptions {
         connect_timeout: PATIENCE,
+        idle_timeout: FORGIVING,
         ..ClientOptions::new(server.quic_addr().to_string(), key('a'), role, node)
     }
 }
@@ -157,7 +164,10 @@ pub async fn broadcast_until(
     let start = Instant::now();
     let mut tick = first;
     while !done() {
-        assert!(start.elapsed() < PATIENCE, "what was waited for did not happen by tick {tick}");
+        assert!(
+            start.elapsed() < PATIENCE,
+            "what was waited for did not happen by tick {tick}"
+        );
         broadcaster.send(&state(tick));
         tick += 1;
         tokio::time::sleep(Duration::from_millis(1)).await;
@@ -179,7 +189,11 @@ pub fn drain(client: &ClientLink) -> Vec<ReceivedState> {
     states
 }
 
-pub async fn event(server: &ServerLink, what: &str, mut wanted: impl FnMut(&LinkEvent) -> bool) -> LinkEvent {
+pub async fn event(
+    server: &ServerLink,
+    what: &str,
+    mut wanted: impl FnMut(&LinkEvent) -> bool,
+) -> LinkEvent {
     let start = Instant::now();
     loop {
         while let Some(event) = server.try_event() {

@@ -43,9 +43,7 @@ pub struct Waiting {
 
 impl Waiting {
     pub fn new() -> Waiting {
-        Waiting {
-            socket: bind(),
-        }
+        Waiting { socket: bind() }
     }
 
     pub fn port(&self) -> u16 {
@@ -83,7 +81,11 @@ impl Relay {
 
     /// Every datagram that the client sent.
     pub fn upstream(&self) -> Vec<Vec<u8>> {
-        self.seen.upstream.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.seen
+            .upstream
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
     }
 }
 
@@ -102,7 +104,13 @@ fn bind() -> UdpSocket {
     socket
 }
 
-fn run(client_side: &UdpSocket, server: SocketAddr, impairment: Impairment, seed: u64, seen: &Seen) {
+fn run(
+    client_side: &UdpSocket,
+    server: SocketAddr,
+    impairment: Impairment,
+    seed: u64,
+    seen: &Seen,
+) {
     let server_side = bind();
     let mut random = seed;
     let mut client = None;
@@ -113,16 +121,31 @@ fn run(client_side: &UdpSocket, server: SocketAddr, impairment: Impairment, seed
         if let Ok((length, from)) = client_side.recv_from(&mut buffer) {
             idle = false;
             client = Some(from);
-            seen.upstream.lock().unwrap_or_else(PoisonError::into_inner).push(buffer[..length].to_vec());
-            impair(&buffer[..length], impairment, &mut random, &mut held_up, |datagram| {
-                let _ = server_side.send_to(datagram, server);
-            });
+            seen.upstream
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(buffer[..length].to_vec());
+            impair(
+                &buffer[..length],
+                impairment,
+                &mut random,
+                &mut held_up,
+                |datagram| {
+                    let _ = server_side.send_to(datagram, server);
+                },
+            );
         }
         if let (Ok((length, _)), Some(client)) = (server_side.recv_from(&mut buffer), client) {
             idle = false;
-            let copies = impair(&buffer[..length], impairment, &mut random, &mut held_down, |datagram| {
-                let _ = client_side.send_to(datagram, client);
-            });
+            let copies = impair(
+                &buffer[..length],
+                impairment,
+                &mut random,
+                &mut held_down,
+                |datagram| {
+                    let _ = client_side.send_to(datagram, client);
+                },
+            );
             match copies {
                 0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
                 2 => seen.doubled_down.fetch_add(1, Ordering::SeqCst),

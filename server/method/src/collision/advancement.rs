@@ -5,11 +5,11 @@
 //! | n      | `direction`  | –    | unit direction from the obstacle's triangle to the body's                 |
 //! | x_i    |              | m    | corners of the body's triangle at `time`; velocity v_i, acceleration a_i  |
 //! | s      | `support`    | m    | `max_j n.y_j` over the corners of the obstacle's triangle                 |
-//! | g_i    |              | m    | `n.x_i - s - minimum_gap`                                                 |
+//! | g_i    |              | m    | `n.x_i - s - stop_gap`                                                    |
 //! | h      |              | –    | step in time                                                              |
 //!
 //! For *any* direction n the distance at `time + h` is at least `min_i n.x_i(time + h) - s`, and for a rigid motion
-//! `n.x_i(time + h) >= n.x_i + h n.v_i + h^2 n.a_i / 2 - h^3 |w|^3 r_i / 6`. The largest h that keeps the right-hand side
+//! `n.x_i(time + h) >= n.x_i + h n.v_i + h^2 n.a_i / 2 - h^3 |w| |w x r_i| |w x n| / 6`. The largest h that keeps the right-hand side
 //! above the minimum gap is a root of a quadratic, the cubic term being bounded by the time that is left. So a step is safe whatever the
 //! closest points were worth, and a tangential or departing motion is passed in one step.
 //! Source: Mirtich 1996 (conservative advancement); Tang et al. 2009 (directional bound); the second-order bound is ours.
@@ -20,9 +20,13 @@ use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
 use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
 
-/// A pair nearer than the minimum gap at the start may come down to this share of its distance there: it is free to
-/// leave and to slide, and never touches.
-const KEPT_SHARE_OF_START_GAP: f64 = 0.5;
+/// Bodies nearer than the minimum gap at the start may come down to this share of their distance there: they are free to
+/// leave and to slide, and never touch.
+const KEPT_SHARE_OF_START_GAP: f64 = 0.9;
+/// Bodies at the minimum gap to rounding may lose this many units of slack: a push that never eases loses 0.1 pm in each search.
+const KEPT_SLACKS: f64 = 4.0;
+/// Share of the gap tolerance, above the minimum gap, at which an advance ends: rounding does not bring the next start below the minimum.
+const STOP_SHARE_OF_TOLERANCE: f64 = 0.5;
 
 /// What a pair of triangles does in an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +37,9 @@ pub(super) enum PairOutcome {
     Hit(f64),
     /// They stay apart up to this time; the iterations ran out.
     Limit(f64),
-    /// They intersect at the start of the motion.
+    /// They are at this distance, nearer than the gap to stop at, when the interval begins, m.
+    Near(f64),
+    /// They intersect when the interval begins.
     Overlap,
 }
 
@@ -41,9 +47,12 @@ pub(super) enum PairOutcome {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
-    /// Minimum gap with the slack of rounding added, m.
+    /// The gap that no pair may go below, m.
     pub(super) minimum_gap: f64,
-    pub(super) gap_tolerance: f64,
+    /// The gap at which an advance ends, m: above the minimum gap.
+    pub(super) stop_gap: f64,
+    /// A pair this far above `stop_gap` is at it, m.
+    pub(super) stop_tolerance: f64,
     /// Bound on the rounding error of a distance, m.
     pub(super) slack: f64,
     pub(super) max_iterations: u32,
@@ -58,39 +67,81 @@ pub(super) struct TrianglePair {
     pub(super) obstacle_normal: Vector3<f64>,
 }
 
-impl PairSearch<'_> {
+impl<'a> PairSearch<'a> {
+    /// A search that stops at most `gap_tolerance` above `minimum_gap`; `slack` is added for rounding.
+    pub(super) fn new(
+        motion: &'a RelativeMotion,
+        minimum_gap: f64,
+        gap_tolerance: f64,
+        slack: f64,
+        max_iterations: u32,
+    ) -> Self {
+        let stop_gap = minimum_gap + slack + STOP_SHARE_OF_TOLERANCE * gap_tolerance;
+        let stop_tolerance = (1.0 - STOP_SHARE_OF_TOLERANCE) * gap_tolerance;
+        Self {
+            motion,
+            minimum_gap,
+            stop_gap,
+            stop_tolerance,
+            slack,
+            max_iterations,
+        }
+    }
+
+    /// The same search for bodies whose distance at the start is `gap`, nearer than the gap to stop at; `None` when nothing is left to keep.
+    pub(super) fn keeping(&self, gap: f64) -> Option<Self> {
+        let above = gap - KEPT_SLACKS * self.slack;
+        let kept = if above >= self.minimum_gap {
+            above
+        } else {
+            KEPT_SHARE_OF_START_GAP * gap
+        };
+        let stop_gap = kept.min(self.stop_gap);
+        let stop_tolerance = self
+            .stop_tolerance
+            .min(STOP_SHARE_OF_TOLERANCE * (gap - stop_gap));
+        (kept > self.slack).then_some(Self {
+            stop_gap,
+            stop_tolerance,
+            ..*self
+        }) // None for NaN
+    }
+
     /// Follows the pair over `[from, to]`; `placement` is the body at `from`.
-    pub(super) fn advance(&self, pair: &TrianglePair, placement: &Placement, from: f64, to: f64, work: &mut Work) -> PairOutcome {
+    pub(super) fn advance(
+        &self,
+        pair: &TrianglePair,
+        placement: &Placement,
+        from: f64,
+        to: f64,
+        work: &mut Work,
+    ) -> PairOutcome {
         let mut moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
         // The planes of the faces settle most pairs, without closest points.
-        let step = moving.safe_step(&pair.obstacle_normal, &pair.on_obstacle, self.minimum_gap).step;
-        if step >= to - from {
-            return PairOutcome::Free;
-        }
-        let step = moving.safe_step(&-(placement.rotation * pair.body_normal), &pair.on_obstacle, self.minimum_gap).step;
-        if step >= to - from {
-            return PairOutcome::Free;
+        let out_of_body = -(placement.rotation * pair.body_normal);
+        for direction in [pair.obstacle_normal, out_of_body] {
+            if moving
+                .safe_step(&direction, &pair.on_obstacle, self.stop_gap)
+                .step
+                >= to - from
+            {
+                return PairOutcome::Free;
+            }
         }
 
         let mut time = from;
         let mut placement = *placement;
-        let mut minimum_gap = self.minimum_gap;
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let mut best = moving.best_step(pair, &placement, minimum_gap);
-            if iteration == 0 && best.gap < minimum_gap {
-                minimum_gap = match self.kept_gap(pair, best.gap, from) {
-                    Some(kept) => kept,
-                    None if from == 0.0 && triangles_intersect(&moving.corners, &pair.on_obstacle) => return PairOutcome::Overlap,
-                    None => return PairOutcome::Hit(from),
-                };
-                best = moving.best_step(pair, &placement, minimum_gap);
+            let best = moving.best_step(pair, &placement, self.stop_gap);
+            let far = best.gap >= self.stop_gap; // false for NaN
+            if iteration == 0 && !far {
+                return self.near(&moving, pair, best.gap);
             }
-            let left = to - time;
-            if best.step >= left {
+            if best.step >= to - time {
                 return PairOutcome::Free;
             }
-            let apart = best.gap - minimum_gap > self.gap_tolerance; // false for NaN
+            let apart = best.gap - self.stop_gap > self.stop_tolerance; // false for NaN
             time += best.step.max(0.0);
             if !apart {
                 return PairOutcome::Hit(time);
@@ -101,16 +152,14 @@ impl PairSearch<'_> {
         PairOutcome::Limit(time)
     }
 
-    /// The gap to keep for a pair that is nearer than the minimum gap at `from`; `None` when there is none to keep.
-    fn kept_gap(&self, pair: &TrianglePair, gap: f64, from: f64) -> Option<f64> {
-        let at_start = if from == 0.0 {
-            gap
+    /// A pair that is nearer than the gap to stop at: along no direction is there more than `gap`.
+    fn near(&self, moving: &MovingTriangle, pair: &TrianglePair, gap: f64) -> PairOutcome {
+        let apart = gap > self.slack; // false for NaN
+        if !apart && triangles_intersect(&moving.corners, &pair.on_obstacle) {
+            PairOutcome::Overlap
         } else {
-            let placement = self.motion.at(0.0);
-            MovingTriangle::at(self.motion, &placement, &pair.on_body, 0.0).best_step(pair, &placement, 0.0).gap
-        };
-        let kept = (KEPT_SHARE_OF_START_GAP * at_start).min(self.minimum_gap);
-        (kept > self.slack && gap >= kept).then_some(kept) // None for NaN
+            PairOutcome::Near(gap)
+        }
     }
 }
 
@@ -128,54 +177,84 @@ struct MovingTriangle {
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.
     bends: [Vector3<f64>; 3],
-    /// `|w|^3 r_i H / 6`, H the time that is left.
+    /// `|w| |w x r_i| H / 6`, H the time that is left.
     remainders: [f64; 3],
+    spin: Vector3<f64>,
 }
 
 impl MovingTriangle {
     #[inline]
-    fn at(motion: &RelativeMotion, placement: &Placement, on_body: &[Point3<f64>; 3], time_left: f64) -> Self {
+    fn at(
+        motion: &RelativeMotion,
+        placement: &Placement,
+        on_body: &[Point3<f64>; 3],
+        time_left: f64,
+    ) -> Self {
         let corners = on_body.map(|p| placement.point(&p));
         let arms = corners.map(|x| x.coords - placement.center);
         let turns = arms.map(|r| motion.spin.cross(&r));
-        let cubic = motion.rate.powi(3) * time_left / 6.0;
+        let cubic = motion.rate * time_left / 6.0;
         Self {
             corners,
             velocities: turns.map(|turn| motion.velocity + turn),
             bends: turns.map(|turn| motion.spin.cross(&turn) * 0.5),
-            remainders: arms.map(|r| r.norm() * cubic),
+            remainders: turns.map(|turn| turn.norm() * cubic),
+            spin: motion.spin,
         }
     }
 
     /// The longest of the safe steps along the closest points and the two face normals, and the largest gap.
-    fn best_step(&self, pair: &TrianglePair, placement: &Placement, minimum_gap: f64) -> SafeStep {
+    fn best_step(&self, pair: &TrianglePair, placement: &Placement, gap_to_keep: f64) -> SafeStep {
         let closest = closest_on_triangles(&self.corners, &pair.on_obstacle);
         let along_points = (closest.on_first - closest.on_second) / closest.squared_distance.sqrt(); // NaN where they touch
-        let directions = [along_points, pair.obstacle_normal, -(placement.rotation * pair.body_normal)];
-        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, minimum_gap));
+        let directions = [
+            along_points,
+            pair.obstacle_normal,
+            -(placement.rotation * pair.body_normal),
+        ];
+        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, gap_to_keep));
         // `max` prefers any number to NaN.
-        steps.iter().fold(SafeStep { step: 0.0, gap: f64::NEG_INFINITY }, |best, s| SafeStep {
-            step: best.step.max(s.step),
-            gap: best.gap.max(s.gap),
-        })
+        steps.iter().fold(
+            SafeStep {
+                step: 0.0,
+                gap: f64::NEG_INFINITY,
+            },
+            |best, s| SafeStep {
+                step: best.step.max(s.step),
+                gap: best.gap.max(s.gap),
+            },
+        )
     }
 
-    /// How far in time the triangle may move so that it stays `minimum_gap` off the other along `direction`. NaN goes nowhere.
+    /// How far in time the triangle may move so that it stays `gap_to_keep` off the other along `direction`. NaN goes nowhere.
     #[inline]
-    fn safe_step(&self, direction: &Vector3<f64>, other: &[Point3<f64>; 3], minimum_gap: f64) -> SafeStep {
+    fn safe_step(
+        &self,
+        direction: &Vector3<f64>,
+        other: &[Point3<f64>; 3],
+        gap_to_keep: f64,
+    ) -> SafeStep {
         let heights = other.map(|y| direction.dot(&y.coords));
         let support = heights[0].max(heights[1]).max(heights[2]);
+        let sideways = direction.cross(&self.spin).norm();
         let mut step = f64::INFINITY;
         let mut gap = f64::INFINITY;
         for i in 0..3 {
             let height = direction.dot(&self.corners[i].coords) - support;
             gap = gap.min(height);
-            let bend = self.remainders[i] - direction.dot(&self.bends[i]);
-            let until = time_to_fall(height - minimum_gap, direction.dot(&self.velocities[i]), bend);
+            let bend = self.remainders[i] * sideways - direction.dot(&self.bends[i]);
+            let until = time_to_fall(
+                height - gap_to_keep,
+                direction.dot(&self.velocities[i]),
+                bend,
+            );
             step = step.min(until);
         }
         let known = support.is_finite();
-        SafeStep { step: if known { step } else { 0.0 }, gap: if known { gap } else { f64::NEG_INFINITY } }
+        SafeStep {
+            step: if known { step } else { 0.0 },
+            gap: if known { gap } else { f64::NEG_INFINITY },
+        }
     }
 }
 
@@ -189,9 +268,17 @@ fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
     let discriminant = speed * speed + 4.0 * bend * height;
     if speed < 0.0 {
         // No real root: the path bends away in time.
-        return if discriminant < 0.0 { f64::INFINITY } else { known(2.0 * height / (discriminant.sqrt() - speed)) };
+        return if discriminant < 0.0 {
+            f64::INFINITY
+        } else {
+            known(2.0 * height / (discriminant.sqrt() - speed))
+        };
     }
-    if bend <= 0.0 { f64::INFINITY } else { known((speed + discriminant.sqrt()) / (2.0 * bend)) }
+    if bend <= 0.0 {
+        f64::INFINITY
+    } else {
+        known((speed + discriminant.sqrt()) / (2.0 * bend))
+    }
 }
 
 #[inline]
@@ -205,10 +292,19 @@ mod tests {
 
     #[test]
     fn a_fall_ends_at_the_first_root() {
-        for (height, speed, bend) in [(1.0, -2.0, 0.5), (1.0, 2.0, 0.5), (1.0, 0.0, 0.25), (1.0, -3.0, -1.0), (1e-9, -1.0, 1e-3)] {
+        for (height, speed, bend) in [
+            (1.0, -2.0, 0.5),
+            (1.0, 2.0, 0.5),
+            (1.0, 0.0, 0.25),
+            (1.0, -3.0, -1.0),
+            (1e-9, -1.0, 1e-3),
+        ] {
             let h = time_to_fall(height, speed, bend);
             let value: f64 = height + speed * h - bend * h * h;
-            assert!(value.abs() < 1e-12 && h > 0.0, "{height} {speed} {bend}: {h}");
+            assert!(
+                value.abs() < 1e-12 && h > 0.0,
+                "{height} {speed} {bend}: {h}"
+            );
             for k in 1..100 {
                 let t = h * f64::from(k) / 100.0;
                 assert!(height + speed * t - bend * t * t > 0.0);
@@ -221,7 +317,12 @@ mod tests {
         assert_eq!(time_to_fall(1e-6, 0.0, 0.0), f64::INFINITY);
         assert_eq!(time_to_fall(0.0, 1.0, 0.0), f64::INFINITY);
         assert_eq!(time_to_fall(1.0, -0.1, -1.0), f64::INFINITY);
-        for (height, speed, bend) in [(f64::NAN, 1.0, 0.0), (1.0, f64::NAN, 1.0), (1.0, -1.0, f64::NAN), (1.0, 1.0, f64::NAN)] {
+        for (height, speed, bend) in [
+            (f64::NAN, 1.0, 0.0),
+            (1.0, f64::NAN, 1.0),
+            (1.0, -1.0, f64::NAN),
+            (1.0, 1.0, f64::NAN),
+        ] {
             assert_eq!(time_to_fall(height, speed, bend), 0.0);
         }
     }

@@ -10,7 +10,8 @@ use crate::spatial::Pose;
 pub fn distance(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle_pose: &Pose) -> f64 {
     let placement = Placement::of(body_pose, obstacle_pose);
     let (a_nodes, b_nodes) = (body.tree().nodes(), obstacle.tree().nodes());
-    let bound = |i: u32, j: u32| lower_bound(&placement, &a_nodes[i as usize], &b_nodes[j as usize]);
+    let bound =
+        |i: u32, j: u32| lower_bound(&placement, &a_nodes[i as usize], &b_nodes[j as usize]);
     let mut least = f64::INFINITY;
     let mut stack = Vec::with_capacity(STACK_CAPACITY);
     stack.push((0, 0, bound(0, 0)));
@@ -25,11 +26,19 @@ pub fn distance(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle_pose: &
             if triangles_intersect(&on_body, &on_obstacle) {
                 return 0.0;
             }
-            least = least.min(closest_on_triangles(&on_body, &on_obstacle).squared_distance.sqrt());
+            least = least.min(
+                closest_on_triangles(&on_body, &on_obstacle)
+                    .squared_distance
+                    .sqrt(),
+            );
             continue;
         }
         let descend_body = !a.is_leaf() && (b.is_leaf() || a.radius > b.radius);
-        let children = if descend_body { [(i + 1, j), (a.second, j)] } else { [(i, j + 1), (i, b.second)] };
+        let children = if descend_body {
+            [(i + 1, j), (a.second, j)]
+        } else {
+            [(i, j + 1), (i, b.second)]
+        };
         let mut pairs = children.map(|(i, j)| (i, j, bound(i, j)));
         // The nearer pair on top.
         if pairs[0].2 < pairs[1].2 {
@@ -45,6 +54,7 @@ fn lower_bound(placement: &Placement, body: &Node, obstacle: &Node) -> f64 {
     let rotation = &placement.rotation;
     let offset = placement.point(&body.center) - obstacle.center;
     let along_obstacle = offset.abs() - rotation.abs() * body.half - obstacle.half;
-    let along_body = rotation.tr_mul(&offset).abs() - rotation.abs().tr_mul(&obstacle.half) - body.half;
+    let along_body =
+        rotation.tr_mul(&offset).abs() - rotation.abs().tr_mul(&obstacle.half) - body.half;
     along_obstacle.max().max(along_body.max())
 }

@@ -13,7 +13,12 @@ use crate::spatial::Pose;
 const INSIDE: f64 = 0.5;
 
 /// Whether the body and the obstacle share a point, surfaces or insides. For set-up: it allocates.
-pub fn meshes_intersect(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle_pose: &Pose) -> bool {
+pub fn meshes_intersect(
+    body: &Mesh,
+    body_pose: &Pose,
+    obstacle: &Mesh,
+    obstacle_pose: &Pose,
+) -> bool {
     let placement = Placement::of(body_pose, obstacle_pose);
     let boxes = SweptBoxes::still(&placement, 0.0);
     let mut intersect = false;
@@ -22,7 +27,12 @@ pub fn meshes_intersect(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle
         obstacle.tree(),
         &mut Vec::with_capacity(STACK_CAPACITY),
         &mut Work::default(),
-        |i, j| boxes.may_meet(&body.tree().nodes()[i as usize], &obstacle.tree().nodes()[j as usize]),
+        |i, j| {
+            boxes.may_meet(
+                &body.tree().nodes()[i as usize],
+                &obstacle.tree().nodes()[j as usize],
+            )
+        },
         |a, b, _| {
             let on_body = body.corners(a).map(|p| placement.point(&p));
             intersect = triangles_intersect(&on_body, &obstacle.corners(b));
@@ -31,8 +41,12 @@ pub fn meshes_intersect(body: &Mesh, body_pose: &Pose, obstacle: &Mesh, obstacle
     );
     // Surfaces that do not meet leave each part wholly inside or wholly outside.
     intersect
-        || part_vertices(body).iter().any(|v| winding_number(obstacle, &placement.point(v)) > INSIDE)
-        || part_vertices(obstacle).iter().any(|v| winding_number(body, &placement.back(v)) > INSIDE)
+        || part_vertices(body)
+            .iter()
+            .any(|v| winding_number(obstacle, &placement.point(v)) > INSIDE)
+        || part_vertices(obstacle)
+            .iter()
+            .any(|v| winding_number(body, &placement.back(v)) > INSIDE)
 }
 
 impl Placement {
@@ -41,7 +55,11 @@ impl Placement {
         let relative = obstacle_pose.inverse() * body_pose;
         let rotation: Matrix3<f64> = relative.rotation.to_rotation_matrix().into_inner();
         let origin = relative.translation.vector;
-        Self { rotation, origin, center: origin }
+        Self {
+            rotation,
+            origin,
+            center: origin,
+        }
     }
 
     /// A point of the obstacle, body frame.

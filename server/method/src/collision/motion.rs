@@ -85,13 +85,18 @@ impl RelativeMotion {
         let turn = Rotation3::from_scaled_axis(self.spin * time).into_inner();
         let rotation = turn * self.rotation;
         let center = self.start + self.velocity * time;
-        Placement { rotation, origin: center - rotation * self.reference_point.coords, center }
+        Placement {
+            rotation,
+            origin: center - rotation * self.reference_point.coords,
+            center,
+        }
     }
 
     /// Whether every number of the motion is finite.
     pub(crate) fn is_finite(&self) -> bool {
         let vectors = [&self.start, &self.velocity, &self.spin];
-        vectors.iter().all(|v| v.iter().all(|c| c.is_finite())) && self.rotation.iter().all(|c| c.is_finite())
+        vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
+            && self.rotation.iter().all(|c| c.is_finite())
     }
 
     /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.

@@ -62,7 +62,8 @@ impl SweptBoxes {
         let center = self.placement.point(&body.center).coords;
         let arm = center - self.placement.center;
         let sweep = self.half_path + self.half_turn.cross(&arm);
-        let stray = self.angle * (body.radius + 0.5 * self.angle * (arm.norm() + body.radius)) + self.margin;
+        let stray = self.angle * (body.radius + 0.5 * self.angle * (arm.norm() + body.radius))
+            + self.margin;
 
         let offset = center - obstacle.center.coords;
         let extent = self.rotation_abs * body.half + obstacle.half + sweep.abs();
@@ -70,7 +71,9 @@ impl SweptBoxes {
             return false;
         }
         let offset = self.placement.rotation.tr_mul(&offset);
-        let extent = self.rotation_abs.tr_mul(&obstacle.half) + body.half + self.placement.rotation.tr_mul(&sweep).abs();
+        let extent = self.rotation_abs.tr_mul(&obstacle.half)
+            + body.half
+            + self.placement.rotation.tr_mul(&sweep).abs();
         !(0..3).any(|k| offset[k].abs() > extent[k] + stray)
     }
 }

@@ -20,6 +20,8 @@ use crate::spatial::Pose;
 
 /// Rounding of a computed distance relative to the largest coordinate on the way: see the file's head.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
+/// Searches of one motion: with the full gap; with that of the nearest hint; with that of the nearest pair; and one for rounding.
+const MAX_SEARCHES: u32 = 4;
 
 /// What the search found. A failure is a value, never a panic: the caller is a real-time loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +46,8 @@ pub enum TimeOfImpact {
 /// Tolerances and limits of [`time_of_impact`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdvancementSettings {
-    /// Gap at which surfaces count as touching, m. They never come nearer, unless they are at the start: such a pair keeps half of its distance.
+    /// Gap at which surfaces count as touching, m. They never come nearer, unless they are nearer at the start: then
+    /// they keep nine tenths of their distance there.
     pub minimum_gap: f64,
     /// The search ends this far above `minimum_gap`, m. Smaller is more accurate, slower.
     pub gap_tolerance: f64,
@@ -59,7 +62,13 @@ pub struct AdvancementSettings {
 impl Default for AdvancementSettings {
     /// For a body of 0.1 m: 1 um, 0.1 um.
     fn default() -> Self {
-        Self { minimum_gap: 1e-6, gap_tolerance: 1e-7, max_iterations: 200, interval_edges: 0.5, max_intervals: 64 }
+        Self {
+            minimum_gap: 1e-6,
+            gap_tolerance: 1e-7,
+            max_iterations: 200,
+            interval_edges: 0.5,
+            max_intervals: 64,
+        }
     }
 }
 
@@ -78,68 +87,155 @@ pub fn time_of_impact(
 ) -> TimeOfImpact {
     let relative = RelativeMotion::new(motion, obstacle_pose);
     let radius = body.radius_bound_about(&motion.reference_point);
-    let finite = relative.is_finite() && settings.minimum_gap.is_finite() && settings.gap_tolerance.is_finite();
+    let finite = relative.is_finite()
+        && settings.minimum_gap.is_finite()
+        && settings.gap_tolerance.is_finite();
     if !finite {
         return TimeOfImpact::Impact { time: 0.0 };
     }
-    let obstacle_reach = obstacle.bounding_box().iter().map(|p| p.coords.amax()).fold(0.0, f64::max);
-    let world_reach = motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
+    let obstacle_reach = obstacle
+        .bounding_box()
+        .iter()
+        .map(|p| p.coords.amax())
+        .fold(0.0, f64::max);
+    let world_reach =
+        motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
     let slack = ROUNDING * (relative.reach(radius) + obstacle_reach + world_reach);
-    let search = PairSearch {
-        motion: &relative,
-        minimum_gap: settings.minimum_gap + slack,
-        gap_tolerance: settings.gap_tolerance,
+    let search = PairSearch::new(
+        &relative,
+        settings.minimum_gap,
+        settings.gap_tolerance,
         slack,
-        max_iterations: settings.max_iterations,
+        settings.max_iterations,
+    );
+    let problem = Problem {
+        body,
+        obstacle,
+        relative: &relative,
+        radius,
+        settings,
     };
-    let mut first = First { time: 1.0, hit: None };
-
-    // The nearest pairs of the last search bound the time before the trees are touched.
-    let start = relative.at(0.0);
-    for &(a, b) in &workspace.hints {
-        let exists = (a as usize) < body.triangles().len() && (b as usize) < obstacle.triangles().len();
-        if exists && !first.take(search.advance(&pair_of(body, a, obstacle, b), &start, 0.0, first.time, work), (a, b)) {
-            return TimeOfImpact::Overlapping;
+    let mut tried = Some(search);
+    for _ in 0..MAX_SEARCHES {
+        let Some(current) = tried else { break };
+        match problem.first_impact(&current, workspace, work) {
+            Ok(answer) => return answer,
+            // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
+            Err(gap) => tried = search.keeping(gap),
         }
     }
+    TimeOfImpact::Impact { time: 0.0 }
+}
 
-    let length = relative.length(radius) * first.time;
-    let finest = body.mean_edge_length().min(obstacle.mean_edge_length());
-    let wanted = (length / (finest * settings.interval_edges)).ceil();
-    let intervals = wanted.clamp(1.0, f64::from(settings.max_intervals.max(1))); // NaN stays NaN: `as` makes it 0, below
-    let last = (intervals as u32).max(1);
-    let end = first.time;
-    for k in 0..last {
-        let [from, to] = [k, k + 1].map(|k| end * f64::from(k) / f64::from(last));
-        if first.time <= from && first.hit.is_some() {
-            break;
+/// A body on its way and an obstacle.
+struct Problem<'a> {
+    body: &'a Mesh,
+    obstacle: &'a Mesh,
+    relative: &'a RelativeMotion,
+    radius: f64,
+    settings: &'a AdvancementSettings,
+}
+
+impl Problem<'_> {
+    /// The earliest impact; `Err` with the distance when some pair is nearer than the gap to stop at from the beginning.
+    fn first_impact(
+        &self,
+        search: &PairSearch,
+        workspace: &mut CollisionWorkspace,
+        work: &mut Work,
+    ) -> Result<TimeOfImpact, f64> {
+        let mut first = First::default();
+
+        // The nearest pairs of the last search bound the time before the trees are touched.
+        let start = self.relative.at(0.0);
+        let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
+        for &(a, b) in workspace
+            .hints
+            .iter()
+            .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
+        {
+            first.take(
+                search.advance(&self.pair(a, b), &start, 0.0, first.time, work),
+                (a, b),
+            );
         }
-        let boxes = SweptBoxes::over(&relative, from, to, settings.minimum_gap + slack);
-        let placement = relative.at(from);
-        let mut overlapping = false;
+
+        let end = first.time;
+        let intervals = self.intervals(end);
+        for k in 0..intervals {
+            let [from, to] = [k, k + 1].map(|k| end * f64::from(k) / f64::from(intervals));
+            if !first.is_near() {
+                self.search_interval(search, [from, to], &mut first, workspace, work);
+            }
+            if first.overlapping {
+                return Ok(TimeOfImpact::Overlapping);
+            }
+            if first.is_near() && k == 0 {
+                return Err(first.near);
+            }
+            if first.is_near() {
+                // It came there in the interval before, within rounding.
+                return Ok(TimeOfImpact::Impact { time: from });
+            }
+            if first.time < to {
+                break;
+            }
+        }
+        if let Some((pair, _)) = first.hit {
+            workspace.remember(pair);
+        }
+        Ok(first.answer())
+    }
+
+    fn search_interval(
+        &self,
+        search: &PairSearch,
+        [from, to]: [f64; 2],
+        first: &mut First,
+        workspace: &mut CollisionWorkspace,
+        work: &mut Work,
+    ) {
+        let boxes = SweptBoxes::over(self.relative, from, to, search.stop_gap);
+        let placement = self.relative.at(from);
+        let (body_nodes, obstacle_nodes) = (self.body.tree().nodes(), self.obstacle.tree().nodes());
         for_triangle_pairs(
-            body.tree(),
-            obstacle.tree(),
+            self.body.tree(),
+            self.obstacle.tree(),
             &mut workspace.stack,
             work,
-            |i, j| boxes.may_meet(&body.tree().nodes()[i as usize], &obstacle.tree().nodes()[j as usize]),
+            |i, j| boxes.may_meet(&body_nodes[i as usize], &obstacle_nodes[j as usize]),
             |a, b, work| {
-                let outcome = search.advance(&pair_of(body, a, obstacle, b), &placement, from, to.min(first.time), work);
-                overlapping = !first.take(outcome, (a, b));
-                !overlapping
+                first.take(
+                    search.advance(&self.pair(a, b), &placement, from, to.min(first.time), work),
+                    (a, b),
+                );
+                !first.overlapping
             },
         );
-        if overlapping {
-            return TimeOfImpact::Overlapping;
-        }
-        if first.time < to {
-            break;
+    }
+
+    /// Intervals in which the body moves by about `interval_edges` of the finer mesh, up to time `end`.
+    fn intervals(&self, end: f64) -> u32 {
+        let finest = self
+            .body
+            .mean_edge_length()
+            .min(self.obstacle.mean_edge_length());
+        let wanted = (self.relative.length(self.radius) * end
+            / (finest * self.settings.interval_edges))
+            .ceil();
+        // `as` saturates, and makes NaN 0.
+        (wanted as u32).clamp(1, self.settings.max_intervals.max(1))
+    }
+
+    #[inline]
+    fn pair(&self, a: u32, b: u32) -> TrianglePair {
+        TrianglePair {
+            on_body: self.body.corners(a),
+            body_normal: *self.body.face_normal(a),
+            on_obstacle: self.obstacle.corners(b),
+            obstacle_normal: *self.obstacle.face_normal(b),
         }
     }
-    if let Some((pair, _)) = first.hit {
-        workspace.remember(pair);
-    }
-    first.answer()
 }
 
 /// The earliest outcome so far.
@@ -147,22 +243,48 @@ struct First {
     time: f64,
     /// The pair, and whether its iterations ran out.
     hit: Option<((u32, u32), bool)>,
+    /// Least distance of the pairs that were nearer than the gap to stop at when the interval began, m.
+    near: f64,
+    /// Some pair intersects.
+    overlapping: bool,
+}
+
+impl Default for First {
+    fn default() -> Self {
+        Self {
+            time: 1.0,
+            hit: None,
+            near: f64::INFINITY,
+            overlapping: false,
+        }
+    }
 }
 
 impl First {
-    /// Takes an outcome into account; false when the pair overlaps.
-    fn take(&mut self, outcome: PairOutcome, pair: (u32, u32)) -> bool {
+    /// Takes an outcome into account.
+    fn take(&mut self, outcome: PairOutcome, pair: (u32, u32)) {
         let (time, limit) = match outcome {
-            PairOutcome::Free => return true,
-            PairOutcome::Overlap => return false,
+            PairOutcome::Free => return,
+            PairOutcome::Near(gap) => {
+                self.near = self.near.min(if gap.is_nan() { 0.0 } else { gap });
+                return;
+            }
+            PairOutcome::Overlap => {
+                self.overlapping = true;
+                return;
+            }
             PairOutcome::Hit(time) => (time, false),
             PairOutcome::Limit(time) => (time, true),
         };
         let later = time >= self.time && self.hit.is_some(); // false for NaN
         if !later {
-            *self = Self { time: time.clamp(0.0, 1.0), hit: Some((pair, limit)) };
+            self.time = time.clamp(0.0, 1.0);
+            self.hit = Some((pair, limit));
         }
-        true
+    }
+
+    fn is_near(&self) -> bool {
+        self.near < f64::INFINITY
     }
 
     fn answer(&self) -> TimeOfImpact {
@@ -171,15 +293,5 @@ impl First {
             Some((_, false)) => TimeOfImpact::Impact { time: self.time },
             Some((_, true)) => TimeOfImpact::IterationLimit { time: self.time },
         }
-    }
-}
-
-#[inline]
-fn pair_of(body: &Mesh, a: u32, obstacle: &Mesh, b: u32) -> TrianglePair {
-    TrianglePair {
-        on_body: body.corners(a),
-        body_normal: *body.face_normal(a),
-        on_obstacle: obstacle.corners(b),
-        obstacle_normal: *obstacle.face_normal(b),
     }
 }

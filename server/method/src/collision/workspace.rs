@@ -8,7 +8,7 @@ use crate::constraint::Contact;
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
 pub(crate) const MAX_CANDIDATES: usize = 8192;
 /// Triangle pairs kept from one search to the next.
-pub(crate) const MAX_HINTS: usize = 16;
+pub(crate) const MAX_HINTS: usize = 64;
 
 /// Buffers that the searches reuse, and the nearest triangle pairs of the last ones.
 ///

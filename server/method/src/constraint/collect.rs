@@ -5,7 +5,9 @@
 
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
-use crate::collision::{CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, SweptBoxes, Work, for_triangle_pairs};
+use crate::collision::{
+    CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, SweptBoxes, Work, for_triangle_pairs,
+};
 use crate::geometry::{Mesh, NormalCone};
 use crate::spatial::Pose;
 
@@ -13,7 +15,10 @@ use crate::spatial::Pose;
 ///
 /// A contact is a pair of features that face each other ([`Contact`]); faces that lie on faces, and parallel edges, are represented by their
 /// vertices and crossings. Poses are those of the meshes' own frames. Flat and concave edges and vertices make no contact. No allocation.
-#[allow(clippy::too_many_arguments, reason = "two placed meshes, a distance, and memory to work in")]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "two placed meshes, a distance, and memory to work in"
+)]
 pub fn collect_contacts(
     body: &Mesh,
     body_pose: &Pose,
@@ -27,7 +32,13 @@ pub fn collect_contacts(
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
     let boxes = SweptBoxes::still(&placement, activation_distance);
-    let facing = Facing { body, obstacle, placement: &placement, obstacle_index, activation_distance };
+    let facing = Facing {
+        body,
+        obstacle,
+        placement: &placement,
+        obstacle_index,
+        activation_distance,
+    };
     let room = (out.capacity() - out.len()).min(MAX_CANDIDATES / 2);
     let candidates = &mut workspace.candidates;
     candidates.clear();
@@ -40,10 +51,18 @@ pub fn collect_contacts(
         work,
         |i, j| {
             may_face(&placement, body_tree.cone(i), obstacle_tree.cone(j))
-                && boxes.may_meet(&body_tree.nodes()[i as usize], &obstacle_tree.nodes()[j as usize])
+                && boxes.may_meet(
+                    &body_tree.nodes()[i as usize],
+                    &obstacle_tree.nodes()[j as usize],
+                )
         },
         |a, b, work| {
-            let pair = Pair { a, b, x: body.corners(a).map(|p| placement.point(&p)), y: obstacle.corners(b) };
+            let pair = Pair {
+                a,
+                b,
+                x: body.corners(a).map(|p| placement.point(&p)),
+                y: obstacle.corners(b),
+            };
             for_contacts(&facing, &pair, work, |contact| {
                 if candidates.len() == MAX_CANDIDATES {
                     keep_nearest(candidates, room);
@@ -87,7 +106,10 @@ fn may_face(placement: &Placement, body: &NormalCone, obstacle: &NormalCone) -> 
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.
 fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl FnMut(Contact)) {
-    let (on_a, on_b) = (facing.body.owned_features(pair.a), facing.obstacle.owned_features(pair.b));
+    let (on_a, on_b) = (
+        facing.body.owned_features(pair.a),
+        facing.obstacle.owned_features(pair.b),
+    );
     let corner = |owned: u8, k: usize| owned & (1 << k) != 0;
     let side = |owned: u8, k: usize| owned & (8 << k) != 0;
     for k in 0..3 {
@@ -124,7 +146,9 @@ fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl F
 
 /// By gap, then by features: the order says nothing of the traversal.
 fn nearer(a: &Contact, b: &Contact) -> std::cmp::Ordering {
-    a.gap.total_cmp(&b.gap).then_with(|| a.features.cmp(&b.features))
+    a.gap
+        .total_cmp(&b.gap)
+        .then_with(|| a.features.cmp(&b.features))
 }
 
 fn keep_nearest(candidates: &mut Vec<Contact>, count: usize) {

@@ -68,7 +68,14 @@ impl Facing<'_> {
         }
         let foot = pair.x[k] - normal * gap;
         let weights = barycentric(&foot, &pair.y, &normal);
-        Some(self.contact(Feature::Vertex(v), Feature::Face(pair.b), [pair.x[k], foot], normal, gap, (pair.b, weights)))
+        Some(self.contact(
+            Feature::Vertex(v),
+            Feature::Face(pair.b),
+            [pair.x[k], foot],
+            normal,
+            gap,
+            (pair.b, weights),
+        ))
     }
 
     /// Corner `k` of the obstacle's triangle under the body's face.
@@ -83,7 +90,14 @@ impl Facing<'_> {
             return None;
         }
         let on_body = pair.y[k] + normal * gap;
-        Some(self.contact(Feature::Face(pair.a), Feature::Vertex(v), [on_body, pair.y[k]], normal, gap, (pair.b, at_corner(k))))
+        Some(self.contact(
+            Feature::Face(pair.a),
+            Feature::Vertex(v),
+            [on_body, pair.y[k]],
+            normal,
+            gap,
+            (pair.b, at_corner(k)),
+        ))
     }
 
     /// Side `i` of the body's triangle across side `j` of the obstacle's.
@@ -104,7 +118,10 @@ impl Facing<'_> {
         }
         let cross = u.cross(&v);
         let unit = cross / cross.norm();
-        let (edge_a, edge_b) = (self.body.triangle_edges(pair.a)[i], self.obstacle.triangle_edges(pair.b)[j]);
+        let (edge_a, edge_b) = (
+            self.body.triangle_edges(pair.a)[i],
+            self.obstacle.triangle_edges(pair.b)[j],
+        );
         // Out of the obstacle and into the body, by the faces at the edges: the points may be too near to say.
         let out_of_body = self.placement.rotation * outward_of_edge(self.body, edge_a);
         let side = unit.dot(&(outward_of_edge(self.obstacle, edge_b) - out_of_body));
@@ -114,18 +131,42 @@ impl Facing<'_> {
         let facing = self.is_near(gap)
             && is_in_edge_cone(self.obstacle, edge_b, &normal)
             && is_in_edge_cone(self.body, edge_a, &-self.placement.rotation.tr_mul(&normal));
-        facing.then(|| self.contact(Feature::Edge(edge_a), Feature::Edge(edge_b), [x, y], normal, gap, (pair.b, on_side(j, t))))
+        facing.then(|| {
+            self.contact(
+                Feature::Edge(edge_a),
+                Feature::Edge(edge_b),
+                [x, y],
+                normal,
+                gap,
+                (pair.b, on_side(j, t)),
+            )
+        })
     }
 
     /// Corner `i` of the body's triangle against side `j` of the obstacle's.
     pub(super) fn vertex_edge(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
         let (foot, t) = foot_on_side(&pair.x[i], &pair.y, j)?;
         let edge = self.obstacle.triangle_edges(pair.b)[j];
-        let (normal, gap) = self.direction(&(pair.x[i] - foot), &outward_of_edge(self.obstacle, edge))?;
+        let (normal, gap) =
+            self.direction(&(pair.x[i] - foot), &outward_of_edge(self.obstacle, edge))?;
         let v = self.body.triangles()[pair.a as usize][i];
         let facing = is_in_edge_cone(self.obstacle, edge, &normal)
-            && is_in_vertex_cone(self.body, v, &-self.placement.rotation.tr_mul(&normal), NORMAL_CONE_TOLERANCE);
-        facing.then(|| self.contact(Feature::Vertex(v), Feature::Edge(edge), [pair.x[i], foot], normal, gap, (pair.b, on_side(j, t))))
+            && is_in_vertex_cone(
+                self.body,
+                v,
+                &-self.placement.rotation.tr_mul(&normal),
+                NORMAL_CONE_TOLERANCE,
+            );
+        facing.then(|| {
+            self.contact(
+                Feature::Vertex(v),
+                Feature::Edge(edge),
+                [pair.x[i], foot],
+                normal,
+                gap,
+                (pair.b, on_side(j, t)),
+            )
+        })
     }
 
     /// Side `i` of the body's triangle against corner `j` of the obstacle's.
@@ -137,16 +178,43 @@ impl Facing<'_> {
         let v = self.obstacle.triangles()[pair.b as usize][j];
         let facing = is_in_vertex_cone(self.obstacle, v, &normal, NORMAL_CONE_TOLERANCE)
             && is_in_edge_cone(self.body, edge, &-self.placement.rotation.tr_mul(&normal));
-        facing.then(|| self.contact(Feature::Edge(edge), Feature::Vertex(v), [foot, pair.y[j]], normal, gap, (pair.b, at_corner(j))))
+        facing.then(|| {
+            self.contact(
+                Feature::Edge(edge),
+                Feature::Vertex(v),
+                [foot, pair.y[j]],
+                normal,
+                gap,
+                (pair.b, at_corner(j)),
+            )
+        })
     }
 
     /// Corner `i` of the body's triangle against corner `j` of the obstacle's.
     pub(super) fn vertex_vertex(&self, pair: &Pair, i: usize, j: usize) -> Option<Contact> {
-        let (normal, gap) = self.direction(&(pair.x[i] - pair.y[j]), self.obstacle.face_normal(pair.b))?;
-        let (v, w) = (self.body.triangles()[pair.a as usize][i], self.obstacle.triangles()[pair.b as usize][j]);
+        let (normal, gap) =
+            self.direction(&(pair.x[i] - pair.y[j]), self.obstacle.face_normal(pair.b))?;
+        let (v, w) = (
+            self.body.triangles()[pair.a as usize][i],
+            self.obstacle.triangles()[pair.b as usize][j],
+        );
         let facing = is_in_vertex_cone(self.obstacle, w, &normal, NORMAL_CONE_TOLERANCE)
-            && is_in_vertex_cone(self.body, v, &-self.placement.rotation.tr_mul(&normal), NORMAL_CONE_TOLERANCE);
-        facing.then(|| self.contact(Feature::Vertex(v), Feature::Vertex(w), [pair.x[i], pair.y[j]], normal, gap, (pair.b, at_corner(j))))
+            && is_in_vertex_cone(
+                self.body,
+                v,
+                &-self.placement.rotation.tr_mul(&normal),
+                NORMAL_CONE_TOLERANCE,
+            );
+        facing.then(|| {
+            self.contact(
+                Feature::Vertex(v),
+                Feature::Vertex(w),
+                [pair.x[i], pair.y[j]],
+                normal,
+                gap,
+                (pair.b, at_corner(j)),
+            )
+        })
     }
 
     #[inline]
@@ -156,14 +224,22 @@ impl Facing<'_> {
 
     /// Unit direction and length of a difference within the activation distance; `otherwise` where it is too short to have one.
     #[inline]
-    fn direction(&self, difference: &Vector3<f64>, otherwise: &Vector3<f64>) -> Option<(Vector3<f64>, f64)> {
+    fn direction(
+        &self,
+        difference: &Vector3<f64>,
+        otherwise: &Vector3<f64>,
+    ) -> Option<(Vector3<f64>, f64)> {
         let squared = difference.norm_squared();
         let near = squared <= self.activation_distance * self.activation_distance; // false for NaN
         if !near {
             return None;
         }
         let gap = squared.sqrt();
-        let normal = if gap > NO_DIRECTION { difference / gap } else { otherwise.try_normalize(0.0)? };
+        let normal = if gap > NO_DIRECTION {
+            difference / gap
+        } else {
+            otherwise.try_normalize(0.0)?
+        };
         Some((normal, gap))
     }
 
@@ -177,7 +253,11 @@ impl Facing<'_> {
         (obstacle_triangle, barycentric): (u32, [f64; 3]),
     ) -> Contact {
         Contact {
-            features: FeaturePair { obstacle: self.obstacle_index, on_body, on_obstacle },
+            features: FeaturePair {
+                obstacle: self.obstacle_index,
+                on_body,
+                on_obstacle,
+            },
             point_on_body: x,
             point_on_obstacle: y,
             normal,
@@ -206,7 +286,9 @@ fn is_over(p: &Point3<f64>, t: &[Point3<f64>; 3], normal: &Vector3<f64>, gap: f6
 fn foot_on_side(p: &Point3<f64>, t: &[Point3<f64>; 3], side: usize) -> Option<(Point3<f64>, f64)> {
     let along = t[(side + 1) % 3] - t[side];
     let fraction = along.dot(&(p - t[side])) / along.norm_squared();
-    (0.0..=1.0).contains(&fraction).then(|| (t[side] + along * fraction, fraction))
+    (0.0..=1.0)
+        .contains(&fraction)
+        .then(|| (t[side] + along * fraction, fraction))
 }
 
 /// No edge at the vertex rises in `direction` by more than `tolerance`.
@@ -222,13 +304,16 @@ fn is_in_vertex_cone(mesh: &Mesh, v: u32, direction: &Vector3<f64>, tolerance: f
 /// Neither face at the edge rises in `direction`.
 fn is_in_edge_cone(mesh: &Mesh, edge: u32, direction: &Vector3<f64>) -> bool {
     let edge = &mesh.edges()[edge as usize];
-    let along = mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];
+    let along =
+        mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];
     let limit = NORMAL_CONE_TOLERANCE * NORMAL_CONE_TOLERANCE * along.norm_squared();
     // `normal x along` points into the left face; into the right one it is the other way.
-    [(edge.faces[0], 1.0), (edge.faces[1], -1.0)].iter().all(|(face, sign)| {
-        let rise = sign * direction.dot(&mesh.face_normal(*face).cross(&along));
-        rise <= 0.0 || rise * rise <= limit
-    })
+    [(edge.faces[0], 1.0), (edge.faces[1], -1.0)]
+        .iter()
+        .all(|(face, sign)| {
+            let rise = sign * direction.dot(&mesh.face_normal(*face).cross(&along));
+            rise <= 0.0 || rise * rise <= limit
+        })
 }
 
 /// Sum of the normals at an edge: a direction inside its normal cone.

@@ -31,7 +31,9 @@ pub fn mass_properties(mesh: &Mesh) -> MassProperties {
         let sum = a + b + c;
         six_volumes += determinant;
         first += sum * (determinant / 24.0);
-        second += (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose()) * (determinant / 120.0);
+        second +=
+            (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose())
+                * (determinant / 120.0);
     }
     let volume = six_volumes / 6.0;
     let offset = first / volume;

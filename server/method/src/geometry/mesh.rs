@@ -45,9 +45,20 @@ impl Mesh {
         for v in &vertices {
             bounding_box = [bounding_box[0].inf(v), bounding_box[1].sup(v)];
         }
-        let lengths = topology.edges.iter().map(|e| (vertices[e.vertices[1] as usize] - vertices[e.vertices[0] as usize]).norm());
+        let lengths = topology
+            .edges
+            .iter()
+            .map(|e| (vertices[e.vertices[1] as usize] - vertices[e.vertices[0] as usize]).norm());
         let mean_edge_length = lengths.sum::<f64>() / topology.edges.len() as f64;
-        Ok(Self { vertices, triangles, face_normals, topology, tree, bounding_box, mean_edge_length })
+        Ok(Self {
+            vertices,
+            triangles,
+            face_normals,
+            topology,
+            tree,
+            bounding_box,
+            mean_edge_length,
+        })
     }
 
     /// Vertex positions, m.
@@ -89,7 +100,10 @@ impl Mesh {
     /// Vertices that share an edge with vertex `v`.
     #[inline]
     pub fn neighbours(&self, v: u32) -> &[u32] {
-        let (from, to) = (self.topology.ring_start[v as usize], self.topology.ring_start[v as usize + 1]);
+        let (from, to) = (
+            self.topology.ring_start[v as usize],
+            self.topology.ring_start[v as usize + 1],
+        );
         &self.topology.neighbours[from as usize..to as usize]
     }
 
@@ -130,7 +144,11 @@ impl Mesh {
 
     /// Greatest distance of a vertex from `point`, m.
     pub fn radius_about(&self, point: &Point3<f64>) -> f64 {
-        self.vertices.iter().map(|v| (v - point).norm_squared()).fold(0.0, f64::max).sqrt()
+        self.vertices
+            .iter()
+            .map(|v| (v - point).norm_squared())
+            .fold(0.0, f64::max)
+            .sqrt()
     }
 }
 
@@ -140,14 +158,24 @@ fn check_numbers(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<(),
     }
     let count = vertices.len().max(triangles.len());
     if count > MAX_COUNT {
-        return Err(MeshError::TooLarge { count, limit: MAX_COUNT });
+        return Err(MeshError::TooLarge {
+            count,
+            limit: MAX_COUNT,
+        });
     }
-    if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|c| c.is_finite())) {
+    if let Some(vertex) = vertices
+        .iter()
+        .position(|v| !v.iter().all(|c| c.is_finite()))
+    {
         return Err(MeshError::VertexNotFinite { vertex });
     }
     for (triangle, corners) in triangles.iter().enumerate() {
         if let Some(&vertex) = corners.iter().find(|v| **v as usize >= vertices.len()) {
-            return Err(MeshError::IndexOutOfRange { triangle, vertex, vertices: vertices.len() });
+            return Err(MeshError::IndexOutOfRange {
+                triangle,
+                vertex,
+                vertices: vertices.len(),
+            });
         }
     }
     Ok(())
@@ -157,9 +185,16 @@ fn check_numbers(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<(),
 ///
 /// The two shortest sides make the cross product: the least cancellation in a sliver.
 pub(crate) fn face_normal(corners: &[Point3<f64>; 3]) -> Option<Vector3<f64>> {
-    let sides = [corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]];
+    let sides = [
+        corners[1] - corners[0],
+        corners[2] - corners[1],
+        corners[0] - corners[2],
+    ];
     let squared = sides.map(|s| s.norm_squared());
-    let longest = (0..3).fold(0, |best, k| if squared[k] > squared[best] { k } else { best });
+    let longest = (0..3).fold(
+        0,
+        |best, k| if squared[k] > squared[best] { k } else { best },
+    );
     let doubled = sides[(longest + 1) % 3].cross(&sides[(longest + 2) % 3]);
     let area = doubled.norm();
     (area > ZERO_AREA * squared[longest]).then(|| doubled / area) // None for NaN

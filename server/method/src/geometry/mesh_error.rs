@@ -7,7 +7,9 @@ pub enum MeshError {
     #[error("the mesh has no triangles: give a closed surface of at least four")]
     Empty,
     /// More vertices, triangles or edges than 32-bit indices name.
-    #[error("the mesh has {count} vertices or triangles, more than the {limit} that indices can name: reduce it")]
+    #[error(
+        "the mesh has {count} vertices or triangles, more than the {limit} that indices can name: reduce it"
+    )]
     TooLarge {
         /// What was given.
         count: usize,
@@ -21,7 +23,9 @@ pub enum MeshError {
         vertex: usize,
     },
     /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} names vertex {vertex}, but there are only {vertices} vertices: repair the file")]
+    #[error(
+        "triangle {triangle} names vertex {vertex}, but there are only {vertices} vertices: repair the file"
+    )]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
@@ -37,7 +41,9 @@ pub enum MeshError {
         triangle: usize,
     },
     /// An edge with one triangle only.
-    #[error("the surface is open at the edge between vertices {from} and {to} of triangle {triangle}: close the hole or merge duplicate vertices")]
+    #[error(
+        "the surface is open at the edge between vertices {from} and {to} of triangle {triangle}: close the hole or merge duplicate vertices"
+    )]
     Open {
         /// First vertex of the edge.
         from: u32,
@@ -47,7 +53,9 @@ pub enum MeshError {
         triangle: u32,
     },
     /// Two triangles run along an edge in the same direction.
-    #[error("triangles {first} and {second} disagree about outside along the edge between vertices {from} and {to}: flip one of them")]
+    #[error(
+        "triangles {first} and {second} disagree about outside along the edge between vertices {from} and {to}: flip one of them"
+    )]
     Orientation {
         /// First vertex of the edge.
         from: u32,
@@ -59,7 +67,9 @@ pub enum MeshError {
         second: u32,
     },
     /// More than two triangles at an edge.
-    #[error("{count} triangles share the edge between vertices {from} and {to}, but a closed surface has two there: split the surfaces apart")]
+    #[error(
+        "{count} triangles share the edge between vertices {from} and {to}, but a closed surface has two there: split the surfaces apart"
+    )]
     NonManifold {
         /// First vertex of the edge.
         from: u32,
@@ -69,7 +79,9 @@ pub enum MeshError {
         count: usize,
     },
     /// The surface is inside out.
-    #[error("the surface is inside out (its volume is {volume} m^3): reverse the corner order of every triangle")]
+    #[error(
+        "the surface is inside out (its volume is {volume} m^3): reverse the corner order of every triangle"
+    )]
     InsideOut {
         /// Signed volume, m^3.
         volume: f64,

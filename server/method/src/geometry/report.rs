@@ -36,7 +36,13 @@ pub struct MeshReport {
 impl MeshReport {
     /// Looks at a surface. Triangles that name no vertex or have no area are counted and left out of the rest.
     pub fn of(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
-        let names_vertices = |t: &&[u32; 3]| t.iter().all(|v| vertices.get(*v as usize).is_some_and(|p| p.iter().all(|c| c.is_finite())));
+        let names_vertices = |t: &&[u32; 3]| {
+            t.iter().all(|v| {
+                vertices
+                    .get(*v as usize)
+                    .is_some_and(|p| p.iter().all(|c| c.is_finite()))
+            })
+        };
         let named: Vec<[u32; 3]> = triangles.iter().filter(names_vertices).copied().collect();
         let with_area = |t: &&[u32; 3]| face_normal(&t.map(|v| vertices[v as usize])).is_some();
         let sound: Vec<[u32; 3]> = named.iter().filter(with_area).copied().collect();
@@ -49,8 +55,14 @@ impl MeshReport {
         };
         let duplicate_faces = sound.iter().filter(duplicate).count();
         let sides = count_sides(&sound);
-        let volume = if sound.is_empty() { 0.0 } else { signed_volume(vertices, &sound) };
-        let heights = sound.iter().map(|t| least_height(&t.map(|v| vertices[v as usize])));
+        let volume = if sound.is_empty() {
+            0.0
+        } else {
+            signed_volume(vertices, &sound)
+        };
+        let heights = sound
+            .iter()
+            .map(|t| least_height(&t.map(|v| vertices[v as usize])));
         Self {
             triangles: triangles.len(),
             vertices: vertices.len(),
@@ -68,7 +80,11 @@ impl MeshReport {
 
     /// Whether the method can use the surface: closed, oriented, 2-manifold, without degenerate or duplicate faces.
     pub fn is_sound(&self) -> bool {
-        self.watertight && self.oriented && self.degenerate_faces == 0 && self.duplicate_faces == 0 && self.non_manifold_edges == 0
+        self.watertight
+            && self.oriented
+            && self.degenerate_faces == 0
+            && self.duplicate_faces == 0
+            && self.non_manifold_edges == 0
     }
 }
 

@@ -79,11 +79,22 @@ impl Topology {
             let along = vertices[ends[1] as usize] - vertices[ends[0] as usize];
             let faces = [left.triangle, right.triangle];
             let normals = faces.map(|f| face_normals[f as usize]);
-            edges.push(Edge { vertices: ends, faces, convexity: signed_angle(&normals, &along) });
+            edges.push(Edge {
+                vertices: ends,
+                faces,
+                convexity: signed_angle(&normals, &along),
+            });
         }
         let (ring_start, neighbours) = rings(vertices.len(), &edges);
         let (vertex_owner, owned) = owners(vertices.len(), triangles, &edges, &triangle_edges);
-        Ok(Self { edges, triangle_edges, ring_start, neighbours, vertex_owner, owned })
+        Ok(Self {
+            edges,
+            triangle_edges,
+            ring_start,
+            neighbours,
+            vertex_owner,
+            owned,
+        })
     }
 }
 
@@ -109,11 +120,24 @@ fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
 fn pair_of(group: &[Side]) -> Result<(Side, Side), MeshError> {
     let (from, to) = (group[0].low, group[0].high);
     match *group {
-        [only] => Err(MeshError::Open { from, to, triangle: only.triangle }),
+        [only] => Err(MeshError::Open {
+            from,
+            to,
+            triangle: only.triangle,
+        }),
         [a, b] if a.forward && !b.forward => Ok((a, b)),
         [a, b] if b.forward && !a.forward => Ok((b, a)),
-        [a, b] => Err(MeshError::Orientation { from, to, first: a.triangle, second: b.triangle }),
-        _ => Err(MeshError::NonManifold { from, to, count: group.len() }),
+        [a, b] => Err(MeshError::Orientation {
+            from,
+            to,
+            first: a.triangle,
+            second: b.triangle,
+        }),
+        _ => Err(MeshError::NonManifold {
+            from,
+            to,
+            count: group.len(),
+        }),
     }
 }
 

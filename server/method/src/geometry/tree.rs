@@ -49,7 +49,11 @@ pub struct NormalCone {
 
 impl NormalCone {
     fn new(axis: Vector3<f64>, angle: f64) -> Self {
-        Self { axis, angle, cos_sin: [angle.cos(), angle.sin()] }
+        Self {
+            axis,
+            angle,
+            cos_sin: [angle.cos(), angle.sin()],
+        }
     }
 }
 
@@ -70,8 +74,16 @@ struct Item {
 }
 
 impl Tree {
-    pub(crate) fn build(vertices: &[Point3<f64>], triangles: &[[u32; 3]], face_normals: &[Vector3<f64>]) -> Self {
-        let mut items: Vec<Item> = triangles.iter().enumerate().map(|(t, corners)| item(vertices, corners, t as u32)).collect();
+    pub(crate) fn build(
+        vertices: &[Point3<f64>],
+        triangles: &[[u32; 3]],
+        face_normals: &[Vector3<f64>],
+    ) -> Self {
+        let mut items: Vec<Item> = triangles
+            .iter()
+            .enumerate()
+            .map(|(t, corners)| item(vertices, corners, t as u32))
+            .collect();
         let mut nodes = Vec::with_capacity(2 * triangles.len() - 1);
         grow(&mut items, 0, &mut nodes);
         let leaf_cones = leaf_cones(vertices.len(), triangles, face_normals);
@@ -104,7 +116,12 @@ impl Tree {
 fn item(vertices: &[Point3<f64>], corners: &[u32; 3], triangle: u32) -> Item {
     let [a, b, c] = corners.map(|v| vertices[v as usize]);
     let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-    Item { low, high, center: nalgebra::center(&low, &high), triangle }
+    Item {
+        low,
+        high,
+        center: nalgebra::center(&low, &high),
+        triangle,
+    }
 }
 
 /// Appends the subtree of `items`.
@@ -115,11 +132,21 @@ fn grow(items: &mut [Item], depth: usize, nodes: &mut Vec<Node>) {
     let rounding = BOX_ROUNDING * low.coords.abs().max().max(high.coords.abs().max());
     let half = (high - low) * 0.5 + Vector3::repeat(rounding);
     let radius = half.norm() * (1.0 + BOX_ROUNDING);
-    nodes.push(Node { center, half, radius, second: 0, triangle: items[0].triangle });
+    nodes.push(Node {
+        center,
+        half,
+        radius,
+        second: 0,
+        triangle: items[0].triangle,
+    });
     if items.len() == 1 {
         return;
     }
-    let split = if depth < HALVE_BELOW_DEPTH { split_by_area(items) } else { None };
+    let split = if depth < HALVE_BELOW_DEPTH {
+        split_by_area(items)
+    } else {
+        None
+    };
     let split = split.unwrap_or_else(|| split_by_count(items));
     let (first, second) = items.split_at_mut(split);
     grow(first, depth + 1, nodes);
@@ -128,19 +155,29 @@ fn grow(items: &mut [Item], depth: usize, nodes: &mut Vec<Node>) {
 }
 
 fn bounds(items: &[Item]) -> (Point3<f64>, Point3<f64>) {
-    items.iter().fold((items[0].low, items[0].high), |(low, high), i| (low.inf(&i.low), high.sup(&i.high)))
+    items
+        .iter()
+        .fold((items[0].low, items[0].high), |(low, high), i| {
+            (low.inf(&i.low), high.sup(&i.high))
+        })
 }
 
 fn center_bounds(items: &[Item]) -> (Point3<f64>, Vector3<f64>) {
     let first = items[0].center;
-    let (low, high) = items.iter().fold((first, first), |(low, high), i| (low.inf(&i.center), high.sup(&i.center)));
+    let (low, high) = items.iter().fold((first, first), |(low, high), i| {
+        (low.inf(&i.center), high.sup(&i.center))
+    });
     (low, high - low)
 }
 
 fn split_by_count(items: &mut [Item]) -> usize {
     let axis = center_bounds(items).1.imax();
     let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| (a.center[axis], a.triangle).partial_cmp(&(b.center[axis], b.triangle)).unwrap_or(std::cmp::Ordering::Equal));
+    items.select_nth_unstable_by(middle, |a, b| {
+        (a.center[axis], a.triangle)
+            .partial_cmp(&(b.center[axis], b.triangle))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
     middle
 }
 
@@ -158,11 +195,16 @@ fn split_by_area(items: &mut [Item]) -> Option<usize> {
     for i in items.iter() {
         let bin = bin_of(i);
         counts[bin] += 1;
-        bins[bin] = Some(bins[bin].map_or((i.low, i.high), |(l, h)| (l.inf(&i.low), h.sup(&i.high))));
+        bins[bin] =
+            Some(bins[bin].map_or((i.low, i.high), |(l, h)| (l.inf(&i.low), h.sup(&i.high))));
     }
     let cost_of = |range: std::ops::Range<usize>| {
         let count: usize = counts[range.clone()].iter().sum();
-        let joined = bins[range].iter().flatten().copied().reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
+        let joined = bins[range]
+            .iter()
+            .flatten()
+            .copied()
+            .reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         joined.map(|(l, h)| half_area(&(h - l)) * count as f64)
     };
     let mut best: Option<(f64, usize)> = None;
@@ -194,7 +236,11 @@ fn half_area(sides: &Vector3<f64>) -> f64 {
 ///
 /// A direction in which a vertex is a local maximum lies in the spherical hull of the normals around that vertex, so the cone
 /// holds the normal cones of the triangle's vertices, edges and face; wider than a right angle it holds everything.
-fn leaf_cones(vertices: usize, triangles: &[[u32; 3]], face_normals: &[Vector3<f64>]) -> Vec<NormalCone> {
+fn leaf_cones(
+    vertices: usize,
+    triangles: &[[u32; 3]],
+    face_normals: &[Vector3<f64>],
+) -> Vec<NormalCone> {
     let mut start = vec![0_u32; vertices + 1];
     for v in triangles.iter().flatten() {
         start[*v as usize + 1] += 1;
@@ -216,7 +262,11 @@ fn leaf_cones(vertices: usize, triangles: &[[u32; 3]], face_normals: &[Vector3<f
             .flat_map(|v| &around[start[*v as usize] as usize..start[*v as usize + 1] as usize])
             .map(|t| axis.dot(&face_normals[*t as usize]))
             .fold(1.0, f64::min);
-        let angle = if least > 0.0 { least.min(1.0).acos() } else { std::f64::consts::PI };
+        let angle = if least > 0.0 {
+            least.min(1.0).acos()
+        } else {
+            std::f64::consts::PI
+        };
         NormalCone::new(*axis, angle)
     };
     triangles.iter().zip(face_normals).map(cone).collect()
@@ -232,5 +282,9 @@ fn merge(a: &NormalCone, b: &NormalCone) -> NormalCone {
     let axis = sum / length;
     let reach = |c: &NormalCone| axis.dot(&c.axis).clamp(-1.0, 1.0).acos() + c.angle;
     let angle = reach(a).max(reach(b));
-    if angle < std::f64::consts::PI { NormalCone::new(axis, angle) } else { everything }
+    if angle < std::f64::consts::PI {
+        NormalCone::new(axis, angle)
+    } else {
+        everything
+    }
 }

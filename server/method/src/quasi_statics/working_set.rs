@@ -225,8 +225,8 @@ impl WorkingSet {
             rest[i] = target[i] - self.normals[i].dot(&y);
         }
         let correction = self.solve_transposed(&rest);
-        for i in 0..k {
-            w[i] += correction[i];
+        for (w, correction) in w.iter_mut().zip(&correction) {
+            *w += correction;
         }
         y = self.combine_basis(&w);
 
@@ -240,8 +240,8 @@ impl WorkingSet {
             *x = q.dot(&unexplained);
         }
         let correction = self.solve_upper(&in_basis);
-        for i in 0..k {
-            self.multiplier[i] += correction[i];
+        for (multiplier, correction) in self.multiplier.iter_mut().zip(&correction) {
+            *multiplier += correction;
         }
         y
     }

@@ -23,7 +23,10 @@ pub fn check<P: AsRef<Path>>(paths: &[P]) -> Vec<FileReport> {
 }
 
 fn check_one(path: &Path) -> FileReport {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default();
     let name = path.to_string_lossy();
     if is_mesh_path(path) {
         check_mesh(path)
@@ -36,10 +39,18 @@ fn check_one(path: &Path) -> FileReport {
     } else if extension == "toml" {
         check_toml(path)
     } else if shipped_scene_text(&name).is_some() {
-        report(path, FileKind::Scene, Scene::named_or_file(&name).and_then(|scene| summarise_scene(&scene)))
+        report(
+            path,
+            FileKind::Scene,
+            Scene::named_or_file(&name).and_then(|scene| summarise_scene(&scene)),
+        )
     } else {
         let text = "is no file that taut knows; use .toml (scene, workbench), .csv (trace), .ply, .obj, .stl, .glb or .gltf";
-        report(path, FileKind::Unknown, Err(Problem::of_file(path.display(), text).into()))
+        report(
+            path,
+            FileKind::Unknown,
+            Err(Problem::of_file(path.display(), text).into()),
+        )
     }
 }
 
@@ -48,7 +59,14 @@ fn report(path: &Path, kind: FileKind, outcome: Result<String, FileError>) -> Fi
         Ok(summary) => (summary, Vec::new()),
         Err(error) => (String::new(), error.into_problems()),
     };
-    FileReport { file: path.display().to_string(), kind, summary, problems, notes: Vec::new(), mesh: None }
+    FileReport {
+        file: path.display().to_string(),
+        kind,
+        summary,
+        problems,
+        notes: Vec::new(),
+        mesh: None,
+    }
 }
 
 fn check_mesh(path: &Path) -> FileReport {
@@ -63,19 +81,31 @@ fn check_mesh(path: &Path) -> FileReport {
     {
         faults.push(error.to_string());
     }
-    let problems = faults.into_iter().map(|text| Problem::of_file(path.display(), text)).collect();
+    let problems = faults
+        .into_iter()
+        .map(|text| Problem::of_file(path.display(), text))
+        .collect();
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
     let mut notes = Vec::new();
     if longest > SUSPICIOUS_SIZE {
         notes.push(format!("the longest side is {longest} m; if the file is in millimetres, write scale = 0.001 in the scene"));
     }
     let summary = figures.to_string();
-    FileReport { file: path.display().to_string(), kind: FileKind::Mesh, summary, problems, notes, mesh: Some(figures) }
+    FileReport {
+        file: path.display().to_string(),
+        kind: FileKind::Mesh,
+        summary,
+        problems,
+        notes,
+        mesh: Some(figures),
+    }
 }
 
 fn check_toml(path: &Path) -> FileReport {
     let name = path.display().to_string();
-    let document = read_text(path, MAX_TOML_BYTES).map_err(FileError::from).and_then(|text| Document::parse(&name, &text));
+    let document = read_text(path, MAX_TOML_BYTES)
+        .map_err(FileError::from)
+        .and_then(|text| Document::parse(&name, &text));
     let document = match document {
         Ok(document) => document,
         Err(error) => return report(path, FileKind::Unknown, Err(error)),
@@ -85,24 +115,50 @@ fn check_toml(path: &Path) -> FileReport {
         _ => false,
     };
     if has(&["god_object", "obstacle", "coupling", "limits", "hand"]) {
-        report(path, FileKind::Scene, Scene::load(path).and_then(|scene| summarise_scene(&scene)))
-    } else if has(&["screen", "node", "viewer", "network", "monitoring", "realtime"]) {
+        report(
+            path,
+            FileKind::Scene,
+            Scene::load(path).and_then(|scene| summarise_scene(&scene)),
+        )
+    } else if has(&[
+        "screen",
+        "node",
+        "viewer",
+        "network",
+        "monitoring",
+        "realtime",
+    ]) {
         let workbench = Workbench::load(path).and_then(|workbench| {
             let scene = workbench.load_scene()?;
             let inner = summarise_scene(&scene)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
-            Ok(format!("workbench \"{}\", {screens} screens, {nodes} nodes, {inner}", workbench.name))
+            Ok(format!(
+                "workbench \"{}\", {screens} screens, {nodes} nodes, {inner}",
+                workbench.name
+            ))
         });
         report(path, FileKind::Workbench, workbench)
     } else {
         let text = "is neither a scene (it has no [god_object]) nor a workbench (it has no [[screen]]); compare it with the shipped examples";
-        report(path, FileKind::Unknown, Err(Problem::of_file(path.display(), text).into()))
+        report(
+            path,
+            FileKind::Unknown,
+            Err(Problem::of_file(path.display(), text).into()),
+        )
     }
 }
 
 fn summarise_scene(scene: &Scene) -> Result<String, FileError> {
     let built = scene.build()?;
-    let triangles: Vec<String> = built.bodies.iter().map(|b| format!("{} {}", b.name, b.mesh.triangles.len())).collect();
+    let triangles: Vec<String> = built
+        .bodies
+        .iter()
+        .map(|b| format!("{} {}", b.name, b.mesh.triangles.len()))
+        .collect();
     let (mass, stiffness) = (built.world.body.mass, built.stiffness());
-    Ok(format!("scene \"{}\", triangles: {}, mass {mass} kg, stiffness {stiffness} N/m", built.name, triangles.join(", ")))
+    Ok(format!(
+        "scene \"{}\", triangles: {}, mass {mass} kg, stiffness {stiffness} N/m",
+        built.name,
+        triangles.join(", ")
+    ))
 }

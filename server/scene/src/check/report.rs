@@ -80,7 +80,9 @@ pub struct MeshFigures {
 impl MeshFigures {
     pub(super) fn of(mesh: &RawMesh) -> Self {
         let report = MeshReport::of(&mesh.vertices, &mesh.triangles);
-        let size = mesh.bounds().map_or([0.0; 3], |(low, high)| (high - low).into());
+        let size = mesh
+            .bounds()
+            .map_or([0.0; 3], |(low, high)| (high - low).into());
         Self {
             triangles: report.triangles,
             vertices: report.vertices,
@@ -100,16 +102,37 @@ impl MeshFigures {
     /// A sentence for each figure that a closed surface must not have.
     pub(super) fn faults(&self) -> Vec<String> {
         let counted = [
-            (self.degenerate_faces, "triangles have no area; remove them or merge their vertices"),
-            (self.duplicate_faces, "triangles have the same corners as another; remove them"),
-            (self.border_edges, "edges have one triangle only; close the holes or merge duplicate vertices"),
-            (self.non_manifold_edges, "edges have more than two triangles; split the surfaces apart"),
-            (self.misoriented_edges, "edges have triangles that disagree about outside; turn triangles around"),
+            (
+                self.degenerate_faces,
+                "triangles have no area; remove them or merge their vertices",
+            ),
+            (
+                self.duplicate_faces,
+                "triangles have the same corners as another; remove them",
+            ),
+            (
+                self.border_edges,
+                "edges have one triangle only; close the holes or merge duplicate vertices",
+            ),
+            (
+                self.non_manifold_edges,
+                "edges have more than two triangles; split the surfaces apart",
+            ),
+            (
+                self.misoriented_edges,
+                "edges have triangles that disagree about outside; turn triangles around",
+            ),
         ];
-        let mut faults: Vec<String> =
-            counted.iter().filter(|(n, _)| *n > 0).map(|(n, text)| format!("{n} {text}")).collect();
+        let mut faults: Vec<String> = counted
+            .iter()
+            .filter(|(n, _)| *n > 0)
+            .map(|(n, text)| format!("{n} {text}"))
+            .collect();
         if self.watertight && self.misoriented_edges == 0 && !self.oriented {
-            faults.push(format!("the surface is inside out (volume {} m^3); turn all triangles around", self.volume_m3));
+            faults.push(format!(
+                "the surface is inside out (volume {} m^3); turn all triangles around",
+                self.volume_m3
+            ));
         }
         faults
     }

@@ -67,7 +67,13 @@ impl<'a> Section<'a> {
             Value::Table(entries) => entries,
             _ => &[],
         };
-        Self { name: "the file".into(), entries, at: &node.at, known: RefCell::default(), problems }
+        Self {
+            name: "the file".into(),
+            entries,
+            at: &node.at,
+            known: RefCell::default(),
+            problems,
+        }
     }
 
     /// Where the table begins.
@@ -88,7 +94,10 @@ impl<'a> Section<'a> {
     /// The value of `key`, if it is there.
     pub(crate) fn get(&self, key: &'static str) -> Option<&'a Node> {
         self.known.borrow_mut().push(key);
-        self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
+        self.entries
+            .iter()
+            .find(|(name, _)| name == key)
+            .map(|(_, node)| node)
     }
 
     /// Whether `key` is there.
@@ -98,11 +107,21 @@ impl<'a> Section<'a> {
 
     /// Notes that `key` is missing.
     pub(crate) fn complain_missing(&self, key: &'static str, example: &str) {
-        self.complain(self.at, format!("`{key}` is missing in {}; add {example}", self.name));
+        self.complain(
+            self.at,
+            format!("`{key}` is missing in {}; add {example}", self.name),
+        );
     }
 
     fn wrong_kind(&self, key: &str, node: &Node, wanted: &str) {
-        self.complain(&node.at, format!("`{key}` in {} is {}, but must be {wanted}", self.name, node.value.kind()));
+        self.complain(
+            &node.at,
+            format!(
+                "`{key}` in {} is {}, but must be {wanted}",
+                self.name,
+                node.value.kind()
+            ),
+        );
     }
 
     /// A number in its range; `None` if it is absent or, with a complaint, wrong.
@@ -117,7 +136,14 @@ impl<'a> Section<'a> {
             return None;
         };
         if !range.contains(value) {
-            self.complain(&node.at, format!("`{key}` in {} is {value}, but must be {}", self.name, range.wanted()));
+            self.complain(
+                &node.at,
+                format!(
+                    "`{key}` in {} is {value}, but must be {}",
+                    self.name,
+                    range.wanted()
+                ),
+            );
             return None;
         }
         Some(value)
@@ -129,7 +155,12 @@ impl<'a> Section<'a> {
     }
 
     /// A number that must be there.
-    pub(crate) fn required_number(&self, key: &'static str, range: Range, example: &str) -> Option<f64> {
+    pub(crate) fn required_number(
+        &self,
+        key: &'static str,
+        range: Range,
+        example: &str,
+    ) -> Option<f64> {
         if !self.has(key) {
             self.complain_missing(key, example);
         }
@@ -142,7 +173,10 @@ impl<'a> Section<'a> {
         match node.value {
             Value::Integer(value) if (low..=high).contains(&value) => Some(value),
             Value::Integer(value) => {
-                let text = format!("`{key}` in {} is {value}, but must be between {low} and {high}", self.name);
+                let text = format!(
+                    "`{key}` in {} is {value}, but must be between {low} and {high}",
+                    self.name
+                );
                 self.complain(&node.at, text);
                 None
             }
@@ -173,7 +207,10 @@ impl<'a> Section<'a> {
         let text = self.text(key)?;
         if text.is_empty() {
             let at = self.get(key).map_or(self.at, |node| &node.at);
-            self.complain(at, format!("`{key}` in {} is empty; write {example}", self.name));
+            self.complain(
+                at,
+                format!("`{key}` in {} is empty; write {example}", self.name),
+            );
             return None;
         }
         Some(text)
@@ -202,21 +239,33 @@ impl<'a> Section<'a> {
         let found = choices.iter().find(|(name, _)| name == text);
         if found.is_none() {
             let hint = nearest(text, names.iter().copied());
-            let text = format!("`{key}` in {} is \"{text}\", but must be {}{hint}", self.name, listed(&names));
+            let text = format!(
+                "`{key}` in {} is \"{text}\", but must be {}{hint}",
+                self.name,
+                listed(&names)
+            );
             self.complain(&node.at, text);
         }
         found.map(|(_, value)| *value)
     }
 
     /// `N` finite numbers.
-    pub(crate) fn numbers<const N: usize>(&self, key: &'static str, range: Range) -> Option<[f64; N]> {
+    pub(crate) fn numbers<const N: usize>(
+        &self,
+        key: &'static str,
+        range: Range,
+    ) -> Option<[f64; N]> {
         let node = self.get(key)?;
         let Value::Array(items) = &node.value else {
             self.wrong_kind(key, node, &format!("an array of {N} numbers"));
             return None;
         };
         if items.len() != N {
-            let text = format!("`{key}` in {} has {} numbers, but must have {N}", self.name, items.len());
+            let text = format!(
+                "`{key}` in {} has {} numbers, but must have {N}",
+                self.name,
+                items.len()
+            );
             self.complain(&node.at, text);
             return None;
         }
@@ -253,9 +302,14 @@ impl<'a> Section<'a> {
 
     /// A list of tables; absent is empty.
     pub(crate) fn sections(&self, key: &'static str) -> Vec<Section<'a>> {
-        let Some(node) = self.get(key) else { return Vec::new() };
+        let Some(node) = self.get(key) else {
+            return Vec::new();
+        };
         match &node.value {
-            Value::Array(items) => items.iter().filter_map(|item| self.table(key, item, format!("[[{key}]]"))).collect(),
+            Value::Array(items) => items
+                .iter()
+                .filter_map(|item| self.table(key, item, format!("[[{key}]]")))
+                .collect(),
             _ => {
                 self.wrong_kind(key, node, &format!("a list of tables; write [[{key}]]"));
                 Vec::new()
@@ -264,14 +318,22 @@ impl<'a> Section<'a> {
     }
 
     fn child_name(&self, key: &str) -> String {
-        if self.name == "the file" { format!("[{key}]") } else { format!("{} {key}", self.name) }
+        if self.name == "the file" {
+            format!("[{key}]")
+        } else {
+            format!("{} {key}", self.name)
+        }
     }
 
     fn table(&self, key: &str, node: &'a Node, name: String) -> Option<Section<'a>> {
         match &node.value {
-            Value::Table(entries) => {
-                Some(Section { name, entries, at: &node.at, known: RefCell::default(), problems: self.problems })
-            }
+            Value::Table(entries) => Some(Section {
+                name,
+                entries,
+                at: &node.at,
+                known: RefCell::default(),
+                problems: self.problems,
+            }),
             _ => {
                 self.wrong_kind(key, node, "a table");
                 None
@@ -285,8 +347,15 @@ impl<'a> Section<'a> {
         for (key, node) in self.entries {
             if !known.contains(&key.as_str()) {
                 let hint = nearest(key, known.iter().copied());
-                let hint = if hint.is_empty() { format!("; known keys: {}", comma_list(&known)) } else { hint };
-                self.complain(&node.at, format!("unknown key `{key}` in {}{hint}", self.name));
+                let hint = if hint.is_empty() {
+                    format!("; known keys: {}", comma_list(&known))
+                } else {
+                    hint
+                };
+                self.complain(
+                    &node.at,
+                    format!("unknown key `{key}` in {}{hint}", self.name),
+                );
             }
         }
     }
@@ -295,7 +364,10 @@ impl<'a> Section<'a> {
 fn as_number(node: &Node) -> Option<f64> {
     match node.value {
         Value::Float(value) => Some(value),
-        #[allow(clippy::cast_precision_loss, reason = "an integer where a measure is meant; 2^53 m is out of range anyway")]
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "an integer where a measure is meant; 2^53 m is out of range anyway"
+        )]
         Value::Integer(value) => Some(value as f64),
         _ => None,
     }

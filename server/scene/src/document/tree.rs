@@ -22,7 +22,11 @@ pub(crate) struct At {
 impl At {
     /// A complaint about what is written here.
     pub(crate) fn problem(&self, text: impl Into<String>) -> Problem {
-        Problem { file: self.file.to_string(), line: self.line, text: text.into() }
+        Problem {
+            file: self.file.to_string(),
+            line: self.line,
+            text: text.into(),
+        }
     }
 }
 
@@ -75,7 +79,13 @@ impl Document {
         let (table, errors) = DeTable::parse_recoverable(text);
         FileError::unless_empty(errors.iter().map(|e| lines.syntax_problem(e)).collect())?;
         let entries = lines.entries(table.get_ref());
-        Ok(Self { root: Node { value: Value::Table(entries), at: lines.at(0) }, overrides: 0 })
+        Ok(Self {
+            root: Node {
+                value: Value::Table(entries),
+                at: lines.at(0),
+            },
+            overrides: 0,
+        })
     }
 
     /// Sets one value: `coupling.k_s=1.0`; `obstacle.0.name="box"` reaches into lists. Tables that are missing are made.
@@ -84,21 +94,33 @@ impl Document {
         let source = format!("--set {assignment}");
         let fail = |text: &str| FileError::from(Problem::of_file(&source, text));
         let Some((path, value)) = assignment.split_once('=') else {
-            return Err(fail("has no `=`; write KEY=VALUE, such as coupling.k_s=1.0"));
+            return Err(fail(
+                "has no `=`; write KEY=VALUE, such as coupling.k_s=1.0",
+            ));
         };
         if self.overrides >= MAX_OVERRIDES {
-            return Err(fail("is one override too many; put the values into the file"));
+            return Err(fail(
+                "is one override too many; put the values into the file",
+            ));
         }
         let keys: Vec<&str> = path.trim().split('.').map(str::trim).collect();
         if keys.iter().any(|key| key.is_empty()) {
-            return Err(fail("has an empty key; write KEY=VALUE, such as coupling.k_s=1.0"));
+            return Err(fail(
+                "has an empty key; write KEY=VALUE, such as coupling.k_s=1.0",
+            ));
         }
         let lines = LineTable::new(None, value);
         let mut node = match DeValue::parse(value.trim()) {
             Ok(parsed) => lines.node(&parsed),
-            Err(_) => Node { value: Value::Text(value.trim().to_owned()), at: lines.at(0) },
+            Err(_) => Node {
+                value: Value::Text(value.trim().to_owned()),
+                at: lines.at(0),
+            },
         };
-        let at = At { file: source.as_str().into(), line: None };
+        let at = At {
+            file: source.as_str().into(),
+            line: None,
+        };
         node.relocate(&at);
         let mut changed = self.clone();
         changed.root.set(&keys, node, &at)?;
@@ -126,20 +148,38 @@ impl Node {
         };
         match &mut self.value {
             Value::Table(entries) => {
-                let position = entries.iter().position(|(name, _)| name == key).unwrap_or_else(|| {
-                    entries.push(((*key).to_owned(), Node { value: Value::Table(Vec::new()), at: at.clone() }));
-                    entries.len() - 1
-                });
+                let position = entries
+                    .iter()
+                    .position(|(name, _)| name == key)
+                    .unwrap_or_else(|| {
+                        entries.push((
+                            (*key).to_owned(),
+                            Node {
+                                value: Value::Table(Vec::new()),
+                                at: at.clone(),
+                            },
+                        ));
+                        entries.len() - 1
+                    });
                 entries[position].1.set(rest, new, at)
             }
             Value::Array(items) => {
                 let count = items.len();
-                match key.parse::<usize>().ok().and_then(|index| items.get_mut(index)) {
+                match key
+                    .parse::<usize>()
+                    .ok()
+                    .and_then(|index| items.get_mut(index))
+                {
                     Some(item) => item.set(rest, new, at),
-                    None => Err(at.problem(format!("`{key}` is no place in a list of {count}; count from 0"))),
+                    None => Err(at.problem(format!(
+                        "`{key}` is no place in a list of {count}; count from 0"
+                    ))),
                 }
             }
-            other => Err(at.problem(format!("`{key}` lies below {}, which has no keys; check the path", other.kind()))),
+            other => Err(at.problem(format!(
+                "`{key}` lies below {}, which has no keys; check the path",
+                other.kind()
+            ))),
         }
     }
 }
@@ -153,13 +193,22 @@ struct LineTable {
 
 impl LineTable {
     fn new(file: Option<&str>, text: &str) -> Self {
-        let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
-        Self { file: file.unwrap_or_default().into(), starts, has_lines: file.is_some() }
+        let starts = std::iter::once(0)
+            .chain(text.match_indices('\n').map(|(i, _)| i + 1))
+            .collect();
+        Self {
+            file: file.unwrap_or_default().into(),
+            starts,
+            has_lines: file.is_some(),
+        }
     }
 
     fn at(&self, offset: usize) -> At {
         let line = self.starts.partition_point(|start| *start <= offset);
-        At { file: self.file.clone(), line: self.has_lines.then_some(line) }
+        At {
+            file: self.file.clone(),
+            line: self.has_lines.then_some(line),
+        }
     }
 
     fn syntax_problem(&self, error: &toml::de::Error) -> Problem {
@@ -180,7 +229,10 @@ impl LineTable {
         }
         // The parser sorts by name; complaints should come in the order of the file.
         entries.sort_by_key(|(offset, ..)| *offset);
-        entries.into_iter().map(|(_, key, node)| (key, node)).collect()
+        entries
+            .into_iter()
+            .map(|(_, key, node)| (key, node))
+            .collect()
     }
 
     fn node(&self, value: &Spanned<DeValue<'_>>) -> Node {
@@ -188,13 +240,21 @@ impl LineTable {
             DeValue::Boolean(b) => Value::Boolean(*b),
             DeValue::Integer(i) => i64::from_str_radix(i.as_str(), i.radix())
                 .map_or(Value::Unsupported("an integer too large"), Value::Integer),
-            DeValue::Float(f) => f.as_str().parse().map_or(Value::Unsupported("no number"), Value::Float),
+            DeValue::Float(f) => f
+                .as_str()
+                .parse()
+                .map_or(Value::Unsupported("no number"), Value::Float),
             DeValue::String(s) => Value::Text(s.to_string()),
             DeValue::Datetime(_) => Value::Unsupported("a date"),
-            DeValue::Array(items) => Value::Array(items.iter().map(|item| self.node(item)).collect()),
+            DeValue::Array(items) => {
+                Value::Array(items.iter().map(|item| self.node(item)).collect())
+            }
             DeValue::Table(table) => Value::Table(self.entries(table)),
         };
-        Node { value: parsed, at: self.at(value.span().start) }
+        Node {
+            value: parsed,
+            at: self.at(value.span().start),
+        }
     }
 }
 
@@ -206,15 +266,26 @@ mod tests {
     fn syntax_faults_name_file_and_line() {
         let error = Document::parse("a.toml", "x = 1\ny = = 2\n").unwrap_err();
         assert_eq!(error.problems()[0].line, Some(2));
-        assert!(error.to_string().starts_with("a.toml:2: is no valid TOML here"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .starts_with("a.toml:2: is no valid TOML here"),
+            "{error}"
+        );
     }
 
     #[test]
     fn an_override_without_an_equals_sign_is_explained() {
         let document = Document::parse("a.toml", "x = 1").unwrap();
         let error = document.with_override("x").unwrap_err().to_string();
-        assert_eq!(error, "--set x: has no `=`; write KEY=VALUE, such as coupling.k_s=1.0");
+        assert_eq!(
+            error,
+            "--set x: has no `=`; write KEY=VALUE, such as coupling.k_s=1.0"
+        );
         let error = document.with_override("x.y=2").unwrap_err().to_string();
-        assert_eq!(error, "--set x.y=2: `y` lies below an integer, which has no keys; check the path");
+        assert_eq!(
+            error,
+            "--set x.y=2: `y` lies below an integer, which has no keys; check the path"
+        );
     }
 }

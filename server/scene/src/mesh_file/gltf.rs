@@ -17,29 +17,44 @@ const MAX_NODE_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
 pub(super) fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
-    let file = gltf::Gltf::from_slice(bytes).map_err(|e| Fault::new(format!("is no valid glTF ({e}); export it again")))?;
+    let file = gltf::Gltf::from_slice(bytes)
+        .map_err(|e| Fault::new(format!("is no valid glTF ({e}); export it again")))?;
     let buffers = buffers(&file, directory)?;
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
         return Err(Fault::new("has no scene; export it with one"));
     };
     let mut mesh = RawMesh::default();
-    let mut pending: Vec<_> = scene.nodes().map(|node| (node, Matrix4::identity(), 0)).collect();
+    let mut pending: Vec<_> = scene
+        .nodes()
+        .map(|node| (node, Matrix4::identity(), 0))
+        .collect();
     pending.reverse();
     let mut visited = 0;
     while let Some((node, world_from_parent, depth)) = pending.pop() {
         visited += 1;
         if depth > MAX_NODE_DEPTH || visited > MAX_NODES {
-            return Err(Fault::new(format!("node {} lies too deep or in a loop; flatten the scene", node.index())));
+            return Err(Fault::new(format!(
+                "node {} lies too deep or in a loop; flatten the scene",
+                node.index()
+            )));
         }
         let parent_from_node = Matrix4::from(node.transform().matrix()).cast::<f64>();
         let world_from_node = world_from_parent * parent_from_node;
         if let Some(of_node) = node.mesh() {
             for primitive in of_node.primitives() {
-                append(&mut mesh, &primitive, &world_from_node, &buffers)
-                    .map_err(|text| Fault::new(format!("mesh {} primitive {}: {text}", of_node.index(), primitive.index())))?;
+                append(&mut mesh, &primitive, &world_from_node, &buffers).map_err(|text| {
+                    Fault::new(format!(
+                        "mesh {} primitive {}: {text}",
+                        of_node.index(),
+                        primitive.index()
+                    ))
+                })?;
             }
         }
-        pending.extend(node.children().map(|child| (child, world_from_node, depth + 1)));
+        pending.extend(
+            node.children()
+                .map(|child| (child, world_from_node, depth + 1)),
+        );
     }
     Ok(mesh.welded())
 }
@@ -49,23 +64,38 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
     for buffer in file.buffers() {
         let number = buffer.index();
         let bytes = match buffer.source() {
-            Source::Bin => file.blob.clone().ok_or_else(|| Fault::new("has no binary part; export it again as .glb"))?,
+            Source::Bin => file
+                .blob
+                .clone()
+                .ok_or_else(|| Fault::new("has no binary part; export it again as .glb"))?,
             Source::Uri(uri) => match uri.split_once(";base64,") {
-                Some((_, data)) if uri.starts_with("data:") => decode_base64(data)
-                    .ok_or_else(|| Fault::new(format!("buffer {number} is no valid base64; export it again")))?,
+                Some((_, data)) if uri.starts_with("data:") => {
+                    decode_base64(data).ok_or_else(|| {
+                        Fault::new(format!(
+                            "buffer {number} is no valid base64; export it again"
+                        ))
+                    })?
+                }
                 _ => {
                     let named = Path::new(uri);
-                    let inside = named.components().all(|c| matches!(c, std::path::Component::Normal(_)));
+                    let inside = named
+                        .components()
+                        .all(|c| matches!(c, std::path::Component::Normal(_)));
                     let directory = directory.filter(|_| inside).ok_or_else(|| {
                         Fault::new(format!("buffer {number} is `{uri}`, but must lie beside the file; export it as .glb"))
                     })?;
-                    read_bytes(&directory.join(named), MAX_MESH_BYTES)
-                        .map_err(|problem| Fault::new(format!("needs buffer {number}: {problem}")))?
+                    read_bytes(&directory.join(named), MAX_MESH_BYTES).map_err(|problem| {
+                        Fault::new(format!("needs buffer {number}: {problem}"))
+                    })?
                 }
             },
         };
         if bytes.len() < buffer.length() {
-            let text = format!("buffer {number} is cut off: {} of {} bytes are there", bytes.len(), buffer.length());
+            let text = format!(
+                "buffer {number} is cut off: {} of {} bytes are there",
+                bytes.len(),
+                buffer.length()
+            );
             return Err(Fault::new(text + "; copy the file again"));
         }
         all.push(bytes);
@@ -79,27 +109,42 @@ fn append(
     world_from_node: &Matrix4<f64>,
     buffers: &[Vec<u8>],
 ) -> Result<(), String> {
-    if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
+    if !matches!(
+        primitive.mode(),
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+    ) {
         return Err("is no triangles (points or lines); remove it".into());
     }
-    let positions = primitive.get(&gltf::Semantic::Positions).ok_or("has no positions; remove it")?;
+    let positions = primitive
+        .get(&gltf::Semantic::Positions)
+        .ok_or("has no positions; remove it")?;
     check_accessor(&positions, buffers)?;
     if positions.dimensions() != Dimensions::Vec3 || positions.data_type() != DataType::F32 {
-        return Err("has positions that are not three 32-bit floats; export it without compression".into());
+        return Err(
+            "has positions that are not three 32-bit floats; export it without compression".into(),
+        );
     }
     if let Some(indices) = primitive.indices() {
         check_accessor(&indices, buffers)?;
-        let unsigned = matches!(indices.data_type(), DataType::U8 | DataType::U16 | DataType::U32);
+        let unsigned = matches!(
+            indices.data_type(),
+            DataType::U8 | DataType::U16 | DataType::U32
+        );
         if indices.dimensions() != Dimensions::Scalar || !unsigned {
             return Err("has indices that are no unsigned integers; export it again".into());
         }
     }
     let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
     let first = mesh.vertices.len();
-    for (number, position) in reader.read_positions().ok_or("has unreadable positions; export it again")?.enumerate() {
+    for (number, position) in reader
+        .read_positions()
+        .ok_or("has unreadable positions; export it again")?
+        .enumerate()
+    {
         let local = Point3::from(position.map(f64::from));
         let placed = world_from_node.transform_point(&local);
-        mesh.vertices.push(finite_vertex(number, [placed.x, placed.y, placed.z])?);
+        mesh.vertices
+            .push(finite_vertex(number, [placed.x, placed.y, placed.z])?);
     }
     let count = mesh.vertices.len() - first;
     if u32::try_from(mesh.vertices.len()).is_err() {
@@ -110,12 +155,15 @@ fn append(
         None => (0..count as u32).collect(),
     };
     if let Some(wrong) = corners.iter().find(|corner| **corner as usize >= count) {
-        return Err(format!("an index is {wrong}, but there are {count} vertices; export it again"));
+        return Err(format!(
+            "an index is {wrong}, but there are {count} vertices; export it again"
+        ));
     }
     let mirrored = world_from_node.determinant() < 0.0;
     for triangle in triangles(primitive.mode(), &corners) {
         let [a, b, c] = triangle.map(|corner| first as u32 + corner);
-        mesh.triangles.push(if mirrored { [a, c, b] } else { [a, b, c] });
+        mesh.triangles
+            .push(if mirrored { [a, c, b] } else { [a, b, c] });
     }
     Ok(())
 }
@@ -126,11 +174,24 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
         Mode::TriangleStrip => corners
             .windows(3)
             .enumerate()
-            .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] })
+            .map(|(i, w)| {
+                if i % 2 == 0 {
+                    [w[0], w[1], w[2]]
+                } else {
+                    [w[1], w[0], w[2]]
+                }
+            })
             .filter(|[a, b, c]| a != b && b != c && c != a)
             .collect(),
-        Mode::TriangleFan => corners.windows(2).skip(1).map(|w| [corners[0], w[0], w[1]]).collect(),
-        _ => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+        Mode::TriangleFan => corners
+            .windows(2)
+            .skip(1)
+            .map(|w| [corners[0], w[0], w[1]])
+            .collect(),
+        _ => corners
+            .chunks_exact(3)
+            .map(|c| [c[0], c[1], c[2]])
+            .collect(),
     }
 }
 
@@ -138,16 +199,33 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
 fn check_accessor(accessor: &gltf::Accessor<'_>, buffers: &[Vec<u8>]) -> Result<(), String> {
     let number = accessor.index();
     if accessor.sparse().is_some() {
-        return Err(format!("accessor {number} is sparse; export the mesh without sparse accessors"));
+        return Err(format!(
+            "accessor {number} is sparse; export the mesh without sparse accessors"
+        ));
     }
-    let view = accessor.view().ok_or_else(|| format!("accessor {number} has no data; export the mesh without compression"))?;
+    let view = accessor.view().ok_or_else(|| {
+        format!("accessor {number} has no data; export the mesh without compression")
+    })?;
     let length = buffers.get(view.buffer().index()).map_or(0, Vec::len);
     let stride = view.stride().unwrap_or(accessor.size());
-    let last = accessor.count().checked_sub(1).ok_or_else(|| format!("accessor {number} is empty; remove the primitive"))?;
-    let end_in_view = stride.checked_mul(last).and_then(|n| n.checked_add(accessor.size())).and_then(|n| n.checked_add(accessor.offset()));
+    let last = accessor
+        .count()
+        .checked_sub(1)
+        .ok_or_else(|| format!("accessor {number} is empty; remove the primitive"))?;
+    let end_in_view = stride
+        .checked_mul(last)
+        .and_then(|n| n.checked_add(accessor.size()))
+        .and_then(|n| n.checked_add(accessor.offset()));
     let view_end = view.offset().checked_add(view.length());
-    let fits = end_in_view.is_some_and(|end| end <= view.length()) && view_end.is_some_and(|end| end <= length);
-    if fits { Ok(()) } else { Err(format!("accessor {number} reaches past its buffer; export the file again")) }
+    let fits = end_in_view.is_some_and(|end| end <= view.length())
+        && view_end.is_some_and(|end| end <= length);
+    if fits {
+        Ok(())
+    } else {
+        Err(format!(
+            "accessor {number} reaches past its buffer; export the file again"
+        ))
+    }
 }
 
 /// RFC 4648, with or without padding; `None` for any other character.
@@ -208,7 +286,11 @@ mod tests {
 
     #[test]
     fn node_transforms_are_applied() {
-        let mesh = parse(triangle(r#","translation":[0,0,5],"scale":[2,2,2]"#, 2).as_bytes(), None).unwrap();
+        let mesh = parse(
+            triangle(r#","translation":[0,0,5],"scale":[2,2,2]"#, 2).as_bytes(),
+            None,
+        )
+        .unwrap();
         assert_eq!(mesh.vertices[1], Point3::new(2.0, 0.0, 5.0));
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
     }
@@ -222,7 +304,10 @@ mod tests {
     #[test]
     fn an_index_out_of_range_is_named() {
         let text = parse(triangle("", 7).as_bytes(), None).unwrap_err().text;
-        assert_eq!(text, "mesh 0 primitive 0: an index is 7, but there are 3 vertices; export it again");
+        assert_eq!(
+            text,
+            "mesh 0 primitive 0: an index is 7, but there are 3 vertices; export it again"
+        );
     }
 
     #[test]
@@ -230,14 +315,26 @@ mod tests {
         let text = triangle("", 2);
         let (head, tail) = text.split_once("data:").unwrap();
         let (_, tail) = tail.split_once('"').unwrap();
-        let text = parse(format!("{head}../secret.bin\"{tail}").as_bytes(), Some(Path::new("."))).unwrap_err().text;
-        assert_eq!(text, "buffer 0 is `../secret.bin`, but must lie beside the file; export it as .glb");
+        let text = parse(
+            format!("{head}../secret.bin\"{tail}").as_bytes(),
+            Some(Path::new(".")),
+        )
+        .unwrap_err()
+        .text;
+        assert_eq!(
+            text,
+            "buffer 0 is `../secret.bin`, but must lie beside the file; export it as .glb"
+        );
     }
 
     #[test]
     fn an_accessor_past_its_buffer_is_refused() {
-        let text = triangle("", 2).replace(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#);
+        let text =
+            triangle("", 2).replace(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#);
         let text = parse(text.as_bytes(), None).unwrap_err().text;
-        assert_eq!(text, "mesh 0 primitive 0: accessor 1 reaches past its buffer; export the file again");
+        assert_eq!(
+            text,
+            "mesh 0 primitive 0: accessor 1 reaches past its buffer; export the file again"
+        );
     }
 }

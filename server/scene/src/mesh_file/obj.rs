@@ -12,11 +12,18 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     // Faces may name vertices that come later: remember the line, check at the end.
     let mut first_line_of_largest = (0u32, 0usize);
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
-        let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
+        let mut words = line
+            .split('#')
+            .next()
+            .unwrap_or_default()
+            .split_whitespace();
         match words.next() {
-            Some("v") => mesh.vertices.push(vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?),
+            Some("v") => mesh
+                .vertices
+                .push(vertex(mesh.vertices.len(), words).map_err(|text| Fault::at(number, text))?),
             Some("f") => {
-                let corners = face(words, mesh.vertices.len()).map_err(|text| Fault::at(number, text))?;
+                let corners =
+                    face(words, mesh.vertices.len()).map_err(|text| Fault::at(number, text))?;
                 let largest = corners.iter().copied().max().unwrap_or(0);
                 if largest > first_line_of_largest.0 || first_line_of_largest.1 == 0 {
                     first_line_of_largest = (largest, number);
@@ -28,17 +35,28 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     }
     let (largest, line) = first_line_of_largest;
     if line > 0 && largest as usize >= mesh.vertices.len() {
-        let text = format!("a face names vertex {}, but the file has {}; repair the mesh", largest + 1, mesh.vertices.len());
+        let text = format!(
+            "a face names vertex {}, but the file has {}; repair the mesh",
+            largest + 1,
+            mesh.vertices.len()
+        );
         return Err(Fault::at(line, text));
     }
     Ok(mesh)
 }
 
-fn vertex<'w>(number: usize, mut words: impl Iterator<Item = &'w str>) -> Result<nalgebra::Point3<f64>, String> {
+fn vertex<'w>(
+    number: usize,
+    mut words: impl Iterator<Item = &'w str>,
+) -> Result<nalgebra::Point3<f64>, String> {
     let mut coordinates = [0.0; 3];
     for coordinate in &mut coordinates {
-        let word = words.next().ok_or("a vertex needs three coordinates; repair the line")?;
-        *coordinate = word.parse().map_err(|_| format!("`{word}` is no number; repair the line"))?;
+        let word = words
+            .next()
+            .ok_or("a vertex needs three coordinates; repair the line")?;
+        *coordinate = word
+            .parse()
+            .map_err(|_| format!("`{word}` is no number; repair the line"))?;
     }
     if number >= u32::MAX as usize {
         return Err("too many vertices; simplify the mesh".into());
@@ -46,21 +64,35 @@ fn vertex<'w>(number: usize, mut words: impl Iterator<Item = &'w str>) -> Result
     finite_vertex(number + 1, coordinates)
 }
 
-fn face<'w>(words: impl Iterator<Item = &'w str>, vertices_so_far: usize) -> Result<Vec<u32>, String> {
+fn face<'w>(
+    words: impl Iterator<Item = &'w str>,
+    vertices_so_far: usize,
+) -> Result<Vec<u32>, String> {
     let mut corners = Vec::new();
     for word in words {
         // v, v/vt, v//vn, v/vt/vn; negative counts back from the last vertex.
         let first = word.split('/').next().unwrap_or_default();
-        let index: i64 = first.parse().map_err(|_| format!("`{word}` is no vertex index; repair the line"))?;
-        let place = if index > 0 { index - 1 } else { vertices_so_far as i64 + index };
+        let index: i64 = first
+            .parse()
+            .map_err(|_| format!("`{word}` is no vertex index; repair the line"))?;
+        let place = if index > 0 {
+            index - 1
+        } else {
+            vertices_so_far as i64 + index
+        };
         let place = u32::try_from(place).ok().filter(|_| index != 0);
         corners.push(place.ok_or_else(|| format!("`{word}` names no vertex; indices start at 1"))?);
         if corners.len() > MAX_FACE_CORNERS {
-            return Err(format!("a face has more than {MAX_FACE_CORNERS} corners; repair the line"));
+            return Err(format!(
+                "a face has more than {MAX_FACE_CORNERS} corners; repair the line"
+            ));
         }
     }
     if corners.len() < 3 {
-        return Err(format!("a face has {} corners, but needs three; repair the line", corners.len()));
+        return Err(format!(
+            "a face has {} corners, but needs three; repair the line",
+            corners.len()
+        ));
     }
     Ok(corners)
 }
@@ -71,7 +103,8 @@ mod tests {
 
     #[test]
     fn polygons_slashes_and_negative_indices_are_understood() {
-        let mesh = parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
+        let mesh =
+            parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices[3].z, 1e-9);
     }
@@ -80,12 +113,28 @@ mod tests {
     fn faults_name_line_and_vertex() {
         let fault = parse(b"v 0 0 0\nv 0 nan 0\n").unwrap_err();
         assert_eq!(fault.line, Some(2));
-        assert!(fault.text.contains("vertex 2 has y = NaN"), "{}", fault.text);
+        assert!(
+            fault.text.contains("vertex 2 has y = NaN"),
+            "{}",
+            fault.text
+        );
         let fault = parse(b"v 0 0 0\nf 1 2 3\n").unwrap_err();
-        assert_eq!(fault, Fault::at(2, "a face names vertex 3, but the file has 1; repair the mesh"));
+        assert_eq!(
+            fault,
+            Fault::at(
+                2,
+                "a face names vertex 3, but the file has 1; repair the mesh"
+            )
+        );
         let fault = parse(b"v 0 0 0\nf 1 1\n").unwrap_err();
-        assert_eq!(fault, Fault::at(2, "a face has 2 corners, but needs three; repair the line"));
+        assert_eq!(
+            fault,
+            Fault::at(2, "a face has 2 corners, but needs three; repair the line")
+        );
         let fault = parse(b"v 0 0\n").unwrap_err();
-        assert_eq!(fault, Fault::at(1, "a vertex needs three coordinates; repair the line"));
+        assert_eq!(
+            fault,
+            Fault::at(1, "a vertex needs three coordinates; repair the line")
+        );
     }
 }

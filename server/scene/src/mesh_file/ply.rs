@@ -64,11 +64,23 @@ struct Element {
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     let (format, elements, body) = header(bytes)?;
-    let header_lines = bytes[..bytes.len() - body.len()].iter().filter(|b| **b == b'\n').count();
+    let header_lines = bytes[..bytes.len() - body.len()]
+        .iter()
+        .filter(|b| **b == b'\n')
+        .count();
     let mut source = match format {
-        Format::Text => Source::Text { rest: body, line: header_lines + 1 },
-        Format::Little => Source::Binary { rest: body, little: true },
-        Format::Big => Source::Binary { rest: body, little: false },
+        Format::Text => Source::Text {
+            rest: body,
+            line: header_lines + 1,
+        },
+        Format::Little => Source::Binary {
+            rest: body,
+            little: true,
+        },
+        Format::Big => Source::Binary {
+            rest: body,
+            little: false,
+        },
     };
     let mut mesh = RawMesh::default();
     for element in &elements {
@@ -78,9 +90,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
             _ => {
                 for number in 0..element.count {
                     for property in &element.properties {
-                        property.skip(&mut source).map_err(|e| e.in_element(element, number, &source))?;
+                        property
+                            .skip(&mut source)
+                            .map_err(|e| e.in_element(element, number, &source))?;
                     }
-                    source.end_element().map_err(|e| e.in_element(element, number, &source))?;
+                    source
+                        .end_element()
+                        .map_err(|e| e.in_element(element, number, &source))?;
                 }
             }
         }
@@ -88,7 +104,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     let count = mesh.vertices.len();
     for (number, triangle) in mesh.triangles.iter().enumerate() {
         if let Some(wrong) = triangle.iter().find(|i| **i as usize >= count) {
-            let text = format!("triangle {number} names vertex {wrong}, but the file has {count}; repair the mesh");
+            let text = format!(
+                "triangle {number} names vertex {wrong}, but the file has {count}; repair the mesh"
+            );
             return Err(Fault::new(text));
         }
     }
@@ -104,13 +122,20 @@ fn header(bytes: &[u8]) -> Result<(Format, Vec<Element>, &[u8]), Fault> {
         number += 1;
         let limit = rest.len().min(MAX_HEADER_BYTES);
         let Some(end) = rest[..limit].iter().position(|b| *b == b'\n') else {
-            let text = if number == 1 { "is no PLY file; export it again" } else { "the header has no end; copy the file again" };
+            let text = if number == 1 {
+                "is no PLY file; export it again"
+            } else {
+                "the header has no end; copy the file again"
+            };
             return Err(Fault::at(number, text));
         };
         let line = String::from_utf8_lossy(&rest[..end]);
         rest = &rest[end + 1..];
         if bytes.len() - rest.len() > MAX_HEADER_BYTES {
-            return Err(Fault::at(number, "the header is too long; is it a PLY file?"));
+            return Err(Fault::at(
+                number,
+                "the header is too long; is it a PLY file?",
+            ));
         }
         let words: Vec<&str> = line.split_whitespace().collect();
         let fail = |text: &str| Err(Fault::at(number, text));
@@ -127,35 +152,55 @@ fn header(bytes: &[u8]) -> Result<(Format, Vec<Element>, &[u8]), Fault> {
             }
             ["comment" | "obj_info", ..] | [] => {}
             ["element", name, count] => {
-                let Ok(count) = count.parse() else { return fail("the count of an element is no number; repair the header") };
-                elements.push(Element { name: (*name).to_owned(), count, properties: Vec::new() });
+                let Ok(count) = count.parse() else {
+                    return fail("the count of an element is no number; repair the header");
+                };
+                elements.push(Element {
+                    name: (*name).to_owned(),
+                    count,
+                    properties: Vec::new(),
+                });
             }
             ["property", words @ ..] => {
                 let property = match words {
-                    ["list", count, scalar, name] => Scalar::named(count).zip(Scalar::named(scalar)).map(|(c, s)| (Some(c), s, name)),
+                    ["list", count, scalar, name] => Scalar::named(count)
+                        .zip(Scalar::named(scalar))
+                        .map(|(c, s)| (Some(c), s, name)),
                     [scalar, name] => Scalar::named(scalar).map(|s| (None, s, name)),
                     _ => None,
                 };
-                let (Some((count, scalar, name)), Some(element)) = (property, elements.last_mut()) else {
+                let (Some((count, scalar, name)), Some(element)) = (property, elements.last_mut())
+                else {
                     return fail("a property is not understood; repair the header");
                 };
                 if element.properties.len() >= MAX_PROPERTIES {
                     return fail("an element has too many properties; repair the header");
                 }
-                element.properties.push(Property { name: (*name).to_owned(), count, scalar });
+                element.properties.push(Property {
+                    name: (*name).to_owned(),
+                    count,
+                    scalar,
+                });
             }
             ["end_header"] => break,
             _ => return fail("a header line is not understood; repair the header"),
         }
     }
-    let Some(format) = format else { return Err(Fault::at(number, "the header names no format; export the file again")) };
+    let Some(format) = format else {
+        return Err(Fault::at(
+            number,
+            "the header names no format; export the file again",
+        ));
+    };
     for element in &elements {
         // Every element takes at least a byte, so a count above the bytes left is a lie (an element without
         // properties takes none, and would be an endless loop instead).
         if element.count > rest.len() || (element.properties.is_empty() && element.count > 0) {
             let text = format!(
                 "is cut off: {} `{}` are promised, {} bytes are there; copy the file again",
-                element.count, element.name, rest.len()
+                element.count,
+                element.name,
+                rest.len()
             );
             return Err(Fault::new(text));
         }
@@ -164,9 +209,16 @@ fn header(bytes: &[u8]) -> Result<(Format, Vec<Element>, &[u8]), Fault> {
 }
 
 fn vertices(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> Result<(), Fault> {
-    let axes = ["x", "y", "z"].map(|axis| element.properties.iter().position(|p| p.name == axis && p.count.is_none()));
+    let axes = ["x", "y", "z"].map(|axis| {
+        element
+            .properties
+            .iter()
+            .position(|p| p.name == axis && p.count.is_none())
+    });
     let [Some(x), Some(y), Some(z)] = axes else {
-        return Err(Fault::new("its vertices lack x, y or z; export the mesh again"));
+        return Err(Fault::new(
+            "its vertices lack x, y or z; export the mesh again",
+        ));
     };
     if u32::try_from(element.count).is_err() {
         return Err(Fault::new("has too many vertices; simplify the mesh"));
@@ -174,50 +226,80 @@ fn vertices(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> R
     for number in 0..element.count {
         let mut coordinates = [0.0; 3];
         for (place, property) in element.properties.iter().enumerate() {
-            let value = property.read(source).map_err(|e| e.in_element(element, number, source))?;
+            let value = property
+                .read(source)
+                .map_err(|e| e.in_element(element, number, source))?;
             for (coordinate, wanted) in coordinates.iter_mut().zip([x, y, z]) {
                 if place == wanted {
                     *coordinate = value;
                 }
             }
         }
-        source.end_element().map_err(|e| e.in_element(element, number, source))?;
-        let vertex = finite_vertex(number, coordinates).map_err(|text| Fault { line: source.finished_line(), text })?;
+        source
+            .end_element()
+            .map_err(|e| e.in_element(element, number, source))?;
+        let vertex = finite_vertex(number, coordinates).map_err(|text| Fault {
+            line: source.finished_line(),
+            text,
+        })?;
         mesh.vertices.push(vertex);
     }
     Ok(())
 }
 
 fn faces(element: &Element, source: &mut Source<'_>, mesh: &mut RawMesh) -> Result<(), Fault> {
-    let is_corners = |p: &Property| p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index");
+    let is_corners = |p: &Property| {
+        p.count.is_some() && matches!(p.name.as_str(), "vertex_indices" | "vertex_index")
+    };
     if !element.properties.iter().any(is_corners) {
-        return Err(Fault::new("its faces lack vertex_indices; export the mesh again"));
+        return Err(Fault::new(
+            "its faces lack vertex_indices; export the mesh again",
+        ));
     }
     let mut corners: Vec<u32> = Vec::new();
     for number in 0..element.count {
         for property in &element.properties {
             match property.count {
                 Some(count) if is_corners(property) => {
-                    let listed = source.scalar(count).map_err(|e| e.in_element(element, number, source))?;
+                    let listed = source
+                        .scalar(count)
+                        .map_err(|e| e.in_element(element, number, source))?;
                     corners.clear();
                     // A list longer than the file runs into its end: no allocation ahead of the bytes.
                     for _ in 0..listed as u64 {
-                        let index = source.scalar(property.scalar).map_err(|e| e.in_element(element, number, source))?;
-                        let whole = index.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(&index);
+                        let index = source
+                            .scalar(property.scalar)
+                            .map_err(|e| e.in_element(element, number, source))?;
+                        let whole =
+                            index.fract() == 0.0 && (0.0..f64::from(u32::MAX)).contains(&index);
                         if !whole {
-                            let text = format!("face {number} names vertex {index}; repair the mesh");
-                            return Err(Fault { line: source.current_line(), text });
+                            let text =
+                                format!("face {number} names vertex {index}; repair the mesh");
+                            return Err(Fault {
+                                line: source.current_line(),
+                                text,
+                            });
                         }
                         corners.push(index as u32);
                     }
                 }
-                _ => property.skip(source).map_err(|e| e.in_element(element, number, source))?,
+                _ => property
+                    .skip(source)
+                    .map_err(|e| e.in_element(element, number, source))?,
             }
         }
-        source.end_element().map_err(|e| e.in_element(element, number, source))?;
+        source
+            .end_element()
+            .map_err(|e| e.in_element(element, number, source))?;
         if corners.len() < 3 {
-            let text = format!("face {number} has {} corners, but needs three; repair the mesh", corners.len());
-            return Err(Fault { line: source.finished_line(), text });
+            let text = format!(
+                "face {number} has {} corners, but needs three; repair the mesh",
+                corners.len()
+            );
+            return Err(Fault {
+                line: source.finished_line(),
+                text,
+            });
         }
         mesh.push_polygon(&corners);
     }
@@ -256,12 +338,20 @@ impl Broken {
     fn in_element(&self, element: &Element, number: usize, source: &Source<'_>) -> Fault {
         let name = &element.name;
         let text = match self {
-            Self::End => format!("is cut off in {name} {number} of {}; copy the file again", element.count),
-            Self::Word(word) => format!("`{word}` in {name} {number} is no number; repair the line"),
+            Self::End => format!(
+                "is cut off in {name} {number} of {}; copy the file again",
+                element.count
+            ),
+            Self::Word(word) => {
+                format!("`{word}` in {name} {number} is no number; repair the line")
+            }
             Self::MissingInLine => format!("{name} {number} has too few numbers; repair the line"),
             Self::LeftInLine => format!("{name} {number} has too many numbers; repair the line"),
         };
-        Fault { line: source.current_line(), text }
+        Fault {
+            line: source.current_line(),
+            text,
+        }
     }
 }
 
@@ -281,20 +371,33 @@ impl Source<'_> {
 
     /// The line of the element that was just ended.
     fn finished_line(&self) -> Option<usize> {
-        self.current_line().map(|line| line.saturating_sub(1).max(1))
+        self.current_line()
+            .map(|line| line.saturating_sub(1).max(1))
     }
 
     fn scalar(&mut self, scalar: Scalar) -> Result<f64, Broken> {
         match self {
             Self::Text { rest, .. } => {
-                let blanks = rest.iter().take_while(|b| **b != b'\n' && b.is_ascii_whitespace()).count();
+                let blanks = rest
+                    .iter()
+                    .take_while(|b| **b != b'\n' && b.is_ascii_whitespace())
+                    .count();
                 let after = &rest[blanks..];
-                let length = after.iter().take_while(|b| !b.is_ascii_whitespace()).count();
+                let length = after
+                    .iter()
+                    .take_while(|b| !b.is_ascii_whitespace())
+                    .count();
                 if length == 0 {
-                    return Err(if after.is_empty() { Broken::End } else { Broken::MissingInLine });
+                    return Err(if after.is_empty() {
+                        Broken::End
+                    } else {
+                        Broken::MissingInLine
+                    });
                 }
                 let word = String::from_utf8_lossy(&after[..length]);
-                let value = word.parse().map_err(|_| Broken::Word(word.chars().take(40).collect()))?;
+                let value = word
+                    .parse()
+                    .map_err(|_| Broken::Word(word.chars().take(40).collect()))?;
                 *rest = &after[length..];
                 Ok(value)
             }
@@ -384,7 +487,9 @@ mod tests {
             bytes.extend(coordinate.to_be_bytes());
         }
         bytes.push(3);
-        [0u16, 1, 2].iter().for_each(|i| bytes.extend(i.to_be_bytes()));
+        [0u16, 1, 2]
+            .iter()
+            .for_each(|i| bytes.extend(i.to_be_bytes()));
         let mesh = parse(&bytes).unwrap();
         assert_eq!(mesh.vertices[1].x, 1.5);
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
@@ -394,14 +499,30 @@ mod tests {
     fn faults_name_line_and_place() {
         let fault = parse(TEXT.replace("1 1 0 9", "1 nan 0 9").as_bytes()).unwrap_err();
         assert_eq!(fault.line, Some(14));
-        assert!(fault.text.starts_with("vertex 2 has y = NaN"), "{}", fault.text);
+        assert!(
+            fault.text.starts_with("vertex 2 has y = NaN"),
+            "{}",
+            fault.text
+        );
         let fault = parse(TEXT.replace("4 0 1 2 3", "4 0 1 2 7").as_bytes()).unwrap_err();
-        assert_eq!(fault.text, "triangle 1 names vertex 7, but the file has 4; repair the mesh");
+        assert_eq!(
+            fault.text,
+            "triangle 1 names vertex 7, but the file has 4; repair the mesh"
+        );
         let fault = parse(TEXT.replace("4 0 1 2 3", "3 0 1").as_bytes()).unwrap_err();
-        assert_eq!(fault, Fault::at(16, "face 0 has too few numbers; repair the line"));
+        assert_eq!(
+            fault,
+            Fault::at(16, "face 0 has too few numbers; repair the line")
+        );
         let fault = parse(TEXT.replace("1 0 0 9", "1 0 zero 9").as_bytes()).unwrap_err();
-        assert_eq!(fault, Fault::at(13, "`zero` in vertex 1 is no number; repair the line"));
-        assert_eq!(parse(b"solid").unwrap_err(), Fault::at(1, "is no PLY file; export it again"));
+        assert_eq!(
+            fault,
+            Fault::at(13, "`zero` in vertex 1 is no number; repair the line")
+        );
+        assert_eq!(
+            parse(b"solid").unwrap_err(),
+            Fault::at(1, "is no PLY file; export it again")
+        );
     }
 
     #[test]
@@ -414,6 +535,11 @@ mod tests {
     #[test]
     fn a_lying_header_allocates_nothing() {
         let text = TEXT.replace("element vertex 4", "element vertex 99999999999999");
-        assert!(parse(text.as_bytes()).unwrap_err().text.contains("is cut off: 99999999999999 `vertex` are promised"));
+        assert!(
+            parse(text.as_bytes())
+                .unwrap_err()
+                .text
+                .contains("is cut off: 99999999999999 `vertex` are promised")
+        );
     }
 }

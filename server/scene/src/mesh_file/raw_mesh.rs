@@ -28,7 +28,11 @@ impl RawMesh {
     /// Smallest and largest corner of the box around the mesh; `None` if it has no vertex.
     pub fn bounds(&self) -> Option<(Point3<f64>, Point3<f64>)> {
         let first = *self.vertices.first()?;
-        Some(self.vertices.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))))
+        Some(
+            self.vertices
+                .iter()
+                .fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))),
+        )
     }
 
     /// Appends a polygon as a fan of triangles around its first corner.
@@ -56,7 +60,14 @@ impl RawMesh {
             }
             new_place.push(place);
         }
-        let triangles = self.triangles.iter().map(|t| t.map(|i| new_place[i as usize])).collect();
-        Self { vertices, triangles }
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|t| t.map(|i| new_place[i as usize]))
+            .collect();
+        Self {
+            vertices,
+            triangles,
+        }
     }
 }

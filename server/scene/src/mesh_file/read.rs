@@ -18,26 +18,41 @@ pub(crate) struct Fault {
 impl Fault {
     /// A fault without a line.
     pub(crate) fn new(text: impl Into<String>) -> Self {
-        Self { line: None, text: text.into() }
+        Self {
+            line: None,
+            text: text.into(),
+        }
     }
 
     /// A fault in a line.
     pub(crate) fn at(line: usize, text: impl Into<String>) -> Self {
-        Self { line: Some(line), text: text.into() }
+        Self {
+            line: Some(line),
+            text: text.into(),
+        }
     }
 
     fn in_file(self, path: &Path) -> Problem {
-        Problem { file: path.display().to_string(), line: self.line, text: self.text }
+        Problem {
+            file: path.display().to_string(),
+            line: self.line,
+            text: self.text,
+        }
     }
 }
 
 /// Whether the name ends like a mesh file that [`read_mesh`] knows.
 pub fn is_mesh_path(path: &Path) -> bool {
-    matches!(extension(path).as_str(), "ply" | "obj" | "stl" | "glb" | "gltf")
+    matches!(
+        extension(path).as_str(),
+        "ply" | "obj" | "stl" | "glb" | "gltf"
+    )
 }
 
 fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+    path.extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase())
+        .unwrap_or_default()
 }
 
 /// Reads a mesh; the format follows from the name: .ply .obj .stl .glb .gltf.
@@ -61,7 +76,9 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
         "obj" => obj::parse(bytes),
         "stl" => stl::parse(bytes),
         "glb" | "gltf" => gltf::parse(bytes, path.parent()),
-        _ => Err(Fault::new("is no known mesh format; use .ply, .obj, .stl, .glb or .gltf")),
+        _ => Err(Fault::new(
+            "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
+        )),
     }?;
     if mesh.triangles.is_empty() {
         return Err(Fault::new("has no faces; export it as a triangle mesh"));
@@ -70,7 +87,10 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
 }
 
 /// A vertex with finite coordinates, or which coordinate is not. `number` counts from 0, as the formats' indices do.
-pub(crate) fn finite_vertex(number: usize, coordinates: [f64; 3]) -> Result<nalgebra::Point3<f64>, String> {
+pub(crate) fn finite_vertex(
+    number: usize,
+    coordinates: [f64; 3],
+) -> Result<nalgebra::Point3<f64>, String> {
     match coordinates.iter().position(|c| !c.is_finite()) {
         None => Ok(coordinates.into()),
         Some(axis) => Err(format!(
@@ -121,9 +141,17 @@ mod tests {
 
     #[test]
     fn a_missing_file_and_an_unknown_ending_are_explained() {
-        let text = read_mesh(Path::new("nowhere/a.ply")).unwrap_err().to_string();
-        assert!(text.starts_with("nowhere/a.ply: cannot be opened ("), "{text}");
+        let text = read_mesh(Path::new("nowhere/a.ply"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            text.starts_with("nowhere/a.ply: cannot be opened ("),
+            "{text}"
+        );
         let text = read_mesh(Path::new("a.step")).unwrap_err().to_string();
-        assert_eq!(text, "a.step: is no known mesh format; use .ply, .obj, .stl, .glb or .gltf");
+        assert_eq!(
+            text,
+            "a.step: is no known mesh format; use .ply, .obj, .stl, .glb or .gltf"
+        );
     }
 }

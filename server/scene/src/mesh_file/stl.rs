@@ -32,11 +32,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
 }
 
 fn broken_triangle(number: usize, bytes: &[u8], error: &std::io::Error) -> String {
-    let promised = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    let promised = bytes
+        .get(80..84)
+        .and_then(|b| b.try_into().ok())
+        .map(u32::from_le_bytes);
     match promised {
-        Some(promised) if error.kind() == std::io::ErrorKind::UnexpectedEof && !bytes.starts_with(b"solid") => {
+        Some(promised)
+            if error.kind() == std::io::ErrorKind::UnexpectedEof
+                && !bytes.starts_with(b"solid") =>
+        {
             let there = bytes.len().saturating_sub(HEADER_BYTES) / TRIANGLE_BYTES;
-            format!("is cut off: {promised} triangles are promised, {there} are there; copy the file again")
+            format!(
+                "is cut off: {promised} triangles are promised, {there} are there; copy the file again"
+            )
         }
         _ => format!("triangle {number} cannot be read ({error}); export the file again"),
     }
@@ -59,7 +67,10 @@ mod tests {
 
     #[test]
     fn equal_corners_become_one_vertex() {
-        let corners = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let corners = [
+            0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0,
+            1.0,
+        ];
         let mesh = parse(&binary(2, &corners)).unwrap();
         assert_eq!(mesh.vertices.len(), 4);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
@@ -74,7 +85,10 @@ mod tests {
     #[test]
     fn a_cut_file_and_nan_are_named() {
         let text = parse(&binary(2, &[0.0; 9])).unwrap_err().text;
-        assert_eq!(text, "is cut off: 2 triangles are promised, 1 are there; copy the file again");
+        assert_eq!(
+            text,
+            "is cut off: 2 triangles are promised, 1 are there; copy the file again"
+        );
         let text = parse(&binary(1, &[f32::NAN; 9])).unwrap_err().text;
         assert!(text.contains("triangle 0: vertex 0 has x = NaN"), "{text}");
     }

@@ -63,21 +63,36 @@ impl Scene {
     pub fn build(&self) -> Result<BuiltScene, FileError> {
         let mut problems = Vec::new();
         let spec = &self.spec;
-        let body_mesh = self.mesh(&spec.god_object.shape, &spec.god_object.shape_at, &mut problems);
-        let obstacle_meshes: Vec<Option<Mesh>> =
-            spec.obstacles.iter().map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems)).collect();
+        let body_mesh = self.mesh(
+            &spec.god_object.shape,
+            &spec.god_object.shape_at,
+            &mut problems,
+        );
+        let obstacle_meshes: Vec<Option<Mesh>> = spec
+            .obstacles
+            .iter()
+            .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
+            .collect();
         let hand_path = self.hand_path().unwrap_or_else(|error| {
             problems.extend(error.into_problems());
             None
         });
         FileError::unless_empty(problems)?;
 
-        let Some(mesh) = body_mesh else { return Err(self.document_start().problem("has no god-object mesh").into()) };
+        let Some(mesh) = body_mesh else {
+            return Err(self
+                .document_start()
+                .problem("has no god-object mesh")
+                .into());
+        };
         let [low, high] = mesh.bounding_box();
         let size = (high - low).max();
         let body = self.body(mesh)?;
         let settings = self.settings(size)?;
-        if body.metric(settings.rotation_metric, &spec.god_object.pose).is_none() {
+        if body
+            .metric(settings.rotation_metric, &spec.god_object.pose)
+            .is_none()
+        {
             let text = "the mass or inertia of the god-object is out of range; check mass, density and the mesh's size (metres)";
             return Err(spec.god_object.at.problem(text).into());
         }
@@ -85,7 +100,14 @@ impl Scene {
             .obstacles
             .iter()
             .zip(obstacle_meshes)
-            .filter_map(|(o, mesh)| Some(Obstacle { name: o.name.clone(), mesh: mesh?, pose: o.pose, surface: o.surface }))
+            .filter_map(|(o, mesh)| {
+                Some(Obstacle {
+                    name: o.name.clone(),
+                    mesh: mesh?,
+                    pose: o.pose,
+                    surface: o.surface,
+                })
+            })
             .collect();
         let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, spec.god_object.pose)];
         bodies.extend(obstacles.iter().map(|o| drawn(&o.name, &o.mesh, o.pose)));
@@ -95,7 +117,11 @@ impl Scene {
             world: World { body, obstacles },
             settings,
             start: spec.god_object.pose,
-            hand: hand.map(|(hand, path)| BuiltHand { path, repeat: hand.repeat, preset: hand.preset }),
+            hand: hand.map(|(hand, path)| BuiltHand {
+                path,
+                repeat: hand.repeat,
+                preset: hand.preset,
+            }),
             bodies,
             view: spec.view,
             size,
@@ -123,14 +149,34 @@ impl Scene {
     pub(crate) fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<RawMesh, FileError> {
         Ok(match *shape {
             Shape::Mesh { ref path, scale } => self.mesh_file(path, at)?.scaled(scale),
-            Shape::Sphere { radius, subdivisions } => shapes::sphere(radius, subdivisions),
+            Shape::Sphere {
+                radius,
+                subdivisions,
+            } => shapes::sphere(radius, subdivisions),
             Shape::Box { half_extents } => shapes::cuboid(half_extents),
-            Shape::Capsule { radius, half_length, facets, axis } => shapes::capsule(radius, half_length, facets, axis),
-            Shape::Cylinder { radius, half_length, facets, axis } => shapes::cylinder(radius, half_length, facets, axis),
-            Shape::BoxWithHole { half_extents, radius, facets, axis } => {
-                shapes::box_with_hole(half_extents, radius, facets, axis)
-            }
-            Shape::Plane { size, thickness, axis } => shapes::plane(size, thickness, axis),
+            Shape::Capsule {
+                radius,
+                half_length,
+                facets,
+                axis,
+            } => shapes::capsule(radius, half_length, facets, axis),
+            Shape::Cylinder {
+                radius,
+                half_length,
+                facets,
+                axis,
+            } => shapes::cylinder(radius, half_length, facets, axis),
+            Shape::BoxWithHole {
+                half_extents,
+                radius,
+                facets,
+                axis,
+            } => shapes::box_with_hole(half_extents, radius, facets, axis),
+            Shape::Plane {
+                size,
+                thickness,
+                axis,
+            } => shapes::plane(size, thickness, axis),
         })
     }
 
@@ -143,20 +189,32 @@ impl Scene {
         };
         let usable = mass.is_finite() && mass > 0.0; // false for NaN
         if !usable {
-            return Err(spec.at.problem(format!("the god-object's mass comes to {mass} kg; check density and scale")).into());
+            return Err(spec
+                .at
+                .problem(format!(
+                    "the god-object's mass comes to {mass} kg; check density and scale"
+                ))
+                .into());
         }
         let reference_point = match spec.reference_point {
             ReferencePoint::CenterOfMass => properties.centroid,
             ReferencePoint::At(point) => point,
         };
         let about_centroid = properties.inertia_per_density * (mass / properties.volume);
-        let inertia = about_centroid + displaced_inertia(mass, &(properties.centroid - reference_point));
-        Ok(Body { mesh, mass, inertia, reference_point })
+        let inertia =
+            about_centroid + displaced_inertia(mass, &(properties.centroid - reference_point));
+        Ok(Body {
+            mesh,
+            mass,
+            inertia,
+            reference_point,
+        })
     }
 
     /// Defaults for the body's size, then `[coupling]`, `[limits]` and `[method]`.
     fn settings(&self, size: f64) -> Result<Settings, FileError> {
-        let (coupling, limits, method) = (&self.spec.coupling, &self.spec.limits, &self.spec.method);
+        let (coupling, limits, method) =
+            (&self.spec.coupling, &self.spec.limits, &self.spec.method);
         let defaults = Settings::for_size(size);
         let settings = Settings {
             k_s: coupling.k_s.unwrap_or(defaults.k_s),
@@ -173,11 +231,15 @@ impl Scene {
             rest_distance: method.rest_distance.unwrap_or(defaults.rest_distance),
             minimum_gap: method.minimum_gap.unwrap_or(defaults.minimum_gap),
             gap_tolerance: method.gap_tolerance.unwrap_or(defaults.gap_tolerance),
-            activation_distance: method.activation_distance.unwrap_or(defaults.activation_distance),
+            activation_distance: method
+                .activation_distance
+                .unwrap_or(defaults.activation_distance),
             motion_tolerance: method.motion_tolerance.unwrap_or(defaults.motion_tolerance),
             max_constraints: method.max_constraints.unwrap_or(defaults.max_constraints),
             max_substeps: method.max_substeps.unwrap_or(defaults.max_substeps),
-            max_advancement_steps: method.max_advancement_steps.unwrap_or(defaults.max_advancement_steps),
+            max_advancement_steps: method
+                .max_advancement_steps
+                .unwrap_or(defaults.max_advancement_steps),
             work_budget: method.work_budget.or(defaults.work_budget),
             solver: method.solver.unwrap_or(defaults.solver),
             ..defaults
@@ -191,8 +253,15 @@ impl Scene {
 }
 
 fn drawn(name: &str, mesh: &Mesh, pose: Pose) -> BuiltBody {
-    let raw = RawMesh { vertices: mesh.vertices().to_vec(), triangles: mesh.triangles().to_vec() };
-    BuiltBody { name: name.to_owned(), mesh: raw, pose }
+    let raw = RawMesh {
+        vertices: mesh.vertices().to_vec(),
+        triangles: mesh.triangles().to_vec(),
+    };
+    BuiltBody {
+        name: name.to_owned(),
+        mesh: raw,
+        pose,
+    }
 }
 
 /// What a mass adds to the inertia about a point `offset` away (parallel axes).

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
-use super::spec::{BodySpec, CouplingSpec, HandPathSpec, LimitSpec, MethodSpec, ObstacleSpec, View};
+use super::spec::{
+    BodySpec, CouplingSpec, HandPathSpec, LimitSpec, MethodSpec, ObstacleSpec, View,
+};
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dirs, read_text};
 use crate::mesh_file::{RawMesh, read_mesh};
@@ -33,18 +35,27 @@ impl Scene {
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path, MAX_TOML_BYTES)?;
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Self::from_document(Document::parse(&path.display().to_string(), &text)?, Origin::Directory(directory))
+        Self::from_document(
+            Document::parse(&path.display().to_string(), &text)?,
+            Origin::Directory(directory),
+        )
     }
 
     /// One of [`SHIPPED_SCENES`] by its name, or else the file of this path.
     pub fn named_or_file(name_or_path: &str) -> Result<Self, FileError> {
         if let Some(text) = shipped_scene_text(name_or_path) {
-            return Self::from_document(Document::parse(&format!("{name_or_path}.toml"), text)?, Origin::Shipped);
+            return Self::from_document(
+                Document::parse(&format!("{name_or_path}.toml"), text)?,
+                Origin::Shipped,
+            );
         }
         let path = Path::new(name_or_path);
         if !path.exists() && path.extension().is_none() {
             let names: Vec<&str> = SHIPPED_SCENES.iter().map(|scene| scene.name).collect();
-            let text = format!("is neither a file nor a shipped scene; write a path or one of {}", names.join(", "));
+            let text = format!(
+                "is neither a file nor a shipped scene; write a path or one of {}",
+                names.join(", ")
+            );
             return Err(Problem::of_file(name_or_path, text).into());
         }
         Self::load(path)
@@ -52,18 +63,28 @@ impl Scene {
 
     /// Reads a scene from text; `file` is its name in messages, files are looked for in `directory`.
     pub fn parse(file: &str, text: &str, directory: &Path) -> Result<Self, FileError> {
-        Self::from_document(Document::parse(file, text)?, Origin::Directory(directory.to_path_buf()))
+        Self::from_document(
+            Document::parse(file, text)?,
+            Origin::Directory(directory.to_path_buf()),
+        )
     }
 
     fn from_document(document: Document, origin: Origin) -> Result<Self, FileError> {
         let spec = parse(&document)?;
-        Ok(Self { document, origin, spec })
+        Ok(Self {
+            document,
+            origin,
+            spec,
+        })
     }
 
     /// The same scene with one value changed, as by `--set coupling.k_s=1.0`. Lists are counted from 0:
     /// `obstacle.0.name="box"`.
     pub fn with_override(&self, assignment: &str) -> Result<Self, FileError> {
-        Self::from_document(self.document.with_override(assignment)?, self.origin.clone())
+        Self::from_document(
+            self.document.with_override(assignment)?,
+            self.origin.clone(),
+        )
     }
 
     /// [`Scene::with_override`] for each, in order, checked once at the end: overrides that only fit together are fine.
@@ -121,7 +142,9 @@ impl Scene {
 
     /// The via points of the hand, if the scene has any.
     pub fn hand_path(&self) -> Result<Option<DeviceTrace>, FileError> {
-        let Some(hand) = &self.spec.hand else { return Ok(None) };
+        let Some(hand) = &self.spec.hand else {
+            return Ok(None);
+        };
         if let (Origin::Shipped, Some(text)) = (&self.origin, shipped_file(&hand.path)) {
             return DeviceTrace::parse(&hand.path, text).map(Some);
         }
@@ -141,17 +164,30 @@ impl Scene {
         if let Origin::Directory(directory) = &self.origin {
             places.push(directory.join(name));
         }
-        places.extend(data_dirs().into_iter().map(|directory| directory.join(name)));
+        places.extend(
+            data_dirs()
+                .into_iter()
+                .map(|directory| directory.join(name)),
+        );
         if let Some(found) = places.iter().find(|place| place.is_file()) {
             return Ok(found.clone());
         }
-        let looked: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
-        let looked = if looked.is_empty() { "there is no data directory".into() } else { format!("looked for {}", looked.join(" and ")) };
+        let looked: Vec<String> = places
+            .iter()
+            .map(|place| place.display().to_string())
+            .collect();
+        let looked = if looked.is_empty() {
+            "there is no data directory".into()
+        } else {
+            format!("looked for {}", looked.join(" and "))
+        };
         let help = if name.starts_with("bunny") {
             "run scripts/get-bunny, or name the directory that holds it in TAUT_DATA"
         } else {
             "check the path, or name the directory that holds it in TAUT_DATA"
         };
-        Err(at.problem(format!("the file \"{name}\" does not exist ({looked}); {help}")))
+        Err(at.problem(format!(
+            "the file \"{name}\" does not exist ({looked}); {help}"
+        )))
     }
 }

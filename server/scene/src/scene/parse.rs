@@ -7,8 +7,8 @@ use nalgebra::Point3;
 
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, ObstacleSpec,
-    ReferencePoint, View,
+    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
+    MethodSpec, ObstacleSpec, ReferencePoint, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::problem::FileError;
@@ -34,7 +34,9 @@ pub(super) struct SceneSpec {
 pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     let problems = RefCell::new(Vec::new());
     let root = Section::root(&document.root, &problems);
-    let name = root.required_text("name", "name = \"my-scene\"").map(str::to_owned);
+    let name = root
+        .required_text("name", "name = \"my-scene\"")
+        .map(str::to_owned);
     let god_object = match root.section("god_object") {
         Some(section) => god_object(section),
         None => {
@@ -56,29 +58,60 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     found.sort_by_key(|problem| problem.line.unwrap_or(usize::MAX));
     let (Some(name), Some(god_object), true) = (name, god_object, found.is_empty()) else {
         FileError::unless_empty(found)?;
-        return Err(document.root.at.problem("is no scene; give it a name and a god_object").into());
+        return Err(document
+            .root
+            .at
+            .problem("is no scene; give it a name and a god_object")
+            .into());
     };
-    Ok(SceneSpec { name, god_object, obstacles, coupling, limits, method, hand, view })
+    Ok(SceneSpec {
+        name,
+        god_object,
+        obstacles,
+        coupling,
+        limits,
+        method,
+        hand,
+        view,
+    })
 }
 
 fn god_object(section: Section<'_>) -> Option<BodySpec> {
-    let shape_at = section.get("shape").map_or(section.at(), |node| &node.at).clone();
+    let shape_at = section
+        .get("shape")
+        .map_or(section.at(), |node| &node.at)
+        .clone();
     let shape = shape(&section);
     let mass = mass(&section);
     let pose = pose(&section);
     let reference_point = reference_point(&section);
     let at = section.at().clone();
     section.finish();
-    Some(BodySpec { shape: shape?, mass: mass?, pose: pose?, reference_point: reference_point?, at, shape_at })
+    Some(BodySpec {
+        shape: shape?,
+        mass: mass?,
+        pose: pose?,
+        reference_point: reference_point?,
+        at,
+        shape_at,
+    })
 }
 
 fn mass(section: &Section<'_>) -> Option<MassSpec> {
     let mass = section.number("mass", Range::Positive).map(MassSpec::Mass);
-    let density = section.number("density", Range::Positive).map(MassSpec::Density);
+    let density = section
+        .number("density", Range::Positive)
+        .map(MassSpec::Density);
     match (section.has("mass"), section.has("density")) {
         (true, true) => {
             let at = section.get("density").map_or(section.at(), |node| &node.at);
-            section.complain(at, format!("{} has both `mass` and `density`; leave one out", section.name()));
+            section.complain(
+                at,
+                format!(
+                    "{} has both `mass` and `density`; leave one out",
+                    section.name()
+                ),
+            );
             None
         }
         (false, false) => {
@@ -96,30 +129,50 @@ fn reference_point(section: &Section<'_>) -> Option<ReferencePoint> {
             let point = section.numbers::<3>("reference_point", Range::Finite)?;
             Some(ReferencePoint::At(Point3::from(point)))
         }
-        Some(_) => section.choice("reference_point", &[("center-of-mass", ReferencePoint::CenterOfMass)]),
+        Some(_) => section.choice(
+            "reference_point",
+            &[("center-of-mass", ReferencePoint::CenterOfMass)],
+        ),
     }
 }
 
 fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
     let mut obstacles: Vec<ObstacleSpec> = Vec::new();
     for section in root.sections("obstacle") {
-        let shape_at = section.get("shape").map_or(section.at(), |node| &node.at).clone();
-        let name = section.required_text("name", "name = \"box\"").map(str::to_owned);
+        let shape_at = section
+            .get("shape")
+            .map_or(section.at(), |node| &node.at)
+            .clone();
+        let name = section
+            .required_text("name", "name = \"box\"")
+            .map(str::to_owned);
         if let Some(name) = &name
             && obstacles.iter().any(|other| other.name == *name)
         {
             let at = section.get("name").map_or(section.at(), |node| &node.at);
-            section.complain(at, format!("there are two obstacles of the name \"{name}\"; rename one"));
+            section.complain(
+                at,
+                format!("there are two obstacles of the name \"{name}\"; rename one"),
+            );
         }
         let (shape, pose, surface) = (shape(&section), pose(&section), surface(&section));
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
-            section.complain(at, format!("there are more than {MAX_OBSTACLES} obstacles; join some meshes"));
+            section.complain(
+                at,
+                format!("there are more than {MAX_OBSTACLES} obstacles; join some meshes"),
+            );
             return obstacles;
         }
         section.finish();
         if let (Some(name), Some(shape), Some(pose)) = (name, shape, pose) {
-            obstacles.push(ObstacleSpec { name, shape, pose, surface, shape_at });
+            obstacles.push(ObstacleSpec {
+                name,
+                shape,
+                pose,
+                surface,
+                shape_at,
+            });
         }
     }
     obstacles
@@ -127,16 +180,24 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
 
 fn coupling(section: Section<'_>) -> CouplingSpec {
     let rotation_metric = match section.get("rotation_metric").map(|node| &node.value) {
-        Some(Value::Text(_)) => section.choice("rotation_metric", &[("inertia", RotationMetric::Inertia)]),
-        _ => section.number("rotation_metric", Range::Positive).map(RotationMetric::RadiusOfGyration),
+        Some(Value::Text(_)) => {
+            section.choice("rotation_metric", &[("inertia", RotationMetric::Inertia)])
+        }
+        _ => section
+            .number("rotation_metric", Range::Positive)
+            .map(RotationMetric::RadiusOfGyration),
     };
     let adaptation = match section.get("adaptation").map(|node| &node.value) {
         Some(Value::Boolean(false)) => Some(AdaptationSpec::Off),
         _ => section.section("adaptation").and_then(|table| {
             let duration = table.required_number("duration", Range::NotNegative, "duration = 0.02");
-            let threshold = table.required_number("threshold", Range::NotPositive, "threshold = -1e-3");
+            let threshold =
+                table.required_number("threshold", Range::NotPositive, "threshold = -1e-3");
             table.finish();
-            Some(AdaptationSpec::On(Adaptation { duration: duration?, threshold: threshold? }))
+            Some(AdaptationSpec::On(Adaptation {
+                duration: duration?,
+                threshold: threshold?,
+            }))
         }),
     };
     let spec = CouplingSpec {
@@ -175,7 +236,9 @@ fn method(section: Section<'_>) -> MethodSpec {
         max_constraints: count("max_constraints").map(|n| n as usize),
         max_substeps: count("max_substeps").map(|n| n as u32),
         max_advancement_steps: count("max_advancement_steps").map(|n| n as u32),
-        work_budget: section.integer("work_budget", 1, i64::MAX).map(|n| n as u64),
+        work_budget: section
+            .integer("work_budget", 1, i64::MAX)
+            .map(|n| n as u64),
         solver: section.choice("solver", &SOLVERS),
     };
     section.finish();
@@ -183,18 +246,36 @@ fn method(section: Section<'_>) -> MethodSpec {
 }
 
 fn hand(section: Section<'_>) -> Option<HandPathSpec> {
-    let at = section.get("path").map_or(section.at(), |node| &node.at).clone();
-    let path = section.required_text("path", "path = \"hand.csv\"").map(str::to_owned);
+    let at = section
+        .get("path")
+        .map_or(section.at(), |node| &node.at)
+        .clone();
+    let path = section
+        .required_text("path", "path = \"hand.csv\"")
+        .map(str::to_owned);
     let repeat = section.boolean("loop").unwrap_or(false);
-    let preset = section.choice("preset", &HandPreset::NAMED).unwrap_or_default();
+    let preset = section
+        .choice("preset", &HandPreset::NAMED)
+        .unwrap_or_default();
     section.finish();
-    Some(HandPathSpec { path: path?, repeat, preset, at })
+    Some(HandPathSpec {
+        path: path?,
+        repeat,
+        preset,
+        at,
+    })
 }
 
 fn view(section: Section<'_>) -> View {
     let display_scale = section.number_or("display_scale", Range::Positive, 1.0);
-    let origin = section.numbers::<3>("origin", Range::Finite).map(Point3::from);
+    let origin = section
+        .numbers::<3>("origin", Range::Finite)
+        .map(Point3::from);
     let rotation = rotation_of(&section);
     section.finish();
-    View { display_scale, origin, rotation }
+    View {
+        display_scale,
+        origin,
+        rotation,
+    }
 }

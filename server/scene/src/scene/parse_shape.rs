@@ -21,20 +21,29 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 
 const AXES: [(&str, Axis); 3] = [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)];
 
+/// Reads one primitive's table.
+type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
+
 /// `shape = { ... }`; complaints go to the section.
 pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     let Some(shape) = body.section("shape") else {
         if !body.has("shape") {
-            body.complain_missing("shape", "shape = { mesh = \"body.ply\" } or { sphere = { radius = 0.01 } }");
+            body.complain_missing(
+                "shape",
+                "shape = { mesh = \"body.ply\" } or { sphere = { radius = 0.01 } }",
+            );
         }
         return None;
     };
     let mut found = Vec::new();
     if let Some(path) = shape.text("mesh") {
         let scale = shape.number_or("scale", Range::Positive, 1.0);
-        found.push(Some(Shape::Mesh { path: path.to_owned(), scale }));
+        found.push(Some(Shape::Mesh {
+            path: path.to_owned(),
+            scale,
+        }));
     }
-    let primitives: [(&'static str, fn(&Section<'_>) -> Option<Shape>); 6] = [
+    let primitives: [(&'static str, ReadPrimitive); 6] = [
         ("sphere", sphere),
         ("box", cuboid),
         ("capsule", capsule),
@@ -54,11 +63,18 @@ pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     let count = found.len();
     let wrong_mesh = shape.has("mesh") && count == 0;
     if count != 1 && !wrong_mesh {
-        let text = format!("{} names {count} forms, but must name one: mesh, sphere, box, capsule, cylinder, box_with_hole or plane", shape.name());
+        let text = format!(
+            "{} names {count} forms, but must name one: mesh, sphere, box, capsule, cylinder, box_with_hole or plane",
+            shape.name()
+        );
         shape.complain(at, text);
     }
     shape.finish();
-    if count == 1 { found.pop().flatten() } else { None }
+    if count == 1 {
+        found.pop().flatten()
+    } else {
+        None
+    }
 }
 
 fn axis(section: &Section<'_>, default: Axis) -> Axis {
@@ -66,7 +82,10 @@ fn axis(section: &Section<'_>, default: Axis) -> Axis {
 }
 
 fn facets(section: &Section<'_>, (low, high): (i64, i64), default: usize) -> usize {
-    section.integer("facets", low, high).and_then(|n| usize::try_from(n).ok()).unwrap_or(default)
+    section
+        .integer("facets", low, high)
+        .and_then(|n| usize::try_from(n).ok())
+        .unwrap_or(default)
 }
 
 fn radius(section: &Section<'_>) -> Option<f64> {
@@ -85,24 +104,41 @@ fn half_extents(section: &Section<'_>) -> Option<[f64; 3]> {
 }
 
 fn sphere(section: &Section<'_>) -> Option<Shape> {
-    let subdivisions = section.integer("subdivisions", 0, MAX_SUBDIVISIONS).unwrap_or(SUBDIVISIONS) as u32;
-    Some(Shape::Sphere { radius: radius(section)?, subdivisions })
+    let subdivisions = section
+        .integer("subdivisions", 0, MAX_SUBDIVISIONS)
+        .unwrap_or(SUBDIVISIONS) as u32;
+    Some(Shape::Sphere {
+        radius: radius(section)?,
+        subdivisions,
+    })
 }
 
 fn cuboid(section: &Section<'_>) -> Option<Shape> {
-    Some(Shape::Box { half_extents: half_extents(section)? })
+    Some(Shape::Box {
+        half_extents: half_extents(section)?,
+    })
 }
 
 fn capsule(section: &Section<'_>) -> Option<Shape> {
     let (facets, axis) = (facets(section, ROUND_FACETS, 48), axis(section, Axis::Y));
     let (radius, half_length) = (radius(section), half_length(section));
-    Some(Shape::Capsule { radius: radius?, half_length: half_length?, facets, axis })
+    Some(Shape::Capsule {
+        radius: radius?,
+        half_length: half_length?,
+        facets,
+        axis,
+    })
 }
 
 fn cylinder(section: &Section<'_>) -> Option<Shape> {
     let (facets, axis) = (facets(section, FACETS, 72), axis(section, Axis::Y));
     let (radius, half_length) = (radius(section), half_length(section));
-    Some(Shape::Cylinder { radius: radius?, half_length: half_length?, facets, axis })
+    Some(Shape::Cylinder {
+        radius: radius?,
+        half_length: half_length?,
+        facets,
+        axis,
+    })
 }
 
 fn box_with_hole(section: &Section<'_>) -> Option<Shape> {
@@ -120,14 +156,23 @@ fn box_with_hole(section: &Section<'_>) -> Option<Shape> {
         section.complain(section.at(), text);
         return None;
     }
-    Some(Shape::BoxWithHole { half_extents, radius, facets, axis })
+    Some(Shape::BoxWithHole {
+        half_extents,
+        radius,
+        facets,
+        axis,
+    })
 }
 
 fn plane(section: &Section<'_>) -> Option<Shape> {
     let axis = axis(section, Axis::Z);
     let size = section.number_or("size", Range::Positive, 1.0);
     let thickness = section.number_or("thickness", Range::Positive, 0.1);
-    Some(Shape::Plane { size, thickness, axis })
+    Some(Shape::Plane {
+        size,
+        thickness,
+        axis,
+    })
 }
 
 /// `pose = { position, rotation }`; what is left out is zero or no rotation.
@@ -143,8 +188,15 @@ pub(super) fn pose(body: &Section<'_>) -> Option<Pose> {
 /// The pose in a table that holds `position` and `rotation`.
 pub(crate) fn pose_of(section: &Section<'_>) -> Option<Pose> {
     let position = position_or_zero(section, "position");
-    let rotation = if section.has("rotation") { rotation_of(section)? } else { UnitQuaternion::identity() };
-    Some(Pose::from_parts(Translation3::from(position?.coords), rotation))
+    let rotation = if section.has("rotation") {
+        rotation_of(section)?
+    } else {
+        UnitQuaternion::identity()
+    };
+    Some(Pose::from_parts(
+        Translation3::from(position?.coords),
+        rotation,
+    ))
 }
 
 /// `rotation`, w x y z, if it is there and a rotation.
@@ -152,22 +204,31 @@ pub(crate) fn rotation_of(section: &Section<'_>) -> Option<UnitQuaternion<f64>> 
     let wxyz = section.numbers::<4>("rotation", Range::Finite)?;
     unit_quaternion(wxyz)
         .map_err(|text| {
-            let at = section.get("rotation").map_or(section.at(), |node| &node.at);
+            let at = section
+                .get("rotation")
+                .map_or(section.at(), |node| &node.at);
             section.complain(at, format!("`rotation` in {}: {text}", section.name()));
         })
         .ok()
 }
 
 fn position_or_zero(section: &Section<'_>, key: &'static str) -> Option<Point3<f64>> {
-    if section.has(key) { section.numbers::<3>(key, Range::Finite).map(Point3::from) } else { Some(Point3::origin()) }
+    if section.has(key) {
+        section.numbers::<3>(key, Range::Finite).map(Point3::from)
+    } else {
+        Some(Point3::origin())
+    }
 }
 
 /// `surface = { shading, texture, friction }`, all optional.
 pub(super) fn surface(body: &Section<'_>) -> Surface {
     let mut surface = Surface::default();
-    let Some(section) = body.section("surface") else { return surface };
+    let Some(section) = body.section("surface") else {
+        return surface;
+    };
     if let Some(shading) = section.section("shading") {
-        let angle = shading.required_number("crease_angle", Range::UpTo(HALF_TURN), "crease_angle = 0.6");
+        let angle =
+            shading.required_number("crease_angle", Range::UpTo(HALF_TURN), "crease_angle = 0.6");
         surface.shading = angle.map(|crease_angle| ForceShading { crease_angle });
         shading.finish();
     }
@@ -176,13 +237,18 @@ pub(super) fn surface(body: &Section<'_>) -> Surface {
             surface.texture = sine_texture(&sine);
             sine.finish();
         } else if !texture.has("sine") {
-            texture.complain_missing("sine", "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }");
+            texture.complain_missing(
+                "sine",
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+            );
         }
         texture.finish();
     }
     let friction = section.number_or("friction", Range::NotNegative, 0.0);
     if friction > 0.0 {
-        let at = section.get("friction").map_or(section.at(), |node| &node.at);
+        let at = section
+            .get("friction")
+            .map_or(section.at(), |node| &node.at);
         section.complain(at, format!("`friction` in {} is {friction}, but surfaces are frictionless in this version; write 0.0 or leave it out", section.name()));
     }
     section.finish();
@@ -199,7 +265,13 @@ fn sine_texture(sine: &Section<'_>) -> Option<SineTexture> {
             let direction = sine.numbers::<3>("axis", Range::Finite).map(Vector3::from);
             let unit = direction.and_then(|d| Unit::try_new(d, f64::MIN_POSITIVE));
             if direction.is_some() && unit.is_none() {
-                sine.complain(&node.at, format!("`axis` in {} has no direction; write a vector that is not zero", sine.name()));
+                sine.complain(
+                    &node.at,
+                    format!(
+                        "`axis` in {} has no direction; write a vector that is not zero",
+                        sine.name()
+                    ),
+                );
             }
             unit.map(Unit::into_inner)
         }
@@ -207,5 +279,9 @@ fn sine_texture(sine: &Section<'_>) -> Option<SineTexture> {
     };
     let wavelength = sine.required_number("wavelength", Range::Positive, "wavelength = 2e-3");
     let amplitude = sine.required_number("amplitude", Range::NotNegative, "amplitude = 0.2");
-    Some(SineTexture { axis: axis?, wavelength: wavelength?, amplitude: amplitude? })
+    Some(SineTexture {
+        axis: axis?,
+        wavelength: wavelength?,
+        amplitude: amplitude?,
+    })
 }

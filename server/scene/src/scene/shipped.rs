@@ -31,17 +31,32 @@ pub const SHIPPED_SCENES: [ShippedScene; 3] = [
 
 /// Files that shipped scenes refer to.
 const FILES: [(&str, &str); 3] = [
-    ("peg-in-a-hole.csv", include_str!("../../../scenes/peg-in-a-hole.csv")),
-    ("two-bunnies.csv", include_str!("../../../scenes/two-bunnies.csv")),
-    ("sphere-on-plane.csv", include_str!("../../../scenes/sphere-on-plane.csv")),
+    (
+        "peg-in-a-hole.csv",
+        include_str!("../../../scenes/peg-in-a-hole.csv"),
+    ),
+    (
+        "two-bunnies.csv",
+        include_str!("../../../scenes/two-bunnies.csv"),
+    ),
+    (
+        "sphere-on-plane.csv",
+        include_str!("../../../scenes/sphere-on-plane.csv"),
+    ),
 ];
 
 /// The text of a shipped scene, to be copied and changed.
 pub fn shipped_scene_text(name: &str) -> Option<&'static str> {
-    SHIPPED_SCENES.iter().find(|scene| scene.name == name).map(|scene| scene.text)
+    SHIPPED_SCENES
+        .iter()
+        .find(|scene| scene.name == name)
+        .map(|scene| scene.text)
 }
 
 /// The text of a file that shipped scenes refer to.
 pub(super) fn shipped_file(name: &str) -> Option<&'static str> {
-    FILES.iter().find(|(file, _)| *file == name).map(|(_, text)| *text)
+    FILES
+        .iter()
+        .find(|(file, _)| *file == name)
+        .map(|(_, text)| *text)
 }

@@ -193,8 +193,12 @@ pub enum HandPreset {
 
 impl HandPreset {
     /// All, with their names in files.
-    pub const NAMED: [(&'static str, Self); 4] =
-        [("released", Self::Released), ("light", Self::Light), ("firm", Self::Firm), ("arm", Self::Arm)];
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("released", Self::Released),
+        ("light", Self::Light),
+        ("firm", Self::Firm),
+        ("arm", Self::Arm),
+    ];
 
     /// The name in files.
     pub fn name(self) -> &'static str {
@@ -232,6 +236,10 @@ pub struct View {
 
 impl Default for View {
     fn default() -> Self {
-        Self { display_scale: 1.0, origin: None, rotation: None }
+        Self {
+            display_scale: 1.0,
+            origin: None,
+            rotation: None,
+        }
     }
 }

@@ -48,7 +48,7 @@ impl Axis {
 /// Cosine and sine of the `k`-th of `n` directions, the first one along u. Exact along the axes.
 pub(super) fn direction(k: usize, n: usize) -> (f64, f64) {
     let quarter = |i: usize| [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][i % 4];
-    if 4 * k % n == 0 {
+    if (4 * k).is_multiple_of(n) {
         return quarter(4 * k / n);
     }
     let angle = std::f64::consts::TAU * k as f64 / n as f64;

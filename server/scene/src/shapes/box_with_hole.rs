@@ -21,12 +21,17 @@ pub fn box_with_hole(half_extents: [f64; 3], radius: f64, facets: usize, axis: A
     for side in [-1.0, 1.0] {
         for k in 0..facets {
             let (sin, cos) = angle(k).sin_cos();
-            mesh.vertices.push(axis.point(circumradius * cos, circumradius * sin, side * half_along));
+            mesh.vertices.push(axis.point(
+                circumradius * cos,
+                circumradius * sin,
+                side * half_along,
+            ));
         }
     }
     for side in [-1.0, 1.0] {
         for (u, v) in [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)] {
-            mesh.vertices.push(axis.point(u * half_u, v * half_v, side * half_along));
+            mesh.vertices
+                .push(axis.point(u * half_u, v * half_v, side * half_along));
         }
     }
     let low = |k: u32| k % n;
@@ -39,16 +44,28 @@ pub fn box_with_hole(half_extents: [f64; 3], radius: f64, facets: usize, axis: A
         mesh.push_polygon(&[low(k + 1), low(k), high(k), high(k + 1)]);
         // The flat from vertex k to k + 1 has its middle at 2 pi k / n: its corner is that of the middle's quadrant.
         let quadrant = 4 * k / n;
-        mesh.triangles.push([high(k), high_corner(quadrant), high(k + 1)]);
-        mesh.triangles.push([low(k + 1), low_corner(quadrant), low(k)]);
+        mesh.triangles
+            .push([high(k), high_corner(quadrant), high(k + 1)]);
+        mesh.triangles
+            .push([low(k + 1), low_corner(quadrant), low(k)]);
         let next_quadrant = 4 * (k + 1) / n;
         if next_quadrant != quadrant {
-            mesh.triangles.push([high(k + 1), high_corner(quadrant), high_corner(next_quadrant)]);
-            mesh.triangles.push([low(k + 1), low_corner(next_quadrant), low_corner(quadrant)]);
+            mesh.triangles.push([
+                high(k + 1),
+                high_corner(quadrant),
+                high_corner(next_quadrant),
+            ]);
+            mesh.triangles
+                .push([low(k + 1), low_corner(next_quadrant), low_corner(quadrant)]);
         }
     }
     for q in 0..4 {
-        mesh.push_polygon(&[low_corner(q), low_corner(q + 1), high_corner(q + 1), high_corner(q)]);
+        mesh.push_polygon(&[
+            low_corner(q),
+            low_corner(q + 1),
+            high_corner(q + 1),
+            high_corner(q),
+        ]);
     }
     mesh
 }

@@ -11,8 +11,18 @@ pub fn cuboid(half_extents: [f64; 3]) -> RawMesh {
         .map(|i| Point3::new(sign(i, 1) * x, sign(i, 2) * y, sign(i, 4) * z))
         .collect();
     // Each face anticlockwise from outside; corner = 1 (x) + 2 (y) + 4 (z).
-    const FACES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let mut mesh = RawMesh { vertices, triangles: Vec::with_capacity(12) };
+    const FACES: [[u32; 4]; 6] = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let mut mesh = RawMesh {
+        vertices,
+        triangles: Vec::with_capacity(12),
+    };
     for face in &FACES {
         mesh.push_polygon(face);
     }

@@ -12,8 +12,10 @@ pub fn cylinder(radius: f64, half_length: f64, facets: usize, axis: Axis) -> Raw
     let mut mesh = RawMesh::default();
     for k in 0..facets {
         let (cos, sin) = direction(k, facets);
-        mesh.vertices.push(axis.point(radius * cos, radius * sin, -half_length));
-        mesh.vertices.push(axis.point(radius * cos, radius * sin, half_length));
+        mesh.vertices
+            .push(axis.point(radius * cos, radius * sin, -half_length));
+        mesh.vertices
+            .push(axis.point(radius * cos, radius * sin, half_length));
     }
     mesh.vertices.push(axis.point(0.0, 0.0, -half_length));
     mesh.vertices.push(axis.point(0.0, 0.0, half_length));

@@ -7,7 +7,8 @@ use crate::mesh_file::RawMesh;
 /// 12 triangles. It is bounded: what goes over its rim falls off.
 pub fn plane(size: f64, thickness: f64, axis: Axis) -> RawMesh {
     let normal = axis.unit();
-    let half = normal * (thickness / 2.0) + (nalgebra::Vector3::repeat(1.0) - normal) * (size / 2.0);
+    let half =
+        normal * (thickness / 2.0) + (nalgebra::Vector3::repeat(1.0) - normal) * (size / 2.0);
     let mut mesh = cuboid([half.x, half.y, half.z]);
     for vertex in &mut mesh.vertices {
         *vertex -= normal * (thickness / 2.0);

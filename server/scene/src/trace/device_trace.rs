@@ -42,12 +42,22 @@ pub struct DeviceTrace {
 
 impl DeviceTrace {
     /// Checks times and poses of samples made by a program.
-    pub fn new(name: &str, samples: Vec<TraceSample>, has_buttons: bool) -> Result<Self, FileError> {
+    pub fn new(
+        name: &str,
+        samples: Vec<TraceSample>,
+        has_buttons: bool,
+    ) -> Result<Self, FileError> {
         let mut last = f64::NEG_INFINITY;
         for (number, sample) in samples.iter().enumerate() {
             let increasing = sample.time > last; // false for NaN
-            if !increasing || sample.time.abs() > MAX_TRACE_TIME || !god_object::spatial::pose_is_finite(&sample.pose) {
-                let text = format!("sample {number} at t = {} is out of order or not finite; write increasing times", sample.time);
+            if !increasing
+                || sample.time.abs() > MAX_TRACE_TIME
+                || !god_object::spatial::pose_is_finite(&sample.pose)
+            {
+                let text = format!(
+                    "sample {number} at t = {} is out of order or not finite; write increasing times",
+                    sample.time
+                );
                 return Err(Problem::of_file(name, text).into());
             }
             last = sample.time;
@@ -55,25 +65,40 @@ impl DeviceTrace {
         if samples.is_empty() {
             return Err(Problem::of_file(name, "has no samples; record at least one").into());
         }
-        Ok(Self { samples, has_buttons })
+        Ok(Self {
+            samples,
+            has_buttons,
+        })
     }
 
     /// Reads a file.
     pub fn load(path: &Path) -> Result<Self, FileError> {
-        Self::parse(&path.display().to_string(), &read_text(path, MAX_TRACE_BYTES)?)
+        Self::parse(
+            &path.display().to_string(),
+            &read_text(path, MAX_TRACE_BYTES)?,
+        )
     }
 
     /// Reads text; `file` is its name in messages. Up to 20 faults are reported, each with its line.
     pub fn parse(file: &str, text: &str) -> Result<Self, FileError> {
-        let mut reader =
-            csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|e| Problem::of_file(file, format!("is no CSV ({e}); repair it")))?.clone();
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .comment(Some(b'#'))
+            .from_reader(text.as_bytes());
+        let header = reader
+            .headers()
+            .map_err(|e| Problem::of_file(file, format!("is no CSV ({e}); repair it")))?
+            .clone();
         let names: Vec<&str> = header.iter().collect();
         let has_buttons = names.len() == COLUMNS.len() + 1 && names[COLUMNS.len()] == BUTTONS;
         if !names.starts_with(&COLUMNS) || (names.len() > COLUMNS.len() && !has_buttons) {
             let line = header.position().map_or(1, |p| p.line() as usize);
             let found: String = names.join(",").chars().take(100).collect();
-            let text = format!("the header is `{found}`, but must be `{}` and optionally `{BUTTONS}`", COLUMNS.join(","));
+            let text = format!(
+                "the header is `{found}`, but must be `{}` and optionally `{BUTTONS}`",
+                COLUMNS.join(",")
+            );
             return Err(Problem::at_line(file, line, text).into());
         }
         let mut problems = Vec::new();
@@ -89,7 +114,10 @@ impl DeviceTrace {
                         Err(text) => problems.push(Problem::at_line(file, line, text)),
                     }
                 }
-                Err(e) => problems.push(Problem::of_file(file, format!("is no CSV ({e}); repair it"))),
+                Err(e) => problems.push(Problem::of_file(
+                    file,
+                    format!("is no CSV ({e}); repair it"),
+                )),
             }
         }
         FileError::unless_empty(problems)?;
@@ -122,9 +150,16 @@ impl DeviceTrace {
         let mut text = COLUMNS.join(",");
         text.push_str(if self.has_buttons { ",buttons\n" } else { "\n" });
         for sample in &self.samples {
-            let (p, q) = (sample.pose.translation.vector, sample.pose.rotation.quaternion());
+            let (p, q) = (
+                sample.pose.translation.vector,
+                sample.pose.rotation.quaternion(),
+            );
             // Writing to a String cannot fail.
-            let _ = write!(text, "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?}", sample.time, p.x, p.y, p.z, q.w, q.i, q.j, q.k);
+            let _ = write!(
+                text,
+                "{:?},{:?},{:?},{:?},{:?},{:?},{:?},{:?}",
+                sample.time, p.x, p.y, p.z, q.w, q.i, q.j, q.k
+            );
             if self.has_buttons {
                 let _ = write!(text, ",{}", sample.buttons);
             }
@@ -134,38 +169,63 @@ impl DeviceTrace {
     }
 }
 
-fn sample(record: &csv::StringRecord, has_buttons: bool, previous: Option<f64>) -> Result<TraceSample, String> {
+fn sample(
+    record: &csv::StringRecord,
+    has_buttons: bool,
+    previous: Option<f64>,
+) -> Result<TraceSample, String> {
     let wanted = COLUMNS.len() + usize::from(has_buttons);
     if record.len() != wanted {
-        return Err(format!("the line has {} values, but must have {wanted}; repair the line", record.len()));
+        return Err(format!(
+            "the line has {} values, but must have {wanted}; repair the line",
+            record.len()
+        ));
     }
     let mut numbers = [0.0; 8];
     for ((number, name), word) in numbers.iter_mut().zip(COLUMNS).zip(record) {
-        *number = word.parse().map_err(|_| format!("`{name}` is `{word}`, which is no number; repair the line"))?;
+        *number = word
+            .parse()
+            .map_err(|_| format!("`{name}` is `{word}`, which is no number; repair the line"))?;
         if !f64::is_finite(*number) {
-            return Err(format!("`{name}` is {number}, but must be finite; repair the line"));
+            return Err(format!(
+                "`{name}` is {number}, but must be finite; repair the line"
+            ));
         }
     }
     let [time, x, y, z, qw, qx, qy, qz] = numbers;
     if time.abs() > MAX_TRACE_TIME {
-        return Err(format!("`t` is {time}, but times are seconds and at most {MAX_TRACE_TIME:e}; convert them"));
+        return Err(format!(
+            "`t` is {time}, but times are seconds and at most {MAX_TRACE_TIME:e}; convert them"
+        ));
     }
     if let Some(previous) = previous.filter(|previous| time <= *previous) {
-        return Err(format!("`t` is {time} after {previous}, but times must increase; remove or reorder the line"));
+        return Err(format!(
+            "`t` is {time} after {previous}, but times must increase; remove or reorder the line"
+        ));
     }
     let buttons = match record.get(COLUMNS.len()) {
-        Some(word) => word.parse().map_err(|_| format!("`{BUTTONS}` is `{word}`, but must be 0 to 65535; repair the line"))?,
+        Some(word) => word.parse().map_err(|_| {
+            format!("`{BUTTONS}` is `{word}`, but must be 0 to 65535; repair the line")
+        })?,
         None => 0,
     };
-    let pose = Pose::from_parts(Translation3::new(x, y, z), unit_quaternion([qw, qx, qy, qz])?);
-    Ok(TraceSample { time, pose, buttons })
+    let pose = Pose::from_parts(
+        Translation3::new(x, y, z),
+        unit_quaternion([qw, qx, qy, qz])?,
+    );
+    Ok(TraceSample {
+        time,
+        pose,
+        buttons,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const GOOD: &str = "t,x,y,z,qw,qx,qy,qz\n0.0,0.1,0.2,0.3,1,0,0,0\n0.001,0.1,0.2,0.3,0.7071,0.7071,0,0\n";
+    const GOOD: &str =
+        "t,x,y,z,qw,qx,qy,qz\n0.0,0.1,0.2,0.3,1,0,0,0\n0.001,0.1,0.2,0.3,0.7071,0.7071,0,0\n";
 
     fn fault(text: &str) -> String {
         DeviceTrace::parse("a.csv", text).unwrap_err().to_string()
@@ -195,25 +255,58 @@ mod tests {
     #[test]
     fn every_fault_names_file_and_line() {
         let cases = [
-            (GOOD.replace("0.001,", "0.0,"), "a.csv:3: `t` is 0 after 0, but times must increase"),
-            (GOOD.replace("0.7071,0.7071", "0.7,0.7"), "a.csv:3: the quaternion has norm 0.98"),
-            (GOOD.replace("0.0,0.1", "0.0,NaN"), "a.csv:2: `x` is NaN, but must be finite"),
-            (GOOD.replace("0.0,0.1", "0.0,one"), "a.csv:2: `x` is `one`, which is no number"),
-            (GOOD.replace("0.0,0.1,", "0.0,"), "a.csv:2: the line has 7 values, but must have 8"),
-            (GOOD.replace("t,x", "t,X"), "a.csv:1: the header is `t,X,y,z,qw,qx,qy,qz`, but must be"),
-            (GOOD.replace("0.001", "1e12"), "a.csv:3: `t` is 1000000000000, but times are seconds"),
+            (
+                GOOD.replace("0.001,", "0.0,"),
+                "a.csv:3: `t` is 0 after 0, but times must increase",
+            ),
+            (
+                GOOD.replace("0.7071,0.7071", "0.7,0.7"),
+                "a.csv:3: the quaternion has norm 0.98",
+            ),
+            (
+                GOOD.replace("0.0,0.1", "0.0,NaN"),
+                "a.csv:2: `x` is NaN, but must be finite",
+            ),
+            (
+                GOOD.replace("0.0,0.1", "0.0,one"),
+                "a.csv:2: `x` is `one`, which is no number",
+            ),
+            (
+                GOOD.replace("0.0,0.1,", "0.0,"),
+                "a.csv:2: the line has 7 values, but must have 8",
+            ),
+            (
+                GOOD.replace("t,x", "t,X"),
+                "a.csv:1: the header is `t,X,y,z,qw,qx,qy,qz`, but must be",
+            ),
+            (
+                GOOD.replace("0.001", "1e12"),
+                "a.csv:3: `t` is 1000000000000, but times are seconds",
+            ),
             ("t,x,y,z,qw,qx,qy,qz\n".into(), "a.csv: has no samples"),
         ];
         for (text, expected) in cases {
-            assert!(fault(&text).starts_with(expected), "{} / {expected}", fault(&text));
+            assert!(
+                fault(&text).starts_with(expected),
+                "{} / {expected}",
+                fault(&text)
+            );
         }
     }
 
     #[test]
     fn several_faults_are_all_reported() {
-        let error = DeviceTrace::parse("a.csv", "t,x,y,z,qw,qx,qy,qz\n0,a,0,0,1,0,0,0\n1,0,0,0,2,0,0,0\n").unwrap_err();
+        let error = DeviceTrace::parse(
+            "a.csv",
+            "t,x,y,z,qw,qx,qy,qz\n0,a,0,0,1,0,0,0\n1,0,0,0,2,0,0,0\n",
+        )
+        .unwrap_err();
         let lines: Vec<_> = error.problems().iter().map(|p| p.line).collect();
         assert_eq!(lines, [Some(2), Some(3)]);
-        assert!(error.to_string().ends_with("(and one more fault; `taut check` lists all)"));
+        assert!(
+            error
+                .to_string()
+                .ends_with("(and one more fault; `taut check` lists all)")
+        );
     }
 }

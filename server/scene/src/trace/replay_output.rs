@@ -49,8 +49,16 @@ pub struct ReplayWriter<W> {
 impl<W: Write> ReplayWriter<W> {
     /// Writes the header.
     pub fn new(mut sink: W, timings: bool) -> io::Result<Self> {
-        writeln!(sink, "{REPLAY_COLUMNS}{}", if timings { TIMING_COLUMNS } else { "" })?;
-        Ok(Self { sink, timings, line: String::new() })
+        writeln!(
+            sink,
+            "{REPLAY_COLUMNS}{}",
+            if timings { TIMING_COLUMNS } else { "" }
+        )?;
+        Ok(Self {
+            sink,
+            timings,
+            line: String::new(),
+        })
     }
 
     /// Writes one row.
@@ -59,7 +67,9 @@ impl<W: Write> ReplayWriter<W> {
         self.number(row.time);
         self.pose(&row.device_pose);
         self.pose(&row.god_object_pose);
-        row.wrench.iter().for_each(|component| self.number(*component));
+        row.wrench
+            .iter()
+            .for_each(|component| self.number(*component));
         let _ = write!(self.line, ",{},{}", row.contacts, row.active); // writing to a String cannot fail
         for value in [row.gap_min, row.kkt, row.stale] {
             self.number(value);
@@ -99,8 +109,22 @@ mod tests {
 
     const ROW: ReplayRow = ReplayRow {
         time: 0.001,
-        device_pose: Pose { rotation: nalgebra::Unit::new_unchecked(nalgebra::Quaternion { coords: nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0) }), translation: nalgebra::Translation { vector: nalgebra::Vector3::new(0.1, -0.2, 1e-9) } },
-        god_object_pose: Pose { rotation: nalgebra::Unit::new_unchecked(nalgebra::Quaternion { coords: nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0) }), translation: nalgebra::Translation { vector: nalgebra::Vector3::new(1.0, 2.0, 3.0) } },
+        device_pose: Pose {
+            rotation: nalgebra::Unit::new_unchecked(nalgebra::Quaternion {
+                coords: nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0),
+            }),
+            translation: nalgebra::Translation {
+                vector: nalgebra::Vector3::new(0.1, -0.2, 1e-9),
+            },
+        },
+        god_object_pose: Pose {
+            rotation: nalgebra::Unit::new_unchecked(nalgebra::Quaternion {
+                coords: nalgebra::Vector4::new(0.0, 0.0, 0.0, 1.0),
+            }),
+            translation: nalgebra::Translation {
+                vector: nalgebra::Vector3::new(1.0, 2.0, 3.0),
+            },
+        },
         wrench: Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 0.1),
         contacts: 7,
         active: 2,
@@ -128,7 +152,13 @@ mod tests {
     #[test]
     fn timings_come_only_to_the_right() {
         let lines = written(true);
-        assert!(lines.lines().next().unwrap().ends_with(",stale,update_us,force_us"));
+        assert!(
+            lines
+                .lines()
+                .next()
+                .unwrap()
+                .ends_with(",stale,update_us,force_us")
+        );
         assert!(lines.ends_with(",0.0,12.5,3.0\n"));
     }
 }

@@ -46,7 +46,11 @@ impl Workbench {
     /// Reads a file. Paths in it are relative to it.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Self::parse(&path.display().to_string(), &read_text(path, MAX_TOML_BYTES)?, &directory)
+        Self::parse(
+            &path.display().to_string(),
+            &read_text(path, MAX_TOML_BYTES)?,
+            &directory,
+        )
     }
 
     /// Reads text; `file` is its name in messages, paths are relative to `directory`.
@@ -76,7 +80,10 @@ impl Workbench {
     /// Reads the scene that the workbench names.
     pub fn load_scene(&self) -> Result<Scene, FileError> {
         if shipped_scene_text(&self.scene).is_none() && !Path::new(&self.scene).is_file() {
-            let text = format!("the scene \"{}\" is neither shipped nor a file; write a shipped name or a path", self.scene);
+            let text = format!(
+                "the scene \"{}\" is neither shipped nor a file; write a shipped name or a path",
+                self.scene
+            );
             return Err(self.scene_at.problem(text).into());
         }
         Scene::named_or_file(&self.scene)

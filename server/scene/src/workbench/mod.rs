@@ -6,6 +6,6 @@ mod spec;
 
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo, TransportKind, Viewer,
-    Window,
+    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
+    TransportKind, Viewer, Window,
 };

@@ -9,8 +9,8 @@ use nalgebra::Point3;
 
 use super::load::Workbench;
 use super::spec::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo, TransportKind, Viewer,
-    Window,
+    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
+    TransportKind, Viewer, Window,
 };
 use crate::document::{Document, Range, Section};
 use crate::problem::FileError;
@@ -30,12 +30,22 @@ const MAX_CLIENTS: i64 = 256;
 pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, FileError> {
     let problems = RefCell::new(Vec::new());
     let root = Section::root(&document.root, &problems);
-    let name = root.required_text("name", "name = \"workbench\"").map(str::to_owned);
-    let scene = root.required_text("scene", "scene = \"peg-in-a-hole\"").map(|scene| {
-        if shipped_scene_text(scene).is_some() { scene.to_owned() } else { directory.join(scene).display().to_string() }
-    });
+    let name = root
+        .required_text("name", "name = \"workbench\"")
+        .map(str::to_owned);
+    let scene = root
+        .required_text("scene", "scene = \"peg-in-a-hole\"")
+        .map(|scene| {
+            if shipped_scene_text(scene).is_some() {
+                scene.to_owned()
+            } else {
+                directory.join(scene).display().to_string()
+            }
+        });
     let scene_at = root.get("scene").map_or(root.at(), |node| &node.at).clone();
-    let scene_origin = table(&root, "scene_origin", pose_of).flatten().unwrap_or_else(Pose::identity);
+    let scene_origin = table(&root, "scene_origin", pose_of)
+        .flatten()
+        .unwrap_or_else(Pose::identity);
     let screens = screens(&root);
     let nodes = nodes(&root, &screens);
     let viewer = match table(&root, "viewer", viewer) {
@@ -48,7 +58,12 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         }
     };
     let files = Files { directory };
-    let simulated = Device::Simulated { hand: None, path: None, tremor: 0.0, seed: 0 };
+    let simulated = Device::Simulated {
+        hand: None,
+        path: None,
+        tremor: 0.0,
+        seed: 0,
+    };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
     let network = network(root.section("network"), &root, &files);
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
@@ -59,10 +74,21 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     // In the order of the file, overrides last.
     found.sort_by_key(|problem| problem.line.unwrap_or(usize::MAX));
     FileError::unless_empty(found)?;
-    let (Some(name), Some(scene), Some(viewer), Some(device), Some(network), Some(monitoring), Some(realtime)) =
-        (name, scene, viewer, device, network, monitoring, realtime)
+    let (
+        Some(name),
+        Some(scene),
+        Some(viewer),
+        Some(device),
+        Some(network),
+        Some(monitoring),
+        Some(realtime),
+    ) = (name, scene, viewer, device, network, monitoring, realtime)
     else {
-        return Err(document.root.at.problem("is no workbench; compare it with the shipped workbench.toml").into());
+        return Err(document
+            .root
+            .at
+            .problem("is no workbench; compare it with the shipped workbench.toml")
+            .into());
     };
     Ok(Workbench {
         name,
@@ -92,7 +118,11 @@ impl Files<'_> {
 }
 
 /// Reads a table and complains of the keys that were not asked for.
-fn table<T>(parent: &Section<'_>, key: &'static str, read: impl FnOnce(&Section<'_>) -> T) -> Option<T> {
+fn table<T>(
+    parent: &Section<'_>,
+    key: &'static str,
+    read: impl FnOnce(&Section<'_>) -> T,
+) -> Option<T> {
     let section = parent.section(key)?;
     let value = read(&section);
     section.finish();
@@ -109,15 +139,28 @@ fn screens(root: &Section<'_>) -> Vec<Screen> {
             }
             section.numbers::<3>(key, Range::Finite).map(Point3::from)
         };
-        let corners = (corner("lower_left"), corner("lower_right"), corner("upper_left"));
-        if let (Some(name), (Some(lower_left), Some(lower_right), Some(upper_left))) = (name, corners) {
+        let corners = (
+            corner("lower_left"),
+            corner("lower_right"),
+            corner("upper_left"),
+        );
+        if let (Some(name), (Some(lower_left), Some(lower_right), Some(upper_left))) =
+            (name, corners)
+        {
             let (right, up) = (lower_right - lower_left, upper_left - lower_left);
             let square = right.dot(&up).abs() <= SQUARENESS * right.norm() * up.norm();
             if right.norm() < MIN_SCREEN_EDGE || up.norm() < MIN_SCREEN_EDGE || !square {
-                let text = format!("the corners of screen \"{name}\" are no rectangle; give lower left, lower right and upper left in metres");
+                let text = format!(
+                    "the corners of screen \"{name}\" are no rectangle; give lower left, lower right and upper left in metres"
+                );
                 section.complain(section.at(), text);
             }
-            screens.push(Screen { name, lower_left, lower_right, upper_left });
+            screens.push(Screen {
+                name,
+                lower_left,
+                lower_right,
+                upper_left,
+            });
         }
         section.finish();
     }
@@ -138,29 +181,58 @@ fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
         for (screen, at) in section.texts("screens").unwrap_or_default() {
             if !screens.iter().any(|known| known.name == screen) {
                 let known: Vec<&str> = screens.iter().map(|s| s.name.as_str()).collect();
-                let text = format!("{} draws the screen \"{screen}\", which does not exist; known screens: {}", section.name(), known.join(", "));
+                let text = format!(
+                    "{} draws the screen \"{screen}\", which does not exist; known screens: {}",
+                    section.name(),
+                    known.join(", ")
+                );
                 section.complain(at, text);
             } else if drawn.iter().any(|other| other == screen) {
-                section.complain(at, format!("{} draws the screen \"{screen}\" twice; remove one", section.name()));
+                section.complain(
+                    at,
+                    format!(
+                        "{} draws the screen \"{screen}\" twice; remove one",
+                        section.name()
+                    ),
+                );
             }
             drawn.push(screen.to_owned());
         }
-        if drawn.is_empty() && section.has("screens") {
-            section.complain(section.at(), format!("{} draws no screen; name at least one in `screens`", section.name()));
+        if let Some(list) = section.get("screens").filter(|_| drawn.is_empty()) {
+            section.complain(
+                &list.at,
+                format!(
+                    "{} draws no screen; name at least one in `screens`",
+                    section.name()
+                ),
+            );
         }
         let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
         let window = table(&section, "window", |window| {
-            let pixels = |key, default| window.integer(key, 16, MAX_PIXELS).map_or(default, |n| n as u32);
+            let pixels = |key, default| {
+                window
+                    .integer(key, 16, MAX_PIXELS)
+                    .map_or(default, |n| n as u32)
+            };
             Window {
                 width: pixels("width", 1280),
                 height: pixels("height", 800),
                 fullscreen: window.boolean("fullscreen").unwrap_or(false),
             }
         });
-        let window = window.unwrap_or(Window { width: 1280, height: 800, fullscreen: false });
+        let window = window.unwrap_or(Window {
+            width: 1280,
+            height: 800,
+            fullscreen: false,
+        });
         section.finish();
         if let Some(name) = name {
-            nodes.push(Node { name, screens: drawn, stereo, window });
+            nodes.push(Node {
+                name,
+                screens: drawn,
+                stereo,
+                window,
+            });
         }
     }
     if nodes.is_empty() && !root.has("node") {
@@ -169,11 +241,18 @@ fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
     nodes
 }
 
-fn unique_name<'n>(section: &Section<'_>, kind: &str, mut others: impl Iterator<Item = &'n str>) -> Option<String> {
+fn unique_name<'n>(
+    section: &Section<'_>,
+    kind: &str,
+    mut others: impl Iterator<Item = &'n str>,
+) -> Option<String> {
     let name = section.required_text("name", &format!("name = \"{kind}-1\""))?;
     if others.any(|other| other == name) {
         let at = section.get("name").map_or(section.at(), |node| &node.at);
-        section.complain(at, format!("there are two {kind}s of the name \"{name}\"; rename one"));
+        section.complain(
+            at,
+            format!("there are two {kind}s of the name \"{name}\"; rename one"),
+        );
     }
     Some(name.to_owned())
 }
@@ -182,7 +261,10 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
     let eye_separation = section.number_or("eye_separation", Range::UpTo(0.2), 0.064);
     let head = table(section, "head", pose_of);
     if head.is_none() && !section.has("head") {
-        section.complain_missing("head", "head = { position = [0.0, -1.3, 0.9], rotation = [0.7071, 0.7071, 0.0, 0.0] }");
+        section.complain_missing(
+            "head",
+            "head = { position = [0.0, -1.3, 0.9], rotation = [0.7071, 0.7071, 0.0, 0.0] }",
+        );
     }
     let sway = table(section, "sway", |sway| HeadTracking::Sway {
         amplitude: sway.number_or("amplitude", Range::UpTo(1.0), 0.05),
@@ -191,10 +273,22 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
     let near = section.number_or("near", Range::Positive, 0.05);
     let far = section.number_or("far", Range::Positive, 20.0);
     if near >= far {
-        section.complain(section.at(), format!("`near` ({near}) in {} must be smaller than `far` ({far})", section.name()));
+        section.complain(
+            section.at(),
+            format!(
+                "`near` ({near}) in {} must be smaller than `far` ({far})",
+                section.name()
+            ),
+        );
     }
     let tracking = sway.unwrap_or(HeadTracking::Fixed);
-    Some(Viewer { eye_separation, head: head.flatten()?, tracking, near, far })
+    Some(Viewer {
+        eye_separation,
+        head: head.flatten()?,
+        tracking,
+        near,
+        far,
+    })
 }
 
 fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
@@ -207,7 +301,11 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     if !section.has("kind") {
         section.complain_missing("kind", "kind = \"simulated\"");
     }
-    let kinds = [("simulated", Kind::Simulated), ("trace", Kind::Trace), ("remote", Kind::Remote)];
+    let kinds = [
+        ("simulated", Kind::Simulated),
+        ("trace", Kind::Trace),
+        ("remote", Kind::Remote),
+    ];
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
         for key in ["hand", "path", "tremor", "seed", "loop"] {
@@ -220,11 +318,17 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
             hand: section.choice("hand", &HandPreset::NAMED),
             path: files.path(section, "path"),
             tremor: section.number_or("tremor", Range::UpTo(1e-3), 0.0),
-            seed: section.integer("seed", 0, i64::MAX).unwrap_or(0).unsigned_abs(),
+            seed: section
+                .integer("seed", 0, i64::MAX)
+                .unwrap_or(0)
+                .unsigned_abs(),
         }),
         Kind::Trace => {
             section.required_text("path", "path = \"trace.csv\"")?;
-            Some(Device::Trace { path: files.path(section, "path")?, repeat: section.boolean("loop").unwrap_or(false) })
+            Some(Device::Trace {
+                path: files.path(section, "path")?,
+                repeat: section.boolean("loop").unwrap_or(false),
+            })
         }
         Kind::Remote => Some(Device::Remote),
     }
@@ -232,17 +336,28 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
 
 /// An address to listen on.
 fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
-    let Some(text) = section.text("bind") else { return (!section.has("bind")).then_some(default) };
+    let Some(text) = section.text("bind") else {
+        return (!section.has("bind")).then_some(default);
+    };
     let address = text.parse();
     if address.is_err() {
         let at = section.get("bind").map_or(section.at(), |node| &node.at);
-        section.complain(at, format!("`bind` in {} is \"{text}\", which is no address; write one such as \"0.0.0.0\"", section.name()));
+        section.complain(
+            at,
+            format!(
+                "`bind` in {} is \"{text}\", which is no address; write one such as \"0.0.0.0\"",
+                section.name()
+            ),
+        );
     }
     address.ok()
 }
 
 fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
-    section.integer(key, 0, i64::from(u16::MAX)).and_then(|n| u16::try_from(n).ok()).unwrap_or(default)
+    section
+        .integer(key, 0, i64::from(u16::MAX))
+        .and_then(|n| u16::try_from(n).ok())
+        .unwrap_or(default)
 }
 
 fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Network> {
@@ -258,12 +373,26 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             max_clients: 16,
         });
     };
-    let transports = [("udp", TransportKind::Udp), ("quic", TransportKind::QuicDatagram)];
+    let transports = [
+        ("udp", TransportKind::Udp),
+        ("quic", TransportKind::QuicDatagram),
+    ];
     let address = bind(&section, loopback);
-    let (quic_port, udp_port) = (port(&section, "quic_port", 4857), port(&section, "udp_port", 4858));
+    let (quic_port, udp_port) = (
+        port(&section, "quic_port", 4857),
+        port(&section, "udp_port", 4858),
+    );
     if quic_port == udp_port && quic_port != 0 {
-        let at = section.get("udp_port").map_or(section.at(), |node| &node.at);
-        section.complain(at, format!("`quic_port` and `udp_port` in {} are both {udp_port}; choose another for one", section.name()));
+        let at = section
+            .get("udp_port")
+            .map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!(
+                "`quic_port` and `udp_port` in {} are both {udp_port}; choose another for one",
+                section.name()
+            ),
+        );
     }
     let network = Network {
         bind: address.unwrap_or(loopback),
@@ -272,13 +401,19 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
         transport: section.choice("transport", &transports).unwrap_or_default(),
         key_file: files.path(&section, "key_file"),
         broadcast_rate: section.number_or("broadcast_rate", Range::PositiveUpTo(MAX_RATE), 1000.0),
-        max_clients: section.integer("max_clients", 1, MAX_CLIENTS).map_or(16, |n| n as usize),
+        max_clients: section
+            .integer("max_clients", 1, MAX_CLIENTS)
+            .map_or(16, |n| n as usize),
     };
     section.finish();
     Some(network)
 }
 
-fn monitoring(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Monitoring> {
+fn monitoring(
+    section: Option<Section<'_>>,
+    root: &Section<'_>,
+    files: &Files<'_>,
+) -> Option<Monitoring> {
     let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let mut monitoring = Monitoring {
         enabled: true,
@@ -288,7 +423,9 @@ fn monitoring(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_
         record: None,
         memory_limit: 256 << 20,
     };
-    let Some(section) = section else { return (!root.has("monitoring")).then_some(monitoring) };
+    let Some(section) = section else {
+        return (!root.has("monitoring")).then_some(monitoring);
+    };
     monitoring.enabled = section.boolean("enabled").unwrap_or(true);
     monitoring.bind = bind(&section, loopback).unwrap_or(loopback);
     monitoring.grpc_port = port(&section, "grpc_port", monitoring.grpc_port);
@@ -298,8 +435,17 @@ fn monitoring(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_
         monitoring.memory_limit = mebibytes.unsigned_abs() << 20;
     }
     if monitoring.grpc_port == monitoring.web_port && monitoring.web_port != 0 {
-        let at = section.get("web_port").map_or(section.at(), |node| &node.at);
-        section.complain(at, format!("`grpc_port` and `web_port` in {} are both {}; choose another for one", section.name(), monitoring.web_port));
+        let at = section
+            .get("web_port")
+            .map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!(
+                "`grpc_port` and `web_port` in {} are both {}; choose another for one",
+                section.name(),
+                monitoring.web_port
+            ),
+        );
     }
     section.finish();
     Some(monitoring)
@@ -316,12 +462,31 @@ fn realtime(section: Option<Section<'_>>) -> Option<RealTime> {
         god_object_core: None,
         god_object_rate: None,
     };
-    let Some(section) = section else { return Some(realtime) };
-    let priority = |key| section.integer(key, 1, 99).and_then(|n| u8::try_from(n).ok());
-    let core = |key| section.integer(key, 0, 1023).and_then(|n| usize::try_from(n).ok());
-    realtime.mode = section.choice("mode", &[("enforce", RealTimeMode::Enforce), ("waive", RealTimeMode::Waive)]).unwrap_or_default();
+    let Some(section) = section else {
+        return Some(realtime);
+    };
+    let priority = |key| {
+        section
+            .integer(key, 1, 99)
+            .and_then(|n| u8::try_from(n).ok())
+    };
+    let core = |key| {
+        section
+            .integer(key, 0, 1023)
+            .and_then(|n| usize::try_from(n).ok())
+    };
+    realtime.mode = section
+        .choice(
+            "mode",
+            &[
+                ("enforce", RealTimeMode::Enforce),
+                ("waive", RealTimeMode::Waive),
+            ],
+        )
+        .unwrap_or_default();
     realtime.haptics_priority = priority("haptics_priority").unwrap_or(realtime.haptics_priority);
-    realtime.coupling_priority = priority("coupling_priority").unwrap_or(realtime.coupling_priority);
+    realtime.coupling_priority =
+        priority("coupling_priority").unwrap_or(realtime.coupling_priority);
     realtime.god_object_priority = priority("god_object_priority");
     realtime.haptics_core = core("haptics_core");
     realtime.coupling_core = core("coupling_core");
@@ -333,5 +498,9 @@ fn realtime(section: Option<Section<'_>>) -> Option<RealTime> {
 
 fn show(section: &Section<'_>) -> Show {
     let wanted = |key| section.boolean(key).unwrap_or(false);
-    Show { ghost: wanted("ghost"), contacts: wanted("contacts"), force: wanted("force") }
+    Show {
+        ghost: wanted("ghost"),
+        contacts: wanted("contacts"),
+        force: wanted("force"),
+    }
 }

@@ -6,6 +6,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::TriangleFeature;
 
+/// Doubled area over the longest side squared below which the inside is empty, to rounding.
+const NO_AREA: f64 = 16.0 * f64::EPSILON;
+
 /// The point of a triangle nearest to a given point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosestOnTriangle {
@@ -21,6 +24,10 @@ pub struct ClosestOnTriangle {
 pub fn closest_on_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTriangle {
     let [a, b, c] = t;
     let (ab, ac) = (b - a, c - a);
+    let flat = ab.cross(&ac).norm() <= NO_AREA * ab.norm_squared().max(ac.norm_squared());
+    if flat {
+        return closest_on_sides(p, t);
+    }
     let (ap, bp, cp) = (p - a, p - b, p - c);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
     if d1 <= 0.0 && d2 <= 0.0 {
@@ -53,10 +60,44 @@ pub fn closest_on_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTr
     at(t, [va / sum, vb / sum, vc / sum], TriangleFeature::Face)
 }
 
+/// The nearest of the three feet on the sides.
+fn closest_on_sides(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> ClosestOnTriangle {
+    let on_side = |k: usize| {
+        let (from, along) = (t[k], t[(k + 1) % 3] - t[k]);
+        let squared = along.norm_squared();
+        let s = if squared > 0.0 {
+            (along.dot(&(p - from)) / squared).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let mut weights = [0.0; 3];
+        (weights[k], weights[(k + 1) % 3]) = (1.0 - s, s);
+        let feature = match s {
+            0.0 => TriangleFeature::Corner(k as u8),
+            1.0 => TriangleFeature::Corner(((k + 1) % 3) as u8),
+            _ => TriangleFeature::Side(k as u8),
+        };
+        at(t, weights, feature)
+    };
+    let nearer = |a: ClosestOnTriangle, b: ClosestOnTriangle| {
+        if (b.point - p).norm_squared() < (a.point - p).norm_squared() {
+            b
+        } else {
+            a
+        }
+    };
+    nearer(nearer(on_side(0), on_side(1)), on_side(2))
+}
+
 #[inline]
 fn at(t: &[Point3<f64>; 3], barycentric: [f64; 3], feature: TriangleFeature) -> ClosestOnTriangle {
-    let point = t[0].coords * barycentric[0] + t[1].coords * barycentric[1] + t[2].coords * barycentric[2];
-    ClosestOnTriangle { point: Point3::from(point), barycentric, feature }
+    let point =
+        t[0].coords * barycentric[0] + t[1].coords * barycentric[1] + t[2].coords * barycentric[2];
+    ClosestOnTriangle {
+        point: Point3::from(point),
+        barycentric,
+        feature,
+    }
 }
 
 /// Weights of the corners of `t` at the foot of `p` on its plane; they sum to 1 and are negative outside. `normal` is
@@ -77,12 +118,28 @@ mod tests {
 
     #[test]
     fn each_region_answers_with_its_feature() {
-        let t = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let t = [
+            Point3::new(0.0, 0.0, 0.0),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+        ];
         let cases = [
             ([0.25, 0.25, 2.0], [0.25, 0.25, 0.0], TriangleFeature::Face),
-            ([-1.0, -1.0, 1.0], [0.0, 0.0, 0.0], TriangleFeature::Corner(0)),
-            ([3.0, -1.0, 0.0], [1.0, 0.0, 0.0], TriangleFeature::Corner(1)),
-            ([-1.0, 3.0, 0.0], [0.0, 1.0, 0.0], TriangleFeature::Corner(2)),
+            (
+                [-1.0, -1.0, 1.0],
+                [0.0, 0.0, 0.0],
+                TriangleFeature::Corner(0),
+            ),
+            (
+                [3.0, -1.0, 0.0],
+                [1.0, 0.0, 0.0],
+                TriangleFeature::Corner(1),
+            ),
+            (
+                [-1.0, 3.0, 0.0],
+                [0.0, 1.0, 0.0],
+                TriangleFeature::Corner(2),
+            ),
             ([0.5, -1.0, 0.0], [0.5, 0.0, 0.0], TriangleFeature::Side(0)),
             ([1.0, 1.0, 5.0], [0.5, 0.5, 0.0], TriangleFeature::Side(1)),
             ([-2.0, 0.5, 0.0], [0.0, 0.5, 0.0], TriangleFeature::Side(2)),
@@ -96,8 +153,16 @@ mod tests {
 
     #[test]
     fn weights_of_a_foot_reproduce_it() {
-        let t = [Point3::new(0.0, 0.0, 1.0), Point3::new(2.0, 0.0, 1.0), Point3::new(0.0, 3.0, 1.0)];
+        let t = [
+            Point3::new(0.0, 0.0, 1.0),
+            Point3::new(2.0, 0.0, 1.0),
+            Point3::new(0.0, 3.0, 1.0),
+        ];
         let w = barycentric(&Point3::new(0.5, 0.75, 7.0), &t, &Vector3::z());
-        assert!((w[0] - 0.5).abs() < 1e-15 && (w[1] - 0.25).abs() < 1e-15 && (w[2] - 0.25).abs() < 1e-15);
+        assert!(
+            (w[0] - 0.5).abs() < 1e-15
+                && (w[1] - 0.25).abs() < 1e-15
+                && (w[2] - 0.25).abs() < 1e-15
+        );
     }
 }

@@ -26,7 +26,9 @@ pub fn triangles_intersect(a: &[Point3<f64>; 3], b: &[Point3<f64>; 3]) -> bool {
     };
     let apart = separates(&normal_a)
         || separates(&normal_b)
-        || sides_a.iter().any(|u| sides_b.iter().any(|v| separates(&u.cross(v))))
+        || sides_a
+            .iter()
+            .any(|u| sides_b.iter().any(|v| separates(&u.cross(v))))
         || sides_a.iter().any(|u| separates(&normal_a.cross(u)))
         || sides_b.iter().any(|v| separates(&normal_b.cross(v)));
     !apart

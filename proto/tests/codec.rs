@@ -1,0 +1,328 @@
+//! Values to bytes and back; and what is not a value.
+
+mod samples;
+
+use proptest::prelude::*;
+use samples::*;
+use taut_proto::{
+    ClientStats, ControlMessage, DecodeError, EncodeError, HotState, Kind, MeshBlob,
+    PROTOCOL_VERSION, Payload, Refusal, SceneDescription,
+    codec::{MAX_LIST, MAX_TEXT_BYTES, decode, encode_onto},
+    control::{Bye, LENGTH_BYTES, MAX_FRAME_BYTES, RefusalCode},
+    header::MAX_PAYLOAD_BYTES,
+    mesh_blob::Positions,
+    stats::DrawnState,
+};
+
+fn bytes_of(payload: &Payload) -> Vec<u8> {
+    let mut buffer = [0; MAX_PAYLOAD_BYTES];
+    match payload.encode_into(&mut buffer) {
+        Ok(used) => buffer[..used].to_vec(),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn frame_of(message: &ControlMessage) -> Vec<u8> {
+    message.to_frame().unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn every_sample_comes_back() {
+    for (name, payload) in datagrams() {
+        assert_eq!(
+            Payload::decode(payload.kind(), &bytes_of(&payload)),
+            Ok(payload),
+            "{name}"
+        );
+    }
+    for (name, message) in messages() {
+        let frame = frame_of(&message);
+        assert_eq!(
+            ControlMessage::from_frame_body(&frame[LENGTH_BYTES..]),
+            Ok(message),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn every_truncation_is_refused() {
+    for (name, payload) in datagrams() {
+        let bytes = bytes_of(&payload);
+        for length in 0..bytes.len() {
+            assert!(
+                Payload::decode(payload.kind(), &bytes[..length]).is_err(),
+                "{name} cut to {length}"
+            );
+        }
+    }
+    for (name, message) in messages() {
+        let frame = frame_of(&message);
+        for length in LENGTH_BYTES..frame.len() {
+            assert!(
+                ControlMessage::from_frame_body(&frame[LENGTH_BYTES..length]).is_err(),
+                "{name} cut to {length}"
+            );
+        }
+    }
+}
+
+#[test]
+fn bytes_after_a_value_are_refused() {
+    for (name, payload) in datagrams() {
+        let mut bytes = bytes_of(&payload);
+        bytes.push(0);
+        assert_eq!(
+            Payload::decode(payload.kind(), &bytes),
+            Err(DecodeError::TrailingBytes { left: 1 }),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn numbers_that_are_not_finite_travel_in_neither_direction() {
+    let mut state = hot();
+    state.tools[0].force[1] = f32::NAN;
+    assert_eq!(state.hash(), Err(EncodeError::NotFinite));
+    let good = bytes_of(&Payload::Hot(hot()));
+    // The head's x: after frame (28 bytes).
+    let mut bent = good.clone();
+    bent[28..32].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    assert_eq!(decode::<HotState>(&bent), Err(DecodeError::NotFinite));
+}
+
+#[test]
+fn a_count_beyond_the_bytes_that_came_is_refused_before_anything_is_taken() {
+    // A name of 65535 bytes in a message of two.
+    assert_eq!(
+        decode::<String>(&[0xff, 0xff]),
+        Err(DecodeError::TooLong {
+            what: "text",
+            len: 65535,
+            max: 0
+        })
+    );
+    // 2000 elements in four bytes.
+    let claim = [0xd0, 0x07, 0, 0];
+    assert_eq!(
+        decode::<Vec<u64>>(&claim),
+        Err(DecodeError::TooLong {
+            what: "list",
+            len: 2000,
+            max: 2
+        })
+    );
+    // More tools than a state holds.
+    let mut state = bytes_of(&Payload::Hot(hot()));
+    state[20] = 3;
+    assert_eq!(
+        decode::<HotState>(&state),
+        Err(DecodeError::TooLong {
+            what: "list",
+            len: 3,
+            max: 2
+        })
+    );
+}
+
+#[test]
+fn what_is_too_long_is_not_sent() {
+    let bye = |length: usize| {
+        ControlMessage::Bye(Bye {
+            reason: "x".repeat(length),
+        })
+        .to_frame()
+    };
+    assert!(bye(MAX_TEXT_BYTES).is_ok());
+    assert!(matches!(
+        bye(MAX_TEXT_BYTES + 1),
+        Err(EncodeError::TooLong { what: "text", .. })
+    ));
+    let stats = |length: usize| {
+        ControlMessage::Stats(ClientStats {
+            drawn: vec![
+                DrawnState {
+                    tick: 1,
+                    state_hash: 2
+                };
+                length
+            ],
+            ..ClientStats::default()
+        })
+        .to_frame()
+    };
+    assert!(stats(MAX_LIST).is_ok());
+    assert!(matches!(
+        stats(MAX_LIST + 1),
+        Err(EncodeError::TooLong { what: "list", .. })
+    ));
+    let mut scene = scene();
+    scene.obstacles = vec![scene.god_object.clone(); MAX_LIST];
+    for obstacle in &mut scene.obstacles {
+        obstacle.name = "x".repeat(MAX_TEXT_BYTES);
+    }
+    assert_eq!(
+        ControlMessage::Scene(scene).to_frame(),
+        Err(EncodeError::BufferFull)
+    );
+}
+
+#[test]
+fn frames_of_impossible_length_are_refused() {
+    assert_eq!(
+        ControlMessage::frame_length([3, 0, 0, 0], MAX_FRAME_BYTES),
+        Err(DecodeError::Truncated)
+    );
+    assert_eq!(
+        ControlMessage::frame_length([4, 0, 0, 0], MAX_FRAME_BYTES),
+        Ok(4)
+    );
+    assert!(matches!(
+        ControlMessage::frame_length([0xff; 4], MAX_FRAME_BYTES),
+        Err(DecodeError::TooLong { .. })
+    ));
+}
+
+#[test]
+fn another_version_is_a_typed_error_but_its_refusal_can_be_read() {
+    for (name, message) in messages() {
+        let mut body = frame_of(&message).split_off(LENGTH_BYTES);
+        body[2] = 200;
+        let read = ControlMessage::from_frame_body(&body);
+        if name == "refused" {
+            assert_eq!(read, Ok(message));
+        } else {
+            let wrong = DecodeError::WrongVersion {
+                theirs: 200,
+                ours: PROTOCOL_VERSION,
+            };
+            assert_eq!(read, Err(wrong), "{name}");
+        }
+    }
+    let refusal = Refusal {
+        code: RefusalCode::WrongVersion,
+        version: 2,
+        text: String::new(),
+    };
+    let frame = frame_of(&ControlMessage::Refused(refusal));
+    assert_eq!(
+        frame[LENGTH_BYTES + 3],
+        0,
+        "its tag stays 0 in every version"
+    );
+}
+
+fn tetrahedron() -> MeshBlob {
+    let positions = vec![
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+    ];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    MeshBlob::new(Positions::F64(positions), triangles, None)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_mesh_comes_back_in_both_precisions_with_and_without_normals() {
+    let double = tetrahedron();
+    for positions in [
+        double.positions().clone(),
+        Positions::F32(double.positions_f32()),
+    ] {
+        for normals in [None, Some(vec![[0.0, 0.0, 1.0]; 4])] {
+            let mesh = MeshBlob::new(positions.clone(), double.triangles().to_vec(), normals)
+                .unwrap_or_else(|error| panic!("{error}"));
+            let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
+        }
+    }
+}
+
+#[test]
+fn a_broken_mesh_is_refused() {
+    let bytes = tetrahedron().encode().unwrap_or_default();
+    for length in 0..bytes.len() {
+        assert!(
+            MeshBlob::decode(&bytes[..length]).is_err(),
+            "cut to {length}"
+        );
+    }
+    let bent = |at: usize, with: &[u8]| {
+        let mut bytes = bytes.clone();
+        bytes[at..at + with.len()].copy_from_slice(with);
+        MeshBlob::decode(&bytes)
+    };
+    assert_eq!(bent(0, b"x"), Err(DecodeError::WrongMagic));
+    assert_eq!(
+        bent(8, &u32::MAX.to_le_bytes()),
+        Err(DecodeError::Inconsistent {
+            what: "mesh length"
+        })
+    );
+    assert_eq!(
+        bent(12, &u32::MAX.to_le_bytes()),
+        Err(DecodeError::Inconsistent {
+            what: "mesh length"
+        })
+    );
+    assert_eq!(
+        bent(16, &f64::NAN.to_le_bytes()),
+        Err(DecodeError::NotFinite)
+    );
+    let first_index = 16 + 4 * 24;
+    assert_eq!(
+        bent(first_index, &4_u32.to_le_bytes()),
+        Err(DecodeError::Inconsistent {
+            what: "vertex index"
+        })
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_payload_comes_back(payload in any_payload()) {
+        prop_assert_eq!(Payload::decode(payload.kind(), &bytes_of(&payload)), Ok(payload));
+    }
+
+    #[test]
+    fn any_scene_comes_back(scene in any_scene()) {
+        let mut bytes = Vec::new();
+        prop_assert_eq!(encode_onto(&scene, &mut bytes), Ok(()));
+        prop_assert_eq!(decode::<SceneDescription>(&bytes), Ok(scene));
+    }
+
+    #[test]
+    fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        for kind in [Kind::Hot, Kind::TimeRequest, Kind::TimeResponse, Kind::Heartbeat, Kind::Input, Kind::Wrench] {
+            // What can be read must be writable again, to the same bytes: no two encodings of one value, but for rounded normals.
+            if let Ok(payload) = Payload::decode(kind, &bytes) && kind != Kind::Hot {
+                prop_assert_eq!(bytes_of(&payload), bytes.clone());
+            }
+        }
+        let _ = ControlMessage::from_frame_body(&bytes);
+        let _ = MeshBlob::decode(&bytes);
+    }
+
+    #[test]
+    fn arbitrary_bodies_under_a_good_prefix_never_panic(tag in 0_u8..10, body in prop::collection::vec(any::<u8>(), 0..600)) {
+        let mut frame = vec![0x57, 0x48, PROTOCOL_VERSION, tag];
+        frame.extend(&body);
+        if let Ok(message) = ControlMessage::from_frame_body(&frame) {
+            prop_assert_eq!(&frame_of(&message)[LENGTH_BYTES..], &frame[..]);
+        }
+    }
+
+    #[test]
+    fn bent_samples_never_panic(which in 0_usize..9, at in any::<prop::sample::Index>(), byte in any::<u8>()) {
+        let (_, message) = messages().swap_remove(which);
+        let mut body = frame_of(&message).split_off(LENGTH_BYTES);
+        let at = at.index(body.len());
+        body[at] = byte;
+        let _ = ControlMessage::from_frame_body(&body);
+    }
+}

@@ -1,0 +1,475 @@
+//! One sample of every datagram payload and control message, and strategies that vary them.
+#![allow(
+    dead_code,
+    unreachable_pub,
+    reason = "each test binary uses its own part of the samples"
+)]
+
+use proptest::prelude::*;
+use taut_proto::{
+    ArrayVec, ClientStats, ControlMessage, HotState, InputSample, MeshHash, Payload, PoseF32,
+    PoseF64, Refusal, Role, SceneDescription, Transport, WrenchCommand,
+    control::{Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome},
+    scene::{
+        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+    },
+    state::{
+        BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, RunState, ToolState,
+        event_code,
+    },
+    stats::DrawnState,
+    time::{TimeRequest, TimeResponse},
+};
+
+pub fn hot() -> HotState {
+    let pose = PoseF32 {
+        position: [0.25, -0.5, 1.0],
+        rotation: [0.0, 1.0, 0.0, 0.0],
+    };
+    HotState {
+        sample_time_ns: 1_000_000_007,
+        tick: 1000,
+        scene_revision: 7,
+        run: RunState::Running,
+        constraint_age_us: 850,
+        head: HeadState {
+            pose,
+            age_us: -12,
+            eye_separation: 0.0625,
+            flags: HEAD_TRACKED,
+        },
+        tools: ArrayVec::from_iter([ToolState {
+            god_object: pose,
+            device: PoseF32::IDENTITY,
+            linear_velocity: [0.5, 0.0, 0.0],
+            angular_velocity: [0.0, 0.5, 0.0],
+            force: [0.0, 2.0, 0.0],
+            torque: [0.0, 0.0, 0.125],
+            buttons: 3,
+            flags: 1,
+            id: 0,
+        }]),
+        bodies: ArrayVec::from_iter([BodyState {
+            id: 2,
+            flags: 0,
+            pose,
+        }]),
+        contacts: ArrayVec::from_iter([ContactState {
+            pair: [0, 2],
+            point: [0.5, 0.25, 0.125],
+            normal: [0.0, 0.0, -1.0],
+            force: 1.5,
+            gap: 0.000_976_562_5,
+        }]),
+        events: ArrayVec::from_iter([EventRecord {
+            id: 9,
+            tick: 998,
+            code: event_code::CONTACT_ON,
+        }]),
+    }
+}
+
+pub fn datagrams() -> Vec<(&'static str, Payload)> {
+    let input = InputSample {
+        sample_time_ns: 1_000_000_000,
+        index: 41,
+        pose: PoseF64 {
+            position: [0.5, 0.25, -0.125],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+        },
+        velocity: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        buttons: 1,
+        flags: 0,
+    };
+    let wrench = WrenchCommand {
+        time_ns: 1_000_000_500,
+        input_index: 41,
+        wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
+        flags: 0,
+    };
+    let response = TimeResponse {
+        client_sent: 17,
+        server_received: 1017,
+        server_sent: 1020,
+    };
+    vec![
+        ("hot", Payload::Hot(hot())),
+        (
+            "time_request",
+            Payload::TimeRequest(TimeRequest { client_sent: 17 }),
+        ),
+        ("time_response", Payload::TimeResponse(response)),
+        ("heartbeat", Payload::Heartbeat),
+        ("input", Payload::Input(input)),
+        ("wrench", Payload::Wrench(wrench)),
+    ]
+}
+
+pub fn scene() -> SceneDescription {
+    let body = |name: &str, byte: u8| BodyDescription {
+        name: name.to_owned(),
+        mesh: MeshHash { bytes: [byte; 32] },
+        pose: PoseF64::IDENTITY,
+        colour: [1.0, 0.5, 0.25, 1.0],
+    };
+    SceneDescription {
+        name: "peg".to_owned(),
+        revision: 7,
+        god_object: body("peg", 1),
+        obstacles: vec![body("box", 2)],
+        reference_point: [0.0, 0.0, 0.5],
+        scene_origin: PoseF64::IDENTITY,
+        display_scale: 2.0,
+        screens: vec![ScreenDescription {
+            name: "front".to_owned(),
+            lower_left: [-1.0, 1.0, 0.0],
+            lower_right: [1.0, 1.0, 0.0],
+            upper_left: [-1.0, 1.0, 1.0],
+        }],
+        nodes: vec![NodeDescription {
+            name: "left".to_owned(),
+            screens: vec!["front".to_owned()],
+            stereo: Stereo::SideBySide,
+            window: WindowDescription {
+                width: 640,
+                height: 480,
+                fullscreen: true,
+            },
+        }],
+        viewer: PoseF64::IDENTITY,
+        eye_separation: 0.0625,
+        near: 0.125,
+        far: 8.0,
+        show: ShowOptions {
+            ghost: true,
+            contacts: false,
+            force: true,
+        },
+    }
+}
+
+pub fn messages() -> Vec<(&'static str, ControlMessage)> {
+    let refusal = Refusal {
+        code: RefusalCode::NameTaken,
+        version: 1,
+        text: "taken".to_owned(),
+    };
+    let hello = Hello {
+        node: "left".to_owned(),
+        role: Role::Render,
+        transport: Transport::QuicDatagram,
+        rate_hz: 1000,
+        proof: [3; 32],
+    };
+    let welcome = Welcome {
+        proof: [4; 32],
+        session: 2,
+        epoch: 0xdead_beef,
+        udp_port: 4858,
+        session_time_ns: 1_000_000_000,
+    };
+    let stats = ClientStats {
+        frames: 600,
+        fps: 59.5,
+        pose_age_ms_p50: 4.0,
+        pose_age_ms_p99: 8.0,
+        pose_age_ms_max: 16.0,
+        swap_skew_ms_p50: 0.5,
+        swap_skew_ms_max: 1.5,
+        packets_lost: 1,
+        packets_received: 10_000,
+        clock_uncertainty_ns: 25_000,
+        drawn: vec![DrawnState {
+            tick: 1000,
+            state_hash: 0x0123_4567_89ab_cdef,
+        }],
+    };
+    let hash = MeshHash { bytes: [1; 32] };
+    let log = LogEvent {
+        level: LogLevel::Warning,
+        text: "software rendering".to_owned(),
+    };
+    vec![
+        ("refused", ControlMessage::Refused(refusal)),
+        ("hello", ControlMessage::Hello(hello)),
+        ("welcome", ControlMessage::Welcome(welcome)),
+        ("scene", ControlMessage::Scene(scene())),
+        (
+            "mesh_request",
+            ControlMessage::MeshRequest(MeshRequest { hash }),
+        ),
+        (
+            "mesh_header",
+            ControlMessage::MeshHeader(MeshHeader { hash, length: 4096 }),
+        ),
+        ("stats", ControlMessage::Stats(stats)),
+        ("log", ControlMessage::Log(log)),
+        (
+            "bye",
+            ControlMessage::Bye(Bye {
+                reason: "done".to_owned(),
+            }),
+        ),
+    ]
+}
+
+fn finite32() -> impl Strategy<Value = f32> {
+    prop::num::f32::NORMAL | prop::num::f32::ZERO | prop::num::f32::SUBNORMAL
+}
+
+fn finite64() -> impl Strategy<Value = f64> {
+    prop::num::f64::NORMAL | prop::num::f64::ZERO | prop::num::f64::SUBNORMAL
+}
+
+fn pose32() -> impl Strategy<Value = PoseF32> {
+    (
+        prop::array::uniform3(finite32()),
+        prop::array::uniform4(finite32()),
+    )
+        .prop_map(|(position, rotation)| PoseF32 { position, rotation })
+}
+
+fn pose64() -> impl Strategy<Value = PoseF64> {
+    (
+        prop::array::uniform3(finite64()),
+        prop::array::uniform4(finite64()),
+    )
+        .prop_map(|(position, rotation)| PoseF64 { position, rotation })
+}
+
+fn list<T: std::fmt::Debug, const N: usize>(
+    element: impl Strategy<Value = T>,
+) -> impl Strategy<Value = ArrayVec<T, N>> {
+    prop::collection::vec(element, 0..=N).prop_map(ArrayVec::from_iter)
+}
+
+fn tool() -> impl Strategy<Value = ToolState> {
+    let vectors = prop::array::uniform4(prop::array::uniform3(finite32()));
+    (pose32(), pose32(), vectors, any::<(u16, u16, u32)>()).prop_map(
+        |(god_object, device, vectors, (buttons, flags, id))| {
+            let [linear_velocity, angular_velocity, force, torque] = vectors;
+            ToolState {
+                god_object,
+                device,
+                linear_velocity,
+                angular_velocity,
+                force,
+                torque,
+                buttons,
+                flags,
+                id,
+            }
+        },
+    )
+}
+
+/// Contacts with normals that survive the rounding unchanged: the axes.
+fn contact() -> impl Strategy<Value = ContactState> {
+    let axes = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+    let normal = prop::sample::select(axes.to_vec());
+    (
+        any::<[u16; 2]>(),
+        prop::array::uniform3(finite32()),
+        normal,
+        finite32(),
+        finite32(),
+    )
+        .prop_map(|(pair, point, normal, force, gap)| ContactState {
+            pair,
+            point,
+            normal,
+            force,
+            gap,
+        })
+}
+
+pub fn any_hot() -> impl Strategy<Value = HotState> {
+    let run = prop::sample::select(vec![
+        RunState::Waiting,
+        RunState::Running,
+        RunState::Paused,
+        RunState::Fault,
+    ]);
+    let head = (pose32(), any::<i32>(), finite32(), any::<u32>()).prop_map(
+        |(pose, age_us, eye_separation, flags)| HeadState {
+            pose,
+            age_us,
+            eye_separation,
+            flags,
+        },
+    );
+    let body = (any::<(u16, u16)>(), pose32()).prop_map(|((id, flags), pose)| BodyState {
+        id,
+        flags,
+        pose,
+    });
+    let event =
+        any::<(u32, u32, u32)>().prop_map(|(id, tick, code)| EventRecord { id, tick, code });
+    (
+        any::<(u64, u64, u32, u32)>(),
+        run,
+        head,
+        list(tool()),
+        list(body),
+        list(contact()),
+        list(event),
+    )
+        .prop_map(
+            |(
+                (sample_time_ns, tick, scene_revision, constraint_age_us),
+                run,
+                head,
+                tools,
+                bodies,
+                contacts,
+                events,
+            )| HotState {
+                sample_time_ns,
+                tick,
+                scene_revision,
+                run,
+                constraint_age_us,
+                head,
+                tools,
+                bodies,
+                contacts,
+                events,
+            },
+        )
+}
+
+pub fn any_payload() -> impl Strategy<Value = Payload> {
+    let six = || {
+        prop::collection::vec(finite64(), 6)
+            .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
+    };
+    let input = (any::<(u64, u64, u16, u16)>(), pose64(), six()).prop_map(
+        |((sample_time_ns, index, buttons, flags), pose, velocity)| {
+            Payload::Input(InputSample {
+                sample_time_ns,
+                index,
+                pose,
+                velocity,
+                buttons,
+                flags,
+            })
+        },
+    );
+    let wrench =
+        (any::<(u64, u64, u16)>(), six()).prop_map(|((time_ns, input_index, flags), wrench)| {
+            Payload::Wrench(WrenchCommand {
+                time_ns,
+                input_index,
+                wrench,
+                flags,
+            })
+        });
+    let response =
+        any::<(u64, u64, u64)>().prop_map(|(client_sent, server_received, server_sent)| {
+            Payload::TimeResponse(TimeResponse {
+                client_sent,
+                server_received,
+                server_sent,
+            })
+        });
+    prop_oneof![
+        any_hot().prop_map(Payload::Hot),
+        any::<u64>().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
+        response,
+        Just(Payload::Heartbeat),
+        input,
+        wrench,
+    ]
+}
+
+pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
+    let body = || {
+        (
+            ".{0,20}",
+            any::<[u8; 32]>(),
+            pose64(),
+            prop::array::uniform4(finite32()),
+        )
+            .prop_map(|(name, bytes, pose, colour)| BodyDescription {
+                name,
+                mesh: MeshHash { bytes },
+                pose,
+                colour,
+            })
+    };
+    let corner = || prop::array::uniform3(finite64());
+    let screen = (".{0,20}", corner(), corner(), corner()).prop_map(
+        |(name, lower_left, lower_right, upper_left)| ScreenDescription {
+            name,
+            lower_left,
+            lower_right,
+            upper_left,
+        },
+    );
+    let stereo = prop::sample::select(vec![
+        Stereo::Mono,
+        Stereo::SideBySide,
+        Stereo::TopBottom,
+        Stereo::Anaglyph,
+        Stereo::TwoWindows,
+    ]);
+    let node = (
+        ".{0,20}",
+        prop::collection::vec(".{0,9}", 0..4),
+        stereo,
+        any::<(u32, u32, bool)>(),
+    )
+        .prop_map(
+            |(name, screens, stereo, (width, height, fullscreen))| NodeDescription {
+                name,
+                screens,
+                stereo,
+                window: WindowDescription {
+                    width,
+                    height,
+                    fullscreen,
+                },
+            },
+        );
+    let lists = (
+        prop::collection::vec(body(), 0..5),
+        prop::collection::vec(screen, 0..4),
+        prop::collection::vec(node, 0..4),
+    );
+    let numbers = (
+        prop::array::uniform5(finite64()),
+        prop::array::uniform3(finite64()),
+        any::<(u32, bool, bool, bool)>(),
+    );
+    (".{0,40}", body(), lists, (pose64(), pose64()), numbers).prop_map(
+        |(
+            name,
+            god_object,
+            (obstacles, screens, nodes),
+            (scene_origin, viewer),
+            (scalars, reference_point, (revision, ghost, contacts, force)),
+        )| {
+            let [display_scale, eye_separation, near, far, _] = scalars;
+            SceneDescription {
+                name,
+                revision,
+                god_object,
+                obstacles,
+                reference_point,
+                scene_origin,
+                display_scale,
+                screens,
+                nodes,
+                viewer,
+                eye_separation,
+                near,
+                far,
+                show: ShowOptions {
+                    ghost,
+                    contacts,
+                    force,
+                },
+            }
+        },
+    )
+}

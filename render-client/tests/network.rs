@@ -1,0 +1,461 @@
+//! A node in a session with a real server on this machine: joins, fetches, draws, reports, ends.
+//! Skipped, said aloud, without a graphics adapter.
+
+mod support;
+
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use taut_link::{Content, ServerLink, ServerOptions, create_key_file, serve};
+use taut_proto::mesh_blob::Positions;
+use taut_proto::scene::{
+    BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+};
+use taut_proto::state::ToolState;
+use taut_proto::{HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription};
+use taut_render::cli::{RenderArgs, TransportArg};
+use taut_render::renderer::{Gpu, shapes};
+use taut_render::stage::TriangleMesh;
+use taut_render::statistics::Ended;
+use taut_render::{RenderError, RenderReport};
+
+/// A server that sends 500 states per second until it is stopped.
+struct Server {
+    runtime: tokio::runtime::Runtime,
+    link: ServerLink,
+    address: String,
+    folder: tempfile::TempDir,
+    stop: Arc<AtomicBool>,
+    sender: Option<JoinHandle<()>>,
+}
+
+fn blob(mesh: &TriangleMesh) -> MeshBlob {
+    let positions = Positions::F32(mesh.vertices.clone());
+    MeshBlob::new(positions, mesh.triangles.clone(), None).expect("a sound mesh")
+}
+
+fn pose(position: [f64; 3]) -> PoseF64 {
+    PoseF64 {
+        position,
+        rotation: [1.0, 0.0, 0.0, 0.0],
+    }
+}
+
+fn content() -> Content {
+    let meshes = [
+        shapes::cylinder(0.01, 0.03, 72),
+        support::box_with_hole(0.03, 0.0102, 72),
+    ];
+    let meshes = meshes.map(|mesh| blob(&mesh));
+    let hash = |mesh: &MeshBlob| MeshHash::of(&mesh.encode().expect("small"));
+    let body = |name: &str, mesh, [red, green, blue]: [f32; 3]| BodyDescription {
+        name: name.to_owned(),
+        mesh: hash(mesh),
+        pose: pose([0.0; 3]),
+        colour: [red, green, blue, 1.0],
+    };
+    let screen = |name: &str, lower_left, lower_right, upper_left| ScreenDescription {
+        name: name.to_owned(),
+        lower_left,
+        lower_right,
+        upper_left,
+    };
+    let node = |name: &str, screens: &[&str], stereo| NodeDescription {
+        name: name.to_owned(),
+        screens: screens.iter().map(|s| (*s).to_owned()).collect(),
+        stereo,
+        window: WindowDescription {
+            width: 640,
+            height: 480,
+            fullscreen: false,
+        },
+    };
+    let description = SceneDescription {
+        name: "peg".to_owned(),
+        revision: 1,
+        god_object: body("peg", &meshes[0], support::ORANGE),
+        obstacles: vec![body("box", &meshes[1], support::GREY_BLUE)],
+        reference_point: [0.0; 3],
+        scene_origin: pose([0.0, -0.28, 0.22]),
+        display_scale: 7.0,
+        screens: vec![
+            screen("wall", [-0.9, 0.0, 0.0], [0.9, 0.0, 0.0], [-0.9, 0.0, 1.2]),
+            screen(
+                "table",
+                [-0.9, -1.2, 0.0],
+                [0.9, -1.2, 0.0],
+                [-0.9, 0.0, 0.0],
+            ),
+        ],
+        nodes: vec![
+            node("both", &["wall", "table"], Stereo::Mono),
+            node("pair", &["wall"], Stereo::TwoWindows),
+            node("lost", &["ceiling"], Stereo::Mono),
+        ],
+        viewer: pose([0.12, -1.1, 0.85]),
+        eye_separation: 0.065,
+        near: 0.05,
+        far: 10.0,
+        show: ShowOptions::default(),
+    };
+    Content {
+        description,
+        meshes: meshes.to_vec(),
+    }
+}
+
+impl Server {
+    fn start() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let key = create_key_file(&folder.path().join("key")).expect("a key");
+        let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+        let options = ServerOptions::loopback(key);
+        let link = runtime.block_on(serve(options, content())).expect("serves");
+        let stop = Arc::new(AtomicBool::new(false));
+        let (mut broadcaster, clock) = (link.broadcaster(), link.clock());
+        let stopped = Arc::clone(&stop);
+        let send = move || {
+            for tick in 1.. {
+                if stopped.load(Ordering::Relaxed) {
+                    return;
+                }
+                let mut state = HotState::empty();
+                state.tick = tick;
+                state.sample_time_ns = clock.now_ns();
+                let mut tool = ToolState::default();
+                tool.god_object = PoseF32 {
+                    position: [0.0, -0.05 + 1e-5 * (tick % 1000) as f32, 0.0],
+                    ..PoseF32::IDENTITY
+                };
+                tool.device = tool.god_object;
+                state.tools.push(tool);
+                broadcaster.send(&state);
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        };
+        let sender = std::thread::Builder::new()
+            .name("sender".to_owned())
+            .spawn(send);
+        Self {
+            address: link.quic_addr().to_string(),
+            runtime,
+            link,
+            folder,
+            stop,
+            sender: Some(sender.expect("a thread")),
+        }
+    }
+
+    fn args(&self, node: &str) -> RenderArgs {
+        RenderArgs {
+            server: self.address.clone(),
+            node: node.to_owned(),
+            key: self.folder.path().join("key"),
+            transport: TransportArg::Udp,
+            headless: true,
+            frames: None,
+            out: None,
+            duration: Some(20.0), // so that a failure ends
+            fps: Some(20.0),
+            show: None,
+            stereo: None,
+            width: Some(120),
+            height: None,
+            monitor: 0,
+            delay_ms: 2.0,
+        }
+    }
+
+    fn pictures(&self) -> PathBuf {
+        self.folder.path().join("pictures")
+    }
+
+    fn stop(mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(sender) = self.sender.take() {
+            sender.join().expect("the sender ends");
+        }
+        self.runtime.block_on(self.link.shutdown());
+    }
+}
+
+/// Runs a node on a thread of its own.
+fn start(args: RenderArgs) -> JoinHandle<Result<RenderReport, RenderError>> {
+    let run = move || taut_render::run(args);
+    std::thread::Builder::new()
+        .name("node".to_owned())
+        .spawn(run)
+        .expect("a thread")
+}
+
+/// Whether pictures can be drawn here; says so if not.
+fn can_draw() -> bool {
+    match Gpu::open() {
+        Ok(_) => true,
+        Err(error) => {
+            println!("skipped: {error}");
+            false
+        }
+    }
+}
+
+fn wait_for(what: &str, mut holds: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < Duration::from_secs(15), "never: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_node_draws_what_it_is_told_over_either_transport_and_reports_it() {
+    if !can_draw() {
+        return;
+    }
+    for transport in [TransportArg::Udp, TransportArg::Quic] {
+        let server = Server::start();
+        let mut args = server.args("both");
+        args.transport = transport;
+        args.frames = Some(5);
+        args.out = Some(server.pictures());
+        let report = taut_render::run(args).expect("draws");
+        assert_eq!((report.frames, report.ended), (5, Ended::Frames));
+        assert_eq!(report.pose_age_ms.count, 5);
+        assert!(report.drawn_age_ms.p50 >= report.pose_age_ms.p50);
+        assert!(
+            report.pose_age_ms.p50 >= 2.0,
+            "the delay is part of the age"
+        );
+        assert!(report.packets_received > 0);
+
+        for screen in ["wall", "table"] {
+            for frame in 1..=5 {
+                let path = server
+                    .pictures()
+                    .join(format!("both-{screen}-{frame:05}.png"));
+                let picture = image::open(&path).expect("a picture").to_rgba8();
+                assert_eq!(picture.dimensions(), (120, 80));
+            }
+        }
+        // The peg points at the viewer: orange on the table's screen.
+        let path = server.pictures().join("both-table-00005.png");
+        let picture = image::open(path).expect("a picture").to_rgba8();
+        let orange = picture
+            .pixels()
+            .filter(|p| p.0[0] > 90 && p.0[0] / 2 > p.0[2])
+            .count();
+        assert!(orange > 30, "{orange} orange pixels");
+        server.stop();
+    }
+}
+
+#[test]
+fn a_node_with_two_pictures_per_screen_names_them_by_eye() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    let mut args = server.args("pair");
+    args.frames = Some(1);
+    args.out = Some(server.pictures());
+    taut_render::run(args).expect("draws");
+    for eye in ["left", "right"] {
+        assert!(
+            server
+                .pictures()
+                .join(format!("pair-wall-{eye}-00001.png"))
+                .is_file()
+        );
+    }
+    server.stop();
+}
+
+#[test]
+fn a_node_ends_in_good_order_when_the_server_says_that_it_stops() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    let node = start(server.args("both"));
+    wait_for("a report of frames", || {
+        let clients = server.link.clients();
+        clients
+            .iter()
+            .any(|c| c.stats.as_ref().is_some_and(|stats| stats.frames > 0))
+    });
+    let mismatches: u64 = server
+        .link
+        .clients()
+        .iter()
+        .map(|c| c.state_hash_mismatches)
+        .sum();
+    let matches: u64 = server
+        .link
+        .clients()
+        .iter()
+        .map(|c| c.state_hash_matches)
+        .sum();
+    assert_eq!(mismatches, 0);
+    assert!(matches > 0, "the states drawn are those that were sent");
+    server.stop();
+    let report = node.join().expect("no panic").expect("a good end");
+    assert_eq!(report.ended, Ended::ServerStopped);
+}
+
+#[test]
+fn a_lost_server_is_an_error_that_names_it() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    let address = server.address.clone();
+    let node = start(server.args("both"));
+    wait_for("a client", || !server.link.clients().is_empty());
+    // All its threads stop at once, as if its machine had lost power.
+    let Server {
+        runtime,
+        link,
+        stop,
+        ..
+    } = server;
+    stop.store(true, Ordering::Relaxed);
+    runtime.shutdown_background();
+    std::mem::forget(link);
+    let error = node.join().expect("no panic").expect_err("lost");
+    assert!(matches!(error, RenderError::ServerLost { .. }), "{error}");
+    assert!(error.to_string().contains(&address));
+    assert_eq!(error.exit_code(), 1);
+}
+
+#[test]
+fn an_unknown_node_or_screen_is_bad_input_that_names_the_known_ones() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    let error = taut_render::run(server.args("celing")).expect_err("unknown");
+    assert!(error.to_string().contains("both, pair, lost"), "{error}");
+    assert_eq!(error.exit_code(), 2);
+    let error = taut_render::run(server.args("lost")).expect_err("no such screen");
+    assert!(error.to_string().contains("ceiling"), "{error}");
+    assert_eq!(error.exit_code(), 2);
+    server.stop();
+}
+
+/// The program `taut-render` for a node of `server`.
+fn program(server: &Server, node: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_taut-render"));
+    command.args([
+        "--server",
+        &server.address,
+        "--node",
+        node,
+        "--duration",
+        "20",
+    ]);
+    command
+        .arg("--key")
+        .arg(server.folder.path().join("key"))
+        .args(more);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+#[test]
+fn the_program_draws_in_windows_where_there_is_a_display() {
+    if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
+        println!("skipped: no display (run the tests under xvfb-run to have one)");
+        return;
+    }
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    for (node, stereo) in [
+        ("both", "mono"),
+        ("pair", "two-windows"),
+        ("both", "anaglyph"),
+    ] {
+        let more = [
+            "--frames", "4", "--stereo", stereo, "--width", "300", "--show", "ghost",
+        ];
+        let output = program(&server, node, &more).output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{text}");
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(said.contains("4 frames"), "{said}");
+    }
+    server.stop();
+}
+
+#[test]
+fn without_a_display_the_program_says_so_and_names_the_way_out() {
+    let server = Server::start();
+    let mut command = program(&server, "both", &[]);
+    command
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET");
+    let output = command.output().expect("runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(
+        text.contains("no display") && text.contains("--headless"),
+        "{text}"
+    );
+    server.stop();
+}
+
+#[test]
+fn without_a_graphics_driver_the_program_says_what_to_install() {
+    let server = Server::start();
+    let mut command = program(&server, "both", &["--headless"]);
+    command
+        .env("VK_DRIVER_FILES", "/dev/null")
+        .env("VK_ICD_FILENAMES", "/dev/null");
+    let output = command
+        .env("WGPU_BACKEND", "vulkan")
+        .output()
+        .expect("runs");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("mesa-vulkan-drivers"), "{text}");
+    server.stop();
+}
+
+#[cfg(unix)]
+#[test]
+fn a_node_that_is_asked_to_end_leaves_in_good_order() {
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    let child = program(&server, "both", &["--headless", "--width", "60"])
+        .spawn()
+        .expect("runs");
+    wait_for("a report of frames", || {
+        let clients = server.link.clients();
+        clients
+            .iter()
+            .any(|c| c.stats.as_ref().is_some_and(|stats| stats.frames > 0))
+    });
+    let asked = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(asked.is_ok_and(|status| status.success()));
+    let output = child.wait_with_output().expect("ends");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    wait_for("the server knows", || server.link.clients().is_empty());
+    server.stop();
+}

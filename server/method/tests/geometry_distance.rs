@@ -1,0 +1,107 @@
+//! Closest points of triangles and distances of meshes, against certificates and brute force.
+
+mod geometry_shapes;
+
+use geometry_shapes::{cuboid, icosphere, mesh, tetrahedron, torus};
+use god_object::collision::{distance, meshes_intersect};
+use god_object::geometry::distance::{
+    closest_on_triangle, closest_on_triangles, triangles_intersect,
+};
+use god_object::nalgebra::{Point3, Vector3};
+use god_object::spatial::Pose;
+use proptest::prelude::*;
+
+fn point(range: f64) -> impl Strategy<Value = Point3<f64>> {
+    // Multiples of a quarter: parallel, coplanar and touching triangles are frequent.
+    let exact = (-4..=4_i32, -4..=4_i32, -4..=4_i32).prop_map(move |(x, y, z)| {
+        Point3::new(f64::from(x), f64::from(y), f64::from(z)) * (range / 4.0)
+    });
+    let any = [-range..range, -range..range, -range..range].prop_map(Point3::from);
+    prop_oneof![exact, any]
+}
+
+fn triangle() -> impl Strategy<Value = [Point3<f64>; 3]> {
+    [point(1.0), point(1.0), point(1.0)]
+}
+
+fn pose() -> impl Strategy<Value = Pose> {
+    (
+        [-1.0..1.0, -1.0..1.0, -1.0..1.0],
+        [-3.0..3.0, -3.0..3.0, -3.0..3.0],
+    )
+        .prop_map(|(p, r)| Pose::new(Vector3::from(p), Vector3::from(r)))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, max_global_rejects: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The plane normal to the closest points' difference separates by their distance: no pair can be nearer.
+    #[test]
+    fn closest_points_of_apart_triangles_carry_their_certificate(a in triangle(), b in triangle()) {
+        prop_assume!(!triangles_intersect(&a, &b));
+        let c = closest_on_triangles(&a, &b);
+        let d = c.squared_distance.sqrt();
+        prop_assume!(d > 1e-9);
+        let n = (c.on_first - c.on_second) / d;
+        let low = a.iter().map(|p| n.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+        let high = b.iter().map(|p| n.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max);
+        prop_assert!((low - high - d).abs() < 1e-9, "{} {}", low - high, d);
+        // The points do lie on the triangles.
+        prop_assert!((closest_on_triangle(&c.on_first, &a).point - c.on_first).norm() < 1e-12);
+        prop_assert!((closest_on_triangle(&c.on_second, &b).point - c.on_second).norm() < 1e-12);
+    }
+
+    #[test]
+    fn triangles_that_share_a_point_intersect_and_separate_when_moved_apart(a in triangle(), b in triangle(), s in 0.0..1.0, t in 0.0..1.0) {
+        let inside = |t: &[Point3<f64>; 3], u: f64, v: f64| {
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v
+        };
+        let shift = inside(&a, s, t) - inside(&b, t, s);
+        let touching = b.map(|p| p + shift);
+        prop_assert!(triangles_intersect(&a, &touching) || closest_on_triangles(&a, &touching).squared_distance < 1e-24);
+        let away = b.map(|p| p + Vector3::new(0.0, 0.0, 4.0));
+        prop_assert!(!triangles_intersect(&a, &away));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mesh_distance_is_that_of_the_nearest_pair(pose in pose(), other in pose(), which in 0..4_usize) {
+        let shapes = [mesh(cuboid([0.2, 0.3, 0.1])), mesh(tetrahedron(0.5)), mesh(icosphere(0.3, 1)), mesh(torus(0.3, 0.1, 9, 6))];
+        let (a, b) = (&shapes[which], &shapes[(which + 1) % 4]);
+        let relative = other.inverse() * pose;
+        let (mut least, mut intersect) = (f64::INFINITY, false);
+        for t in 0..a.triangles().len() as u32 {
+            let x = a.corners(t).map(|p| relative * p);
+            for s in 0..b.triangles().len() as u32 {
+                intersect |= triangles_intersect(&x, &b.corners(s));
+                least = least.min(closest_on_triangles(&x, &b.corners(s)).squared_distance.sqrt());
+            }
+        }
+        let expected = if intersect { 0.0 } else { least };
+        prop_assert!((distance(a, &pose, b, &other) - expected).abs() < 1e-13);
+        if intersect {
+            prop_assert!(meshes_intersect(a, &pose, b, &other));
+        }
+    }
+}
+
+#[test]
+fn a_mesh_inside_another_intersects_it_either_way_round() {
+    let (big, small) = (mesh(icosphere(1.0, 2)), mesh(cuboid([0.1; 3])));
+    let at = Pose::new(Vector3::new(0.2, 0.1, -0.3), Vector3::new(0.4, 0.5, 0.6));
+    assert!(meshes_intersect(&big, &at, &small, &Pose::identity()));
+    assert!(meshes_intersect(&small, &at, &big, &Pose::identity()));
+    let outside = Pose::translation(1.2, 0.0, 0.0);
+    assert!(!meshes_intersect(&small, &outside, &big, &Pose::identity()));
+    // In the hole of a torus: inside its hull, outside the solid.
+    assert!(!meshes_intersect(
+        &small,
+        &Pose::identity(),
+        &mesh(torus(1.0, 0.3, 24, 12)),
+        &Pose::identity()
+    ));
+}

@@ -1,0 +1,161 @@
+//! `check` finds the kind of a file and everything that is wrong with it.
+
+use std::path::{Path, PathBuf};
+
+use taut_scene::shapes::cuboid;
+use taut_scene::{
+    FileKind, FileReport, SHIPPED_WORKBENCH, check, read_mesh, shipped_scene_text, write_ply,
+};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+
+    fn check(&self, name: &str, content: impl AsRef<[u8]>) -> FileReport {
+        check(&[self.file(name, content)]).remove(0)
+    }
+}
+
+#[test]
+fn a_sound_mesh_gets_its_figures() {
+    let report = Folder::new().check("box.ply", write_ply(&cuboid([0.1, 0.2, 0.3])));
+    assert!(report.is_good(), "{report}");
+    let figures = report.mesh.unwrap();
+    assert_eq!((figures.triangles, figures.vertices), (12, 8));
+    assert!(figures.watertight && figures.oriented);
+    assert!((figures.volume_m3 - 0.048).abs() < 1e-12);
+    assert_eq!(figures.size_m, [0.2, 0.4, 0.6]);
+    assert!(
+        report
+            .to_string()
+            .contains("12 triangles, 8 vertices, 0.2000 x 0.4000 x 0.6000 m, watertight yes"),
+        "{report}"
+    );
+}
+
+#[test]
+fn a_broken_mesh_is_told_everything_that_is_wrong() {
+    let mut mesh = cuboid([0.1, 0.1, 0.1]);
+    mesh.triangles.pop();
+    let doubled = mesh.triangles[0];
+    mesh.triangles.push(doubled);
+    mesh.triangles.push([0, 0, 1]);
+    let report = Folder::new().check("broken.ply", write_ply(&mesh));
+    let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
+    // The copy closes one of the three edges of the hole, the wrong way round, and crowds its other two.
+    let expected = [
+        "1 triangles have no area; remove them or merge their vertices",
+        "1 triangles have the same corners as another; remove them",
+        "2 edges have one triangle only; close the holes or merge duplicate vertices",
+        "2 edges have more than two triangles; split the surfaces apart",
+        "1 edges have triangles that disagree about outside; turn triangles around",
+    ];
+    assert_eq!(texts, expected);
+    assert!(report.to_string().contains("watertight NO"), "{report}");
+}
+
+#[test]
+fn an_inside_out_mesh_and_millimetres_are_noticed() {
+    let mut mesh = cuboid([30.0, 30.0, 30.0]);
+    mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    let report = Folder::new().check("inside.ply", write_ply(&mesh));
+    assert!(
+        report.problems[0]
+            .text
+            .starts_with("the surface is inside out"),
+        "{report}"
+    );
+    assert!(report.notes[0].contains("write scale = 0.001"), "{report}");
+}
+
+#[test]
+fn files_are_known_by_ending_and_contents() {
+    let folder = Folder::new();
+    folder.file(
+        "peg-in-a-hole.csv",
+        include_str!("../../../scenes/peg-in-a-hole.csv"),
+    );
+    let scene = folder.check("scene.toml", shipped_scene_text("peg-in-a-hole").unwrap());
+    assert_eq!(scene.kind, FileKind::Scene);
+    assert!(
+        scene.is_good() && scene.summary.contains("god-object 288, box 280"),
+        "{scene}"
+    );
+    let workbench = folder.check("bench.toml", SHIPPED_WORKBENCH);
+    assert_eq!(workbench.kind, FileKind::Workbench);
+    assert!(
+        workbench.is_good() && workbench.summary.contains("2 screens, 2 nodes"),
+        "{workbench}"
+    );
+    let trace = folder.check("trace.csv", "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n");
+    assert_eq!((trace.kind, trace.is_good()), (FileKind::Trace, true));
+    let neither = folder.check("other.toml", "a = 1");
+    assert!(
+        neither.problems[0].text.starts_with("is neither a scene"),
+        "{neither}"
+    );
+    let unknown = folder.check("a.docx", "");
+    assert!(
+        unknown.problems[0]
+            .text
+            .starts_with("is no file that taut knows"),
+        "{unknown}"
+    );
+    let shipped = check(&[Path::new("sphere-on-plane")]).remove(0);
+    assert_eq!((shipped.kind, shipped.is_good()), (FileKind::Scene, true));
+}
+
+#[test]
+fn a_scenes_faults_come_with_lines_and_as_json_values() {
+    let text = shipped_scene_text("sphere-on-plane")
+        .unwrap()
+        .replace("mass = 1.0", "mas = 1.0")
+        .replace("k_h", "kh");
+    let report = Folder::new().check("scene.toml", text);
+    assert_eq!(report.problems.len(), 3, "{report}");
+    assert!(report.problems.iter().all(|p| p.line.is_some()));
+    assert!(report.to_string().contains("3 faults"), "{report}");
+}
+
+#[test]
+fn all_formats_give_the_same_box() {
+    let folder = Folder::new();
+    let mesh = cuboid([1.0, 2.0, 3.0]);
+    let mut obj = String::new();
+    let mut stl = String::from("solid box\n");
+    for v in &mesh.vertices {
+        obj += &format!("v {} {} {}\n", v.x, v.y, v.z);
+    }
+    for t in &mesh.triangles {
+        obj += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        stl += "facet normal 0 0 0\nouter loop\n";
+        for i in t {
+            let v = mesh.vertices[*i as usize];
+            stl += &format!("vertex {} {} {}\n", v.x, v.y, v.z);
+        }
+        stl += "endloop\nendfacet\n";
+    }
+    stl += "endsolid box\n";
+    for (name, content) in [
+        ("a.ply", write_ply(&mesh)),
+        ("a.obj", obj.into_bytes()),
+        ("a.stl", stl.into_bytes()),
+    ] {
+        let read = read_mesh(&folder.file(name, content)).unwrap();
+        assert_eq!(
+            (read.vertices.len(), read.triangles.len()),
+            (8, 12),
+            "{name}"
+        );
+        assert!(check(&[folder.0.path().join(name)])[0].is_good(), "{name}");
+    }
+}

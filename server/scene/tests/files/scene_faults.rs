@@ -1,0 +1,351 @@
+//! Every fault of a scene names file, line and what to do.
+
+use std::path::Path;
+
+use god_object::{RotationMetric, SolverKind};
+use nalgebra::Point3;
+use proptest::prelude::*;
+use taut_scene::{MassSpec, Scene, Workbench};
+
+const GOOD: &str = r#"name = "test"
+[god_object]
+shape = { sphere = { radius = 0.01 } }
+mass = 1.0
+pose = { position = [0.0, 0.0, 0.1], rotation = [1.0, 0.0, 0.0, 0.0] }
+reference_point = "center-of-mass"
+[[obstacle]]
+name = "box"
+shape = { box = { half_extents = [0.1, 0.1, 0.01] } }
+surface = { shading = { crease_angle = 0.6 }, texture = { sine = { axis = "x", wavelength = 2e-3, amplitude = 0.2 } }, friction = 0.0 }
+[coupling]
+k_s = 0.5
+k_h = 2000.0
+rotation_metric = "inertia"
+adaptation = { duration = 0.02, threshold = -1e-3 }
+look_ahead = true
+[limits]
+force = 20.0
+torque = 0.5
+[method]
+rest_distance = 1e-5
+"#;
+
+fn parse(text: &str) -> Result<Scene, taut_scene::SceneError> {
+    Scene::parse("s.toml", text, Path::new("nowhere"))
+}
+
+fn fault(text: &str) -> String {
+    parse(text)
+        .and_then(|scene| scene.build())
+        .expect_err("a fault")
+        .to_string()
+}
+
+/// The good scene with one change.
+fn changed(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "{from}");
+    GOOD.replacen(from, to, 1)
+}
+
+#[test]
+fn the_example_of_the_interface_is_read() {
+    let scene = parse(GOOD).unwrap();
+    let built = scene.build().unwrap();
+    assert_eq!(built.name, "test");
+    assert_eq!(built.settings.rest_distance, 1e-5);
+    assert_eq!(built.settings.rotation_metric, RotationMetric::Inertia);
+    assert_eq!(built.start.translation.z, 0.1);
+    let surface = &built.world.obstacles[0].surface;
+    assert_eq!(surface.shading.unwrap().crease_angle, 0.6);
+    assert_eq!(surface.texture.unwrap().axis, nalgebra::Vector3::x());
+    assert_eq!(
+        built
+            .bodies
+            .iter()
+            .map(|b| b.name.as_str())
+            .collect::<Vec<_>>(),
+        ["god-object", "box"]
+    );
+    assert!(built.reference_point().coords.norm() < 1e-15);
+    assert_eq!(built.stiffness(), 1000.0);
+}
+
+#[test]
+fn every_fault_names_file_line_and_key() {
+    let cases = [
+        (
+            changed("k_s =", "k_ss ="),
+            "s.toml:12: unknown key `k_ss` in [coupling]; did you mean `k_s`?",
+        ),
+        (
+            changed("friction", "frction"),
+            "s.toml:10: unknown key `frction` in [[obstacle]] surface; did you mean `friction`?",
+        ),
+        (
+            changed("[limits]", "[limit]"),
+            "s.toml:17: unknown key `limit` in the file; did you mean `limits`?",
+        ),
+        (
+            changed("mass = 1.0", "mass = 0"),
+            "s.toml:4: `mass` in [god_object] is 0, but must be a finite number greater than zero",
+        ),
+        (
+            changed("mass = 1.0", "mass = -2.0"),
+            "s.toml:4: `mass` in [god_object] is -2, but must be a finite number greater than zero",
+        ),
+        (
+            changed("mass = 1.0", "mass = nan"),
+            "s.toml:4: `mass` in [god_object] is NaN, but must be a finite number greater than zero",
+        ),
+        (
+            changed("mass = 1.0", "mass = \"1 kg\""),
+            "s.toml:4: `mass` in [god_object] is a text, but must be a finite number greater than zero",
+        ),
+        (
+            changed("mass = 1.0\n", ""),
+            "s.toml:2: `mass` is missing in [god_object]; add mass = 1.0 (kg) or density = 1000.0 (kg/m^3)",
+        ),
+        (
+            changed("mass = 1.0", "mass = 1.0\ndensity = 2.0"),
+            "s.toml:5: [god_object] has both `mass` and `density`; leave one out",
+        ),
+        (
+            changed("rotation = [1.0", "rotation = [1.1"),
+            "s.toml:5: `rotation` in [god_object] pose: the quaternion has norm 1.1, but must have 1 within 0.001",
+        ),
+        (
+            changed("[0.0, 0.0, 0.1]", "[0.0, inf, 0.1]"),
+            "s.toml:5: `position` in [god_object] pose is inf, but must be a finite number",
+        ),
+        (
+            changed("[0.0, 0.0, 0.1]", "[0.0, 0.1]"),
+            "s.toml:5: `position` in [god_object] pose has 2 numbers, but must have 3",
+        ),
+        (
+            changed("\"center-of-mass\"", "\"centre-of-mass\""),
+            "s.toml:6: `reference_point` in [god_object] is \"centre-of-mass\", but must be \"center-of-mass\"; did you mean `center-of-mass`?",
+        ),
+        (
+            changed("k_s = 0.5", "k_s = 1.5"),
+            "s.toml:12: `k_s` in [coupling] is 1.5, but must be greater than zero and at most 1",
+        ),
+        (
+            changed("threshold = -1e-3", "threshold = 1e-3"),
+            "s.toml:15: `threshold` in [coupling] adaptation is 0.001, but must be a finite number not above zero",
+        ),
+        (
+            changed("look_ahead = true", "look_ahead = 1"),
+            "s.toml:16: `look_ahead` in [coupling] is an integer, but must be true or false",
+        ),
+        (
+            changed("friction = 0.0", "friction = 0.3"),
+            "s.toml:10: `friction` in [[obstacle]] surface is 0.3, but surfaces are frictionless in this version; write 0.0 or leave it out",
+        ),
+        (
+            changed(
+                "{ sphere = { radius = 0.01 } }",
+                "{ sphere = { radius = 0.01 }, mesh = \"a.ply\" }",
+            ),
+            "s.toml:3: [god_object] shape names 2 forms, but must name one",
+        ),
+        (
+            changed(
+                "{ sphere = { radius = 0.01 } }",
+                "{ mesh = \"nothing.ply\" }",
+            ),
+            "s.toml:3: the file \"nothing.ply\" does not exist (looked for nowhere/nothing.ply",
+        ),
+        (
+            changed("{ sphere = { radius = 0.01 } }", "{ sphere = {} }"),
+            "s.toml:3: `radius` is missing in [god_object] shape sphere; add radius = 0.01",
+        ),
+        (
+            changed(
+                "{ sphere = { radius = 0.01 } }",
+                "{ shpere = { radius = 0.01 } }",
+            ),
+            "s.toml:3: [god_object] shape names 0 forms, but must name one: mesh, sphere, box, capsule, cylinder, box_with_hole or plane (and one more fault; `taut check` lists all)",
+        ),
+        (
+            changed("rest_distance = 1e-5", "rest_distance = 1.0"),
+            "s.toml:1: the settings for a body of 0.02",
+        ),
+        (
+            changed("name = \"box\"\n", ""),
+            "s.toml:7: `name` is missing in [[obstacle]]; add name = \"box\"",
+        ),
+        (
+            changed("name = \"test\"\n", ""),
+            "s.toml:1: `name` is missing in the file; add name = \"my-scene\"",
+        ),
+        (
+            "name = \"a\"".into(),
+            "s.toml:1: `god_object` is missing in the file; add the table [god_object] with shape and mass",
+        ),
+        (
+            changed("[limits]", "[limits"),
+            "s.toml:17: is no valid TOML here",
+        ),
+        (
+            changed("force = 20.0", "force = 20.0\nforce = 1.0"),
+            "s.toml:19: is no valid TOML here: duplicate key",
+        ),
+        (
+            format!("{GOOD}[hand]\npath = \"no.csv\"\n"),
+            "s.toml:23: the file \"no.csv\" does not exist",
+        ),
+        (
+            format!("{GOOD}[hand]\npath = \"no.csv\"\npreset = \"ligth\"\n"),
+            "s.toml:24: `preset` in [hand] is \"ligth\", but must be \"released\", \"light\", \"firm\" or \"arm\"; did you mean `light`?",
+        ),
+        (
+            GOOD.replace(
+                "box = { half_extents = [0.1, 0.1, 0.01] }",
+                "box_with_hole = { half_extents = [0.1, 0.1, 0.01], radius = 0.02 }",
+            ),
+            "s.toml:9: the hole of [[obstacle]] shape box_with_hole reaches 0.0200",
+        ),
+    ];
+    for (text, expected) in cases {
+        let found = fault(&text);
+        assert!(
+            found.starts_with(expected),
+            "found    {found}\nexpected {expected}"
+        );
+        assert!(!found.contains('\n'), "one sentence: {found}");
+    }
+}
+
+#[test]
+fn two_obstacles_of_one_name_are_refused() {
+    let text =
+        format!("{GOOD}[[obstacle]]\nname = \"box\"\nshape = {{ sphere = {{ radius = 1.0 }} }}\n");
+    assert_eq!(
+        fault(&text),
+        "s.toml:23: there are two obstacles of the name \"box\"; rename one"
+    );
+}
+
+#[test]
+fn all_faults_are_reported_in_the_order_of_the_file() {
+    let text = GOOD
+        .replace("mass = 1.0", "mass = 0")
+        .replace("k_s = 0.5", "k_s = 0")
+        .replace("force = 20.0", "farce = 20.0");
+    let error = parse(&text).unwrap_err();
+    let lines: Vec<_> = error.problems().iter().map(|p| p.line).collect();
+    assert_eq!(lines, [Some(4), Some(12), Some(18)]);
+    assert!(
+        error
+            .to_string()
+            .ends_with("(and 2 more faults; `taut check` lists all)"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_open_mesh_is_refused_with_the_place() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(
+        directory.path().join("open.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    )
+    .unwrap();
+    let text = changed("{ sphere = { radius = 0.01 } }", "{ mesh = \"open.obj\" }");
+    let scene = Scene::parse("s.toml", &text, directory.path()).unwrap();
+    let found = scene.build().unwrap_err().to_string();
+    assert!(found.starts_with("s.toml:3: the mesh \"open.obj\" cannot be used: the surface is open at the edge between vertices"), "{found}");
+}
+
+#[test]
+fn overrides_change_any_key_and_are_checked_like_the_file() {
+    let scene = parse(GOOD).unwrap();
+    let changed = scene.with_override("coupling.k_s=1.0").unwrap();
+    assert_eq!(changed.coupling().k_s, Some(1.0));
+    let changed = scene
+        .with_overrides(&[
+            "method.solver=clarabel",
+            "obstacle.0.name=wall",
+            "god_object.mass=2",
+        ])
+        .unwrap();
+    assert_eq!(changed.method().solver, Some(SolverKind::Clarabel));
+    assert_eq!(changed.obstacles()[0].name, "wall");
+    assert_eq!(changed.god_object().mass, MassSpec::Mass(2.0));
+    let changed = scene
+        .with_override("god_object.reference_point=[0.0, 0.1, 0.0]")
+        .unwrap();
+    assert_eq!(
+        changed.build().unwrap().reference_point(),
+        Point3::new(0.0, 0.1, 0.0)
+    );
+    let found = scene
+        .with_override("coupling.k_ss=1.0")
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        found,
+        "--set coupling.k_ss=1.0: unknown key `k_ss` in [coupling]; did you mean `k_s`?"
+    );
+    let found = scene
+        .with_override("obstacle.3.name=a")
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        found,
+        "--set obstacle.3.name=a: `3` is no place in a list of 1; count from 0"
+    );
+}
+
+#[test]
+fn density_and_reference_point_give_mass_and_inertia_of_the_solid() {
+    let text = changed(
+        "{ sphere = { radius = 0.01 } }",
+        "{ box = { half_extents = [0.1, 0.2, 0.3] } }",
+    )
+    .replace("mass = 1.0", "density = 1000.0")
+    .replace("\"center-of-mass\"", "[0.1, 0.0, 0.0]");
+    let body = parse(&text).unwrap().build().unwrap().world.body;
+    let mass = 1000.0 * 0.2 * 0.4 * 0.6;
+    assert!((body.mass - mass).abs() < 1e-9);
+    // A box about its centre, then moved by 0.1 m along x.
+    let expected = [
+        mass / 3.0 * (0.04 + 0.09),
+        mass / 3.0 * (0.01 + 0.09) + mass * 0.01,
+        mass / 3.0 * (0.01 + 0.04) + mass * 0.01,
+    ];
+    for (k, expected) in expected.iter().enumerate() {
+        assert!((body.inertia[(k, k)] - expected).abs() < 1e-9, "{k}");
+    }
+}
+
+#[test]
+fn a_scene_that_is_neither_shipped_nor_a_file_lists_the_shipped_ones() {
+    let found = Scene::named_or_file("peg-in-hole").unwrap_err().to_string();
+    assert_eq!(
+        found,
+        "peg-in-hole: is neither a file nor a shipped scene; write a path or one of peg-in-a-hole, two-bunnies, sphere-on-plane"
+    );
+}
+
+proptest! {
+    #[test]
+    fn arbitrary_text_never_panics(text in "\\PC{0,200}", place in 0usize..700) {
+        let _ = parse(&text);
+        let _ = Workbench::parse("w.toml", &text, Path::new(""));
+        let _ = taut_scene::DeviceTrace::parse("t.csv", &text);
+        // Also in the middle of a scene and of a workbench that are otherwise good.
+        for good in [GOOD, taut_scene::SHIPPED_WORKBENCH] {
+            let place = (0..=place % good.len()).rev().find(|i| good.is_char_boundary(*i)).unwrap_or(0);
+            let spliced = format!("{}{text}{}", &good[..place], &good[place..]);
+            let _ = parse(&spliced);
+            let _ = Workbench::parse("w.toml", &spliced, Path::new(""));
+        }
+        let _ = parse(GOOD).unwrap().with_override(&text);
+    }
+
+    #[test]
+    fn arbitrary_values_never_panic(key in "(coupling|god_object|obstacle|view|hand|method)\\.[a-z_]{1,12}", value in "(-?[0-9]{1,20}|[\\[{\"a-z0-9=., }\\]]{0,20}|nan|inf)") {
+        let _ = parse(GOOD).unwrap().with_override(&format!("{key}={value}")).map(|scene| scene.name().len());
+    }
+}

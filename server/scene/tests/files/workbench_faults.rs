@@ -1,0 +1,171 @@
+//! Every fault of a workbench names file, line and what to do.
+
+use std::path::Path;
+
+use taut_scene::{Device, HandPreset, SHIPPED_WORKBENCH, Workbench};
+
+fn line_of(text: &str, wanted: &str) -> usize {
+    1 + text
+        .lines()
+        .position(|line| line.contains(wanted))
+        .expect("the line is there")
+}
+
+/// The fault that one change of the shipped file makes; its line must be that of `at`.
+fn fault(from: &str, to: &str, at: &str) -> String {
+    assert!(SHIPPED_WORKBENCH.contains(from), "{from}");
+    let text = SHIPPED_WORKBENCH.replacen(from, to, 1);
+    let found = Workbench::parse("w.toml", &text, Path::new(""))
+        .expect_err("a fault")
+        .to_string();
+    let place = format!("w.toml:{}: ", line_of(&text, at));
+    found
+        .strip_prefix(&place)
+        .unwrap_or_else(|| panic!("{found} is not at {place}"))
+        .to_owned()
+}
+
+#[test]
+fn every_fault_names_file_line_and_key() {
+    let node = "name = \"table\"\nscreens";
+    let cases = [
+        (
+            node,
+            "name = \"front\" #\nscreens",
+            "\"front\" #",
+            "there are two nodes of the name \"front\"; rename one",
+        ),
+        (
+            "screens = [\"table\"]",
+            "screens = [\"tabel\"]",
+            "tabel",
+            "[[node]] draws the screen \"tabel\", which does not exist; known screens: front, table",
+        ),
+        (
+            "screens = [\"table\"]",
+            "screens = []",
+            "screens = []",
+            "[[node]] draws no screen; name at least one in `screens`",
+        ),
+        (
+            "quic_port = 4857",
+            "quick_port = 4857",
+            "quick_port",
+            "unknown key `quick_port` in [network]; did you mean `quic_port`?",
+        ),
+        (
+            "udp_port = 4858",
+            "udp_port = 4857",
+            "udp_port",
+            "`quic_port` and `udp_port` in [network] are both 4857; choose another for one",
+        ),
+        (
+            "quic_port = 4857",
+            "quic_port = 70000",
+            "quic_port",
+            "`quic_port` in [network] is 70000, but must be between 0 and 65535",
+        ),
+        (
+            "bind = \"127.0.0.1\"",
+            "bind = \"here\"",
+            "\"here\"",
+            "`bind` in [network] is \"here\", which is no address; write one such as \"0.0.0.0\"",
+        ),
+        (
+            "mode = \"waive\"",
+            "mode = \"wave\"",
+            "\"wave\"",
+            "`mode` in [realtime] is \"wave\", but must be \"enforce\" or \"waive\"; did you mean `waive`?",
+        ),
+        (
+            "haptics_priority = 80",
+            "haptics_priority = 100",
+            "haptics_priority",
+            "`haptics_priority` in [realtime] is 100, but must be between 1 and 99",
+        ),
+        (
+            "eye_separation = 0.064",
+            "eye_separation = 64",
+            "eye_separation",
+            "`eye_separation` in [viewer] is 64, but must be between 0 and 0.2",
+        ),
+        (
+            "near = 0.05",
+            "near = 50.0",
+            "[viewer]",
+            "`near` (50) in [viewer] must be smaller than `far` (20)",
+        ),
+        (
+            "kind = \"simulated\"",
+            "kind = \"trace\"",
+            "[device]",
+            "`path` is missing in [device]; add path = \"trace.csv\"",
+        ),
+        (
+            "stereo = \"side-by-side\"",
+            "stereo = \"sidebyside\"",
+            "sidebyside",
+            "`stereo` in [[node]] is \"sidebyside\", but must be",
+        ),
+        (
+            "upper_left = [-0.9, 0.0, 1.2]",
+            "upper_left = [0.9, 0.0, 1.2]",
+            "[[screen]]",
+            "the corners of screen \"front\" are no rectangle",
+        ),
+    ];
+    for (from, to, at, expected) in cases {
+        let found = fault(from, to, at);
+        assert!(
+            found.starts_with(expected),
+            "found    {found}\nexpected {expected}"
+        );
+    }
+}
+
+#[test]
+fn a_workbench_needs_screens_nodes_and_a_viewer() {
+    let error = Workbench::parse(
+        "w.toml",
+        "name = \"a\"\nscene = \"peg-in-a-hole\"\n",
+        Path::new(""),
+    )
+    .unwrap_err();
+    let texts: Vec<&str> = error.problems().iter().map(|p| p.text.as_str()).collect();
+    assert_eq!(texts.len(), 3, "{texts:?}");
+    assert!(texts[0].starts_with("`screen` is missing"));
+    assert!(texts[1].starts_with("`node` is missing"));
+    assert!(texts[2].starts_with("`viewer` is missing"));
+}
+
+#[test]
+fn paths_are_relative_to_the_file_and_shipped_scenes_are_names() {
+    let text = SHIPPED_WORKBENCH
+        .replace("# hand = \"firm\"", "hand = \"arm\" #")
+        .replace("# path = \"my-hand.csv\"", "path = \"my-hand.csv\" #");
+    let workbench = Workbench::parse("w.toml", &text, Path::new("lab")).unwrap();
+    let Device::Simulated { hand, path, .. } = &workbench.device else {
+        panic!("simulated")
+    };
+    assert_eq!(*hand, Some(HandPreset::Arm));
+    assert_eq!(path.as_deref(), Some(Path::new("lab/my-hand.csv")));
+    assert_eq!(workbench.scene, "peg-in-a-hole");
+    let text = SHIPPED_WORKBENCH.replace("scene = \"peg-in-a-hole\"", "scene = \"mine.toml\"");
+    let workbench = Workbench::parse("w.toml", &text, Path::new("lab")).unwrap();
+    let found = workbench.load_scene().unwrap_err().to_string();
+    assert!(found.ends_with("the scene \"lab/mine.toml\" is neither shipped nor a file; write a shipped name or a path"), "{found}");
+}
+
+#[test]
+fn overrides_reach_every_key() {
+    let directory = Path::new("");
+    let workbench = Workbench::parse_with_overrides(
+        "w.toml",
+        SHIPPED_WORKBENCH,
+        directory,
+        &["network.quic_port=0", "node.1.stereo=mono"],
+    )
+    .unwrap();
+    assert_eq!(workbench.network.quic_port, 0);
+    assert_eq!(workbench.nodes[1].stereo, taut_scene::Stereo::Mono);
+}

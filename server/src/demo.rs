@@ -1,0 +1,208 @@
+//! `taut demo`: the whole workbench on this machine. The server runs in this process, every render node (and the bridge, if
+//! wanted) in a process of its own, with a fresh cluster key that nobody else knows.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use taut_link::create_key_file;
+use taut_scene::{Device, Scene, Workbench};
+
+use crate::children::{NamedChild, wait_or_kill};
+use crate::cli::DemoArgs;
+use crate::config::{Overrides, session_setup};
+use crate::failure::Failure;
+use crate::monitor::MonitorFeed;
+use crate::realtime::after_parent;
+use crate::rendering;
+use crate::report::SessionReport;
+use crate::serve::{announce, watch};
+use crate::session::Session;
+use crate::signals::BlockingEndSignal;
+use crate::terminal::Terminal;
+
+/// Children have this long to end by themselves once the server closed.
+const GRACE: Duration = Duration::from_secs(3);
+/// Sets what a process logs.
+const LOG_VARIABLE: &str = "TAUT_LOG";
+/// What the bridge is called.
+const BRIDGE_NODE: &str = "bridge";
+
+/// Runs the demo. The report comes with the failure, if the session broke down on the way.
+pub fn run(args: &DemoArgs, terminal: &Terminal) -> Result<(SessionReport, Option<Failure>), Failure> {
+    let directory = tempfile::Builder::new()
+        .prefix("taut-demo-")
+        .tempdir()
+        .map_err(|error| Failure::failed(format!("no temporary directory can be made ({error}); check TMPDIR")))?;
+    let key_path = directory.path().join("cluster.key");
+    let key = create_key_file(&key_path)?;
+
+    let mut workbench = Workbench::shipped()?;
+    take_free_ports(&mut workbench, terminal);
+    let scene = args.scene.clone().unwrap_or_else(|| workbench.scene.clone());
+    let hand_path = if args.bridge {
+        workbench.device = Device::Remote;
+        write_hand_path(&scene, directory.path())?
+    } else {
+        None
+    };
+    if !MonitorFeed::BUILT_IN {
+        terminal.say("this program was built without the monitor; the demo goes on without it");
+    }
+    let overrides = Overrides {
+        scene: Some(scene),
+        no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
+        record: args.record.clone(),
+        ..Overrides::default()
+    };
+    let setup = session_setup(&workbench, key, &overrides)?;
+    let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
+    let mut session = Session::start(setup)?;
+    announce(&session, terminal);
+
+    let mut children = Vec::new();
+    let launcher = Launcher::new(&session, key_path, args)?;
+    if args.bridge {
+        children.push(launcher.bridge(hand_path.as_ref(), terminal)?);
+    }
+    if rendering::BUILT_IN {
+        for node in &workbench.nodes {
+            children.push(launcher.render_node(&node.name, terminal)?);
+        }
+    } else {
+        terminal.say("this program was built without drawing; the demo goes on without it");
+    }
+
+    watch(&mut session, &mut signal, args.duration, terminal, |_| {
+        for child in &mut children {
+            if let Some(status) = child.newly_ended()
+                && !status.success()
+            {
+                terminal.say(&format!("taut: {} ended early ({status}); the demo goes on without it", child.name()));
+            }
+        }
+    });
+    terminal.end_status();
+    children.iter().for_each(NamedChild::mute);
+    let ended = session.stop(terminal);
+    for name in wait_or_kill(children, GRACE) {
+        terminal.say(&format!("taut: {name} did not end by itself and was killed"));
+    }
+    Ok(ended)
+}
+
+/// Replaces every port of the workbench that somebody else has by a free one, and says so.
+fn take_free_ports(workbench: &mut Workbench, terminal: &Terminal) {
+    // A demonstration is nobody else's business.
+    workbench.network.bind = IpAddr::V4(Ipv4Addr::LOCALHOST);
+    let bind = workbench.network.bind;
+    let udp_is_free = |port: u16| UdpSocket::bind((bind, port)).is_ok();
+    let tcp_bind = workbench.monitoring.bind;
+    let tcp_is_free = |port: u16| TcpListener::bind((tcp_bind, port)).is_ok();
+    let ports: [(&mut u16, &dyn Fn(u16) -> bool, &str); 4] = [
+        (&mut workbench.network.quic_port, &udp_is_free, "the control plane"),
+        (&mut workbench.network.udp_port, &udp_is_free, "the poses"),
+        (&mut workbench.monitoring.grpc_port, &tcp_is_free, "the monitor's stream"),
+        (&mut workbench.monitoring.web_port, &tcp_is_free, "the monitor's page"),
+    ];
+    for (port, is_free, what) in ports {
+        if !is_free(*port) {
+            terminal.say(&format!("port {port} is in use; {what} takes a free one"));
+            *port = 0;
+        }
+    }
+}
+
+/// The intention of the scene's hand as a file for the bridge, and how the hand holds.
+struct HandPath {
+    path: PathBuf,
+    repeat: bool,
+    preset: &'static str,
+}
+
+fn write_hand_path(scene: &str, directory: &Path) -> Result<Option<HandPath>, Failure> {
+    let scene = Scene::named_or_file(scene)?;
+    let (Some(hand), Some(trace)) = (scene.hand(), scene.hand_path()?) else {
+        return Ok(None);
+    };
+    let path = directory.join("hand.csv");
+    std::fs::write(&path, trace.to_csv())
+        .map_err(|error| Failure::failed(format!("{}: cannot be written ({error}); check TMPDIR", path.display())))?;
+    Ok(Some(HandPath { path, repeat: hand.repeat, preset: hand.preset.name() }))
+}
+
+/// Starts the other roles from this very program.
+struct Launcher<'a> {
+    program: PathBuf,
+    server: SocketAddr,
+    key: PathBuf,
+    args: &'a DemoArgs,
+    headless: bool,
+}
+
+impl<'a> Launcher<'a> {
+    fn new(session: &Session, key: PathBuf, args: &'a DemoArgs) -> Result<Self, Failure> {
+        let program = std::env::current_exe()
+            .map_err(|error| Failure::failed(format!("this program's own file is not known ({error}); start it by its path")))?;
+        let server = session
+            .quic_address()
+            .ok_or_else(|| Failure::failed("the server has no address: this is a fault of the program"))?;
+        let has_display = ["DISPLAY", "WAYLAND_DISPLAY"]
+            .iter()
+            .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+        let headless = args.headless || args.out.is_some() || !has_display;
+        Ok(Self { program, server, key, args, headless })
+    }
+
+    fn role(&self, role: &str, node: &str) -> Command {
+        let mut command = Command::new(&self.program);
+        command.arg(role).args(["--server", &self.server.to_string(), "--node", node]);
+        command.arg("--key").arg(&self.key);
+        command.args(["--transport", self.args.transport.name()]);
+        command
+    }
+
+    fn render_node(&self, node: &str, terminal: &Terminal) -> Result<NamedChild, Failure> {
+        let mut command = self.role("render", node);
+        // Drawing in software takes every core that it gets; the loops come first.
+        after_parent(&mut command);
+        if self.headless {
+            command.arg("--headless");
+            if std::env::var_os("XDG_RUNTIME_DIR").is_none()
+                && let Some(directory) = self.key.parent()
+            {
+                // Graphics drivers complain without it, though nothing is put there.
+                command.env("XDG_RUNTIME_DIR", directory);
+            }
+        }
+        if let Some(frames) = self.args.frames {
+            command.args(["--frames", &frames.to_string()]);
+        }
+        if let Some(out) = &self.args.out {
+            command.arg("--out").arg(out);
+        }
+        start(node, command, terminal)
+    }
+
+    fn bridge(&self, hand: Option<&HandPath>, terminal: &Terminal) -> Result<NamedChild, Failure> {
+        let mut command = self.role("bridge", BRIDGE_NODE);
+        command.args(["--device", "simulated"]);
+        if std::env::var_os(LOG_VARIABLE).is_none() {
+            // Its events come over the network as well.
+            command.env(LOG_VARIABLE, "error");
+        }
+        if let Some(hand) = hand {
+            command.arg("--path").arg(&hand.path).args(["--hand", hand.preset]);
+            if hand.repeat {
+                command.arg("--loop");
+            }
+        }
+        start(BRIDGE_NODE, command, terminal)
+    }
+}
+
+fn start(name: &str, command: Command, terminal: &Terminal) -> Result<NamedChild, Failure> {
+    NamedChild::start(name, command, terminal)
+        .map_err(|error| Failure::failed(format!("{name} cannot be started ({error}); check the limit on processes (ulimit -u)")))
+}

@@ -1,0 +1,114 @@
+//! Figure 3 put together: the three loops, the shared data between them, and the ends for those who only look on.
+
+use std::sync::Arc;
+
+use god_object::{Coupling, GodObject, Settings, World};
+use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+
+use super::coupling::CouplingLoop;
+use super::god_object::GodObjectLoop;
+use super::haptics::HapticsLoop;
+use super::shell::Waker;
+use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::device_state::DeviceState;
+use crate::shared::fanout::Subscriber;
+use crate::shared::wrench_command::WrenchCommand;
+use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
+use crate::statistics::Statistics;
+
+/// The loops, ready to be ticked.
+pub struct WiredLoops {
+    /// Loop 1.
+    pub god_object: GodObjectLoop,
+    /// Loop 2.
+    pub coupling: CouplingLoop,
+    /// Loop 3.
+    pub haptics: HapticsLoop,
+    /// Wakes loop 2: loop 3 does after each sample, loop 1's thread after each constraint set.
+    pub coupling_waker: Waker,
+    /// For those who look on.
+    pub observers: Observers,
+    /// What all of them count.
+    pub statistics: Statistics,
+}
+
+/// The reading ends that belong to no loop.
+#[derive(Debug)]
+pub struct Observers {
+    /// For the broadcaster.
+    pub broadcast: SharedView,
+    /// For the monitor.
+    pub monitor: SharedView,
+    /// For the checker.
+    pub checker: Subscriber<ContactSnapshot>,
+    /// For the status line.
+    pub status: Subscriber<WrenchCommand>,
+}
+
+/// One observer's ends of all that the loops publish.
+#[derive(Debug)]
+pub struct SharedView {
+    /// From loop 3.
+    pub device: Subscriber<DeviceState>,
+    /// From loop 1.
+    pub contacts: Subscriber<ContactSnapshot>,
+    /// From loop 2.
+    pub wrench: Subscriber<WrenchCommand>,
+}
+
+impl WiredLoops {
+    /// Puts the boxes between their arrows. `device` stands where the god-object does.
+    pub fn new(
+        world: &Arc<World>,
+        settings: &Settings,
+        god_object: GodObject,
+        device: Box<dyn Device>,
+        safety: SafetySettings,
+    ) -> Self {
+        let start = *god_object.pose();
+        let (states, device_readers) = device_state::channel(&start);
+        let (snapshots, contact_readers) = contact_snapshot::channel(&start, settings.max_constraints);
+        let (wrenches, wrench_readers) = wrench_command::channel();
+        let (shaded, shaded_reader) = shaded_acceleration::channel();
+        let coupling_waker = Waker::default();
+
+        let god_object = GodObjectLoop::new(god_object, device_readers.god_object, shaded_reader, snapshots);
+        let coupling = CouplingLoop::new(
+            Coupling::new(world, settings),
+            device_readers.coupling,
+            contact_readers.coupling,
+            wrenches,
+            shaded,
+        );
+        let haptics = HapticsLoop::new(
+            device,
+            Safety::new(safety),
+            EnergyObserver::new(world.body.reference_point),
+            &start,
+            wrench_readers.haptics,
+            states,
+            coupling_waker.clone(),
+        );
+        let statistics = Statistics {
+            haptics: haptics.statistics(),
+            coupling: coupling.statistics(),
+            god_object: god_object.statistics(),
+            ..Statistics::default()
+        };
+        let observers = Observers {
+            broadcast: SharedView {
+                device: device_readers.broadcast,
+                contacts: contact_readers.broadcast,
+                wrench: wrench_readers.broadcast,
+            },
+            monitor: SharedView {
+                device: device_readers.monitor,
+                contacts: contact_readers.monitor,
+                wrench: wrench_readers.monitor,
+            },
+            checker: contact_readers.checker,
+            status: wrench_readers.status,
+        };
+        Self { god_object, coupling, haptics, coupling_waker, observers, statistics }
+    }
+}

@@ -1,0 +1,85 @@
+//! `taut serve`: the haptic PC, until its time is over, the user ends it, or something breaks.
+
+use std::path::Path;
+use std::time::Duration;
+
+use taut_link::ClusterKey;
+use taut_scene::Workbench;
+
+use crate::cli::ServeArgs;
+use crate::config::{Overrides, session_setup};
+use crate::failure::Failure;
+use crate::key;
+use crate::report::SessionReport;
+use crate::session::Session;
+use crate::signals::BlockingEndSignal;
+use crate::terminal::Terminal;
+
+/// Time between two looks at network, children and clock; also of the status line.
+const LOOK_PERIOD: Duration = Duration::from_millis(100);
+
+/// Serves the workbench. The report comes with the failure, if the session broke down on the way.
+pub fn run(args: &ServeArgs, terminal: &Terminal) -> Result<(SessionReport, Option<Failure>), Failure> {
+    let workbench = Workbench::load(&args.config)?;
+    let key = workbench_key(args.key.as_deref(), &workbench)?;
+    let overrides = Overrides {
+        scene: args.scene.clone(),
+        quic: args.quic,
+        udp: args.udp,
+        no_monitor: args.no_monitor,
+        record: args.record.clone(),
+    };
+    let setup = session_setup(&workbench, key, &overrides)?;
+    let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
+    let mut session = Session::start(setup)?;
+    announce(&session, terminal);
+    watch(&mut session, &mut signal, args.duration, terminal, |_| {});
+    terminal.end_status();
+    Ok(session.stop(terminal))
+}
+
+/// The key of the command line, else of the workbench file, else of the environment.
+fn workbench_key(named: Option<&Path>, workbench: &Workbench) -> Result<ClusterKey, Failure> {
+    key::read(named.or(workbench.network.key_file.as_deref()))
+}
+
+/// Says where the session can be reached, and what of real time is not in force.
+pub fn announce(session: &Session, terminal: &Terminal) {
+    if let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) {
+        terminal.say(&format!("serving on {quic} (control) and {udp} (poses)"));
+    }
+    if let Some(monitor) = session.monitor() {
+        if let Some(page) = monitor.address() {
+            terminal.say(&format!("watch it in a browser: {page}"));
+        }
+        if let Some(stream) = monitor.stream_address() {
+            terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
+        }
+    }
+    for line in &session.realtime().waived {
+        terminal.say(&format!("not in force: {line}"));
+    }
+}
+
+/// Lets the session run until `duration` is over, the signal is given, or something breaks; `each` is called at every look.
+pub fn watch(
+    session: &mut Session,
+    signal: &mut BlockingEndSignal,
+    duration: Option<f64>,
+    terminal: &Terminal,
+    mut each: impl FnMut(&mut Session),
+) {
+    let end = duration.map(Duration::from_secs_f64);
+    loop {
+        let left = end.map_or(LOOK_PERIOD, |end| end.saturating_sub(session.age()).min(LOOK_PERIOD));
+        if signal.wait(left) || session.is_ending() {
+            return;
+        }
+        session.follow_network(terminal);
+        terminal.status(session.status_line());
+        each(session);
+        if end.is_some_and(|end| session.age() >= end) {
+            return;
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! The three loops under a virtual clock, with a simulated device and hand: everything but the threads.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use god_object::nalgebra::Vector3;
+use god_object::spatial::linear;
+use god_object::{GodObject, Pose};
+use taut::checker::PenetrationChecker;
+use taut::loops::wiring::WiredLoops;
+use taut_bridge::{
+    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings, SimulatedDevice, ViaPoint,
+};
+use taut_scene::{BuiltScene, Scene};
+
+const TICK: Duration = Duration::from_millis(1);
+
+/// The session's loops, ticked in the order in which their threads would run.
+struct VirtualSession {
+    loops: WiredLoops,
+    now: Duration,
+}
+
+fn sphere_on_plane() -> BuiltScene {
+    match Scene::named_or_file("sphere-on-plane").and_then(|scene| scene.build()) {
+        Ok(scene) => scene,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// The hand goes down to 10 mm below the plane's surface within a second, waits a second, and comes up again.
+fn pressing_hand(scene: &BuiltScene) -> SimulatedDevice {
+    let radius = 0.02;
+    let at = |time_s, height: f64| ViaPoint {
+        time_s,
+        pose: Pose::translation(0.0, 0.0, height),
+    };
+    let points = vec![
+        at(0.0, 0.04),
+        at(1.0, radius - 0.01),
+        at(2.0, radius - 0.01),
+        at(3.0, 0.04),
+    ];
+    match MinJerkPath::new(points, false) {
+        Ok(path) => SimulatedDevice::new(Grip::workbench(), Hand::FIRM, path, scene.reference_point()),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+impl VirtualSession {
+    fn new(scene: &BuiltScene, device: Box<dyn Device>, start: &Pose) -> Self {
+        let world = Arc::new(scene.world.clone());
+        let god_object = match GodObject::new(world.clone(), scene.settings, *start) {
+            Ok(god_object) => god_object,
+            Err(error) => panic!("{error}"),
+        };
+        let safety = SafetySettings { ramp_in: Duration::from_millis(10), ..SafetySettings::default() };
+        Self {
+            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety),
+            now: Duration::ZERO,
+        }
+    }
+
+    /// One millisecond: loop 3, loop 2; loop 1 only every `god_object_ticks`.
+    fn tick(&mut self, god_object_ticks: u32) {
+        self.now += TICK;
+        let now = self.now;
+        self.loops.haptics.tick(now);
+        self.loops.coupling.tick(now);
+        if now.as_millis().is_multiple_of(u128::from(god_object_ticks)) {
+            self.loops.god_object.tick(|| now);
+        }
+    }
+}
+
+#[test]
+fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate() {
+    let scene = sphere_on_plane();
+    let Some(checker) = PenetrationChecker::new(&scene.world) else {
+        panic!("parry refuses the meshes");
+    };
+    for god_object_ticks in [1, 4, 14] {
+        let device = pressing_hand(&scene);
+        let start = Pose::translation(0.0, 0.0, 0.04);
+        let mut session = VirtualSession::new(&scene, Box::new(device), &start);
+        let mut largest: f64 = 0.0;
+        for _ in 0..3500 {
+            session.tick(god_object_ticks);
+            let pose = session.loops.observers.monitor.contacts.newest().set.god_object_pose;
+            assert!(pose.translation.z >= 0.019, "centre at {}", pose.translation.z);
+            assert_eq!(checker.penetrated_obstacle(&pose), None);
+            let force = linear(&session.loops.observers.monitor.wrench.newest().wrench);
+            // Frictionless, so nothing but along the normal.
+            assert!(force.xy().norm() < 1e-3 * force.norm().max(1.0), "{force}");
+            largest = largest.max(force.z);
+        }
+        // A firm hand of 500 N/m against 1000 N/m: two thirds of 10 mm stay as force.
+        assert!((2.0..6.0).contains(&largest), "largest force {largest} N at every {god_object_ticks} ticks");
+        assert_eq!(session.loops.observers.monitor.wrench.newest().wrench.norm(), 0.0, "no force in free space");
+        assert!(session.loops.observers.monitor.device.newest().pose.translation.z > 0.035, "the hand is back");
+        assert!(session.loops.haptics.statistics().energy_injected() < 1e-2);
+    }
+}
+
+/// Answers until its cable is pulled.
+struct Unplugged {
+    device: SimulatedDevice,
+    at: Duration,
+    written: Arc<std::sync::Mutex<Vector3<f64>>>,
+}
+
+impl Device for Unplugged {
+    fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        if now < self.at { self.device.read(now) } else { Err(DeviceFault::Lost { age: now - self.at }) }
+    }
+
+    fn write(&mut self, now: Duration, wrench: &god_object::Vector6) {
+        if let Ok(mut written) = self.written.lock() {
+            *written = linear(wrench);
+        }
+        self.device.write(now, wrench);
+    }
+}
+
+#[test]
+fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
+    let scene = sphere_on_plane();
+    let written = Arc::default();
+    let device = Unplugged {
+        device: pressing_hand(&scene),
+        at: Duration::from_millis(1500),
+        written: Arc::clone(&written),
+    };
+    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
+    for _ in 0..1499 {
+        session.tick(1);
+    }
+    assert!(felt() > 2.0);
+    let before = session.loops.haptics.statistics().safety_events.load(std::sync::atomic::Ordering::Relaxed);
+    session.tick(1);
+    assert_eq!(felt(), 0.0, "dropped at once");
+    session.tick(1);
+    assert!(session.loops.observers.monitor.device.newest().faulty);
+    let after = session.loops.haptics.statistics().safety_events.load(std::sync::atomic::Ordering::Relaxed);
+    assert_eq!(after, before + 1, "one event, not one per tick");
+}
+
+#[test]
+fn a_silent_coupling_lets_the_force_fade() {
+    let scene = sphere_on_plane();
+    let written = Arc::default();
+    let device = Unplugged {
+        device: pressing_hand(&scene),
+        at: Duration::MAX,
+        written: Arc::clone(&written),
+    };
+    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    for _ in 0..1500 {
+        session.tick(1);
+    }
+    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
+    assert!(felt() > 2.0);
+    for _ in 0..150 {
+        session.now += TICK;
+        session.loops.haptics.tick(session.now);
+    }
+    assert_eq!(felt(), 0.0);
+}
+
+#[test]
+fn constraints_older_than_a_tenth_of_a_second_let_the_force_fade() {
+    let scene = sphere_on_plane();
+    let written = Arc::default();
+    let device = Unplugged {
+        device: pressing_hand(&scene),
+        at: Duration::MAX,
+        written: Arc::clone(&written),
+    };
+    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    for _ in 0..1500 {
+        session.tick(1);
+    }
+    let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
+    // Loop 1 hangs; loops 2 and 3 go on.
+    let mut hang = |ticks: u32| {
+        for _ in 0..ticks {
+            session.now += TICK;
+            session.loops.haptics.tick(session.now);
+            session.loops.coupling.tick(session.now);
+        }
+    };
+    hang(90);
+    assert!(felt() > 2.0, "held at first: {}", felt());
+    hang(160);
+    assert_eq!(felt(), 0.0);
+}

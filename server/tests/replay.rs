@@ -1,0 +1,122 @@
+//! Replay through the program: deterministic, complete, and gone without a trace when it fails.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn taut(arguments: &[&str]) -> Output {
+    match Command::new(env!("CARGO_BIN_EXE_taut")).args(arguments).output() {
+        Ok(output) => output,
+        Err(error) => panic!("taut does not start: {error}"),
+    }
+}
+
+fn temporary() -> tempfile::TempDir {
+    match tempfile::tempdir() {
+        Ok(directory) => directory,
+        Err(error) => panic!("no temporary directory: {error}"),
+    }
+}
+
+/// A sphere is pressed 5 mm into the plane, slid, and lifted, at 500 Hz.
+fn write_trace(path: &Path) {
+    let mut text = String::from("t,x,y,z,qw,qx,qy,qz\n");
+    for row in 0..1000_u32 {
+        let time = f64::from(row) * 0.002;
+        let height = 0.015 + (0.02 - 0.02 * time).abs();
+        text.push_str(&format!("{time},{},0.0,{height},1,0,0,0\n", 0.05 - 0.05 * time));
+    }
+    assert!(std::fs::write(path, text).is_ok());
+}
+
+fn path_text(path: &Path) -> &str {
+    path.to_str().unwrap_or_default()
+}
+
+#[test]
+fn the_same_trace_gives_the_same_bytes_and_a_complete_report() {
+    let directory = temporary();
+    let trace = directory.path().join("trace.csv");
+    write_trace(&trace);
+    let mut answers = Vec::new();
+    for (name, rate) in [("a.csv", "250"), ("b.csv", "250"), ("c.csv", "70")] {
+        let out = directory.path().join(name);
+        let output = taut(&[
+            "replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out", path_text(&out),
+            "--god-object-rate", rate, "--json",
+        ]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        assert_eq!(report["steps"], 1000);
+        assert!(report["max_force_n"].as_f64().is_some_and(|force| (4.0..6.0).contains(&force)), "{report}");
+        assert!(report["gap_min_m"].as_f64().is_some_and(|gap| gap > 0.0), "{report}");
+        assert!(report["kkt_max"].as_f64().is_some_and(|kkt| kkt < 1e-6), "{report}");
+        assert!(report["work"]["projections"].as_u64().is_some_and(|count| count > 0), "{report}");
+        answers.push(std::fs::read(&out).unwrap_or_default());
+    }
+    assert!(!answers[0].is_empty());
+    assert!(answers[0] == answers[1], "the same input gave other bytes");
+    assert!(answers[0] != answers[2], "the rate makes no difference");
+    let text = String::from_utf8_lossy(&answers[0]);
+    assert_eq!(text.lines().count(), 1001);
+    assert!(text.starts_with("t,hx,hy,hz,hqw,hqx,hqy,hqz,sx,sy,sz,"));
+}
+
+#[test]
+fn timings_add_two_columns_and_change_no_other() {
+    let directory = temporary();
+    let trace = directory.path().join("trace.csv");
+    write_trace(&trace);
+    let run = |name: &str, more: &[&str]| {
+        let out = directory.path().join(name);
+        let mut arguments = vec!["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out"];
+        let out_text = path_text(&out).to_owned();
+        arguments.push(&out_text);
+        arguments.extend(more);
+        assert!(taut(&arguments).status.success());
+        std::fs::read_to_string(&out).unwrap_or_default()
+    };
+    let plain = run("plain.csv", &[]);
+    let timed = run("timed.csv", &["--timings"]);
+    assert!(timed.lines().next().is_some_and(|header| header.ends_with(",stale,update_us,force_us")));
+    for (plain, timed) in plain.lines().zip(timed.lines()) {
+        assert!(timed.starts_with(plain), "{plain}\n{timed}");
+    }
+}
+
+#[test]
+fn overrides_and_solvers_reach_the_method() {
+    let directory = temporary();
+    let trace = directory.path().join("trace.csv");
+    write_trace(&trace);
+    let force = |more: &[&str]| {
+        let out = directory.path().join("out.csv");
+        let mut arguments = vec!["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--json", "--out"];
+        let out_text = path_text(&out).to_owned();
+        arguments.push(&out_text);
+        arguments.extend(more);
+        let output = taut(&arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        report["max_force_n"].as_f64().unwrap_or(f64::NAN)
+    };
+    let plain = force(&[]);
+    let soft = force(&["--set", "coupling.k_h=1000.0"]);
+    assert!((soft / plain - 0.5).abs() < 1e-3, "{soft} N of {plain} N");
+    let reference = force(&["--solver", "clarabel"]);
+    assert!((reference / plain - 1.0).abs() < 1e-4, "{reference} N, not {plain} N");
+}
+
+#[test]
+fn a_failing_replay_leaves_no_file_and_says_one_sentence() {
+    let directory = temporary();
+    let trace = directory.path().join("trace.csv");
+    let broken = "t,x,y,z,qw,qx,qy,qz\n0.0,0.05,0,0.04,1,0,0,0\n0.001,nan,0,0.04,1,0,0,0\n";
+    assert!(std::fs::write(&trace, broken).is_ok());
+    let out = directory.path().join("out.csv");
+    let output = taut(&["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out", path_text(&out)]);
+    assert_eq!(output.status.code(), Some(2));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(error.starts_with("taut: ") && error.contains("trace.csv:3") && error.trim().lines().count() == 1, "{error}");
+    let files: Vec<_> = std::fs::read_dir(directory.path()).into_iter().flatten().flatten().collect();
+    assert_eq!(files.len(), 1, "{files:?}");
+}

@@ -1,0 +1,177 @@
+//! A workbench of a test's own: a directory with a workbench file on free ports and a cluster key; one runs at a time.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use taut_link::{ClusterKey, create_key_file, read_key_file};
+use tempfile::TempDir;
+use toml::{Table, Value};
+
+use crate::process::{Ended, Process};
+
+/// Longest wait for a server to serve: a debug build on a busy machine loads a scene of 27,000 triangles.
+pub const START_LIMIT: Duration = Duration::from_secs(60);
+/// Longest wait for the end of a process that was asked to end.
+pub const END_LIMIT: Duration = Duration::from_secs(15);
+/// Longest wait for the end of a process that is given bad input.
+const REFUSAL_LIMIT: Duration = Duration::from_secs(30);
+
+/// The directory, the files in it, and the right to run a workbench now.
+#[derive(Debug)]
+pub struct TestWorkbench {
+    /// Program under test.
+    program: PathBuf,
+    /// The workbench file's content.
+    pub file: Table,
+    directory: TempDir,
+    /// Held until the end: two workbenches at once would starve each other on a small machine.
+    _turn: Turn,
+}
+
+impl TestWorkbench {
+    /// The shipped workbench on free ports of loopback, without monitor. `program` is the program under test. Waits
+    /// until no other test runs a workbench.
+    ///
+    /// # Panics
+    /// When the directory or the key cannot be made.
+    #[must_use]
+    pub fn new(program: &str) -> Self {
+        let turn = Turn::wait();
+        let directory = tempfile::Builder::new().prefix("taut-tests-").tempdir().expect("a temporary directory");
+        create_key_file(&directory.path().join("cluster.key")).unwrap_or_else(|error| panic!("{error}"));
+        let file = taut_scene::SHIPPED_WORKBENCH.parse().expect("the shipped workbench file is TOML");
+        let mut workbench = Self { program: program.into(), file, directory, _turn: turn };
+        for port in ["network.quic_port", "network.udp_port", "monitoring.grpc_port", "monitoring.web_port"] {
+            workbench.set(port, 0);
+        }
+        workbench.set("monitoring.enabled", false);
+        workbench
+    }
+
+    /// Changes a value of the workbench file, such as `network.quic_port`.
+    ///
+    /// # Panics
+    /// When the table is not there.
+    pub fn set(&mut self, key: &str, value: impl Into<Value>) {
+        match key.split_once('.') {
+            Some((table, key)) => {
+                let table = self.file.get_mut(table).and_then(Value::as_table_mut);
+                table.unwrap_or_else(|| panic!("the workbench file has no table for {key}")).insert(key.into(), value.into());
+            }
+            None => {
+                self.file.insert(key.into(), value.into());
+            }
+        }
+    }
+
+    /// Where its files are.
+    #[must_use]
+    pub fn directory(&self) -> &Path {
+        self.directory.path()
+    }
+
+    /// Writes a file into the directory; its path.
+    ///
+    /// # Panics
+    /// When it cannot be written.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.directory().join(name);
+        std::fs::write(&path, content).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        path
+    }
+
+    /// The cluster key's file.
+    #[must_use]
+    pub fn key_path(&self) -> String {
+        self.directory().join("cluster.key").display().to_string()
+    }
+
+    /// The cluster key.
+    ///
+    /// # Panics
+    /// When it cannot be read.
+    #[must_use]
+    pub fn key(&self) -> ClusterKey {
+        read_key_file(self.key_path().as_ref()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Starts the program under test in the directory.
+    pub fn start(&self, name: &str, arguments: &[&str]) -> Process {
+        Process::start(name, &self.program, arguments, self.directory())
+    }
+
+    /// Runs the program under test to its end.
+    pub fn run(&self, name: &str, arguments: &[&str]) -> Ended {
+        self.start(name, arguments).end(REFUSAL_LIMIT)
+    }
+
+    /// Starts `taut serve` on the workbench file as it is now, and waits until it serves.
+    pub fn serve(&self, arguments: &[&str]) -> Server {
+        let config = self.write("workbench.toml", self.file.to_string()).display().to_string();
+        let key = self.key_path();
+        let always = ["serve", "--config", &config, "--key", &key, "--json"];
+        let mut process = self.start("server", &[&always, arguments].concat());
+        // serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)
+        let addresses = process.line_after("serving on ", START_LIMIT);
+        let (quic, udp) = addresses.split_once(" (control) and ").unwrap_or_else(|| panic!("two addresses: {addresses}"));
+        let udp = udp.strip_suffix(" (poses)").unwrap_or_else(|| panic!("two addresses: {addresses}"));
+        Server { process, quic: quic.to_owned(), udp: udp.to_owned() }
+    }
+
+    /// Starts another role that joins `server`.
+    pub fn join(&self, role: &str, node: &str, server: &Server, arguments: &[&str]) -> Process {
+        let key = self.key_path();
+        let always = [role, "--server", &server.quic, "--node", node, "--key", &key];
+        self.start(node, &[&always, arguments].concat())
+    }
+
+    /// What this machine draws with is there; else why not, in the program's own words.
+    ///
+    /// # Errors
+    /// The sentence of `taut render`, which looks for an adapter before anything else.
+    pub fn adapter(&self) -> Result<(), String> {
+        let nowhere = ["render", "--headless", "--server", "127.0.0.1:1", "--node", "front", "--key", "no.key"];
+        let ended = self.run("adapter", &nowhere);
+        if ended.stderr.contains("no graphics adapter") { Err(ended.one_sentence().to_owned()) } else { Ok(()) }
+    }
+}
+
+/// A running server.
+#[derive(Debug)]
+pub struct Server {
+    /// Its process.
+    pub process: Process,
+    /// Address of the control plane.
+    pub quic: String,
+    /// Address of the state plane.
+    pub udp: String,
+}
+
+impl Server {
+    /// Asks it to end and reads its report.
+    ///
+    /// # Panics
+    /// When it does not end well.
+    pub fn stop(self) -> serde_json::Value {
+        self.process.interrupt();
+        let ended = self.process.end(END_LIMIT);
+        assert!(ended.status.success(), "the server ended with {}: {}", ended.status, ended.stderr);
+        ended.json()
+    }
+}
+
+/// The right to run a workbench: a lock on a file that all test processes share. The system lets go when the process ends.
+#[derive(Debug)]
+struct Turn {
+    _file: File,
+}
+
+impl Turn {
+    fn wait() -> Self {
+        let path = std::env::temp_dir().join("taut-tests.lock");
+        let file = File::options().create(true).append(true).open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        file.lock().unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        Self { _file: file }
+    }
+}
