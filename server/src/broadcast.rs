@@ -8,11 +8,11 @@ use std::time::Duration;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
 use god_object::{ConstraintSet, NonPenetrationConstraint};
-use taut_proto::state::{
-    ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState, TOOL_DEVICE_SILENT,
-    TOOL_FORCE_LIMITED, ToolState, event_code,
-};
 use taut_link::Broadcaster;
+use taut_proto::state::{
+    ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState,
+    TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
+};
 use taut_proto::wrench::WRENCH_PAUSED;
 use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 
@@ -79,7 +79,12 @@ pub struct StateWriter {
 
 impl StateWriter {
     /// A writer of states of one scene.
-    pub fn new(shared: SharedView, head: Head, reference_point: &Point3<f64>, scene_revision: u32) -> Self {
+    pub fn new(
+        shared: SharedView,
+        head: Head,
+        reference_point: &Point3<f64>,
+        scene_revision: u32,
+    ) -> Self {
         Self {
             shared,
             head,
@@ -106,11 +111,18 @@ impl StateWriter {
         state.sample_time_ns = nanoseconds(device.time);
         state.tick = device.sequence;
         state.scene_revision = self.scene_revision;
-        state.run = if device.faulty { RunState::Fault } else { RunState::Running };
-        state.constraint_age_us = u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
+        state.run = if device.faulty {
+            RunState::Fault
+        } else {
+            RunState::Running
+        };
+        state.constraint_age_us =
+            u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
         state.head = head_state(&self.head, now, device.time);
         state.tools.clear();
-        state.tools.push(tool_state(device, contacts, wrench, &self.motion.velocity));
+        state
+            .tools
+            .push(tool_state(device, contacts, wrench, &self.motion.velocity));
         nearest_contacts(&contacts.set, &mut state.contacts);
         state.events.clone_from(&self.events.recent);
         Some(&self.state)
@@ -133,7 +145,11 @@ fn tool_state(
     wrench: &WrenchCommand,
     velocity: &Vector6,
 ) -> ToolState {
-    let limited = if wrench.saturated { TOOL_FORCE_LIMITED } else { 0 };
+    let limited = if wrench.saturated {
+        TOOL_FORCE_LIMITED
+    } else {
+        0
+    };
     let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
     ToolState {
         god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
@@ -156,7 +172,10 @@ fn nearest_contacts(
     nearest.clear();
     for constraint in &set.constraints {
         let contact = contact_state(constraint);
-        let place = nearest.iter().take_while(|other| other.gap <= contact.gap).count();
+        let place = nearest
+            .iter()
+            .take_while(|other| other.gap <= contact.gap)
+            .count();
         if place < MAX_CONTACTS {
             if nearest.is_full() {
                 nearest.pop();
@@ -217,17 +236,29 @@ impl EventTrail {
         let tick = device.sequence as u32;
         let touching = contacts.report.active > 0;
         if touching != self.touching {
-            let code = if touching { event_code::CONTACT_ON } else { event_code::CONTACT_OFF };
+            let code = if touching {
+                event_code::CONTACT_ON
+            } else {
+                event_code::CONTACT_OFF
+            };
             self.push(tick, code);
         }
         let changed = device.buttons ^ self.buttons;
         for button in (0..BUTTONS).filter(|button| changed >> button & 1 == 1) {
             let down = device.buttons >> button & 1 == 1;
-            let code = if down { event_code::BUTTON_DOWN } else { event_code::BUTTON_UP };
+            let code = if down {
+                event_code::BUTTON_DOWN
+            } else {
+                event_code::BUTTON_UP
+            };
             self.push(tick, code | button << BUTTON_SHIFT);
         }
         if device.faulty != self.faulty {
-            let code = if device.faulty { event_code::FAULT } else { event_code::RESUMED };
+            let code = if device.faulty {
+                event_code::FAULT
+            } else {
+                event_code::RESUMED
+            };
             self.push(tick, code);
         }
         (self.touching, self.buttons, self.faulty) = (touching, device.buttons, device.faulty);
@@ -238,7 +269,11 @@ impl EventTrail {
             self.recent.remove(0);
         }
         self.count = self.count.wrapping_add(1);
-        self.recent.push(EventRecord { id: self.count, tick, code });
+        self.recent.push(EventRecord {
+            id: self.count,
+            tick,
+            code,
+        });
     }
 }
 
@@ -268,7 +303,11 @@ mod tests {
         let (mut states, state_readers) = device_state::channel(&start);
         let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
         let (mut wrenches, wrench_readers) = wrench_command::channel();
-        let head = Head { rest: Pose::translation(0.0, -1.0, 1.0), eye_separation: 0.064, sway: None };
+        let head = Head {
+            rest: Pose::translation(0.0, -1.0, 1.0),
+            eye_separation: 0.064,
+            sway: None,
+        };
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,
@@ -286,7 +325,10 @@ mod tests {
         };
         states.publish(&device);
         let mut snapshot = ContactSnapshot::at_start(&start, 32);
-        snapshot.set.constraints.extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
+        snapshot
+            .set
+            .constraints
+            .extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
         snapshot.published = Duration::from_millis(6);
         snapshot.report.active = 1;
         contacts.publish(&snapshot);
@@ -301,29 +343,64 @@ mod tests {
         let Some(state) = writer.newest(Duration::from_millis(7)) else {
             panic!("a sample was published");
         };
-        assert_eq!((state.tick, state.sample_time_ns, state.scene_revision), (5, 5_000_000, 7));
-        assert_eq!((state.run, state.constraint_age_us), (RunState::Running, 250));
+        assert_eq!(
+            (state.tick, state.sample_time_ns, state.scene_revision),
+            (5, 5_000_000, 7)
+        );
+        assert_eq!(
+            (state.run, state.constraint_age_us),
+            (RunState::Running, 250)
+        );
         let tool = &state.tools[0];
-        assert_eq!((tool.device.position[2], tool.god_object.position[2]), (0.05, 0.1));
-        assert_eq!((tool.force[2], tool.torque[0], tool.flags), (3.0, 0.1, TOOL_FORCE_LIMITED));
-        let obstacles: Vec<u16> = state.contacts.iter().map(|contact| contact.pair[1]).collect();
+        assert_eq!(
+            (tool.device.position[2], tool.god_object.position[2]),
+            (0.05, 0.1)
+        );
+        assert_eq!(
+            (tool.force[2], tool.torque[0], tool.flags),
+            (3.0, 0.1, TOOL_FORCE_LIMITED)
+        );
+        let obstacles: Vec<u16> = state
+            .contacts
+            .iter()
+            .map(|contact| contact.pair[1])
+            .collect();
         assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
         let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
-        assert_eq!(codes, [event_code::CONTACT_ON, event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT]);
+        assert_eq!(
+            codes,
+            [
+                event_code::CONTACT_ON,
+                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT
+            ]
+        );
         assert_eq!(state.head.age_us, -2000);
-        assert!(writer.newest(Duration::from_millis(8)).is_none(), "nothing new");
+        assert!(
+            writer.newest(Duration::from_millis(8)).is_none(),
+            "nothing new"
+        );
 
         // The god-object moves 2 mm in 2 ms.
         snapshot.set.god_object_pose = Pose::translation(0.0, 0.0, 0.098);
         snapshot.published = Duration::from_millis(8);
         contacts.publish(&snapshot);
-        states.publish(&DeviceState { sequence: 6, faulty: true, ..device });
+        states.publish(&DeviceState {
+            sequence: 6,
+            faulty: true,
+            ..device
+        });
         let Some(state) = writer.newest(Duration::from_millis(9)) else {
             panic!("a sample was published");
         };
         assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
         assert_eq!(state.run, RunState::Fault);
-        assert_eq!(state.tools[0].flags & TOOL_DEVICE_SILENT, TOOL_DEVICE_SILENT);
-        assert_eq!(state.events.last().map(|event| event.code), Some(event_code::FAULT));
+        assert_eq!(
+            state.tools[0].flags & TOOL_DEVICE_SILENT,
+            TOOL_DEVICE_SILENT
+        );
+        assert_eq!(
+            state.events.last().map(|event| event.code),
+            Some(event_code::FAULT)
+        );
     }
 }

@@ -31,19 +31,24 @@ pub struct NamedChild {
 impl NamedChild {
     /// Starts `command` under `name`. It lives no longer than the calling thread.
     pub fn start(name: &str, mut command: Command, terminal: &Terminal) -> std::io::Result<Self> {
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
         die_with_parent(&mut command);
         let mut process = command.spawn()?;
         let muted = Arc::new(AtomicBool::new(false));
         let reader = process.stderr.take().map(|stderr| {
             let (terminal, muted) = (terminal.clone(), muted.clone());
-            std::thread::Builder::new().name(format!("lines of {name}")).spawn(move || {
-                for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                    if !muted.load(Ordering::Relaxed) {
-                        terminal.say_once(&line);
+            std::thread::Builder::new()
+                .name(format!("lines of {name}"))
+                .spawn(move || {
+                    for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                        if !muted.load(Ordering::Relaxed) {
+                            terminal.say_once(&line);
+                        }
                     }
-                }
-            })
+                })
         });
         Ok(Self {
             name: name.to_owned(),
@@ -100,7 +105,10 @@ pub fn wait_or_kill(mut children: Vec<NamedChild>, grace: Duration) -> Vec<Strin
     while children.iter_mut().any(NamedChild::is_running) && Instant::now() < deadline {
         std::thread::sleep(LOOK_PERIOD);
     }
-    children.iter_mut().filter_map(|child| child.is_running().then(|| child.name.clone())).collect()
+    children
+        .iter_mut()
+        .filter_map(|child| child.is_running().then(|| child.name.clone()))
+        .collect()
 }
 
 #[cfg(all(test, unix))]
@@ -117,7 +125,8 @@ mod tests {
     fn a_child_that_ends_is_waited_for_and_one_that_does_not_is_killed() {
         let terminal = Terminal::standard_error();
         let start = |name, script| NamedChild::start(name, shell(script), &terminal);
-        let (Ok(short), Ok(long)) = (start("short", "exit 3"), start("long", "exec sleep 600")) else {
+        let (Ok(short), Ok(long)) = (start("short", "exit 3"), start("long", "exec sleep 600"))
+        else {
             panic!("sh does not start");
         };
         let long_id = long.process.id();
@@ -128,7 +137,9 @@ mod tests {
 
     #[test]
     fn an_end_is_told_once() {
-        let Ok(mut child) = NamedChild::start("quick", shell("exit 2"), &Terminal::standard_error()) else {
+        let Ok(mut child) =
+            NamedChild::start("quick", shell("exit 2"), &Terminal::standard_error())
+        else {
             panic!("sh does not start");
         };
         let status = loop {

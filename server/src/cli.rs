@@ -27,7 +27,9 @@ pub enum Command {
     /// The haptic PC: three loops, broadcast, monitoring
     Serve(ServeArgs),
     /// One node of the render cluster
-    #[command(after_help = "Example: taut render --server haptic-pc:4857 --node front --key cluster.key")]
+    #[command(
+        after_help = "Example: taut render --server haptic-pc:4857 --node front --key cluster.key"
+    )]
     Render(crate::rendering::RenderArgs),
     /// The device side, on this or another PC
     Bridge(taut_bridge::BridgeArgs),
@@ -114,7 +116,9 @@ pub struct ServeArgs {
 
 /// `taut replay`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0")]
+#[command(
+    after_help = "Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0"
+)]
 pub struct ReplayArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "F")]
@@ -150,7 +154,9 @@ pub struct ReplayArgs {
 
 /// `taut record`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut record --server haptic-pc:4857 --key cluster.key --out hand.csv --duration 60")]
+#[command(
+    after_help = "Example: taut record --server haptic-pc:4857 --key cluster.key --out hand.csv --duration 60"
+)]
 pub struct RecordArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]
@@ -192,7 +198,9 @@ pub struct DoctorArgs {
 
 /// `taut keys`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut keys --out cluster.key, then copy cluster.key to every machine of the workbench")]
+#[command(
+    after_help = "Example: taut keys --out cluster.key, then copy cluster.key to every machine of the workbench"
+)]
 pub struct KeysArgs {
     /// The file to make; an existing one is never overwritten
     #[arg(long, value_name = "FILE", default_value = "cluster.key")]
@@ -287,9 +295,16 @@ mod tests {
         let mut cli = Cli::command();
         cli.build();
         cli.clone().debug_assert();
-        for command in cli.get_subcommands().filter(|command| command.get_name() != "help") {
+        for command in cli
+            .get_subcommands()
+            .filter(|command| command.get_name() != "help")
+        {
             let example = command.clone().render_help().to_string();
-            assert!(example.contains("Example"), "{} has no example", command.get_name());
+            assert!(
+                example.contains("Example"),
+                "{} has no example",
+                command.get_name()
+            );
         }
     }
 
@@ -301,7 +316,10 @@ mod tests {
     #[test]
     fn durations_and_rates_must_be_positive_numbers() {
         for bad in ["0", "-1", "nan", "inf", "x"] {
-            assert!(Cli::try_parse_from(["taut", "demo", "--duration", bad]).is_err(), "{bad}");
+            assert!(
+                Cli::try_parse_from(["taut", "demo", "--duration", bad]).is_err(),
+                "{bad}"
+            );
         }
         assert!(Cli::try_parse_from(["taut", "demo", "--duration", "0.5"]).is_ok());
     }

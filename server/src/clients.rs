@@ -42,7 +42,9 @@ impl ClientLedger {
                 self.note(status);
                 Some(format!("{} left: {reason}", status.node))
             }
-            LinkEvent::Refused { address, text, .. } => Some(format!("a client at {address} was refused: {text}")),
+            LinkEvent::Refused { address, text, .. } => {
+                Some(format!("a client at {address} was refused: {text}"))
+            }
             LinkEvent::Stats { node, stats } => {
                 self.follow_stats(node, stats);
                 None
@@ -59,10 +61,14 @@ impl ClientLedger {
     }
 
     fn note(&mut self, status: &ClientStatus) {
-        let index = self.clients.iter().position(|client| client.node == status.node).unwrap_or_else(|| {
-            self.clients.push(ClientRecord::new(status));
-            self.clients.len() - 1
-        });
+        let index = self
+            .clients
+            .iter()
+            .position(|client| client.node == status.node)
+            .unwrap_or_else(|| {
+                self.clients.push(ClientRecord::new(status));
+                self.clients.len() - 1
+            });
         let client = &mut self.clients[index];
         client.state_hash_mismatches = status.state_hash_mismatches;
         client.transport = status.transport;
@@ -79,15 +85,24 @@ impl ClientLedger {
         client.age_medians_ms.push(f64::from(stats.pose_age_ms_p50));
         client.age_p99_ms = client.age_p99_ms.max(f64::from(stats.pose_age_ms_p99));
         client.age_max_ms = client.age_max_ms.max(f64::from(stats.pose_age_ms_max));
-        client.skew_medians_us.push(f64::from(stats.swap_skew_ms_p50) * MICROSECONDS_PER_MILLISECOND);
-        client.skew_max_us =
-            client.skew_max_us.max(f64::from(stats.swap_skew_ms_max) * MICROSECONDS_PER_MILLISECOND);
+        client
+            .skew_medians_us
+            .push(f64::from(stats.swap_skew_ms_p50) * MICROSECONDS_PER_MILLISECOND);
+        client.skew_max_us = client
+            .skew_max_us
+            .max(f64::from(stats.swap_skew_ms_max) * MICROSECONDS_PER_MILLISECOND);
     }
 
     /// One report per render node or bridge, in the order in which they joined, and the number of observers.
     pub fn reports(&self) -> (Vec<ClientReport>, u64) {
-        let observes = |client: &&ClientRecord| matches!(client.role, Role::Observer | Role::Operator);
-        let reports = self.clients.iter().filter(|client| !observes(client)).map(ClientRecord::report).collect();
+        let observes =
+            |client: &&ClientRecord| matches!(client.role, Role::Observer | Role::Operator);
+        let reports = self
+            .clients
+            .iter()
+            .filter(|client| !observes(client))
+            .map(ClientRecord::report)
+            .collect();
         (reports, self.clients.iter().filter(observes).count() as u64)
     }
 }
@@ -167,13 +182,20 @@ mod tests {
             pose_age_ms_max: 3.0 * age_ms,
             ..ClientStats::default()
         };
-        LinkEvent::Stats { node: node.into(), stats }
+        LinkEvent::Stats {
+            node: node.into(),
+            stats,
+        }
     }
 
     #[test]
     fn a_client_is_reported_from_all_its_reports_even_after_it_left() {
         let mut ledger = ClientLedger::default();
-        assert!(ledger.follow(&joined("left", Role::Render)).is_some_and(|line| line.contains("left joined")));
+        assert!(
+            ledger
+                .follow(&joined("left", Role::Render))
+                .is_some_and(|line| line.contains("left joined"))
+        );
         ledger.follow(&joined("watcher", Role::Observer));
         for (frames, age) in [(60, 8.0), (120, 9.0), (180, 20.0)] {
             assert_eq!(ledger.follow(&stats("left", frames, age)), None);
@@ -182,7 +204,23 @@ mod tests {
         assert_eq!(observers, 1);
         assert_eq!(reports.len(), 1);
         let report = &reports[0];
-        assert_eq!((report.frames, report.transport.as_str(), report.state_hash_mismatches), (180, "quic", 3));
-        assert_eq!(report.pose_age_ms, Distribution { p50: 9.0, p99: 40.0, p999: 60.0, max: 60.0, count: 180 });
+        assert_eq!(
+            (
+                report.frames,
+                report.transport.as_str(),
+                report.state_hash_mismatches
+            ),
+            (180, "quic", 3)
+        );
+        assert_eq!(
+            report.pose_age_ms,
+            Distribution {
+                p50: 9.0,
+                p99: 40.0,
+                p999: 60.0,
+                max: 60.0,
+                count: 180
+            }
+        );
     }
 }

@@ -56,7 +56,10 @@ mod tests {
     fn session_time_and_the_monotonic_clock_belong_together() {
         let clock = SessionClock::start();
         let time = clock.now();
-        assert_eq!(clock.monotonic(time) - clock.monotonic(Duration::ZERO), time);
+        assert_eq!(
+            clock.monotonic(time) - clock.monotonic(Duration::ZERO),
+            time
+        );
         assert!(clock.now() >= time);
         assert!(clock.monotonic(clock.now()) <= monotonic_now());
     }

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::head::{Head, Sway};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
-use crate::session::{LinkSettings, RealtimeSettings, SessionSetup};
+use crate::setup::{LinkSettings, RealtimeSettings, SessionSetup};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -43,7 +43,11 @@ pub struct Overrides {
 }
 
 /// Puts the session together. Files are read and checked, nothing is started.
-pub fn session_setup(workbench: &Workbench, key: ClusterKey, overrides: &Overrides) -> Result<SessionSetup, Failure> {
+pub fn session_setup(
+    workbench: &Workbench,
+    key: ClusterKey,
+    overrides: &Overrides,
+) -> Result<SessionSetup, Failure> {
     let scene = match &overrides.scene {
         Some(named) => Scene::named_or_file(named)?,
         None => workbench.load_scene()?,
@@ -52,8 +56,12 @@ pub fn session_setup(workbench: &Workbench, key: ClusterKey, overrides: &Overrid
     let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
     let network = &workbench.network;
     let link = LinkSettings {
-        quic: overrides.quic.unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
-        udp: overrides.udp.unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        quic: overrides
+            .quic
+            .unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
+        udp: overrides
+            .udp
+            .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         key,
         max_clients: network.max_clients,
     };

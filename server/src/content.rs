@@ -20,7 +20,11 @@ const GOD_OBJECT_COLOUR: [f32; 4] = [0.90, 0.30, 0.05, 1.0];
 const OBSTACLE_COLOUR: [f32; 4] = [0.45, 0.53, 0.62, 1.0];
 
 /// What clients fetch at join. `workbench_from_scene` is where the scene stands.
-pub fn content(scene: &BuiltScene, workbench: &Workbench, workbench_from_scene: &Pose) -> Result<Content, Failure> {
+pub fn content(
+    scene: &BuiltScene,
+    workbench: &Workbench,
+    workbench_from_scene: &Pose,
+) -> Result<Content, Failure> {
     let mut meshes: Vec<(MeshHash, MeshBlob)> = Vec::new();
     let mut bodies = Vec::new();
     for (index, body) in scene.bodies.iter().enumerate() {
@@ -32,11 +36,17 @@ pub fn content(scene: &BuiltScene, workbench: &Workbench, workbench_from_scene: 
             name: body.name.clone(),
             mesh: hash,
             pose: PoseF64::from_isometry(&body.pose),
-            colour: if index == 0 { GOD_OBJECT_COLOUR } else { OBSTACLE_COLOUR },
+            colour: if index == 0 {
+                GOD_OBJECT_COLOUR
+            } else {
+                OBSTACLE_COLOUR
+            },
         });
     }
     if bodies.is_empty() {
-        return Err(Failure::failed("the scene has no bodies to draw: this is a fault of the program"));
+        return Err(Failure::failed(
+            "the scene has no bodies to draw: this is a fault of the program",
+        ));
     }
     let god_object = bodies.remove(0);
     let viewer = &workbench.viewer;
@@ -60,13 +70,22 @@ pub fn content(scene: &BuiltScene, workbench: &Workbench, workbench_from_scene: 
             force: workbench.show.force,
         },
     };
-    Ok(Content { description, meshes: meshes.into_iter().map(|(_, blob)| blob).collect() })
+    Ok(Content {
+        description,
+        meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
+    })
 }
 
 fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
-    let refused = |error: String| Failure::BadInput(format!("the mesh of \"{}\" cannot be sent to clients: {error}", body.name));
+    let refused = |error: String| {
+        Failure::BadInput(format!(
+            "the mesh of \"{}\" cannot be sent to clients: {error}",
+            body.name
+        ))
+    };
     let positions = Positions::F64(body.mesh.vertices.iter().map(array).collect());
-    let blob = MeshBlob::new(positions, body.mesh.triangles.clone(), None).map_err(|error| refused(error.to_string()))?;
+    let blob = MeshBlob::new(positions, body.mesh.triangles.clone(), None)
+        .map_err(|error| refused(error.to_string()))?;
     let hash = MeshHash::of(&blob.encode().map_err(|error| refused(error.to_string()))?);
     Ok((hash, blob))
 }

@@ -30,17 +30,27 @@ const LOG_VARIABLE: &str = "TAUT_LOG";
 const BRIDGE_NODE: &str = "bridge";
 
 /// Runs the demo. The report comes with the failure, if the session broke down on the way.
-pub fn run(args: &DemoArgs, terminal: &Terminal) -> Result<(SessionReport, Option<Failure>), Failure> {
+pub fn run(
+    args: &DemoArgs,
+    terminal: &Terminal,
+) -> Result<(SessionReport, Option<Failure>), Failure> {
     let directory = tempfile::Builder::new()
         .prefix("taut-demo-")
         .tempdir()
-        .map_err(|error| Failure::failed(format!("no temporary directory can be made ({error}); check TMPDIR")))?;
+        .map_err(|error| {
+            Failure::failed(format!(
+                "no temporary directory can be made ({error}); check TMPDIR"
+            ))
+        })?;
     let key_path = directory.path().join("cluster.key");
     let key = create_key_file(&key_path)?;
 
     let mut workbench = Workbench::shipped()?;
     take_free_ports(&mut workbench, terminal);
-    let scene = args.scene.clone().unwrap_or_else(|| workbench.scene.clone());
+    let scene = args
+        .scene
+        .clone()
+        .unwrap_or_else(|| workbench.scene.clone());
     let hand_path = if args.bridge {
         workbench.device = Device::Remote;
         write_hand_path(&scene, directory.path())?
@@ -79,7 +89,10 @@ pub fn run(args: &DemoArgs, terminal: &Terminal) -> Result<(SessionReport, Optio
             if let Some(status) = child.newly_ended()
                 && !status.success()
             {
-                terminal.say(&format!("taut: {} ended early ({status}); the demo goes on without it", child.name()));
+                terminal.say(&format!(
+                    "taut: {} ended early ({status}); the demo goes on without it",
+                    child.name()
+                ));
             }
         }
     });
@@ -87,7 +100,9 @@ pub fn run(args: &DemoArgs, terminal: &Terminal) -> Result<(SessionReport, Optio
     children.iter().for_each(NamedChild::mute);
     let ended = session.stop(terminal);
     for name in wait_or_kill(children, GRACE) {
-        terminal.say(&format!("taut: {name} did not end by itself and was killed"));
+        terminal.say(&format!(
+            "taut: {name} did not end by itself and was killed"
+        ));
     }
     Ok(ended)
 }
@@ -96,22 +111,37 @@ pub fn run(args: &DemoArgs, terminal: &Terminal) -> Result<(SessionReport, Optio
 fn take_free_ports(workbench: &mut Workbench, terminal: &Terminal) {
     // A demonstration is nobody else's business.
     workbench.network.bind = IpAddr::V4(Ipv4Addr::LOCALHOST);
-    let bind = workbench.network.bind;
-    let udp_is_free = |port: u16| UdpSocket::bind((bind, port)).is_ok();
-    let tcp_bind = workbench.monitoring.bind;
-    let tcp_is_free = |port: u16| TcpListener::bind((tcp_bind, port)).is_ok();
-    let ports: [(&mut u16, &dyn Fn(u16) -> bool, &str); 4] = [
-        (&mut workbench.network.quic_port, &udp_is_free, "the control plane"),
-        (&mut workbench.network.udp_port, &udp_is_free, "the poses"),
-        (&mut workbench.monitoring.grpc_port, &tcp_is_free, "the monitor's stream"),
-        (&mut workbench.monitoring.web_port, &tcp_is_free, "the monitor's page"),
-    ];
-    for (port, is_free, what) in ports {
-        if !is_free(*port) {
+    let (network, monitoring) = (&mut workbench.network, &mut workbench.monitoring);
+    let free_udp = |port: u16| UdpSocket::bind((network.bind, port)).is_ok();
+    let free_tcp = |port: u16| TcpListener::bind((monitoring.bind, port)).is_ok();
+    let usable = |port: u16, is_free: bool, what: &str| {
+        if !is_free {
             terminal.say(&format!("port {port} is in use; {what} takes a free one"));
-            *port = 0;
         }
-    }
+        if is_free { port } else { 0 }
+    };
+    let quic = usable(
+        network.quic_port,
+        free_udp(network.quic_port),
+        "the control plane",
+    );
+    let udp = usable(
+        network.udp_port,
+        free_udp(network.udp_port),
+        "the pose stream",
+    );
+    let grpc = usable(
+        monitoring.grpc_port,
+        free_tcp(monitoring.grpc_port),
+        "the monitor's stream",
+    );
+    let web = usable(
+        monitoring.web_port,
+        free_tcp(monitoring.web_port),
+        "the monitor's page",
+    );
+    (network.quic_port, network.udp_port) = (quic, udp);
+    (monitoring.grpc_port, monitoring.web_port) = (grpc, web);
 }
 
 /// The intention of the scene's hand as a file for the bridge, and how the hand holds.
@@ -127,9 +157,17 @@ fn write_hand_path(scene: &str, directory: &Path) -> Result<Option<HandPath>, Fa
         return Ok(None);
     };
     let path = directory.join("hand.csv");
-    std::fs::write(&path, trace.to_csv())
-        .map_err(|error| Failure::failed(format!("{}: cannot be written ({error}); check TMPDIR", path.display())))?;
-    Ok(Some(HandPath { path, repeat: hand.repeat, preset: hand.preset.name() }))
+    std::fs::write(&path, trace.to_csv()).map_err(|error| {
+        Failure::failed(format!(
+            "{}: cannot be written ({error}); check TMPDIR",
+            path.display()
+        ))
+    })?;
+    Ok(Some(HandPath {
+        path,
+        repeat: hand.repeat,
+        preset: hand.preset.name(),
+    }))
 }
 
 /// Starts the other roles from this very program.
@@ -143,21 +181,32 @@ struct Launcher<'a> {
 
 impl<'a> Launcher<'a> {
     fn new(session: &Session, key: PathBuf, args: &'a DemoArgs) -> Result<Self, Failure> {
-        let program = std::env::current_exe()
-            .map_err(|error| Failure::failed(format!("this program's own file is not known ({error}); start it by its path")))?;
-        let server = session
-            .quic_address()
-            .ok_or_else(|| Failure::failed("the server has no address: this is a fault of the program"))?;
+        let program = std::env::current_exe().map_err(|error| {
+            Failure::failed(format!(
+                "this program's own file is not known ({error}); start it by its path"
+            ))
+        })?;
+        let server = session.quic_address().ok_or_else(|| {
+            Failure::failed("the server has no address: this is a fault of the program")
+        })?;
         let has_display = ["DISPLAY", "WAYLAND_DISPLAY"]
             .iter()
             .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
         let headless = args.headless || args.out.is_some() || !has_display;
-        Ok(Self { program, server, key, args, headless })
+        Ok(Self {
+            program,
+            server,
+            key,
+            args,
+            headless,
+        })
     }
 
     fn role(&self, role: &str, node: &str) -> Command {
         let mut command = Command::new(&self.program);
-        command.arg(role).args(["--server", &self.server.to_string(), "--node", node]);
+        command
+            .arg(role)
+            .args(["--server", &self.server.to_string(), "--node", node]);
         command.arg("--key").arg(&self.key);
         command.args(["--transport", self.args.transport.name()]);
         command
@@ -193,7 +242,10 @@ impl<'a> Launcher<'a> {
             command.env(LOG_VARIABLE, "error");
         }
         if let Some(hand) = hand {
-            command.arg("--path").arg(&hand.path).args(["--hand", hand.preset]);
+            command
+                .arg("--path")
+                .arg(&hand.path)
+                .args(["--hand", hand.preset]);
             if hand.repeat {
                 command.arg("--loop");
             }
@@ -203,6 +255,9 @@ impl<'a> Launcher<'a> {
 }
 
 fn start(name: &str, command: Command, terminal: &Terminal) -> Result<NamedChild, Failure> {
-    NamedChild::start(name, command, terminal)
-        .map_err(|error| Failure::failed(format!("{name} cannot be started ({error}); check the limit on processes (ulimit -u)")))
+    NamedChild::start(name, command, terminal).map_err(|error| {
+        Failure::failed(format!(
+            "{name} cannot be started ({error}); check the limit on processes (ulimit -u)"
+        ))
+    })
 }

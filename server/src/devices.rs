@@ -4,12 +4,13 @@ use std::path::Path;
 
 use god_object::nalgebra::Point3;
 use taut_bridge::{
-    AtEnd, DeviceLimits, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow, Tremor, ViaPoint,
+    AtEnd, DeviceLimits, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
+    Tremor, ViaPoint,
 };
 use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
 
 use crate::failure::Failure;
-use crate::session::DeviceSource;
+use crate::setup::DeviceSource;
 
 /// A hand without a path sways this far to either side, in a cycle of this time: m, s.
 const SWAY: (f64, f64) = (0.02, 8.0);
@@ -17,11 +18,16 @@ const SWAY: (f64, f64) = (0.02, 8.0);
 /// Makes the device that the workbench names. A remote one is found once the network is up.
 pub fn device(wanted: &taut_scene::Device, scene: &BuiltScene) -> Result<DeviceSource, Failure> {
     match wanted {
-        taut_scene::Device::Simulated { hand, path, tremor, seed } => {
-            simulated(scene, *hand, path.as_deref(), *tremor, *seed).map(|device| DeviceSource::Local(Box::new(device)))
-        }
+        taut_scene::Device::Simulated {
+            hand,
+            path,
+            tremor,
+            seed,
+        } => simulated(scene, *hand, path.as_deref(), *tremor, *seed)
+            .map(|device| DeviceSource::Local(Box::new(device))),
         taut_scene::Device::Trace { path, repeat } => {
-            recorded(path, *repeat, &scene.reference_point()).map(|device| DeviceSource::Local(Box::new(device)))
+            recorded(path, *repeat, &scene.reference_point())
+                .map(|device| DeviceSource::Local(Box::new(device)))
         }
         taut_scene::Device::Remote => Ok(DeviceSource::Remote {
             limits: DeviceLimits::UNLIMITED,
@@ -39,10 +45,20 @@ fn simulated(
     seed: u64,
 ) -> Result<SimulatedDevice, Failure> {
     let scene_hand = scene.hand.as_ref();
-    let preset = hand.or(scene_hand.map(|hand| hand.preset)).unwrap_or_default();
+    let preset = hand
+        .or(scene_hand.map(|hand| hand.preset))
+        .unwrap_or_default();
     let (trace, repeat, named) = match (path, scene_hand) {
-        (Some(path), _) => (Some(DeviceTrace::load(path)?), true, path.display().to_string()),
-        (None, Some(hand)) => (Some(hand.path.clone()), hand.repeat, format!("the hand's path of scene \"{}\"", scene.name)),
+        (Some(path), _) => (
+            Some(DeviceTrace::load(path)?),
+            true,
+            path.display().to_string(),
+        ),
+        (None, Some(hand)) => (
+            Some(hand.path.clone()),
+            hand.repeat,
+            format!("the hand's path of scene \"{}\"", scene.name),
+        ),
         (None, None) => (None, true, String::new()),
     };
     let intention = match trace {
@@ -50,11 +66,24 @@ fn simulated(
             .map_err(|error| Failure::BadInput(format!("{named}: {error}")))?,
         None => MinJerkPath::sway(scene.start, SWAY.0, SWAY.1),
     };
-    let device = SimulatedDevice::new(Grip::workbench(), impedance(preset), intention, scene.reference_point());
-    Ok(if tremor > 0.0 { device.with_tremor(Tremor::new(tremor, seed)) } else { device })
+    let device = SimulatedDevice::new(
+        Grip::workbench(),
+        impedance(preset),
+        intention,
+        scene.reference_point(),
+    );
+    Ok(if tremor > 0.0 {
+        device.with_tremor(Tremor::new(tremor, seed))
+    } else {
+        device
+    })
 }
 
-fn recorded(path: &Path, repeat: bool, reference_point: &Point3<f64>) -> Result<RecordedDevice, Failure> {
+fn recorded(
+    path: &Path,
+    repeat: bool,
+    reference_point: &Point3<f64>,
+) -> Result<RecordedDevice, Failure> {
     let trace = DeviceTrace::load(path)?;
     let rows = trace.samples().iter().map(|sample| TraceRow {
         time_s: sample.time,
@@ -68,7 +97,10 @@ fn recorded(path: &Path, repeat: bool, reference_point: &Point3<f64>) -> Result<
 
 fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
     let start = trace.samples().first().map_or(0.0, |first| first.time);
-    let point = |sample: &taut_scene::TraceSample| ViaPoint { time_s: sample.time - start, pose: sample.pose };
+    let point = |sample: &taut_scene::TraceSample| ViaPoint {
+        time_s: sample.time - start,
+        pose: sample.pose,
+    };
     trace.samples().iter().map(point).collect()
 }
 

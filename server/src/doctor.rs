@@ -4,7 +4,9 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
-use taut_bridge::realtime::{RealtimeGrant, monotonic_now, request_fifo, sharpen_timers, sleep_until};
+use taut_bridge::realtime::{
+    RealtimeGrant, monotonic_now, request_fifo, sharpen_timers, sleep_until,
+};
 
 use crate::timing::{Distribution, Histogram};
 
@@ -46,18 +48,31 @@ pub struct Finding {
 
 impl Finding {
     fn good(what: &'static str, found: impl Into<String>) -> Self {
-        Self { what, good: true, found: found.into(), mend: None }
+        Self {
+            what,
+            good: true,
+            found: found.into(),
+            mend: None,
+        }
     }
 
     fn lacking(what: &'static str, found: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { what, good: false, found: found.into(), mend: Some(mend.into()) }
+        Self {
+            what,
+            good: false,
+            found: found.into(),
+            mend: Some(mend.into()),
+        }
     }
 }
 
 impl fmt::Display for DoctorReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, finding) in self.findings.iter().enumerate() {
-            let (newline, mark) = (if index > 0 { "\n" } else { "" }, if finding.good { "ok" } else { "--" });
+            let (newline, mark) = (
+                if index > 0 { "\n" } else { "" },
+                if finding.good { "ok" } else { "--" },
+            );
             write!(f, "{newline}{mark}  {}: {}", finding.what, finding.found)?;
             if let Some(mend) = &finding.mend {
                 write!(f, "\n    mend: {mend}")?;
@@ -75,32 +90,44 @@ pub fn examine() -> std::io::Result<DoctorReport> {
         scheduling(&grant),
         memory_lock(limit_of("Max locked memory")),
         timers(&lateness),
-        kernel(std::fs::read_to_string("/sys/kernel/realtime").ok().as_deref()),
+        kernel(
+            std::fs::read_to_string("/sys/kernel/realtime")
+                .ok()
+                .as_deref(),
+        ),
         socket_buffer("receive buffer of sockets", "net.core.rmem_max"),
         socket_buffer("send buffer of sockets", "net.core.wmem_max"),
     ];
     findings.extend(rendering());
-    Ok(DoctorReport { findings, timer_lateness_us: lateness, timer_realtime })
+    Ok(DoctorReport {
+        findings,
+        timer_lateness_us: lateness,
+        timer_realtime,
+    })
 }
 
 /// Sleeps to 1 kHz deadlines on a thread of the real-time class, if that is granted.
 fn measure_timers() -> std::io::Result<(RealtimeGrant, Distribution)> {
-    let thread = std::thread::Builder::new().name("timer check".into()).spawn(|| {
-        let grant = request_fifo(FIFO_PRIORITY);
-        if !grant.is_granted() {
-            // The answer shows in the measurement.
-            let _ = sharpen_timers();
-        }
-        let lateness = Histogram::default();
-        let mut deadline = monotonic_now();
-        for _ in 0..MEASURED_PERIODS {
-            deadline += PERIOD;
-            sleep_until(deadline);
-            lateness.record_time(monotonic_now().saturating_sub(deadline));
-        }
-        (grant, lateness.distribution_us())
-    })?;
-    thread.join().map_err(|_| std::io::Error::other("the measurement of the timers broke down"))
+    let thread = std::thread::Builder::new()
+        .name("timer check".into())
+        .spawn(|| {
+            let grant = request_fifo(FIFO_PRIORITY);
+            if !grant.is_granted() {
+                // The answer shows in the measurement.
+                let _ = sharpen_timers();
+            }
+            let lateness = Histogram::default();
+            let mut deadline = monotonic_now();
+            for _ in 0..MEASURED_PERIODS {
+                deadline += PERIOD;
+                sleep_until(deadline);
+                lateness.record_time(monotonic_now().saturating_sub(deadline));
+            }
+            (grant, lateness.distribution_us())
+        })?;
+    thread
+        .join()
+        .map_err(|_| std::io::Error::other("the measurement of the timers broke down"))
 }
 
 fn scheduling(grant: &RealtimeGrant) -> Finding {
@@ -121,7 +148,9 @@ fn memory_lock(limit: Option<String>) -> Finding {
         Some("unlimited") => Finding::good(WHAT, "any amount of memory may be locked"),
         Some(bytes) => Finding::lacking(
             WHAT,
-            format!("only {bytes} bytes may be locked, so a page of a loop may have to be fetched from disk"),
+            format!(
+                "only {bytes} bytes may be locked, so a page of a loop may have to be fetched from disk"
+            ),
             "echo \"@realtime - memlock unlimited\" | sudo tee -a /etc/security/limits.d/99-taut.conf  # then log in again",
         ),
         None => Finding::good(WHAT, "not known on this system"),
@@ -155,13 +184,19 @@ fn kernel(realtime: Option<&str>) -> Finding {
 
 fn socket_buffer(what: &'static str, key: &'static str) -> Finding {
     let path = format!("/proc/sys/{}", key.replace('.', "/"));
-    let bytes = std::fs::read_to_string(path).ok().and_then(|text| text.trim().parse::<u64>().ok());
+    let bytes = std::fs::read_to_string(path)
+        .ok()
+        .and_then(|text| text.trim().parse::<u64>().ok());
     match bytes {
         None => Finding::good(what, "not known on this system"),
-        Some(bytes) if bytes >= GOOD_SOCKET_BUFFER => Finding::good(what, format!("up to {bytes} bytes")),
-        Some(bytes) => {
-            Finding::lacking(what, format!("up to {bytes} bytes"), format!("sudo sysctl -w {key}={}", 8 * GOOD_SOCKET_BUFFER))
+        Some(bytes) if bytes >= GOOD_SOCKET_BUFFER => {
+            Finding::good(what, format!("up to {bytes} bytes"))
         }
+        Some(bytes) => Finding::lacking(
+            what,
+            format!("up to {bytes} bytes"),
+            format!("sudo sysctl -w {key}={}", 8 * GOOD_SOCKET_BUFFER),
+        ),
     }
 }
 
@@ -192,8 +227,14 @@ mod tests {
     fn whatever_is_lacking_comes_with_a_command() {
         let lacking = [
             memory_lock(Some("65536".into())),
-            timers(&Distribution { p99: 900.0, ..Distribution::default() }),
-            scheduling(&RealtimeGrant::Waived { what: "SCHED_FIFO".into(), why: "no".into() }),
+            timers(&Distribution {
+                p99: 900.0,
+                ..Distribution::default()
+            }),
+            scheduling(&RealtimeGrant::Waived {
+                what: "SCHED_FIFO".into(),
+                why: "no".into(),
+            }),
         ];
         for finding in lacking {
             assert!(!finding.good && finding.mend.is_some(), "{finding:?}");
@@ -207,6 +248,11 @@ mod tests {
             panic!("the examination broke down");
         };
         assert_eq!(report.timer_lateness_us.count, u64::from(MEASURED_PERIODS));
-        assert!(report.findings.iter().any(|finding| finding.what == "real-time scheduling"));
+        assert!(
+            report
+                .findings
+                .iter()
+                .any(|finding| finding.what == "real-time scheduling")
+        );
     }
 }

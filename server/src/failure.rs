@@ -43,7 +43,9 @@ impl From<taut_link::LinkError> for Failure {
         use taut_link::LinkError as E;
         match error {
             // The link was there, or the machine is at its end: nothing that other input would mend.
-            E::Closed { .. } | E::NoSuchMesh { .. } | E::BadMesh { .. } | E::System { .. } => Self::failed(error),
+            E::Closed { .. } | E::NoSuchMesh { .. } | E::BadMesh { .. } | E::System { .. } => {
+                Self::failed(error)
+            }
             E::PortInUse { .. }
             | E::Listen { .. }
             | E::BadAddress { .. }

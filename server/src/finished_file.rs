@@ -31,7 +31,10 @@ impl FinishedFile {
     /// Gives the whole file its name.
     pub fn finish(mut self) -> io::Result<()> {
         if let Some(writer) = self.writer.take() {
-            writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+            writer
+                .into_inner()
+                .map_err(io::IntoInnerError::into_error)?
+                .sync_all()?;
         }
         fs::rename(&self.partial, &self.path)
     }

@@ -69,14 +69,18 @@ mod tests {
         let head = Head {
             rest,
             eye_separation: 0.064,
-            sway: Some(Sway { amplitude: 0.05, period: 6.0 }),
+            sway: Some(Sway {
+                amplitude: 0.05,
+                period: 6.0,
+            }),
         };
         assert_eq!(head.pose(Duration::ZERO), rest);
         let mut farthest: f64 = 0.0;
         for tick in 0..10_000 {
             let pose = head.pose(Duration::from_millis(tick));
             assert_eq!(pose.rotation, rest.rotation);
-            let offset = rest.inverse_transform_vector(&(pose.translation.vector - rest.translation.vector));
+            let offset =
+                rest.inverse_transform_vector(&(pose.translation.vector - rest.translation.vector));
             assert!(offset.y.abs() < 1e-12);
             farthest = farthest.max(offset.x.abs());
         }
@@ -85,7 +89,11 @@ mod tests {
 
     #[test]
     fn a_still_head_stays() {
-        let head = Head { rest: Pose::identity(), eye_separation: 0.064, sway: None };
+        let head = Head {
+            rest: Pose::identity(),
+            eye_separation: 0.064,
+            sway: None,
+        };
         assert_eq!(head.pose(Duration::from_secs(3)), Pose::identity());
         assert!(!head.moves());
     }

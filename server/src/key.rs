@@ -11,8 +11,11 @@ pub const KEY_VARIABLE: &str = "TAUT_KEY_FILE";
 
 /// Reads the key from `named`, else from the file that [`KEY_VARIABLE`] names.
 pub fn read(named: Option<&Path>) -> Result<ClusterKey, Failure> {
-    let from_environment =
-        || std::env::var_os(KEY_VARIABLE).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let from_environment = || {
+        std::env::var_os(KEY_VARIABLE)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
     let path = named.map(Path::to_path_buf).or_else(from_environment).ok_or_else(|| {
         Failure::BadInput(format!(
             "no cluster key is named: make one with `taut keys --out FILE`, and give it by --key FILE or {KEY_VARIABLE}"

@@ -36,6 +36,7 @@ pub mod replay;
 pub mod report;
 pub mod serve;
 pub mod session;
+pub mod setup;
 pub mod shared;
 pub mod shutdown;
 pub mod signals;

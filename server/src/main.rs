@@ -18,12 +18,20 @@ const LOG_VARIABLE: &str = "TAUT_LOG";
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .without_time()
+        .init();
     match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
         Ok(code) => code,
         Err(error) => {
             eprintln!("taut: {error:#}");
-            ExitCode::from(error.downcast_ref::<Failure>().map_or(EXIT_FAILED, Failure::exit_code))
+            ExitCode::from(
+                error
+                    .downcast_ref::<Failure>()
+                    .map_or(EXIT_FAILED, Failure::exit_code),
+            )
         }
     }
 }
@@ -46,7 +54,10 @@ fn run(command: Command) -> Result<ExitCode> {
     }
 }
 
-fn end_session((report, failure): (SessionReport, Option<Failure>), json: bool) -> Result<ExitCode> {
+fn end_session(
+    (report, failure): (SessionReport, Option<Failure>),
+    json: bool,
+) -> Result<ExitCode> {
     if json {
         print_json(&report)?;
     } else {
@@ -89,7 +100,11 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
         }
     }
     let good = reports.iter().all(taut_scene::FileReport::is_good);
-    Ok(if good { ExitCode::SUCCESS } else { ExitCode::from(EXIT_BAD_INPUT) })
+    Ok(if good {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(EXIT_BAD_INPUT)
+    })
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
@@ -104,11 +119,17 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
 
 fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
     taut_link::create_key_file(&args.out).map_err(Failure::from)?;
-    println!("{}: copy it to every machine of the workbench, and show it to nobody else", args.out.display());
+    println!(
+        "{}: copy it to every machine of the workbench, and show it to nobody else",
+        args.out.display()
+    );
     Ok(ExitCode::SUCCESS)
 }
 
 fn print_json(value: &impl Serialize) -> Result<()> {
-    println!("{}", serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?);
+    println!(
+        "{}",
+        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?
+    );
     Ok(())
 }

@@ -68,7 +68,11 @@ impl RealtimeLedger {
 
     /// Everything noted so far, in the order of names.
     pub fn report(&self) -> RealtimeReport {
-        let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut report = self
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
         report.enforced.sort();
         report.waived.sort();
         report
@@ -99,7 +103,10 @@ pub fn after_parent(command: &mut std::process::Command) {
 }
 
 #[cfg(target_os = "linux")]
-#[allow(unsafe_code, reason = "thread clock, nice value and parent-death signal are system calls")]
+#[allow(
+    unsafe_code,
+    reason = "thread clock, nice value and parent-death signal are system calls"
+)]
 mod os {
     use std::os::unix::process::CommandExt;
     use std::time::Duration;
@@ -110,7 +117,10 @@ mod os {
     const CHILD_NICE: libc::c_int = 5;
 
     pub(super) fn thread_cpu_time() -> Duration {
-        let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+        let mut time = libc::timespec {
+            tv_sec: 0,
+            tv_nsec: 0,
+        };
         // SAFETY: `time` is a valid timespec for the kernel to fill; the calling thread's clock always exists.
         unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
         Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
@@ -137,7 +147,13 @@ mod os {
         // SAFETY: between fork and exec only system calls are made that are safe there; nothing is allocated or locked.
         unsafe {
             command.pre_exec(move || {
-                libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL as libc::c_ulong, 0, 0, 0);
+                libc::prctl(
+                    libc::PR_SET_PDEATHSIG,
+                    libc::SIGKILL as libc::c_ulong,
+                    0,
+                    0,
+                    0,
+                );
                 // The parent may have died before the request.
                 if libc::getppid() as u32 == parent {
                     Ok(())
@@ -192,6 +208,11 @@ mod tests {
         // Above the largest priority: refused to everybody.
         assert!(!ledger.schedule("haptics", Scheduling::Fifo(200)));
         let report = ledger.report();
-        assert!(report.waived.iter().any(|line| line.contains("haptics: SCHED_FIFO priority 200")));
+        assert!(
+            report
+                .waived
+                .iter()
+                .any(|line| line.contains("haptics: SCHED_FIFO priority 200"))
+        );
     }
 }

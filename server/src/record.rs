@@ -32,7 +32,8 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ..ClientOptions::new(&args.server, key, Role::Operator, node)
     };
     let link = connect(options).await?;
-    let mut trace = TraceWriter::begin(FinishedFile::create(&args.out).map_err(cannot_write)?).map_err(cannot_write)?;
+    let mut trace = TraceWriter::begin(FinishedFile::create(&args.out).map_err(cannot_write)?)
+        .map_err(cannot_write)?;
     let recorded = take_states(&link, &mut trace, args.duration, &mut signal).await;
     let lost = link.counters().lost;
     link.close().await;
@@ -46,7 +47,9 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         )));
     }
     if lost > 0 {
-        eprintln!("taut: {lost} samples were lost on the way; record on the haptic PC itself, or with --transport quic");
+        eprintln!(
+            "taut: {lost} samples were lost on the way; record on the haptic PC itself, or with --transport quic"
+        );
     }
     let rows = trace.rows;
     trace.file.finish().map_err(cannot_write)?;
@@ -88,7 +91,12 @@ struct TraceWriter {
 impl TraceWriter {
     fn begin(mut file: FinishedFile) -> std::io::Result<Self> {
         writeln!(file, "t,x,y,z,qw,qx,qy,qz,buttons")?;
-        Ok(Self { file, first_ns: None, last_time_s: 0.0, rows: 0 })
+        Ok(Self {
+            file,
+            first_ns: None,
+            last_time_s: 0.0,
+            rows: 0,
+        })
     }
 
     fn row(&mut self, received: &ReceivedState) -> std::io::Result<()> {
@@ -104,7 +112,11 @@ impl TraceWriter {
         }
         let [x, y, z] = tool.device.position;
         let [w, i, j, k] = tool.device.rotation;
-        writeln!(self.file, "{time_s:.9},{x},{y},{z},{w},{i},{j},{k},{}", tool.buttons)?;
+        writeln!(
+            self.file,
+            "{time_s:.9},{x},{y},{z},{w},{i},{j},{k},{}",
+            tool.buttons
+        )?;
         self.last_time_s = time_s;
         self.rows += 1;
         Ok(())

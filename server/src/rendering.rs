@@ -41,7 +41,10 @@ pub fn run(_args: RenderArgs) -> Result<(), crate::failure::Failure> {
 #[cfg(feature = "render")]
 pub fn adapter() -> Option<Result<String, String>> {
     let gpu = taut_render::renderer::Gpu::open();
-    Some(gpu.map(|gpu| gpu.summary().to_string()).map_err(|error| error.to_string()))
+    Some(
+        gpu.map(|gpu| gpu.summary().to_string())
+            .map_err(|error| error.to_string()),
+    )
 }
 
 /// What this machine draws with, or why it does not; `None` in a build that cannot draw.

@@ -129,18 +129,60 @@ pub struct WorkReport {
 
 impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (period, update, force, age) =
-            (&self.haptics_period_us, &self.god_object_update_us, &self.force_us, &self.constraint_age_us);
+        let (period, update, force, age) = (
+            &self.haptics_period_us,
+            &self.god_object_update_us,
+            &self.force_us,
+            &self.constraint_age_us,
+        );
         writeln!(f, "ran for             {:.1} s", self.duration_s)?;
-        writeln!(f, "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed", self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses)?;
-        writeln!(f, "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us", self.god_object_hz, update.p50, update.p99, update.max)?;
-        writeln!(f, "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us; constraints {:.0} us old at p99", force.p50, force.p99, force.max, age.p99)?;
-        writeln!(f, "contacts            p50 {:.0}, max {:.0}", self.contacts.p50, self.contacts.max)?;
-        writeln!(f, "penetrations        {} in {} poses checked", self.penetrations, self.penetration_checks)?;
-        writeln!(f, "safety events       {}, energy injected {:.2e} J", self.safety_events, self.energy_injected_j)?;
-        write!(f, "datagrams           {} sent, {} refused", self.packets_sent, self.packets_refused)?;
+        writeln!(
+            f,
+            "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed",
+            self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses
+        )?;
+        writeln!(
+            f,
+            "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
+            self.god_object_hz, update.p50, update.p99, update.max
+        )?;
+        writeln!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
+            force.p50, force.p99, force.max, age.p99
+        )?;
+        writeln!(
+            f,
+            "contacts            p50 {:.0}, max {:.0}",
+            self.contacts.p50, self.contacts.max
+        )?;
+        writeln!(
+            f,
+            "penetrations        {} in {} poses checked",
+            self.penetrations, self.penetration_checks
+        )?;
+        writeln!(
+            f,
+            "safety events       {}, energy injected {:.2e} J",
+            self.safety_events, self.energy_injected_j
+        )?;
+        write!(
+            f,
+            "datagrams           {} sent, {} refused",
+            self.packets_sent, self.packets_refused
+        )?;
         for client in &self.clients {
-            write!(f, "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old (p99 {:.1} ms), {} lost, by {}", client.node, client.frames, client.fps, client.pose_age_ms.p50, client.pose_age_ms.p99, client.packets_lost, client.transport)?;
+            write!(
+                f,
+                "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old (p99 {:.1} ms), {} lost, by {}",
+                client.node,
+                client.frames,
+                client.fps,
+                client.pose_age_ms.p50,
+                client.pose_age_ms.p99,
+                client.packets_lost,
+                client.transport
+            )?;
         }
         Ok(())
     }
@@ -149,15 +191,35 @@ impl fmt::Display for SessionReport {
 impl fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "rows                {}", self.steps)?;
-        writeln!(f, "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us", self.update_us.p50, self.update_us.p99, self.update_us.max)?;
-        writeln!(f, "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us", self.force_us.p50, self.force_us.p99, self.force_us.max)?;
-        writeln!(f, "contacts            p50 {:.0}, max {:.0}; active max {:.0}", self.contacts.p50, self.contacts.max, self.active.max)?;
+        writeln!(
+            f,
+            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.update_us.p50, self.update_us.p99, self.update_us.max
+        )?;
+        writeln!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.force_us.p50, self.force_us.p99, self.force_us.max
+        )?;
+        writeln!(
+            f,
+            "contacts            p50 {:.0}, max {:.0}; active max {:.0}",
+            self.contacts.p50, self.contacts.max, self.active.max
+        )?;
         match self.gap_min_m {
             Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
             None => writeln!(f, "smallest gap        never near")?,
         }
-        writeln!(f, "largest force       {:.2} N, largest change per row {:.3} N", self.max_force_n, self.max_force_step_n)?;
-        write!(f, "KKT residual        {:.1e}, {} solver fallbacks; energy injected {:.2e} J", self.kkt_max, self.solver_fallbacks, self.energy_injected_j)
+        writeln!(
+            f,
+            "largest force       {:.2} N, largest change per row {:.3} N",
+            self.max_force_n, self.max_force_step_n
+        )?;
+        write!(
+            f,
+            "KKT residual        {:.1e}, {} solver fallbacks; energy injected {:.2e} J",
+            self.kkt_max, self.solver_fallbacks, self.energy_injected_j
+        )
     }
 }
 
@@ -174,29 +236,57 @@ mod tests {
 
     fn has_all(keys: &[String], wanted: &[&str]) {
         for key in wanted {
-            assert!(keys.iter().any(|k| k == key), "{key} is missing in {keys:?}");
+            assert!(
+                keys.iter().any(|k| k == key),
+                "{key} is missing in {keys:?}"
+            );
         }
     }
 
     #[test]
     fn the_session_report_has_the_keys_that_scripts_rely_on() {
-        let report = SessionReport { clients: vec![ClientReport::default()], ..Default::default() };
+        let report = SessionReport {
+            clients: vec![ClientReport::default()],
+            ..Default::default()
+        };
         has_all(
             &keys(&report),
             &[
-                "duration_s", "haptics_hz", "haptics_period_us", "deadline_misses", "god_object_update_us",
-                "force_us", "constraint_age_us", "contacts", "penetrations", "penetration_checks", "realtime",
-                "packets_sent", "safety_events", "energy_injected_j", "clients", "observers",
+                "duration_s",
+                "haptics_hz",
+                "haptics_period_us",
+                "deadline_misses",
+                "god_object_update_us",
+                "force_us",
+                "constraint_age_us",
+                "contacts",
+                "penetrations",
+                "penetration_checks",
+                "realtime",
+                "packets_sent",
+                "safety_events",
+                "energy_injected_j",
+                "clients",
+                "observers",
             ],
         );
         has_all(
             &keys(&report.clients[0]),
             &[
-                "node", "transport", "frames", "fps", "pose_age_ms", "swap_skew_us", "packets_lost",
+                "node",
+                "transport",
+                "frames",
+                "fps",
+                "pose_age_ms",
+                "swap_skew_us",
+                "packets_lost",
                 "state_hash_mismatches",
             ],
         );
-        has_all(&keys(&report.force_us), &["p50", "p99", "p999", "max", "count"]);
+        has_all(
+            &keys(&report.force_us),
+            &["p50", "p99", "p999", "max", "count"],
+        );
         has_all(&keys(&report.realtime), &["enforced", "waived"]);
     }
 
@@ -206,13 +296,28 @@ mod tests {
         has_all(
             &keys(&report),
             &[
-                "steps", "update_us", "force_us", "contacts", "active", "gap_min_m", "kkt_max", "solver_fallbacks",
-                "energy_injected_j", "max_force_step_n", "work",
+                "steps",
+                "update_us",
+                "force_us",
+                "contacts",
+                "active",
+                "gap_min_m",
+                "kkt_max",
+                "solver_fallbacks",
+                "energy_injected_j",
+                "max_force_step_n",
+                "work",
             ],
         );
         has_all(
             &keys(&report.work),
-            &["node_pairs", "triangle_pairs", "feature_pairs", "advancement_steps", "projections"],
+            &[
+                "node_pairs",
+                "triangle_pairs",
+                "feature_pairs",
+                "advancement_steps",
+                "projections",
+            ],
         );
     }
 }

@@ -19,7 +19,10 @@ use crate::terminal::Terminal;
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Serves the workbench. The report comes with the failure, if the session broke down on the way.
-pub fn run(args: &ServeArgs, terminal: &Terminal) -> Result<(SessionReport, Option<Failure>), Failure> {
+pub fn run(
+    args: &ServeArgs,
+    terminal: &Terminal,
+) -> Result<(SessionReport, Option<Failure>), Failure> {
     let workbench = Workbench::load(&args.config)?;
     let key = workbench_key(args.key.as_deref(), &workbench)?;
     let overrides = Overrides {
@@ -71,7 +74,9 @@ pub fn watch(
 ) {
     let end = duration.map(Duration::from_secs_f64);
     loop {
-        let left = end.map_or(LOOK_PERIOD, |end| end.saturating_sub(session.age()).min(LOOK_PERIOD));
+        let left = end.map_or(LOOK_PERIOD, |end| {
+            end.saturating_sub(session.age()).min(LOOK_PERIOD)
+        });
         if signal.wait(left) || session.is_ending() {
             return;
         }

@@ -12,10 +12,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose, Settings, World};
+use god_object::{GodObject, Pose};
 use taut_bridge::realtime::{lock_memory, pin_to_core};
-use taut_bridge::{Device, DeviceLimits, RemoteDevice, SafetySettings};
-use taut_link::{Broadcaster, ClusterKey, Content, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_bridge::{Device, RemoteDevice};
+use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use tokio::runtime::Runtime;
 
 use crate::broadcast::{self, BridgeCommands, StateWriter};
@@ -23,15 +23,15 @@ use crate::checker::{self, PenetrationChecker};
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::failure::Failure;
-use crate::head::Head;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
 use crate::loops::shell::{Waker, run_at_deadlines, spawn};
 use crate::loops::wiring::WiredLoops;
-use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
+use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, NetworkCounts, Severity};
 use crate::realtime::{RealtimeLedger, RealtimePolicy, Scheduling};
 use crate::report::{RealtimeReport, SessionReport};
+use crate::setup::{DeviceSource, RealtimeSettings, SessionSetup};
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::fanout::Subscriber;
 use crate::shared::wrench_command::WrenchCommand;
@@ -45,87 +45,6 @@ const COUPLING_TIMEOUT: Duration = Duration::from_millis(10);
 const SCHEDULING_TIME: Duration = Duration::from_millis(200);
 /// Threads of the network runtime: one for packets, one for joins.
 const NETWORK_THREADS: usize = 2;
-
-/// Everything that a session is made of.
-pub struct SessionSetup {
-    /// Bodies.
-    pub world: Arc<World>,
-    /// Of the method.
-    pub settings: Settings,
-    /// Where god-object and device start.
-    pub start: Pose,
-    /// What moves the god-object.
-    pub device: DeviceSource,
-    /// Limits and times of the force.
-    pub safety: SafetySettings,
-    /// The viewer.
-    pub head: Head,
-    /// What clients fetch at join.
-    pub content: Content,
-    /// Addresses, key and limits of the network.
-    pub link: LinkSettings,
-    /// Rates and scheduling.
-    pub realtime: RealtimeSettings,
-    /// Where the monitor is served; `None` does without.
-    pub monitor: Option<MonitorSettings>,
-}
-
-/// What moves the god-object.
-pub enum DeviceSource {
-    /// A device on this machine, in the haptics loop.
-    Local(Box<dyn Device>),
-    /// A device behind a bridge.
-    Remote {
-        /// What the device there can bear.
-        limits: DeviceLimits,
-        /// Silence after which it counts as lost.
-        max_age: Duration,
-    },
-}
-
-/// Addresses, key and limits of the network.
-#[derive(Clone, Debug)]
-pub struct LinkSettings {
-    /// Of the control plane.
-    pub quic: SocketAddr,
-    /// Of the state plane.
-    pub udp: SocketAddr,
-    /// The cluster key.
-    pub key: ClusterKey,
-    /// Most clients at a time.
-    pub max_clients: usize,
-}
-
-/// Rates and scheduling.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RealtimeSettings {
-    /// What a refusal by the system means.
-    pub policy: RealtimePolicy,
-    /// Period of the haptics loop.
-    pub haptics_period: Duration,
-    /// Shortest period of the god-object loop.
-    pub god_object_period: Duration,
-    /// Time between two states to a client.
-    pub broadcast_period: Duration,
-    /// Real-time priority of the haptics loop.
-    pub haptics_priority: u8,
-    /// Real-time priority of the coupling; below that of the haptics loop.
-    pub coupling_priority: u8,
-    /// Real-time priority of the broadcaster; below that of the coupling.
-    pub broadcast_priority: u8,
-    /// Real-time priority of the network's threads; below that of the broadcaster.
-    pub network_priority: u8,
-    /// Real-time priority of the god-object loop; `None` is the normal class, because an update may take long.
-    pub god_object_priority: Option<u8>,
-    /// Core of the haptics loop; `None` is the system's choice.
-    pub haptics_core: Option<usize>,
-    /// Core of the coupling.
-    pub coupling_core: Option<usize>,
-    /// Core of the god-object loop.
-    pub god_object_core: Option<usize>,
-    /// Keep all memory in RAM.
-    pub lock_memory: bool,
-}
 
 /// A running session. Dropped, it ends.
 pub struct Session {
@@ -150,7 +69,9 @@ impl Session {
         // What the scene can be wrong in, before anything is opened.
         let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
         let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
-            Failure::bad_input("a mesh of the scene cannot be checked for penetration: run `taut check` on it")
+            Failure::bad_input(
+                "a mesh of the scene cannot be checked for penetration: run `taut check` on it",
+            )
         })?;
 
         // The network, whose clock is everybody's; the device may be behind it.
@@ -170,7 +91,13 @@ impl Session {
         let (device, bridge_commands) = connect_device(setup.device, &link)?;
 
         // Figure 3.
-        let loops = WiredLoops::new(&setup.world, &setup.settings, god_object, device, setup.safety);
+        let loops = WiredLoops::new(
+            &setup.world,
+            &setup.settings,
+            god_object,
+            device,
+            setup.safety,
+        );
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -194,7 +121,13 @@ impl Session {
                 statistics: loops.statistics.clone(),
                 clock,
             };
-            let feed = MonitorFeed::start(settings, &picture, sources, session.network.clone(), &session.shutdown)?;
+            let feed = MonitorFeed::start(
+                settings,
+                &picture,
+                sources,
+                session.network.clone(),
+                &session.shutdown,
+            )?;
             session.monitor = Some(feed);
         }
         if setup.realtime.lock_memory {
@@ -206,7 +139,11 @@ impl Session {
             &setup.world.body.reference_point,
             scene_revision,
         );
-        session.start_coupling(loops.coupling, loops.coupling_waker.clone(), &setup.realtime)?;
+        session.start_coupling(
+            loops.coupling,
+            loops.coupling_waker.clone(),
+            &setup.realtime,
+        )?;
         session.start_god_object(loops.god_object, loops.coupling_waker, &setup.realtime)?;
         session.start_checker(checker, loops.observers.checker)?;
         session.start_broadcast(states, broadcaster, bridge_commands, &setup.realtime)?;
@@ -215,31 +152,61 @@ impl Session {
         Ok(session)
     }
 
-    fn start_coupling(&mut self, mut coupling: CouplingLoop, waker: Waker, realtime: &RealtimeSettings) -> Result<(), Failure> {
+    fn start_coupling(
+        &mut self,
+        mut coupling: CouplingLoop,
+        waker: Waker,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
         let (clock, shutdown) = (self.clock, self.shutdown.clone());
-        self.start_thread("coupling", Scheduling::Fifo(realtime.coupling_priority), realtime.coupling_core, move || {
-            while !shutdown.is_asked() {
-                if !coupling.tick(clock.now()) {
-                    waker.wait(COUPLING_TIMEOUT);
+        self.start_thread(
+            "coupling",
+            Scheduling::Fifo(realtime.coupling_priority),
+            realtime.coupling_core,
+            move || {
+                while !shutdown.is_asked() {
+                    if !coupling.tick(clock.now()) {
+                        waker.wait(COUPLING_TIMEOUT);
+                    }
                 }
-            }
-        })
+            },
+        )
     }
 
-    fn start_god_object(&mut self, mut god_object: GodObjectLoop, waker: Waker, realtime: &RealtimeSettings) -> Result<(), Failure> {
-        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.god_object_period);
-        let scheduling = realtime.god_object_priority.map_or(Scheduling::Normal, Scheduling::Fifo);
-        self.start_thread("god-object", scheduling, realtime.god_object_core, move || {
-            // Updates that take longer than a period are no fault: the next one starts at once.
-            let late = AtomicU64::new(0);
-            run_at_deadlines(clock, period, &shutdown, &late, |_| {
-                god_object.tick(|| clock.now());
-                waker.wake();
-            });
-        })
+    fn start_god_object(
+        &mut self,
+        mut god_object: GodObjectLoop,
+        waker: Waker,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) = (
+            self.clock,
+            self.shutdown.clone(),
+            realtime.god_object_period,
+        );
+        let scheduling = realtime
+            .god_object_priority
+            .map_or(Scheduling::Normal, Scheduling::Fifo);
+        self.start_thread(
+            "god-object",
+            scheduling,
+            realtime.god_object_core,
+            move || {
+                // Updates that take longer than a period are no fault: the next one starts at once.
+                let late = AtomicU64::new(0);
+                run_at_deadlines(clock, period, &shutdown, &late, |_| {
+                    god_object.tick(|| clock.now());
+                    waker.wake();
+                });
+            },
+        )
     }
 
-    fn start_checker(&mut self, checker: PenetrationChecker, contacts: Subscriber<ContactSnapshot>) -> Result<(), Failure> {
+    fn start_checker(
+        &mut self,
+        checker: PenetrationChecker,
+        contacts: Subscriber<ContactSnapshot>,
+    ) -> Result<(), Failure> {
         let (counts, shutdown) = (self.statistics.checks.clone(), self.shutdown.clone());
         self.start_thread("checker", Scheduling::Background, None, move || {
             checker::run(&checker, contacts, &counts, &shutdown);
@@ -253,26 +220,55 @@ impl Session {
         bridge_commands: Option<BridgeCommands>,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
-        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.broadcast_period);
-        self.start_thread("broadcast", Scheduling::Fifo(realtime.broadcast_priority), None, move || {
-            broadcast::run(states, broadcaster, bridge_commands, clock, period, &shutdown);
-        })
+        let (clock, shutdown, period) =
+            (self.clock, self.shutdown.clone(), realtime.broadcast_period);
+        self.start_thread(
+            "broadcast",
+            Scheduling::Fifo(realtime.broadcast_priority),
+            None,
+            move || {
+                broadcast::run(
+                    states,
+                    broadcaster,
+                    bridge_commands,
+                    clock,
+                    period,
+                    &shutdown,
+                );
+            },
+        )
     }
 
-    fn start_haptics(&mut self, mut haptics: HapticsLoop, realtime: &RealtimeSettings) -> Result<(), Failure> {
-        let (clock, shutdown, period) = (self.clock, self.shutdown.clone(), realtime.haptics_period);
+    fn start_haptics(
+        &mut self,
+        mut haptics: HapticsLoop,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) =
+            (self.clock, self.shutdown.clone(), realtime.haptics_period);
         let statistics = self.statistics.haptics.clone();
         self.started = clock.now();
-        self.start_thread("haptics", Scheduling::Fifo(realtime.haptics_priority), realtime.haptics_core, move || {
-            let ticked = catch_unwind(AssertUnwindSafe(|| {
-                run_at_deadlines(clock, period, &shutdown, &statistics.deadline_misses, |now| haptics.tick(now));
-            }));
-            // Whatever ended the loop: no force is left on the hand.
-            haptics.release(clock.now());
-            if let Err(cause) = ticked {
-                resume_unwind(cause);
-            }
-        })
+        self.start_thread(
+            "haptics",
+            Scheduling::Fifo(realtime.haptics_priority),
+            realtime.haptics_core,
+            move || {
+                let ticked = catch_unwind(AssertUnwindSafe(|| {
+                    run_at_deadlines(
+                        clock,
+                        period,
+                        &shutdown,
+                        &statistics.deadline_misses,
+                        |now| haptics.tick(now),
+                    );
+                }));
+                // Whatever ended the loop: no force is left on the hand.
+                haptics.release(clock.now());
+                if let Err(cause) = ticked {
+                    resume_unwind(cause);
+                }
+            },
+        )
     }
 
     fn start_thread(
@@ -345,7 +341,11 @@ impl Session {
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
-            lines.extend(self.clients.follow(&event).map(|line| (severity(&event), line)));
+            lines.extend(
+                self.clients
+                    .follow(&event)
+                    .map(|line| (severity(&event), line)),
+            );
         }
         for (severity, line) in lines {
             if severity == Severity::Error {
@@ -359,9 +359,16 @@ impl Session {
         let clients = link.clients();
         self.clients.look_at(&clients);
         let counters = link.counters();
-        self.network.packets_sent.store(counters.packets_sent, Ordering::Relaxed);
-        self.network.packets_received.store(counters.packets_received, Ordering::Relaxed);
-        self.network.clients.store(u32::try_from(clients.len()).unwrap_or(u32::MAX), Ordering::Relaxed);
+        self.network
+            .packets_sent
+            .store(counters.packets_sent, Ordering::Relaxed);
+        self.network
+            .packets_received
+            .store(counters.packets_received, Ordering::Relaxed);
+        self.network.clients.store(
+            u32::try_from(clients.len()).unwrap_or(u32::MAX),
+            Ordering::Relaxed,
+        );
     }
 
     /// One line of what goes on.
@@ -392,10 +399,16 @@ impl Session {
         if let Some(link) = &self.link {
             let counters = link.counters();
             report.packets_sent = counters.packets_sent;
-            report.packets_refused =
-                counters.garbage + counters.wrong_version + counters.forged + counters.replayed + counters.inputs_refused;
+            report.packets_refused = counters.garbage
+                + counters.wrong_version
+                + counters.forged
+                + counters.replayed
+                + counters.inputs_refused;
         }
-        let mut failure = self.shutdown.failure().map(|sentence| Failure::Failed(sentence.to_owned()));
+        let mut failure = self
+            .shutdown
+            .failure()
+            .map(|sentence| Failure::Failed(sentence.to_owned()));
         match self.end() {
             Ok(dropped) => report.monitor_dropped = dropped,
             Err(error) => failure = failure.or(Some(error)),
@@ -439,11 +452,16 @@ fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Fai
         })
         .enable_all()
         .build()
-        .map_err(|error| Failure::failed(format!("the network's threads cannot be started ({error})")))
+        .map_err(|error| {
+            Failure::failed(format!("the network's threads cannot be started ({error})"))
+        })
 }
 
 /// The device, and the commands that go to its bridge if it is behind the network.
-fn connect_device(source: DeviceSource, link: &ServerLink) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
+fn connect_device(
+    source: DeviceSource,
+    link: &ServerLink,
+) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
     match source {
         DeviceSource::Local(device) => Ok((device, None)),
         DeviceSource::Remote { limits, max_age } => {
@@ -464,7 +482,10 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
         world: setup.world.clone(),
         start: setup.start,
         screens: description.screens.clone(),
-        workbench_from_scene: description.scene_origin.to_isometry().unwrap_or_else(Pose::identity),
+        workbench_from_scene: description
+            .scene_origin
+            .to_isometry()
+            .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
         head: setup.head,
     }

@@ -52,7 +52,9 @@ pub struct BlockingEndSignal {
 impl BlockingEndSignal {
     /// Starts to listen.
     pub fn listen() -> std::io::Result<Self> {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()?;
         let signal = {
             let _inside = runtime.enter();
             EndSignal::listen()?
@@ -63,7 +65,8 @@ impl BlockingEndSignal {
     /// Waits for the signal, at most `time`; whether it was given.
     pub fn wait(&mut self, time: Duration) -> bool {
         let given = self.signal.given();
-        self.runtime.block_on(async { tokio::time::timeout(time, given).await.is_ok() })
+        self.runtime
+            .block_on(async { tokio::time::timeout(time, given).await.is_ok() })
     }
 
     /// Turns it into a request that can be looked at without waiting.
@@ -71,10 +74,12 @@ impl BlockingEndSignal {
         let shutdown = Shutdown::default();
         let asked = shutdown.clone();
         // The thread ends with the process.
-        std::thread::Builder::new().name("signals".into()).spawn(move || {
-            self.runtime.block_on(self.signal.given());
-            asked.ask();
-        })?;
+        std::thread::Builder::new()
+            .name("signals".into())
+            .spawn(move || {
+                self.runtime.block_on(self.signal.given());
+                asked.ask();
+            })?;
         Ok(shutdown)
     }
 }

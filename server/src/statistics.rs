@@ -27,7 +27,13 @@ impl Statistics {
     /// The loops' part of the end report, after they ran for `duration`.
     pub fn report(&self, duration: Duration) -> SessionReport {
         let duration_s = duration.as_secs_f64();
-        let per_second = |count: u64| if duration_s > 0.0 { count as f64 / duration_s } else { 0.0 };
+        let per_second = |count: u64| {
+            if duration_s > 0.0 {
+                count as f64 / duration_s
+            } else {
+                0.0
+            }
+        };
         let haptics_period_us = self.haptics.period.distribution_us();
         let god_object_update_us = self.god_object.update.distribution_us();
         SessionReport {

@@ -2,7 +2,7 @@
 //!
 //! | symbol | name in code    | meaning                                                        |
 //! |--------|-----------------|----------------------------------------------------------------|
-//! | 2^-6   | [`SUB_BUCKETS`] | relative width of a bucket: 1.6 %, so a percentile errs by less |
+//! | 2^-6   | `SUB_BUCKETS`   | relative width of a bucket: 1.6 %, so a percentile errs by less |
 //!
 //! A log-linear histogram (as HdrHistogram's) of atomic counters: recording is one addition, without allocation, lock or loop.
 //! One thread records; any thread reads.
@@ -131,7 +131,12 @@ impl HistogramWindow {
     }
 
     fn advance(&mut self, histogram: &Histogram) -> Distribution {
-        for ((fresh, seen), count) in self.fresh.iter_mut().zip(&mut self.seen).zip(&histogram.counts) {
+        for ((fresh, seen), count) in self
+            .fresh
+            .iter_mut()
+            .zip(&mut self.seen)
+            .zip(&histogram.counts)
+        {
             let now = count.load(Ordering::Relaxed);
             *fresh = now - *seen;
             *seen = now;
@@ -213,7 +218,10 @@ mod tests {
             for offset in [0, 1, 3] {
                 let time = (1u64 << exponent) + offset;
                 let (low, width) = bucket_range(bucket(time));
-                assert!((low..low + width).contains(&time), "{time}: {low} + {width}");
+                assert!(
+                    (low..low + width).contains(&time),
+                    "{time}: {low} + {width}"
+                );
             }
         }
     }
@@ -227,8 +235,15 @@ mod tests {
         }
         let exact = distribution_of(&values);
         let found = histogram.distribution_us();
-        for (found, exact) in [(found.p50, exact.p50), (found.p99, exact.p99), (found.p999, exact.p999)] {
-            assert!((found / exact - 1.0).abs() < 1.0 / SUB_BUCKETS as f64, "{found} {exact}");
+        for (found, exact) in [
+            (found.p50, exact.p50),
+            (found.p99, exact.p99),
+            (found.p999, exact.p999),
+        ] {
+            assert!(
+                (found / exact - 1.0).abs() < 1.0 / SUB_BUCKETS as f64,
+                "{found} {exact}"
+            );
         }
         assert_eq!(found.max, 10_000.0);
         assert_eq!(found.count, 10_000);

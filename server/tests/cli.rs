@@ -41,8 +41,15 @@ impl Workplace {
 
     /// `taut serve` of the workbench file `name`, for `seconds`.
     fn serve(&self, name: &str, seconds: &str, more: &[&str]) -> Vec<String> {
-        let mut arguments: Vec<String> = ["serve", "--no-monitor", "--json", "--duration", seconds].map(String::from).into();
-        arguments.extend(["--config".into(), self.text(name), "--key".into(), self.text("cluster.key")]);
+        let mut arguments: Vec<String> = ["serve", "--no-monitor", "--json", "--duration", seconds]
+            .map(String::from)
+            .into();
+        arguments.extend([
+            "--config".into(),
+            self.text(name),
+            "--key".into(),
+            self.text("cluster.key"),
+        ]);
         arguments.extend(more.iter().map(|argument| (*argument).to_owned()));
         arguments
     }
@@ -89,7 +96,11 @@ fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
     assert!(begun.elapsed() < PATIENCE, "took {:?}", begun.elapsed());
     assert!(error.starts_with("taut: "), "{error}");
     assert_eq!(error.trim_end().lines().count(), 1, "{error}");
-    assert!(output.stdout.is_empty(), "{:?}", String::from_utf8_lossy(&output.stdout));
+    assert!(
+        output.stdout.is_empty(),
+        "{:?}",
+        String::from_utf8_lossy(&output.stdout)
+    );
     for part in parts {
         assert!(error.contains(part), "\"{part}\" is missing: {error}");
     }
@@ -97,16 +108,26 @@ fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["demo", "serve", "render", "bridge", "replay", "record", "check", "doctor", "keys"] {
+    for command in [
+        "demo", "serve", "render", "bridge", "replay", "record", "check", "doctor", "keys",
+    ] {
         let output = taut(&[command, "--help"]);
         assert!(output.status.success(), "{command}");
-        assert!(String::from_utf8_lossy(&output.stdout).contains("Example"), "{command}");
+        assert!(
+            String::from_utf8_lossy(&output.stdout).contains("Example"),
+            "{command}"
+        );
     }
 }
 
 #[test]
 fn bad_usage_is_exit_code_2() {
-    for arguments in [["demo", "--no-such-option"].as_slice(), &["no-such-command"], &["replay"], &["demo", "--duration", "-1"]] {
+    for arguments in [
+        ["demo", "--no-such-option"].as_slice(),
+        &["no-such-command"],
+        &["replay"],
+        &["demo", "--duration", "-1"],
+    ] {
         assert_eq!(taut(arguments).status.code(), Some(2), "{arguments:?}");
     }
 }
@@ -115,12 +136,41 @@ fn bad_usage_is_exit_code_2() {
 fn missing_files_are_named() {
     let place = Workplace::new();
     refused(&place.serve("absent.toml", "1", &[]), &["absent.toml"]);
-    refused(&["serve", "--config", &place.text("workbench.toml"), "--key", &place.text("absent.key")], &["absent.key"]);
-    refused(&["serve", "--config", &place.text("workbench.toml")], &["no cluster key", "taut keys"]);
-    refused(&place.serve("workbench.toml", "1", &["--scene", "absent.toml"]), &["absent.toml"]);
-    refused(&place.serve("workbench.toml", "1", &["--scene", "no-such-scene"]), &["no-such-scene", "peg-in-a-hole"]);
+    refused(
+        &[
+            "serve",
+            "--config",
+            &place.text("workbench.toml"),
+            "--key",
+            &place.text("absent.key"),
+        ],
+        &["absent.key"],
+    );
+    refused(
+        &["serve", "--config", &place.text("workbench.toml")],
+        &["no cluster key", "taut keys"],
+    );
+    refused(
+        &place.serve("workbench.toml", "1", &["--scene", "absent.toml"]),
+        &["absent.toml"],
+    );
+    refused(
+        &place.serve("workbench.toml", "1", &["--scene", "no-such-scene"]),
+        &["no-such-scene", "peg-in-a-hole"],
+    );
     let out = place.text("out.csv");
-    refused(&["replay", "--scene", "sphere-on-plane", "--trace", "absent.csv", "--out", &out], &["absent.csv"]);
+    refused(
+        &[
+            "replay",
+            "--scene",
+            "sphere-on-plane",
+            "--trace",
+            "absent.csv",
+            "--out",
+            &out,
+        ],
+        &["absent.csv"],
+    );
     assert!(!place.path("out.csv").exists());
 }
 
@@ -138,14 +188,47 @@ fn broken_scenes_are_refused_with_file_and_reason() {
     let open_mesh = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n0.1 0 0\n0 0.1 0\n3 0 1 2\n";
     place.write("open.ply", open_mesh);
     let cases = [
-        (scene("nan.toml", &format!("{sphere}mass = nan\npose = {{ position = [0, 0, 0.1] }}")), ["nan.toml", "mass"]),
-        (scene("zero.toml", &format!("{sphere}mass = 0.0\npose = {{ position = [0, 0, 0.1] }}")), ["zero.toml", "mass"]),
-        (scene("open.toml", "shape = { mesh = \"open.ply\" }\nmass = 1.0\npose = { position = [0, 0, 0.1] }"), ["open.toml", "open.ply"]),
-        (scene("inside.toml", &format!("{sphere}mass = 1.0\npose = {{ position = [0, 0, 0.03] }}")), ["penetration", "table"]),
-        (scene("typo.toml", &format!("{sphere}mas = 1.0\npose = {{ position = [0, 0, 0.1] }}")), ["typo.toml", "mass"]),
+        (
+            scene(
+                "nan.toml",
+                &format!("{sphere}mass = nan\npose = {{ position = [0, 0, 0.1] }}"),
+            ),
+            ["nan.toml", "mass"],
+        ),
+        (
+            scene(
+                "zero.toml",
+                &format!("{sphere}mass = 0.0\npose = {{ position = [0, 0, 0.1] }}"),
+            ),
+            ["zero.toml", "mass"],
+        ),
+        (
+            scene(
+                "open.toml",
+                "shape = { mesh = \"open.ply\" }\nmass = 1.0\npose = { position = [0, 0, 0.1] }",
+            ),
+            ["open.toml", "open.ply"],
+        ),
+        (
+            scene(
+                "inside.toml",
+                &format!("{sphere}mass = 1.0\npose = {{ position = [0, 0, 0.03] }}"),
+            ),
+            ["penetration", "table"],
+        ),
+        (
+            scene(
+                "typo.toml",
+                &format!("{sphere}mas = 1.0\npose = {{ position = [0, 0, 0.1] }}"),
+            ),
+            ["typo.toml", "mass"],
+        ),
     ];
     for (scene, parts) in cases {
-        refused(&place.serve("workbench.toml", "1", &["--scene", &scene]), &parts);
+        refused(
+            &place.serve("workbench.toml", "1", &["--scene", &scene]),
+            &parts,
+        );
     }
 }
 
@@ -154,7 +237,10 @@ fn two_nodes_of_one_name_are_refused() {
     let place = Workplace::new();
     let twice = workbench().replace("name = \"table\"\nscreens", "name = \"front\"\nscreens");
     place.write("twice.toml", &twice);
-    refused(&place.serve("twice.toml", "1", &[]), &["twice.toml", "two nodes", "front"]);
+    refused(
+        &place.serve("twice.toml", "1", &[]),
+        &["twice.toml", "two nodes", "front"],
+    );
 }
 
 #[test]
@@ -166,18 +252,32 @@ fn a_port_in_use_is_named_and_nothing_is_left_running() {
     let Ok(address) = other.local_addr() else {
         panic!("no address");
     };
-    refused(&place.serve("workbench.toml", "30", &["--quic", &address.to_string()]), &[&address.to_string(), "in use"]);
-    refused(&place.serve("workbench.toml", "30", &["--udp", &address.to_string()]), &[&address.to_string(), "in use"]);
+    refused(
+        &place.serve("workbench.toml", "30", &["--quic", &address.to_string()]),
+        &[&address.to_string(), "in use"],
+    );
+    refused(
+        &place.serve("workbench.toml", "30", &["--udp", &address.to_string()]),
+        &[&address.to_string(), "in use"],
+    );
 }
 
 #[test]
 fn a_server_that_nobody_runs_is_unreachable() {
     let place = Workplace::new();
-    let Ok(silent) = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr()) else {
+    let Ok(silent) = UdpSocket::bind(("127.0.0.1", 0)).and_then(|socket| socket.local_addr())
+    else {
         panic!("no port");
     };
-    let (server, key, out) = (silent.to_string(), place.text("cluster.key"), place.text("trace.csv"));
-    refused(&["record", "--server", &server, "--key", &key, "--out", &out], &[&server]);
+    let (server, key, out) = (
+        silent.to_string(),
+        place.text("cluster.key"),
+        place.text("trace.csv"),
+    );
+    refused(
+        &["record", "--server", &server, "--key", &key, "--out", &out],
+        &[&server],
+    );
     assert!(!place.path("trace.csv").exists());
 }
 
@@ -191,9 +291,26 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
     let server = start(&place.serve("workbench.toml", "60", &["--quic", &address]));
 
     // A client with another key is refused, and disturbs nobody.
-    assert!(taut(&["keys", "--out", &place.text("other.key")]).status.success());
+    assert!(
+        taut(&["keys", "--out", &place.text("other.key")])
+            .status
+            .success()
+    );
     let out = place.text("trace.csv");
-    let record = |key: &str| ["record", "--server", &address, "--key", key, "--out", &out, "--duration", "1"].map(str::to_owned);
+    let record = |key: &str| {
+        [
+            "record",
+            "--server",
+            &address,
+            "--key",
+            key,
+            "--out",
+            &out,
+            "--duration",
+            "1",
+        ]
+        .map(str::to_owned)
+    };
     let begun = Instant::now();
     let recorded = loop {
         let output = taut(&record(&place.text("cluster.key")));
@@ -201,46 +318,101 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
             break output;
         }
     };
-    assert!(recorded.status.success(), "{}", String::from_utf8_lossy(&recorded.stderr));
+    assert!(
+        recorded.status.success(),
+        "{}",
+        String::from_utf8_lossy(&recorded.stderr)
+    );
     refused(&record(&place.text("other.key")), &["key"]);
 
     let checked = taut(&["check", &out]);
-    assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stdout));
-    let rows = std::fs::read_to_string(place.path("trace.csv")).map_or(0, |text| text.lines().count());
+    assert!(
+        checked.status.success(),
+        "{}",
+        String::from_utf8_lossy(&checked.stdout)
+    );
+    let rows =
+        std::fs::read_to_string(place.path("trace.csv")).map_or(0, |text| text.lines().count());
     assert!(rows > 300, "{rows} rows in a second");
 
-    let ended = Command::new("kill").args(["-TERM", &server.id().to_string()]).status();
+    let ended = Command::new("kill")
+        .args(["-TERM", &server.id().to_string()])
+        .status();
     assert!(ended.is_ok_and(|status| status.success()));
     let Ok(output) = server.wait_with_output() else {
         panic!("the server cannot be waited for");
     };
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
-    assert!(report["haptics_hz"].as_f64().is_some_and(|rate| rate > 300.0), "{report}");
+    assert!(
+        report["haptics_hz"]
+            .as_f64()
+            .is_some_and(|rate| rate > 300.0),
+        "{report}"
+    );
     assert_eq!(report["penetrations"], 0, "{report}");
-    assert!(report["penetration_checks"].as_u64().is_some_and(|checks| checks > 10), "{report}");
-    assert!(report["packets_sent"].as_u64().is_some_and(|sent| sent > 300), "{report}");
+    assert!(
+        report["penetration_checks"]
+            .as_u64()
+            .is_some_and(|checks| checks > 10),
+        "{report}"
+    );
+    assert!(
+        report["packets_sent"]
+            .as_u64()
+            .is_some_and(|sent| sent > 300),
+        "{report}"
+    );
     assert_eq!(report["observers"], 1, "{report}");
 }
 
 #[test]
 fn check_lists_every_fault_and_tells_good_from_bad() {
     let place = Workplace::new();
-    place.write("bad.toml", "name = \"x\"\nspeed = 3\n[god_object]\nmass = -1.0\n");
-    let good = taut(&["check", &place.text("workbench.toml"), "peg-in-a-hole", "--json"]);
-    assert!(good.status.success(), "{}", String::from_utf8_lossy(&good.stdout));
-    let bad = taut(&["check", &place.text("workbench.toml"), &place.text("bad.toml"), "--json"]);
+    place.write(
+        "bad.toml",
+        "name = \"x\"\nspeed = 3\n[god_object]\nmass = -1.0\n",
+    );
+    let good = taut(&[
+        "check",
+        &place.text("workbench.toml"),
+        "peg-in-a-hole",
+        "--json",
+    ]);
+    assert!(
+        good.status.success(),
+        "{}",
+        String::from_utf8_lossy(&good.stdout)
+    );
+    let bad = taut(&[
+        "check",
+        &place.text("workbench.toml"),
+        &place.text("bad.toml"),
+        "--json",
+    ]);
     assert_eq!(bad.status.code(), Some(2));
     let reports: serde_json::Value = serde_json::from_slice(&bad.stdout).unwrap_or_default();
     assert_eq!(reports[0]["problems"].as_array().map(Vec::len), Some(0));
-    assert!(reports[1]["problems"].as_array().is_some_and(|problems| problems.len() >= 2), "{reports}");
+    assert!(
+        reports[1]["problems"]
+            .as_array()
+            .is_some_and(|problems| problems.len() >= 2),
+        "{reports}"
+    );
 }
 
 #[test]
 fn a_key_is_never_overwritten() {
     let place = Workplace::new();
     let before = std::fs::read(place.path("cluster.key"));
-    refused(&["keys", "--out", &place.text("cluster.key")], &["cluster.key"]);
+    refused(
+        &["keys", "--out", &place.text("cluster.key")],
+        &["cluster.key"],
+    );
     assert_eq!(before.ok(), std::fs::read(place.path("cluster.key")).ok());
 }
 
@@ -250,6 +422,17 @@ fn an_answer_is_written_beside_its_name_until_it_is_whole() {
     let out = place.path("no-such-directory").join("out.csv");
     place.write("trace.csv", "t,x,y,z,qw,qx,qy,qz\n0,0.05,0,0.04,1,0,0,0\n");
     let (trace, out_text) = (place.text("trace.csv"), out.display().to_string());
-    refused(&["replay", "--scene", "sphere-on-plane", "--trace", &trace, "--out", &out_text], &["out.csv"]);
+    refused(
+        &[
+            "replay",
+            "--scene",
+            "sphere-on-plane",
+            "--trace",
+            &trace,
+            "--out",
+            &out_text,
+        ],
+        &["out.csv"],
+    );
     assert!(!Path::new(&out).exists());
 }

@@ -9,7 +9,8 @@ use god_object::{GodObject, Pose};
 use taut::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
-    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings, SimulatedDevice, ViaPoint,
+    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings,
+    SimulatedDevice, ViaPoint,
 };
 use taut_scene::{BuiltScene, Scene};
 
@@ -42,7 +43,9 @@ fn pressing_hand(scene: &BuiltScene) -> SimulatedDevice {
         at(3.0, 0.04),
     ];
     match MinJerkPath::new(points, false) {
-        Ok(path) => SimulatedDevice::new(Grip::workbench(), Hand::FIRM, path, scene.reference_point()),
+        Ok(path) => {
+            SimulatedDevice::new(Grip::workbench(), Hand::FIRM, path, scene.reference_point())
+        }
         Err(error) => panic!("{error}"),
     }
 }
@@ -54,7 +57,10 @@ impl VirtualSession {
             Ok(god_object) => god_object,
             Err(error) => panic!("{error}"),
         };
-        let safety = SafetySettings { ramp_in: Duration::from_millis(10), ..SafetySettings::default() };
+        let safety = SafetySettings {
+            ramp_in: Duration::from_millis(10),
+            ..SafetySettings::default()
+        };
         Self {
             loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety),
             now: Duration::ZERO,
@@ -86,8 +92,19 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
         let mut largest: f64 = 0.0;
         for _ in 0..3500 {
             session.tick(god_object_ticks);
-            let pose = session.loops.observers.monitor.contacts.newest().set.god_object_pose;
-            assert!(pose.translation.z >= 0.019, "centre at {}", pose.translation.z);
+            let pose = session
+                .loops
+                .observers
+                .monitor
+                .contacts
+                .newest()
+                .set
+                .god_object_pose;
+            assert!(
+                pose.translation.z >= 0.019,
+                "centre at {}",
+                pose.translation.z
+            );
             assert_eq!(checker.penetrated_obstacle(&pose), None);
             let force = linear(&session.loops.observers.monitor.wrench.newest().wrench);
             // Frictionless, so nothing but along the normal.
@@ -95,9 +112,35 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
             largest = largest.max(force.z);
         }
         // A firm hand of 500 N/m against 1000 N/m: two thirds of 10 mm stay as force.
-        assert!((2.0..6.0).contains(&largest), "largest force {largest} N at every {god_object_ticks} ticks");
-        assert_eq!(session.loops.observers.monitor.wrench.newest().wrench.norm(), 0.0, "no force in free space");
-        assert!(session.loops.observers.monitor.device.newest().pose.translation.z > 0.035, "the hand is back");
+        assert!(
+            (2.0..6.0).contains(&largest),
+            "largest force {largest} N at every {god_object_ticks} ticks"
+        );
+        assert_eq!(
+            session
+                .loops
+                .observers
+                .monitor
+                .wrench
+                .newest()
+                .wrench
+                .norm(),
+            0.0,
+            "no force in free space"
+        );
+        assert!(
+            session
+                .loops
+                .observers
+                .monitor
+                .device
+                .newest()
+                .pose
+                .translation
+                .z
+                > 0.035,
+            "the hand is back"
+        );
         assert!(session.loops.haptics.statistics().energy_injected() < 1e-2);
     }
 }
@@ -115,7 +158,11 @@ impl Device for Unplugged {
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
-        if now < self.at { self.device.read(now) } else { Err(DeviceFault::Lost { age: now - self.at }) }
+        if now < self.at {
+            self.device.read(now)
+        } else {
+            Err(DeviceFault::Lost { age: now - self.at })
+        }
     }
 
     fn write(&mut self, now: Duration, wrench: &god_object::Vector6) {
@@ -135,18 +182,29 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
         at: Duration::from_millis(1500),
         written: Arc::clone(&written),
     };
-    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let mut session =
+        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
     let felt = || written.lock().map(|force| force.norm()).unwrap_or(f64::NAN);
     for _ in 0..1499 {
         session.tick(1);
     }
     assert!(felt() > 2.0);
-    let before = session.loops.haptics.statistics().safety_events.load(std::sync::atomic::Ordering::Relaxed);
+    let before = session
+        .loops
+        .haptics
+        .statistics()
+        .safety_events
+        .load(std::sync::atomic::Ordering::Relaxed);
     session.tick(1);
     assert_eq!(felt(), 0.0, "dropped at once");
     session.tick(1);
     assert!(session.loops.observers.monitor.device.newest().faulty);
-    let after = session.loops.haptics.statistics().safety_events.load(std::sync::atomic::Ordering::Relaxed);
+    let after = session
+        .loops
+        .haptics
+        .statistics()
+        .safety_events
+        .load(std::sync::atomic::Ordering::Relaxed);
     assert_eq!(after, before + 1, "one event, not one per tick");
 }
 
@@ -159,7 +217,8 @@ fn a_silent_coupling_lets_the_force_fade() {
         at: Duration::MAX,
         written: Arc::clone(&written),
     };
-    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let mut session =
+        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
     for _ in 0..1500 {
         session.tick(1);
     }
@@ -181,7 +240,8 @@ fn constraints_older_than_a_tenth_of_a_second_let_the_force_fade() {
         at: Duration::MAX,
         written: Arc::clone(&written),
     };
-    let mut session = VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    let mut session =
+        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
     for _ in 0..1500 {
         session.tick(1);
     }

@@ -4,7 +4,10 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 fn taut(arguments: &[&str]) -> Output {
-    match Command::new(env!("CARGO_BIN_EXE_taut")).args(arguments).output() {
+    match Command::new(env!("CARGO_BIN_EXE_taut"))
+        .args(arguments)
+        .output()
+    {
         Ok(output) => output,
         Err(error) => panic!("taut does not start: {error}"),
     }
@@ -23,7 +26,10 @@ fn write_trace(path: &Path) {
     for row in 0..1000_u32 {
         let time = f64::from(row) * 0.002;
         let height = 0.015 + (0.02 - 0.02 * time).abs();
-        text.push_str(&format!("{time},{},0.0,{height},1,0,0,0\n", 0.05 - 0.05 * time));
+        text.push_str(&format!(
+            "{time},{},0.0,{height},1,0,0,0\n",
+            0.05 - 0.05 * time
+        ));
     }
     assert!(std::fs::write(path, text).is_ok());
 }
@@ -41,16 +47,44 @@ fn the_same_trace_gives_the_same_bytes_and_a_complete_report() {
     for (name, rate) in [("a.csv", "250"), ("b.csv", "250"), ("c.csv", "70")] {
         let out = directory.path().join(name);
         let output = taut(&[
-            "replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out", path_text(&out),
-            "--god-object-rate", rate, "--json",
+            "replay",
+            "--scene",
+            "sphere-on-plane",
+            "--trace",
+            path_text(&trace),
+            "--out",
+            path_text(&out),
+            "--god-object-rate",
+            rate,
+            "--json",
         ]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         assert_eq!(report["steps"], 1000);
-        assert!(report["max_force_n"].as_f64().is_some_and(|force| (4.0..6.0).contains(&force)), "{report}");
-        assert!(report["gap_min_m"].as_f64().is_some_and(|gap| gap > 0.0), "{report}");
-        assert!(report["kkt_max"].as_f64().is_some_and(|kkt| kkt < 1e-6), "{report}");
-        assert!(report["work"]["projections"].as_u64().is_some_and(|count| count > 0), "{report}");
+        assert!(
+            report["max_force_n"]
+                .as_f64()
+                .is_some_and(|force| (4.0..6.0).contains(&force)),
+            "{report}"
+        );
+        assert!(
+            report["gap_min_m"].as_f64().is_some_and(|gap| gap > 0.0),
+            "{report}"
+        );
+        assert!(
+            report["kkt_max"].as_f64().is_some_and(|kkt| kkt < 1e-6),
+            "{report}"
+        );
+        assert!(
+            report["work"]["projections"]
+                .as_u64()
+                .is_some_and(|count| count > 0),
+            "{report}"
+        );
         answers.push(std::fs::read(&out).unwrap_or_default());
     }
     assert!(!answers[0].is_empty());
@@ -68,7 +102,14 @@ fn timings_add_two_columns_and_change_no_other() {
     write_trace(&trace);
     let run = |name: &str, more: &[&str]| {
         let out = directory.path().join(name);
-        let mut arguments = vec!["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out"];
+        let mut arguments = vec![
+            "replay",
+            "--scene",
+            "sphere-on-plane",
+            "--trace",
+            path_text(&trace),
+            "--out",
+        ];
         let out_text = path_text(&out).to_owned();
         arguments.push(&out_text);
         arguments.extend(more);
@@ -77,7 +118,12 @@ fn timings_add_two_columns_and_change_no_other() {
     };
     let plain = run("plain.csv", &[]);
     let timed = run("timed.csv", &["--timings"]);
-    assert!(timed.lines().next().is_some_and(|header| header.ends_with(",stale,update_us,force_us")));
+    assert!(
+        timed
+            .lines()
+            .next()
+            .is_some_and(|header| header.ends_with(",stale,update_us,force_us"))
+    );
     for (plain, timed) in plain.lines().zip(timed.lines()) {
         assert!(timed.starts_with(plain), "{plain}\n{timed}");
     }
@@ -90,12 +136,24 @@ fn overrides_and_solvers_reach_the_method() {
     write_trace(&trace);
     let force = |more: &[&str]| {
         let out = directory.path().join("out.csv");
-        let mut arguments = vec!["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--json", "--out"];
+        let mut arguments = vec![
+            "replay",
+            "--scene",
+            "sphere-on-plane",
+            "--trace",
+            path_text(&trace),
+            "--json",
+            "--out",
+        ];
         let out_text = path_text(&out).to_owned();
         arguments.push(&out_text);
         arguments.extend(more);
         let output = taut(&arguments);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         report["max_force_n"].as_f64().unwrap_or(f64::NAN)
     };
@@ -103,7 +161,10 @@ fn overrides_and_solvers_reach_the_method() {
     let soft = force(&["--set", "coupling.k_h=1000.0"]);
     assert!((soft / plain - 0.5).abs() < 1e-3, "{soft} N of {plain} N");
     let reference = force(&["--solver", "clarabel"]);
-    assert!((reference / plain - 1.0).abs() < 1e-4, "{reference} N, not {plain} N");
+    assert!(
+        (reference / plain - 1.0).abs() < 1e-4,
+        "{reference} N, not {plain} N"
+    );
 }
 
 #[test]
@@ -113,10 +174,27 @@ fn a_failing_replay_leaves_no_file_and_says_one_sentence() {
     let broken = "t,x,y,z,qw,qx,qy,qz\n0.0,0.05,0,0.04,1,0,0,0\n0.001,nan,0,0.04,1,0,0,0\n";
     assert!(std::fs::write(&trace, broken).is_ok());
     let out = directory.path().join("out.csv");
-    let output = taut(&["replay", "--scene", "sphere-on-plane", "--trace", path_text(&trace), "--out", path_text(&out)]);
+    let output = taut(&[
+        "replay",
+        "--scene",
+        "sphere-on-plane",
+        "--trace",
+        path_text(&trace),
+        "--out",
+        path_text(&out),
+    ]);
     assert_eq!(output.status.code(), Some(2));
     let error = String::from_utf8_lossy(&output.stderr);
-    assert!(error.starts_with("taut: ") && error.contains("trace.csv:3") && error.trim().lines().count() == 1, "{error}");
-    let files: Vec<_> = std::fs::read_dir(directory.path()).into_iter().flatten().flatten().collect();
+    assert!(
+        error.starts_with("taut: ")
+            && error.contains("trace.csv:3")
+            && error.trim().lines().count() == 1,
+        "{error}"
+    );
+    let files: Vec<_> = std::fs::read_dir(directory.path())
+        .into_iter()
+        .flatten()
+        .flatten()
+        .collect();
     assert_eq!(files.len(), 1, "{files:?}");
 }

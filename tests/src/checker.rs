@@ -31,12 +31,25 @@ impl PenetrationChecker {
     pub fn new(world: &World) -> Self {
         let obstacles = world.obstacles.iter().map(|obstacle| {
             let vertices = vertices_in_world(&obstacle.mesh, &obstacle.pose);
-            let triangles: Vec<Triangle> = obstacle.mesh.triangles().iter().map(|t| triangle(&vertices, t)).collect();
-            Obstacle { name: obstacle.name.clone(), grid: Grid::new(&triangles), triangles }
+            let triangles: Vec<Triangle> = obstacle
+                .mesh
+                .triangles()
+                .iter()
+                .map(|t| triangle(&vertices, t))
+                .collect();
+            Obstacle {
+                name: obstacle.name.clone(),
+                grid: Grid::new(&triangles),
+                triangles,
+            }
         });
         let body = &world.body.mesh;
         Self {
-            vertices: body.vertices().iter().map(|v| Vector::new(v.x, v.y, v.z)).collect(),
+            vertices: body
+                .vertices()
+                .iter()
+                .map(|v| Vector::new(v.x, v.y, v.z))
+                .collect(),
             triangles: body.triangles().to_vec(),
             obstacles: obstacles.collect(),
         }
@@ -45,7 +58,11 @@ impl PenetrationChecker {
     /// The first obstacle that the body intersects at this pose, if there is one.
     #[must_use]
     pub fn penetrated(&self, world_from_body: &Pose) -> Option<&str> {
-        let vertices: Vec<Vector> = self.vertices.iter().map(|v| mapped(world_from_body, v)).collect();
+        let vertices: Vec<Vector> = self
+            .vertices
+            .iter()
+            .map(|v| mapped(world_from_body, v))
+            .collect();
         let hit = |obstacle: &&Obstacle| {
             self.triangles.iter().any(|indices| {
                 let mine = triangle(&vertices, indices);
@@ -56,7 +73,10 @@ impl PenetrationChecker {
                 })
             })
         };
-        self.obstacles.iter().find(hit).map(|obstacle| obstacle.name.as_str())
+        self.obstacles
+            .iter()
+            .find(hit)
+            .map(|obstacle| obstacle.name.as_str())
     }
 }
 
@@ -66,7 +86,10 @@ fn triangle(vertices: &[Vector], indices: &[u32; 3]) -> Triangle {
 }
 
 fn vertices_in_world(mesh: &Mesh, pose: &Pose) -> Vec<Vector> {
-    mesh.vertices().iter().map(|v| mapped(pose, &Vector::new(v.x, v.y, v.z))).collect()
+    mesh.vertices()
+        .iter()
+        .map(|v| mapped(pose, &Vector::new(v.x, v.y, v.z)))
+        .collect()
 }
 
 /// p + q v q*, written out.
@@ -97,7 +120,10 @@ impl Bounds {
     }
 
     fn joined(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
     }
 }
 
@@ -111,10 +137,20 @@ struct Grid {
 
 impl Grid {
     fn new(triangles: &[Triangle]) -> Self {
-        let bounds = triangles.iter().map(Bounds::of).reduce(Bounds::joined).expect("an obstacle has triangles");
-        let cells_per_axis = ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MAX_CELLS_PER_AXIS);
+        let bounds = triangles
+            .iter()
+            .map(Bounds::of)
+            .reduce(Bounds::joined)
+            .expect("an obstacle has triangles");
+        let cells_per_axis =
+            ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MAX_CELLS_PER_AXIS);
         let cell = (bounds.high - bounds.low) / cells_per_axis as f64;
-        let mut grid = Self { bounds, cells_per_axis, cell, lists: vec![Vec::new(); cells_per_axis.pow(3)] };
+        let mut grid = Self {
+            bounds,
+            cells_per_axis,
+            cell,
+            lists: vec![Vec::new(); cells_per_axis.pow(3)],
+        };
         for (index, triangle) in triangles.iter().enumerate() {
             for cell in grid.cells(&Bounds::of(triangle)) {
                 grid.lists[cell].push(index);
@@ -125,7 +161,10 @@ impl Grid {
 
     /// Whether `test` holds for any triangle that shares a cell with `bounds`.
     fn any_near(&self, bounds: &Bounds, mut test: impl FnMut(usize) -> bool) -> bool {
-        self.bounds.overlaps(bounds) && self.cells(bounds).any(|cell| self.lists[cell].iter().any(|index| test(*index)))
+        self.bounds.overlaps(bounds)
+            && self
+                .cells(bounds)
+                .any(|cell| self.lists[cell].iter().any(|index| test(*index)))
     }
 
     /// The cells that `bounds` reaches into; those at the rim stand for everything beyond.
@@ -139,7 +178,8 @@ impl Grid {
         let [xs, ys, zs] = [0, 1, 2].map(|axis| place(bounds.low, axis)..=place(bounds.high, axis));
         xs.flat_map(move |x| {
             let zs = zs.clone();
-            ys.clone().flat_map(move |y| zs.clone().map(move |z| (x * count + y) * count + z))
+            ys.clone()
+                .flat_map(move |y| zs.clone().map(move |z| (x * count + y) * count + z))
         })
     }
 }
@@ -150,15 +190,28 @@ mod tests {
     use taut_scene::Scene;
 
     fn sphere_on_plane() -> World {
-        Scene::named_or_file("sphere-on-plane").expect("shipped").build().expect("good").world
+        Scene::named_or_file("sphere-on-plane")
+            .expect("shipped")
+            .build()
+            .expect("good")
+            .world
     }
 
     #[test]
     fn a_sphere_above_the_plane_is_apart_and_one_that_dips_in_is_not() {
         let checker = PenetrationChecker::new(&sphere_on_plane());
-        assert_eq!(checker.penetrated(&Pose::translation(0.0, 0.0, 0.0201)), None);
-        assert_eq!(checker.penetrated(&Pose::translation(0.0, 0.0, 0.0195)), Some("plane"));
-        assert_eq!(checker.penetrated(&Pose::translation(0.0, 0.19, 0.0)), Some("plane"));
+        assert_eq!(
+            checker.penetrated(&Pose::translation(0.0, 0.0, 0.0201)),
+            None
+        );
+        assert_eq!(
+            checker.penetrated(&Pose::translation(0.0, 0.0, 0.0195)),
+            Some("plane")
+        );
+        assert_eq!(
+            checker.penetrated(&Pose::translation(0.0, 0.19, 0.0)),
+            Some("plane")
+        );
     }
 
     #[test]
@@ -167,10 +220,20 @@ mod tests {
         let checker = PenetrationChecker::new(&world);
         for step in 0..60 {
             let turn = nalgebra::Vector3::new(0.1, 0.2, 0.05) * f64::from(step);
-            let pose = Pose::new(nalgebra::Vector3::new(0.002 * f64::from(step), 0.0, 0.0200 - 4e-6 * f64::from(step)), turn);
+            let pose = Pose::new(
+                nalgebra::Vector3::new(
+                    0.002 * f64::from(step),
+                    0.0,
+                    0.0200 - 4e-6 * f64::from(step),
+                ),
+                turn,
+            );
             let body = vertices_in_world(&world.body.mesh, &pose);
             let brute = world.body.mesh.triangles().iter().any(|mine| {
-                checker.obstacles[0].triangles.iter().any(|other| intersect(&triangle(&body, mine), other))
+                checker.obstacles[0]
+                    .triangles
+                    .iter()
+                    .any(|other| intersect(&triangle(&body, mine), other))
             });
             assert_eq!(checker.penetrated(&pose).is_some(), brute, "step {step}");
         }

@@ -26,19 +26,29 @@ pub struct Sample {
 /// A shipped scene, ready to run; its meshes must be there.
 #[must_use]
 pub fn shipped(name: &str) -> BuiltScene {
-    Scene::named_or_file(name).and_then(|scene| scene.build()).unwrap_or_else(|error| panic!("{error}"))
+    Scene::named_or_file(name)
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// What the scene's hand intends, as a path in time.
 #[must_use]
 pub fn intention(scene: &BuiltScene) -> MinJerkPath {
     let hand = scene.hand.as_ref().expect("the scene has a hand");
-    let points = hand.path.samples().iter().map(|s| ViaPoint { time_s: s.time, pose: s.pose });
+    let points = hand.path.samples().iter().map(|s| ViaPoint {
+        time_s: s.time,
+        pose: s.pose,
+    });
     MinJerkPath::new(points.collect(), hand.repeat).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The path at `rate_hz` from `from` to `to`, s.
-pub fn sampled(path: &MinJerkPath, rate_hz: f64, from: f64, to: f64) -> impl Iterator<Item = (f64, Pose)> {
+pub fn sampled(
+    path: &MinJerkPath,
+    rate_hz: f64,
+    from: f64,
+    to: f64,
+) -> impl Iterator<Item = (f64, Pose)> {
     let steps = ((to - from) * rate_hz).round() as u64;
     (0..=steps).map(move |step| {
         let time = from + step as f64 / rate_hz;
@@ -48,14 +58,21 @@ pub fn sampled(path: &MinJerkPath, rate_hz: f64, from: f64, to: f64) -> impl Ite
 
 /// The trace's samples as times and poses.
 pub fn traced(trace: &DeviceTrace) -> impl Iterator<Item = (f64, Pose)> {
-    trace.samples().iter().map(|sample| (sample.time, sample.pose))
+    trace
+        .samples()
+        .iter()
+        .map(|sample| (sample.time, sample.pose))
 }
 
 /// Leads the god-object along `device`: for each pose one update, then one force, as the loops do when neither is late.
-pub fn lead(scene: &BuiltScene, device: impl Iterator<Item = (f64, Pose)>) -> impl Iterator<Item = Sample> {
+pub fn lead(
+    scene: &BuiltScene,
+    device: impl Iterator<Item = (f64, Pose)>,
+) -> impl Iterator<Item = Sample> {
     let world = Arc::new(scene.world.clone());
     let mut coupling = Coupling::new(&world, &scene.settings);
-    let mut god_object = GodObject::new(world, scene.settings, scene.start).unwrap_or_else(|error| panic!("{error}"));
+    let mut god_object = GodObject::new(world, scene.settings, scene.start)
+        .unwrap_or_else(|error| panic!("{error}"));
     let mut shaded = None;
     device.map(move |(time, pose)| {
         god_object.step(&pose, shaded.as_ref());

@@ -29,7 +29,8 @@ impl Ended {
     /// When it is none.
     #[must_use]
     pub fn json(&self) -> serde_json::Value {
-        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("no JSON ({error}): {}", self.stdout))
+        serde_json::from_str(&self.stdout)
+            .unwrap_or_else(|error| panic!("no JSON ({error}): {}", self.stdout))
     }
 
     /// The one line on standard error.
@@ -64,15 +65,40 @@ impl Process {
         I: IntoIterator,
         I::Item: AsRef<std::ffi::OsStr>,
     {
-        let (stdout, stderr) = (directory.join(format!("{name}.out")), directory.join(format!("{name}.err")));
-        let file = |path: &Path| File::create(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let (stdout, stderr) = (
+            directory.join(format!("{name}.out")),
+            directory.join(format!("{name}.err")),
+        );
+        let file = |path: &Path| {
+            File::create(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+        };
         let mut command = Command::new(program.as_ref());
-        command.args(arguments).current_dir(directory).process_group(0);
-        command.env_remove("TAUT_KEY_FILE").env_remove("TAUT_LOG").env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
-        command.stdin(Stdio::null()).stdout(file(&stdout)).stderr(file(&stderr));
+        command
+            .args(arguments)
+            .current_dir(directory)
+            .process_group(0);
+        command
+            .env_remove("TAUT_KEY_FILE")
+            .env_remove("TAUT_LOG")
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY");
+        // Drivers complain aloud where a login session has not set it.
+        command.env("XDG_RUNTIME_DIR", directory);
+        command
+            .stdin(Stdio::null())
+            .stdout(file(&stdout))
+            .stderr(file(&stderr));
         die_with_this_thread(&mut command);
-        let child = command.spawn().unwrap_or_else(|error| panic!("{} does not start: {error}", program.as_ref().display()));
-        Self { name: name.to_owned(), child, ended: None, stdout, stderr }
+        let child = command.spawn().unwrap_or_else(|error| {
+            panic!("{} does not start: {error}", program.as_ref().display())
+        });
+        Self {
+            name: name.to_owned(),
+            child,
+            ended: None,
+            stdout,
+            stderr,
+        }
     }
 
     /// What it wrote to standard error so far.
@@ -89,7 +115,9 @@ impl Process {
 
     /// Whether it still runs.
     pub fn is_running(&mut self) -> bool {
-        self.ended = self.ended.or_else(|| self.child.try_wait().expect("a child can be asked"));
+        self.ended = self
+            .ended
+            .or_else(|| self.child.try_wait().expect("a child can be asked"));
         self.ended.is_none()
     }
 
@@ -104,8 +132,14 @@ impl Process {
             let text = self.stderr();
             // A line is whole once its end is written.
             let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-            let found = whole.lines().find_map(|line| line.strip_prefix(beginning).map(str::to_owned));
-            assert!(found.is_some() || running, "{} ended before it wrote \"{beginning} ..\"", self.name);
+            let found = whole
+                .lines()
+                .find_map(|line| line.strip_prefix(beginning).map(str::to_owned));
+            assert!(
+                found.is_some() || running,
+                "{} ended before it wrote \"{beginning} ..\"",
+                self.name
+            );
             found
         })
     }
@@ -119,7 +153,12 @@ impl Process {
     pub fn kill(&mut self) {
         signal(self.child.id() as i32, libc::SIGKILL);
         let status = self.child.wait().expect("a killed child ends");
-        assert_eq!(status.signal(), Some(libc::SIGKILL), "{} was not killed, it ended before", self.name);
+        assert_eq!(
+            status.signal(),
+            Some(libc::SIGKILL),
+            "{} was not killed, it ended before",
+            self.name
+        );
         self.ended = Some(status);
     }
 
@@ -133,7 +172,11 @@ impl Process {
             self.ended
         });
         assert!(!self.group_lives(), "{} left a process behind", self.name);
-        Ended { status, stdout: read(&self.stdout), stderr: read(&self.stderr) }
+        Ended {
+            status,
+            stdout: read(&self.stdout),
+            stderr: read(&self.stderr),
+        }
     }
 
     /// Whether any process of its group is there: itself, or one that it started.
@@ -170,14 +213,20 @@ fn read(path: &Path) -> String {
 }
 
 /// Sends a signal to a process, or to the group of a negative number; whether there was anybody.
-#[allow(unsafe_code, reason = "std sends no signals but SIGKILL, and none to groups")]
+#[allow(
+    unsafe_code,
+    reason = "std sends no signals but SIGKILL, and none to groups"
+)]
 fn signal(receiver: i32, number: i32) -> bool {
     // SAFETY: kill touches no memory of ours.
     unsafe { libc::kill(receiver, number) == 0 }
 }
 
 /// A test binary that is killed takes its processes along.
-#[allow(unsafe_code, reason = "std cannot ask for a signal at the parent's death")]
+#[allow(
+    unsafe_code,
+    reason = "std cannot ask for a signal at the parent's death"
+)]
 fn die_with_this_thread(command: &mut Command) {
     let ask = || {
         // SAFETY: prctl with these arguments touches no memory; it is safe between fork and exec.

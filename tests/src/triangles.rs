@@ -36,16 +36,33 @@ fn edges_cross(edges_of: &Triangle, face: &Triangle) -> bool {
 
 /// Whether the line through both points passes the three edges of the face on the same side.
 fn passes_inside(from: Vector, to: Vector, face: &Triangle) -> bool {
-    let turns = [(face.a, face.b), (face.b, face.c), (face.c, face.a)].map(|(a, b)| side(from, to, a, b));
+    let turns =
+        [(face.a, face.b), (face.b, face.c), (face.c, face.a)].map(|(a, b)| side(from, to, a, b));
     turns.iter().all(|turn| *turn >= 0) || turns.iter().all(|turn| *turn <= 0)
 }
 
 fn side(p: Vector, q: Vector, r: Vector, s: Vector) -> i32 {
     let (u, v, w) = (q - p, r - p, s - p);
-    let minors = [(v.y * w.z, v.z * w.y), (v.z * w.x, v.x * w.z), (v.x * w.y, v.y * w.x)];
-    let determinant: f64 = [u.x, u.y, u.z].iter().zip(minors).map(|(u, (plus, minus))| u * (plus - minus)).sum();
-    let magnitude: f64 = [u.x, u.y, u.z].iter().zip(minors).map(|(u, (plus, minus))| u.abs() * (plus.abs() + minus.abs())).sum();
-    if determinant.abs() > ORIENTATION_ERROR * magnitude { determinant.signum() as i32 } else { 0 } // NaN touches
+    let minors = [
+        (v.y * w.z, v.z * w.y),
+        (v.z * w.x, v.x * w.z),
+        (v.x * w.y, v.y * w.x),
+    ];
+    let determinant: f64 = [u.x, u.y, u.z]
+        .iter()
+        .zip(minors)
+        .map(|(u, (plus, minus))| u * (plus - minus))
+        .sum();
+    let magnitude: f64 = [u.x, u.y, u.z]
+        .iter()
+        .zip(minors)
+        .map(|(u, (plus, minus))| u.abs() * (plus.abs() + minus.abs()))
+        .sum();
+    if determinant.abs() > ORIENTATION_ERROR * magnitude {
+        determinant.signum() as i32
+    } else {
+        0
+    } // NaN touches
 }
 
 #[cfg(test)]
@@ -63,7 +80,9 @@ mod tests {
     fn random_numbers() -> impl FnMut() -> f64 {
         let mut state = 1_u64;
         move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         }
     }
@@ -94,20 +113,37 @@ mod tests {
             let mut corners = || [0; 3].map(|_| [0; 3].map(|_| number()));
             let (a, b) = (triangle(corners()), triangle(corners()));
             let identity = Pose::IDENTITY;
-            let parry = intersection_test(&identity, &a, &identity, &b).expect("triangles are supported").intersecting;
+            let parry = intersection_test(&identity, &a, &identity, &b)
+                .expect("triangles are supported")
+                .intersecting;
             assert_eq!(intersect(&a, &b), parry, "case {case}: {a:?} {b:?}");
             crossing += i32::from(parry);
         }
-        assert!((2_000..18_000).contains(&crossing), "the cases are one-sided: {crossing} cross");
+        assert!(
+            (2_000..18_000).contains(&crossing),
+            "the cases are one-sided: {crossing} cross"
+        );
     }
 
     /// Peg and box at the mouth of the hole, some 10 um apart by rational arithmetic: parry 0.31.1 says that they intersect.
     #[test]
     fn triangles_a_thousandth_of_their_size_apart_are_apart() {
         let peg = triangle([
-            [-8.568301078098132e-12, 0.02987861301314389, 0.0010252099050107656],
-            [0.009063077805449184, 0.02999348374125386, 0.005249831219742722],
-            [0.00866025396260952, 0.03001451666207477, 0.006023362699084398],
+            [
+                -8.568301078098132e-12,
+                0.02987861301314389,
+                0.0010252099050107656,
+            ],
+            [
+                0.009063077805449184,
+                0.02999348374125386,
+                0.005249831219742722,
+            ],
+            [
+                0.00866025396260952,
+                0.03001451666207477,
+                0.006023362699084398,
+            ],
         ]);
         let rim = triangle([
             [0.008843178416417349, 0.03, 0.005683165682368668],

@@ -38,11 +38,27 @@ impl TestWorkbench {
     #[must_use]
     pub fn new(program: &str) -> Self {
         let turn = Turn::wait();
-        let directory = tempfile::Builder::new().prefix("taut-tests-").tempdir().expect("a temporary directory");
-        create_key_file(&directory.path().join("cluster.key")).unwrap_or_else(|error| panic!("{error}"));
-        let file = taut_scene::SHIPPED_WORKBENCH.parse().expect("the shipped workbench file is TOML");
-        let mut workbench = Self { program: program.into(), file, directory, _turn: turn };
-        for port in ["network.quic_port", "network.udp_port", "monitoring.grpc_port", "monitoring.web_port"] {
+        let directory = tempfile::Builder::new()
+            .prefix("taut-tests-")
+            .tempdir()
+            .expect("a temporary directory");
+        create_key_file(&directory.path().join("cluster.key"))
+            .unwrap_or_else(|error| panic!("{error}"));
+        let file = taut_scene::SHIPPED_WORKBENCH
+            .parse()
+            .expect("the shipped workbench file is TOML");
+        let mut workbench = Self {
+            program: program.into(),
+            file,
+            directory,
+            _turn: turn,
+        };
+        for port in [
+            "network.quic_port",
+            "network.udp_port",
+            "monitoring.grpc_port",
+            "monitoring.web_port",
+        ] {
             workbench.set(port, 0);
         }
         workbench.set("monitoring.enabled", false);
@@ -57,7 +73,9 @@ impl TestWorkbench {
         match key.split_once('.') {
             Some((table, key)) => {
                 let table = self.file.get_mut(table).and_then(Value::as_table_mut);
-                table.unwrap_or_else(|| panic!("the workbench file has no table for {key}")).insert(key.into(), value.into());
+                table
+                    .unwrap_or_else(|| panic!("the workbench file has no table for {key}"))
+                    .insert(key.into(), value.into());
             }
             None => {
                 self.file.insert(key.into(), value.into());
@@ -77,7 +95,8 @@ impl TestWorkbench {
     /// When it cannot be written.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.directory().join(name);
-        std::fs::write(&path, content).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        std::fs::write(&path, content)
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         path
     }
 
@@ -108,21 +127,40 @@ impl TestWorkbench {
 
     /// Starts `taut serve` on the workbench file as it is now, and waits until it serves.
     pub fn serve(&self, arguments: &[&str]) -> Server {
-        let config = self.write("workbench.toml", self.file.to_string()).display().to_string();
+        let config = self
+            .write("workbench.toml", self.file.to_string())
+            .display()
+            .to_string();
         let key = self.key_path();
         let always = ["serve", "--config", &config, "--key", &key, "--json"];
         let mut process = self.start("server", &[&always, arguments].concat());
         // serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)
         let addresses = process.line_after("serving on ", START_LIMIT);
-        let (quic, udp) = addresses.split_once(" (control) and ").unwrap_or_else(|| panic!("two addresses: {addresses}"));
-        let udp = udp.strip_suffix(" (poses)").unwrap_or_else(|| panic!("two addresses: {addresses}"));
-        Server { process, quic: quic.to_owned(), udp: udp.to_owned() }
+        let (quic, udp) = addresses
+            .split_once(" (control) and ")
+            .unwrap_or_else(|| panic!("two addresses: {addresses}"));
+        let udp = udp
+            .strip_suffix(" (poses)")
+            .unwrap_or_else(|| panic!("two addresses: {addresses}"));
+        Server {
+            process,
+            quic: quic.to_owned(),
+            udp: udp.to_owned(),
+        }
     }
 
     /// Starts another role that joins `server`.
     pub fn join(&self, role: &str, node: &str, server: &Server, arguments: &[&str]) -> Process {
         let key = self.key_path();
-        let always = [role, "--server", &server.quic, "--node", node, "--key", &key];
+        let always = [
+            role,
+            "--server",
+            &server.quic,
+            "--node",
+            node,
+            "--key",
+            &key,
+        ];
         self.start(node, &[&always, arguments].concat())
     }
 
@@ -131,9 +169,22 @@ impl TestWorkbench {
     /// # Errors
     /// The sentence of `taut render`, which looks for an adapter before anything else.
     pub fn adapter(&self) -> Result<(), String> {
-        let nowhere = ["render", "--headless", "--server", "127.0.0.1:1", "--node", "front", "--key", "no.key"];
+        let nowhere = [
+            "render",
+            "--headless",
+            "--server",
+            "127.0.0.1:1",
+            "--node",
+            "front",
+            "--key",
+            "no.key",
+        ];
         let ended = self.run("adapter", &nowhere);
-        if ended.stderr.contains("no graphics adapter") { Err(ended.one_sentence().to_owned()) } else { Ok(()) }
+        if ended.stderr.contains("no graphics adapter") {
+            Err(ended.one_sentence().to_owned())
+        } else {
+            Ok(())
+        }
     }
 }
 
@@ -156,7 +207,12 @@ impl Server {
     pub fn stop(self) -> serde_json::Value {
         self.process.interrupt();
         let ended = self.process.end(END_LIMIT);
-        assert!(ended.status.success(), "the server ended with {}: {}", ended.status, ended.stderr);
+        assert!(
+            ended.status.success(),
+            "the server ended with {}: {}",
+            ended.status,
+            ended.stderr
+        );
         ended.json()
     }
 }
@@ -170,8 +226,13 @@ struct Turn {
 impl Turn {
     fn wait() -> Self {
         let path = std::env::temp_dir().join("taut-tests.lock");
-        let file = File::options().create(true).append(true).open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        file.lock().unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let file = File::options()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        file.lock()
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         Self { _file: file }
     }
 }

@@ -1,73 +1,306 @@
-//! probe
+//! The paper's scenes under a virtual clock, without a process: what the god-object does and what the hand feels.
+//!
+//! Poses are checked for penetration by code that shares nothing with the method. Source: Ortega et al. 2007, Figures 10 to 12.
+
+use nalgebra::Vector3;
+use taut_scene::{BuiltScene, DeviceTrace, Scene, data_file};
 use taut_tests::checker::PenetrationChecker;
-use taut_tests::motion::*;
-use taut_scene::*;
-use std::time::Instant;
+use taut_tests::motion::{Sample, intention, lead, sampled, shipped, traced};
+
+/// Stiffness that the hand feels in the shipped scenes, N/m.
+const STIFFNESS: f64 = 1000.0;
+/// How deep the shipped hands press into what they slide on, m.
+const DEPTH: f64 = 0.006;
+/// Force that counts as none, N: of forces of several newtons, what rounding leaves.
+const NO_FORCE: f64 = 1e-6;
+/// Half the length of the shipped peg, and of the box with the hole, m.
+const HALF_LENGTH: f64 = 0.030;
+
+/// No sample's pose penetrates, and no gap is below the least one.
+fn assert_apart(scene: &BuiltScene, samples: &[Sample], every: usize) {
+    let checker = PenetrationChecker::new(&scene.world);
+    for sample in samples {
+        assert!(
+            sample.gap_min >= scene.settings.minimum_gap,
+            "a gap of {:e} m at {} s",
+            sample.gap_min,
+            sample.time
+        );
+    }
+    for sample in samples.iter().step_by(every) {
+        assert_eq!(
+            checker.penetrated(&sample.god_object),
+            None,
+            "at {} s: {}",
+            sample.time,
+            sample.god_object
+        );
+    }
+}
+
+fn force(sample: &Sample) -> Vector3<f64> {
+    sample.wrench.fixed_rows::<3>(0).into()
+}
+
+fn torque(sample: &Sample) -> Vector3<f64> {
+    sample.wrench.fixed_rows::<3>(3).into()
+}
+
+/// The force of a stiff surface `depth` away from where the body stands, which is `rest_distance` before it.
+fn assert_force(what: &str, sample: &Sample, value: f64, depth: f64, rest_distance: f64) {
+    let (least, most) = (
+        STIFFNESS * (depth - rest_distance),
+        STIFFNESS * (depth + 2.0 * rest_distance),
+    );
+    assert!(
+        (least..=most).contains(&value),
+        "{what} {value} N at {} s, not {least} to {most}",
+        sample.time
+    );
+}
+
+fn between(samples: &[Sample], from: f64, to: f64) -> impl Iterator<Item = &Sample> {
+    samples
+        .iter()
+        .filter(move |sample| (from..to).contains(&sample.time))
+}
+
 #[test]
-fn peg() {
+fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11() {
     let scene = shipped("peg-in-a-hole");
-    let checker = PenetrationChecker::new(&scene.world);
-    let path = intention(&scene);
-    let t0 = Instant::now();
-    let samples: Vec<_> = lead(&scene, sampled(&path, 1000.0, 0.0, 30.0)).collect();
-    println!("peg method {:?}", t0.elapsed());
-    let t0 = Instant::now();
-    for s in samples.iter() { if checker.penetrated(&s.god_object).is_some() { println!("HIT {}", s.time); } }
-    println!("peg check {:?}", t0.elapsed());
+    assert_eq!(
+        (
+            scene.world.body.mesh.triangles().len(),
+            scene.world.obstacles[0].mesh.triangles().len()
+        ),
+        (288, 280)
+    );
+    assert!((scene.stiffness() - STIFFNESS).abs() < 1e-9);
+    let samples: Vec<Sample> =
+        lead(&scene, sampled(&intention(&scene), 1000.0, 0.0, 30.0)).collect();
+    assert_apart(&scene, &samples, 5);
+    let rest = scene.settings.rest_distance;
+
+    // (a), (b): the tip, then the side, slides on the top. Nothing along the hole; the full force across, also where the peg goes
+    // from one triangle to the next.
+    for sample in between(&samples, 0.0, 11.8) {
+        assert!(
+            force(sample).y.abs() <= NO_FORCE,
+            "F_y {} at {} s",
+            force(sample).y,
+            sample.time
+        );
+    }
+    // From 1 s to 4.5 s, and from 7.4 s to 11 s, the hand is 6 mm deep. A peg that rolls onto a side between two facets stands
+    // lower by its sagitta, 10 mm (1 - cos 2.5 degrees) = 9.5 um.
+    for sample in between(&samples, 1.0, 4.5).chain(between(&samples, 7.4, 11.0)) {
+        assert_force("F_z", sample, force(sample).z, DEPTH, rest + 9.6e-6);
+    }
+
+    // (c): pushes the left face, which pushes back: never positive, the full force while the hand is 6 mm deep.
+    for sample in between(&samples, 12.8, 17.3) {
+        assert!(
+            force(sample).y <= NO_FORCE,
+            "F_y {} at {} s",
+            force(sample).y,
+            sample.time
+        );
+    }
+    for sample in between(&samples, 14.3, 16.7) {
+        assert_force("-F_y", sample, -force(sample).y, DEPTH, rest);
+    }
+
+    // (d): the right face pushes the other way, until the hole is felt.
+    assert!(between(&samples, 19.6, 22.0).all(|sample| force(sample).y >= -NO_FORCE));
+    assert!(between(&samples, 20.9, 21.5).all(|sample| force(sample).y > 0.99 * STIFFNESS * DEPTH));
+
+    // (e): 50 mm in and out again. Inserted, nothing holds it along the hole, whose lower side carries it: the hand is 2 mm down, the
+    // clearance 0.5 mm, and facets add up to 22 um to that.
+    let deepest = samples
+        .iter()
+        .map(insertion)
+        .fold(f64::NEG_INFINITY, f64::max);
+    assert!(deepest >= 0.050 - rest, "the peg went only {deepest} m in");
+    assert!(
+        insertion(&samples[samples.len() - 1]) < 0.0,
+        "the peg did not come out"
+    );
+    let inserted = |sample: &&Sample| insertion(sample) > 0.036;
+    assert!(
+        between(&samples, 22.4, 28.4).filter(inserted).count() > 2000,
+        "the peg was hardly inserted"
+    );
+    for sample in between(&samples, 22.4, 28.4).filter(inserted) {
+        let (force, torque) = (force(sample), torque(sample));
+        assert!(
+            force.y.abs() <= NO_FORCE && force.x.abs() <= NO_FORCE,
+            "inserted: {force} at {} s",
+            sample.time
+        );
+        assert!(
+            (1.478..=1.515).contains(&force.z),
+            "inserted: F_z {} at {} s",
+            force.z,
+            sample.time
+        );
+        assert!(
+            torque.y.abs() <= NO_FORCE,
+            "inserted: the round peg is twisted by {} N m at {} s",
+            torque.y,
+            sample.time
+        );
+    }
+    // Partly inserted the peg may tilt in the clearance, and the mouth of the hole then pushes a little along it.
+    assert!(
+        between(&samples, 22.4, 28.4)
+            .all(|sample| force(sample).y.abs() < 0.01 * STIFFNESS * DEPTH)
+    );
 }
+
+/// How far the tip is in the hole, m, measured from the right face.
+fn insertion(sample: &Sample) -> f64 {
+    let tip = sample.god_object.translation.y - HALF_LENGTH;
+    let beside_the_axis = sample
+        .god_object
+        .translation
+        .x
+        .hypot(sample.god_object.translation.z);
+    if beside_the_axis < 0.002 {
+        HALF_LENGTH - tip
+    } else {
+        f64::NEG_INFINITY
+    }
+}
+
 #[test]
-fn bunny() {
-    let t0 = Instant::now();
+fn two_bunnies_slide_for_ten_seconds_and_no_pair_of_triangles_ever_intersects() {
+    if data_file("bunny_27k.ply").is_none() {
+        println!(
+            "skipped: two bunnies, because bunny_27k.ply is not there; scripts/get-bunny fetches it"
+        );
+        return;
+    }
+    // A slower clock than the workbench's, so that the test is short: longer steps are harder for the collision detection.
+    const RATE_HZ: f64 = 125.0;
     let scene = shipped("two-bunnies");
-    println!("load {:?}", t0.elapsed());
-    let checker = PenetrationChecker::new(&scene.world);
-    println!("{:?}", scene.settings);
-    println!("checker {:?}", t0.elapsed());
-    let path = intention(&scene);
-    let t0 = Instant::now();
-    let samples: Vec<_> = lead(&scene, sampled(&path, 250.0, 0.0, 17.0)).collect();
-    println!("bunny method {:?}", t0.elapsed());
-    let t0 = Instant::now();
-    for s in samples.iter() { if checker.penetrated(&s.god_object).is_some() { println!("HIT {}", s.time); } }
-    println!("bunny check {:?}", t0.elapsed());
-    println!("touching {}", samples.iter().filter(|s| s.active > 0).count());
-    println!("gap {:e}", samples.iter().map(|s| s.gap_min).fold(f64::INFINITY, f64::min));
+    let samples: Vec<Sample> =
+        lead(&scene, sampled(&intention(&scene), RATE_HZ, 0.0, 16.0)).collect();
+    let touching = samples.iter().filter(|sample| sample.active > 0).count() as f64 / RATE_HZ;
+    assert!(
+        touching >= 10.0,
+        "the bunnies touched for {touching} s only"
+    );
+    let way: f64 = samples
+        .windows(2)
+        .map(|two| {
+            (two[1].god_object.translation.vector - two[0].god_object.translation.vector).norm()
+        })
+        .sum();
+    assert!(way > 0.3, "the bunny slid for {way} m only");
+    assert!(
+        samples
+            .iter()
+            .all(|sample| force(sample).norm() <= scene.settings.force_limit + NO_FORCE)
+    );
+    assert_apart(&scene, &samples, 1);
 }
+
 #[test]
-fn sphere() {
+fn a_sphere_on_a_plane_feels_the_closed_form_force_and_never_loses_it() {
     let scene = shipped("sphere-on-plane");
-    println!("{:?}", scene.settings);
-    let checker = PenetrationChecker::new(&scene.world);
-    let path = intention(&scene);
-    let t0 = Instant::now();
-    let samples: Vec<_> = lead(&scene, sampled(&path, 1000.0, 0.0, 11.4)).collect();
-    println!("sphere method {:?}", t0.elapsed());
-    for s in samples.iter().step_by(5) { if checker.penetrated(&s.god_object).is_some() { println!("HIT {}", s.time); } }
-    println!("sphere check {:?}", t0.elapsed());
-    for s in samples.iter().step_by(200) {
-        let (p, w) = (s.god_object.translation.vector, s.wrench);
-        println!("S {:7.3} s {:8.5} {:8.5} {:9.6} F {:10.2e} {:10.2e} {:8.4} T {:8.1e} {:8.1e} {:8.1e} gap {:.2e} act {}", s.time, p.x, p.y, p.z, w[0], w[1], w[2], w[3], w[4], w[5], s.gap_min, s.active);
+    let samples: Vec<Sample> =
+        lead(&scene, sampled(&intention(&scene), 1000.0, 0.0, 11.4)).collect();
+    assert_apart(&scene, &samples, 5);
+    let rest = scene.settings.rest_distance;
+    for sample in &samples {
+        let depth = 0.020 - sample.device.translation.z;
+        let (force, torque) = (force(sample), torque(sample));
+        assert!(
+            force.x.abs() <= NO_FORCE && force.y.abs() <= NO_FORCE,
+            "friction: {force} at {} s",
+            sample.time
+        );
+        assert!(
+            torque.norm() <= NO_FORCE,
+            "a sphere on a plane is twisted by {torque} at {} s",
+            sample.time
+        );
+        if depth > 2.0 * rest {
+            assert_force("F_z", sample, force.z, depth, rest);
+        } else if depth < -2.0 * rest {
+            assert_eq!(force.z, 0.0, "a force in the air at {} s", sample.time);
+        }
     }
-    let f: Vec<f64> = samples.iter().filter(|s| s.time>1.0 && s.time<10.0).map(|s| s.wrench[2]).collect();
-    println!("F_z {} {}", f.iter().copied().fold(f64::INFINITY, f64::min), f.iter().copied().fold(0.0, f64::max));
 }
+
+/// The device traces of these scenes run from the start to the goal without touching.
 #[test]
-fn assembly() {
-    for name in ["peg_round_8mm_loose", "peg_round_8mm_tight", "peg_rect_16mm_loose", "gear_on_pin", "nut_bolt_m24"] {
-        let t0 = Instant::now();
-        let scene = Scene::load(&data_file(format!("assembly/{name}.toml")).unwrap()).unwrap().build().unwrap();
-        let trace = DeviceTrace::load(&data_file(format!("assembly/{name}_trace.csv")).unwrap()).unwrap();
-        let checker = PenetrationChecker::new(&scene.world);
-        println!("{name}: {} x {} load {:?}", scene.world.body.mesh.triangles().len(), scene.world.obstacles[0].mesh.triangles().len(), t0.elapsed());
-        let t0 = Instant::now();
-        let samples: Vec<_> = lead(&scene, traced(&trace)).collect();
-        println!("   method {:?} for {}", t0.elapsed(), samples.len());
-        let t0 = Instant::now();
-        let hits = samples.iter().step_by(10).filter(|s| checker.penetrated(&s.god_object).is_some()).count();
-        println!("   check {:?} hits {hits}", t0.elapsed());
-        let worst = samples.iter().map(|s| (s.god_object.translation.vector - s.device.translation.vector).norm()).fold(0.0, f64::max);
-        let last = samples.last().unwrap();
-        println!("   worst lag {worst:e} last {:e} {:e} force max {} gap {:e} rest {:e}", (last.god_object.translation.vector - last.device.translation.vector).norm(), last.god_object.rotation.angle_to(&last.device.rotation),
-          samples.iter().map(|s| s.wrench.fixed_rows::<3>(0).norm()).fold(0.0, f64::max), samples.iter().map(|s| s.gap_min).fold(f64::INFINITY, f64::min), scene.settings.rest_distance);
+fn assembly_scenes_are_followed_to_their_goal_without_penetration() {
+    // How many rows of the trace's end are used, and one in how many: the nut on its bolt touches nearly everywhere and takes its time.
+    const ALL: usize = usize::MAX;
+    for (name, rows_used, every) in [
+        ("peg_round_8mm_loose", ALL, 10),
+        ("peg_round_8mm_tight", ALL, 10),
+        ("peg_rect_16mm_loose", ALL, 10),
+        ("gear_on_pin", ALL, 40),
+        ("nut_bolt_m24", 200, 1),
+    ] {
+        let (Some(scene), Some(trace)) = (
+            data_file(format!("assembly/{name}.toml")),
+            data_file(format!("assembly/{name}_trace.csv")),
+        ) else {
+            println!("skipped: {name}, because assembly/{name}.toml is not in the data directory");
+            continue;
+        };
+        let mut built = Scene::load(&scene)
+            .and_then(|scene| scene.build())
+            .unwrap_or_else(|error| panic!("{error}"));
+        let trace = DeviceTrace::load(&trace).unwrap_or_else(|error| panic!("{error}"));
+        let rows: Vec<_> = traced(&trace).collect();
+        let rows = &rows[rows.len().saturating_sub(rows_used)..];
+        built.start = rows[0].1;
+        let thinned = rows.iter().copied().step_by(every);
+        // At the goal the hand waits for the body.
+        let goal = rows[rows.len() - 1];
+        let waiting = (1..=40).map(|step| (goal.0 + 0.001 * f64::from(step), goal.1));
+        let samples: Vec<Sample> = lead(&built, thinned.chain(waiting)).collect();
+        assert_apart(&built, &samples, 2);
+        let last = &samples[samples.len() - 1];
+        let left = (last.device.translation.vector - last.god_object.translation.vector).norm();
+        assert!(
+            left <= built.settings.rest_distance,
+            "{name}: the body ends {left:e} m from its goal"
+        );
+        assert!(
+            force(last).norm() <= STIFFNESS * built.settings.rest_distance,
+            "{name}: {} at the goal",
+            force(last)
+        );
     }
+}
+
+#[test]
+fn the_same_path_gives_the_same_bits() {
+    let scene = shipped("peg-in-a-hole");
+    let path = intention(&scene);
+    let run = || -> Vec<_> {
+        lead(&scene, sampled(&path, 200.0, 0.0, 30.0))
+            .map(|sample| bits(&sample))
+            .collect()
+    };
+    assert_eq!(run(), run());
+}
+
+fn bits(sample: &Sample) -> Vec<u64> {
+    let pose = &sample.god_object;
+    let numbers = pose
+        .translation
+        .vector
+        .iter()
+        .chain(pose.rotation.coords.iter())
+        .chain(sample.wrench.iter());
+    numbers
+        .chain(std::iter::once(&sample.gap_min))
+        .map(|number| number.to_bits())
+        .collect()
 }

@@ -2,13 +2,16 @@
 //!
 //! | symbol    | name in code            | unit | meaning                                                  |
 //! |-----------|-------------------------|------|----------------------------------------------------------|
-//! | d_k       | `violation_at_entry`    | m    | `J_k a_u` when the constraint first appeared             |
+//! | d_k       | `violation_at_entry`    | m    | `J_k (a_u + c)` when the constraint first appeared       |
+//! | c         | `Coupling::correction`  | m, rad | `a_c - a_u` of the step before: zero without contact   |
 //! | b_k       | `bound`                 | m    | where the constraint belongs                             |
 //! | f_k(t)    | [`AdaptationState::bound`] | m | bound in force at time t, rising from d_k to b_k         |
 //! | Delta-t   | `Adaptation::duration`  | s    | time of the rise                                         |
 //! | epsilon   | `Adaptation::threshold` | m    | only `d_k - b_k <= epsilon` is smoothed                  |
 //!
-//! A constraint that is known by its features keeps its progress when the set is replaced.
+//! A constraint that is known by its features keeps its progress when the set is replaced. The paper enters from `J_k a_u`, so that a
+//! body that slides from one triangle to the next loses its force for Delta-t, although nothing is new but the features; c
+//! enters from what the force of the step before already upholds.
 //! Source: Ortega et al. 2007, Section 5, Figure 6.
 
 use crate::constraint::{FeaturePair, NonPenetrationConstraint};
@@ -69,13 +72,13 @@ impl AdaptationState {
 
     /// The bound in force now for one row: `bound` itself, or less while the row is on its way in.
     ///
-    /// `unconstrained` is `J_k a_u` at the present device pose, `time` in seconds never runs back.
-    pub(crate) fn bound(&mut self, time: f64, features: FeaturePair, bound: f64, unconstrained: f64) -> f64 {
+    /// `reached` is `J_k (a_u + c)` at the present device pose, `time` in seconds never runs back.
+    pub(crate) fn bound(&mut self, time: f64, features: FeaturePair, bound: f64, reached: f64) -> f64 {
         if self.arrivals.binary_search(&features).is_ok()
-            && unconstrained - bound <= self.adaptation.threshold
+            && reached - bound <= self.adaptation.threshold
             && self.ramps.len() < self.ramps.capacity()
         {
-            self.ramps.push(Ramp { features, violation_at_entry: unconstrained, start: time });
+            self.ramps.push(Ramp { features, violation_at_entry: reached, start: time });
         }
         let Some(ramp) = self.ramps.iter().find(|ramp| ramp.features == features) else {
             return bound;

@@ -34,6 +34,8 @@ pub struct Coupling {
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     rotation: Vector3<f64>,
+    /// `a_c - a_u` of the last step: what the force did. Zero without force.
+    correction: Vector6,
 }
 
 /// What the coupling needs to know of the body: no surface.
@@ -80,6 +82,7 @@ impl Coupling {
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
             rotation: Vector3::zeros(),
+            correction: Vector6::zeros(),
         }
     }
 
@@ -100,7 +103,9 @@ impl Coupling {
         };
 
         let center = Point3::from(god_object.translation.vector);
-        let shaded = self.gather_rows(time, &unconstrained, &center, set);
+        // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
+        let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
+        let shaded = self.gather_rows(time, &reached, &center, set);
         let projection = self.projector.project(&metric, &unconstrained, &self.rows, &self.warm_start);
         if projection.status != ProjectionStatus::Solved {
             self.warm_start.clear();
@@ -111,6 +116,7 @@ impl Coupling {
 
         // F_c = k_h M (a_c - a_u)
         let change = projection.acceleration - unconstrained;
+        self.correction = change;
         let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
         if !self.surfaces.is_empty() {
             wrench = self.textured(&wrench, &projection, &center, set);
@@ -133,7 +139,7 @@ impl Coupling {
     fn gather_rows(
         &mut self,
         time: f64,
-        unconstrained: &Vector6,
+        reached: &Vector6,
         center: &Point3<f64>,
         set: &ConstraintSet,
     ) -> bool {
@@ -148,8 +154,7 @@ impl Coupling {
             let jacobian = contact_jacobian(&normal, &constraint.point, center);
             let mut bound = self.settings.coupling_bound(constraint.gap);
             if let Some(adaptation) = &mut self.adaptation {
-                let reached = jacobian.dot(unconstrained);
-                bound = adaptation.bound(time, constraint.features, bound, reached);
+                bound = adaptation.bound(time, constraint.features, bound, jacobian.dot(reached));
             }
             self.rows.push(HalfSpace { jacobian, bound });
         }

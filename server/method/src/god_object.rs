@@ -33,6 +33,8 @@ use crate::world::World;
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
+/// How much shorter the motions become when one turns back on the last.
+const TURNING_BACK_DAMPING: f64 = 0.5;
 /// The paper's cone has touching contacts only: gaps up to this many rest distances touch.
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
@@ -57,13 +59,17 @@ pub struct GodObject {
     looks_ahead: f64,
 }
 
-/// How far the set that an update publishes must look ahead.
+/// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
-struct LookAhead {
+struct Update {
     /// Path of the device since the last update, m: it may move as far again until the next.
     device_moved: f64,
-    /// That, and what the body may still cover, m.
-    needed: f64,
+    /// That, and what the body may still cover, m: so far the published set must look ahead.
+    look_ahead: f64,
+    /// Motion of the sub-step before.
+    last_motion: Vector6,
+    /// Share of the projected motion that is made; shrinks while motions turn back on each other.
+    damping: f64,
 }
 
 /// What one update did.
@@ -197,7 +203,7 @@ impl GodObject {
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
-        let mut plan = LookAhead { device_moved, needed: device_moved };
+        let mut update = Update { device_moved, look_ahead: device_moved, last_motion: Vector6::zeros(), damping: 1.0 };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {
             let budget_left = self.settings.work_budget.is_none_or(|b| report.work.advancement_steps < b);
@@ -207,13 +213,13 @@ impl GodObject {
             report.substeps += 1;
             let left = pose_difference(&goal, &self.pose_at_reference_point(), &branch);
             branch = angular(&left);
-            if !self.substep(&left, &mut plan, &mut report) {
+            if !self.substep(&left, &mut update, &mut report) {
                 report.unfinished = false;
                 break;
             }
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
-        let published = plan.needed.min(self.settings.look_ahead_limit);
+        let published = update.look_ahead.min(self.settings.look_ahead_limit);
         if self.settings.look_ahead && self.looks_ahead < published {
             self.collect(published, &mut report.work);
         }
@@ -222,7 +228,7 @@ impl GodObject {
     }
 
     /// Project, move, collect, once. False when there was nothing left to move.
-    fn substep(&mut self, left: &Vector6, plan: &mut LookAhead, report: &mut StepReport) -> bool {
+    fn substep(&mut self, left: &Vector6, update: &mut Update, report: &mut StepReport) -> bool {
         let length = self.motion_length(left);
         let moves = length > self.settings.motion_tolerance; // false for NaN
         let eases = self.set.gap_min < self.settings.rest_distance - self.settings.motion_tolerance;
@@ -231,13 +237,19 @@ impl GodObject {
         }
         // 3. Project, on no more of the way than the linear constraints are trusted for.
         let trusted = if length > self.trust_length { left * (self.trust_length / length) } else { *left };
-        let Some(constrained) = self.project(&trusted, report) else {
+        let Some(mut constrained) = self.project(&trusted, report) else {
             return false;
         };
+        // A motion that turns back on the last one says that the minimum lies between: features took turns in holding.
+        if self.turns_back(&constrained, &update.last_motion) {
+            update.damping *= TURNING_BACK_DAMPING;
+        }
+        constrained *= update.damping;
+        update.last_motion = constrained;
         let covered = self.motion_length(&constrained);
         if report.substeps == 1 {
             // This update covers the share k_s of what is free, the next sets must serve the rest.
-            plan.needed = plan.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+            update.look_ahead = update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
         if !worth_moving {
@@ -259,7 +271,7 @@ impl GodObject {
 
         // 5. Collect at the pose reached. A motion that arrived is likely the last of the update.
         let arrived = time >= 1.0 && length <= self.trust_length;
-        let beyond = if arrived { plan.needed.min(self.settings.look_ahead_limit) } else { 0.0 };
+        let beyond = if arrived { update.look_ahead.min(self.settings.look_ahead_limit) } else { 0.0 };
         self.collect(beyond, &mut report.work);
         true
     }
@@ -394,6 +406,13 @@ impl GodObject {
     /// Bound on the path of the body's fastest point, m.
     fn motion_length(&self, displacement: &Vector6) -> f64 {
         linear(displacement).norm() + self.radius * angular(displacement).norm()
+    }
+
+    /// Whether one motion undoes a part of the other, points of the body weighed alike.
+    fn turns_back(&self, motion: &Vector6, last: &Vector6) -> bool {
+        let along = linear(motion).dot(&linear(last))
+            + self.radius * self.radius * angular(motion).dot(&angular(last));
+        along < 0.0
     }
 
     fn describe_set(&self, report: &mut StepReport) {

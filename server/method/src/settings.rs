@@ -24,7 +24,7 @@ const ACTIVATION_DISTANCE_PER_SIZE: f64 = 1e-2;
 /// Longest look-ahead per metre of body size: half of it, which a hand at 0.3 m/s covers in 50 ms for a body of 0.04 m.
 const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.5;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
-const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 1e-3;
+const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
 
 /// What stands in the metric for the inertia tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]

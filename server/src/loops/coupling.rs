@@ -7,8 +7,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use god_object::{Coupling, ProjectionStatus, ShadedAcceleration};
 use crate::realtime::thread_cpu_time;
+use god_object::{Coupling, ProjectionStatus, ShadedAcceleration};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
@@ -76,8 +76,12 @@ impl CouplingLoop {
         let contacts = self.contacts.held();
 
         let before = thread_cpu_time();
-        let output = self.coupling.step(now.as_secs_f64(), &device.pose, &contacts.set);
-        self.statistics.force.record_time(thread_cpu_time().saturating_sub(before));
+        let output = self
+            .coupling
+            .step(now.as_secs_f64(), &device.pose, &contacts.set);
+        self.statistics
+            .force
+            .record_time(thread_cpu_time().saturating_sub(before));
 
         let constraint_age = now.saturating_sub(contacts.published);
         self.statistics.constraint_age.record_time(constraint_age);

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use god_object::{GodObject, ShadedAcceleration};
 use crate::realtime::thread_cpu_time;
+use god_object::{GodObject, ShadedAcceleration};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
@@ -72,7 +72,9 @@ impl GodObjectLoop {
 
         let before = thread_cpu_time();
         let report = self.god_object.step(&device.pose, shaded.as_ref());
-        self.statistics.update.record_time(thread_cpu_time().saturating_sub(before));
+        self.statistics
+            .update
+            .record_time(thread_cpu_time().saturating_sub(before));
 
         self.statistics.contacts.record(report.contacts as u64);
         let fallbacks = &self.statistics.solver_fallbacks;
@@ -80,7 +82,9 @@ impl GodObjectLoop {
             fallbacks.load(Ordering::Relaxed) + u64::from(report.solver_fallbacks),
             Ordering::Relaxed,
         );
-        self.snapshot.set.clone_from(self.god_object.constraint_set());
+        self.snapshot
+            .set
+            .clone_from(self.god_object.constraint_set());
         self.snapshot.published = clock();
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;

@@ -94,7 +94,11 @@ impl HapticsLoop {
         self.states.publish(&self.state);
         self.coupling.wake();
 
-        let wrench = if trusted { self.safe_wrench(now) } else { Vector6::zeros() };
+        let wrench = if trusted {
+            self.safe_wrench(now)
+        } else {
+            Vector6::zeros()
+        };
         self.device.write(now, &wrench);
         self.energy.step(&self.state.pose, &wrench);
         self.statistics
@@ -131,7 +135,9 @@ impl HapticsLoop {
             }
         }
         if was_faulty != self.state.faulty {
-            self.statistics.device_faulty.store(self.state.faulty, Ordering::Relaxed);
+            self.statistics
+                .device_faulty
+                .store(self.state.faulty, Ordering::Relaxed);
         }
         !self.state.faulty
     }
@@ -139,7 +145,9 @@ impl HapticsLoop {
     /// The newest wrench of the coupling after the safety stage.
     fn safe_wrench(&mut self, now: Duration) -> Vector6 {
         let command = *self.wrench.newest();
-        let stale_constraints = command.constraint_age.saturating_sub(CONSTRAINT_AGE_ALLOWED);
+        let stale_constraints = command
+            .constraint_age
+            .saturating_sub(CONSTRAINT_AGE_ALLOWED);
         let made = command.time.saturating_sub(stale_constraints);
         let safe = self.safety.step(now, &command.wrench, made);
         if safe.event.is_some() {

@@ -103,7 +103,11 @@ mod tests {
         let thread = spawn("breaks", &shutdown, || panic!("on purpose"));
         assert!(thread.is_ok_and(|thread| thread.join().is_ok()));
         assert!(shutdown.is_asked());
-        assert!(shutdown.failure().is_some_and(|text| text.contains("breaks")));
+        assert!(
+            shutdown
+                .failure()
+                .is_some_and(|text| text.contains("breaks"))
+        );
     }
 
     #[test]

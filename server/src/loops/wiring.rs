@@ -67,12 +67,18 @@ impl WiredLoops {
     ) -> Self {
         let start = *god_object.pose();
         let (states, device_readers) = device_state::channel(&start);
-        let (snapshots, contact_readers) = contact_snapshot::channel(&start, settings.max_constraints);
+        let (snapshots, contact_readers) =
+            contact_snapshot::channel(&start, settings.max_constraints);
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
 
-        let god_object = GodObjectLoop::new(god_object, device_readers.god_object, shaded_reader, snapshots);
+        let god_object = GodObjectLoop::new(
+            god_object,
+            device_readers.god_object,
+            shaded_reader,
+            snapshots,
+        );
         let coupling = CouplingLoop::new(
             Coupling::new(world, settings),
             device_readers.coupling,
@@ -109,6 +115,13 @@ impl WiredLoops {
             checker: contact_readers.checker,
             status: wrench_readers.status,
         };
-        Self { god_object, coupling, haptics, coupling_waker, observers, statistics }
+        Self {
+            god_object,
+            coupling,
+            haptics,
+            coupling_waker,
+            observers,
+            statistics,
+        }
     }
 }

@@ -11,8 +11,8 @@ use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::Pose;
 use taut_bridge::realtime::sleep_until;
 use taut_monitor::{
-    BodyRole, LogLevel, LoopTime, Monitor, MonitorBody, MonitorError, MonitorOptions, MonitorSample, MonitorScene,
-    MonitorScreen, MonitorSender, ShownContact,
+    BodyRole, LogLevel, LoopTime, Monitor, MonitorBody, MonitorError, MonitorOptions,
+    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, ShownContact,
 };
 use taut_proto::scene::ScreenDescription;
 
@@ -90,14 +90,18 @@ impl MonitorFeed {
 
     /// Ends it, after the end was asked for; how many samples were dropped.
     pub fn stop(self) -> Result<u64, Failure> {
-        self.thread.join().map_err(|_| Failure::failed("the thread that feeds the monitor broke down"))?;
+        self.thread
+            .join()
+            .map_err(|_| Failure::failed("the thread that feeds the monitor broke down"))?;
         Ok(self.monitor.stop().map_err(failure)?.samples_dropped)
     }
 }
 
 fn failure(error: MonitorError) -> Failure {
     match error {
-        MonitorError::Thread(_) | MonitorError::ThreadLost | MonitorError::Rerun { .. } => Failure::failed(error),
+        MonitorError::Thread(_) | MonitorError::ThreadLost | MonitorError::Rerun { .. } => {
+            Failure::failed(error)
+        }
         _ => Failure::bad_input(error),
     }
 }
@@ -135,7 +139,11 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
     let mut body = |name: &str, mesh: &god_object::Mesh, role, pose: &Pose| {
         scene.bodies.push(MonitorBody {
             name: name.to_owned(),
-            vertices: mesh.vertices().iter().map(|v| [v.x as f32, v.y as f32, v.z as f32]).collect(),
+            vertices: mesh
+                .vertices()
+                .iter()
+                .map(|v| [v.x as f32, v.y as f32, v.z as f32])
+                .collect(),
             normals: None,
             triangles: mesh.triangles().to_vec(),
             colour: None,
@@ -143,11 +151,25 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
             pose: *pose,
         });
     };
-    body("god-object", &world.body.mesh, BodyRole::GodObject, &picture.start);
+    body(
+        "god-object",
+        &world.body.mesh,
+        BodyRole::GodObject,
+        &picture.start,
+    );
     for obstacle in &world.obstacles {
-        body(&obstacle.name, &obstacle.mesh, BodyRole::Obstacle, &obstacle.pose);
+        body(
+            &obstacle.name,
+            &obstacle.mesh,
+            BodyRole::Obstacle,
+            &obstacle.pose,
+        );
     }
-    scene.screens = picture.screens.iter().map(|screen| outline(screen, frame)).collect();
+    scene.screens = picture
+        .screens
+        .iter()
+        .map(|screen| outline(screen, frame))
+        .collect();
     scene.head = Some(frame.pose(&picture.head.rest));
     scene.reference_point = world.body.reference_point;
     scene.up = frame.scene_from_workbench.rotation * Vector3::z();
@@ -156,7 +178,8 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
 
 fn outline(screen: &ScreenDescription, frame: &SceneFrame) -> MonitorScreen {
     let [lower_left, lower_right, upper_left] =
-        [screen.lower_left, screen.lower_right, screen.upper_left].map(|corner| frame.point(&corner));
+        [screen.lower_left, screen.lower_right, screen.upper_left]
+            .map(|corner| frame.point(&corner));
     let upper_right = lower_right + (upper_left - lower_left);
     MonitorScreen {
         name: screen.name.clone(),
@@ -202,12 +225,24 @@ fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> Moni
             .set
             .constraints
             .iter()
-            .map(|c| ShownContact { point: c.point, normal: c.normal, gap: c.gap })
+            .map(|c| ShownContact {
+                point: c.point,
+                normal: c.normal,
+                gap: c.gap,
+            })
             .collect(),
         // Nothing near is no gap to plot.
-        gap_min: if gap_min.is_finite() { gap_min } else { f64::NAN },
+        gap_min: if gap_min.is_finite() {
+            gap_min
+        } else {
+            f64::NAN
+        },
         constraint_age_us: wrench.constraint_age.as_secs_f32() * 1e6,
-        penetrations: sources.statistics.checks.penetrations.load(Ordering::Relaxed),
+        penetrations: sources
+            .statistics
+            .checks
+            .penetrations
+            .load(Ordering::Relaxed),
         ..MonitorSample::at(nanoseconds(now))
     }
 }
@@ -223,10 +258,18 @@ struct LoopTimes {
 impl LoopTimes {
     fn follow(&mut self, sources: &MonitorSources, sample: &mut MonitorSample) {
         let statistics = &sources.statistics;
-        let histograms: [&Histogram; 3] =
-            [&statistics.haptics.period, &statistics.god_object.update, &statistics.coupling.force];
+        let histograms: [&Histogram; 3] = [
+            &statistics.haptics.period,
+            &statistics.god_object.update,
+            &statistics.coupling.force,
+        ];
         if self.samples.is_multiple_of(WINDOW_SAMPLES) {
-            for ((window, histogram), p99) in self.windows.iter_mut().zip(histograms).zip(&mut self.p99_us) {
+            for ((window, histogram), p99) in self
+                .windows
+                .iter_mut()
+                .zip(histograms)
+                .zip(&mut self.p99_us)
+            {
                 *p99 = window.advance_us(histogram).p99 as f32;
             }
         }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3};
 
 use super::motion::Placement;
-use super::swept_box::{STACK_CAPACITY, SweptBoxes, for_triangle_pairs};
+use super::swept_box::{STACK_CAPACITY, StillBoxes, for_triangle_pairs};
 use super::work::Work;
 use crate::geometry::Mesh;
 use crate::geometry::distance::triangles_intersect;
@@ -20,7 +20,7 @@ pub fn meshes_intersect(
     obstacle_pose: &Pose,
 ) -> bool {
     let placement = Placement::of(body_pose, obstacle_pose);
-    let boxes = SweptBoxes::still(&placement, 0.0);
+    let boxes = StillBoxes::new(&placement, 0.0);
     let mut intersect = false;
     for_triangle_pairs(
         body.tree(),

@@ -17,5 +17,5 @@ pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
 pub(crate) use motion::Placement;
-pub(crate) use swept_box::{SweptBoxes, for_triangle_pairs};
+pub(crate) use swept_box::{StillBoxes, for_triangle_pairs};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

@@ -36,22 +36,13 @@ impl SweptBoxes {
     /// Boxes over `[from, to]` that count as meeting within `margin`, m.
     pub(crate) fn over(motion: &RelativeMotion, from: f64, to: f64, margin: f64) -> Self {
         let half = 0.5 * (to - from);
+        let placement = motion.at(0.5 * (from + to));
         Self {
+            rotation_abs: placement.rotation.abs(),
+            placement,
             half_path: motion.velocity * half,
             half_turn: motion.spin * half,
             angle: motion.rate * half,
-            ..Self::still(&motion.at(0.5 * (from + to)), margin)
-        }
-    }
-
-    /// Boxes of a body at rest.
-    pub(crate) fn still(placement: &Placement, margin: f64) -> Self {
-        Self {
-            placement: *placement,
-            rotation_abs: placement.rotation.abs(),
-            half_path: Vector3::zeros(),
-            half_turn: Vector3::zeros(),
-            angle: 0.0,
             margin,
         }
     }
@@ -75,6 +66,58 @@ impl SweptBoxes {
             + body.half
             + self.placement.rotation.tr_mul(&sweep).abs();
         !(0..3).any(|k| offset[k].abs() > extent[k] + stray)
+    }
+}
+
+/// Tests boxes of a body at rest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StillBoxes {
+    pub(crate) placement: Placement,
+    rotation_abs: Matrix3<f64>,
+    margin: f64,
+}
+
+impl StillBoxes {
+    /// Boxes that count as meeting within `margin`, m.
+    pub(crate) fn new(placement: &Placement, margin: f64) -> Self {
+        Self {
+            placement: *placement,
+            rotation_abs: placement.rotation.abs(),
+            margin,
+        }
+    }
+
+    /// From the centre of the obstacle's box to that of the body's, obstacle frame, m.
+    #[inline]
+    pub(crate) fn offset(&self, body: &Node, obstacle: &Node) -> Vector3<f64> {
+        self.placement.point(&body.center) - obstacle.center
+    }
+
+    /// Whether the spheres around the boxes come within the margin. True for NaN.
+    #[inline]
+    pub(crate) fn spheres_meet(&self, body: &Node, obstacle: &Node, offset: &Vector3<f64>) -> bool {
+        let reach = body.radius + obstacle.radius + self.margin;
+        let apart = offset.norm_squared() > reach * reach;
+        !apart
+    }
+
+    /// Whether the boxes come within the margin along every face axis. True for NaN.
+    #[inline]
+    pub(crate) fn boxes_meet(&self, body: &Node, obstacle: &Node, offset: &Vector3<f64>) -> bool {
+        let extent = self.rotation_abs * body.half + obstacle.half;
+        if (0..3).any(|k| offset[k].abs() > extent[k] + self.margin) {
+            return false;
+        }
+        let offset = self.placement.rotation.tr_mul(offset);
+        let extent = self.rotation_abs.tr_mul(&obstacle.half) + body.half;
+        !(0..3).any(|k| offset[k].abs() > extent[k] + self.margin)
+    }
+
+    /// Whether the boxes come within the margin.
+    #[inline]
+    pub(crate) fn may_meet(&self, body: &Node, obstacle: &Node) -> bool {
+        let offset = self.offset(body, obstacle);
+        self.spheres_meet(body, obstacle, &offset) && self.boxes_meet(body, obstacle, &offset)
     }
 }
 

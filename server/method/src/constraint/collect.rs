@@ -3,12 +3,14 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
+use nalgebra::Vector3;
+
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, SweptBoxes, Work, for_triangle_pairs,
+    CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, StillBoxes, Work, for_triangle_pairs,
 };
-use crate::geometry::{Mesh, NormalCone};
+use crate::geometry::{Mesh, Node, NormalCone};
 use crate::spatial::Pose;
 
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
@@ -31,7 +33,7 @@ pub fn collect_contacts(
     work: &mut Work,
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
-    let boxes = SweptBoxes::still(&placement, activation_distance);
+    let boxes = StillBoxes::new(&placement, activation_distance);
     let facing = Facing {
         body,
         obstacle,
@@ -50,11 +52,19 @@ pub fn collect_contacts(
         &mut workspace.stack,
         work,
         |i, j| {
-            may_face(&placement, body_tree.cone(i), obstacle_tree.cone(j))
-                && boxes.may_meet(
-                    &body_tree.nodes()[i as usize],
-                    &obstacle_tree.nodes()[j as usize],
+            let nodes = (
+                &body_tree.nodes()[i as usize],
+                &obstacle_tree.nodes()[j as usize],
+            );
+            let offset = boxes.offset(nodes.0, nodes.1);
+            boxes.spheres_meet(nodes.0, nodes.1, &offset)
+                && may_face(
+                    &placement,
+                    nodes,
+                    (body_tree.cone(i), obstacle_tree.cone(j)),
+                    &offset,
                 )
+                && boxes.boxes_meet(nodes.0, nodes.1, &offset)
         },
         |a, b, work| {
             let pair = Pair {
@@ -90,18 +100,41 @@ pub fn collect_contacts(
     Collected { truncated, gap_min }
 }
 
-/// Whether some normal of one cone and some normal of the other can be opposite, to tolerance. True for NaN.
+/// Whether features below the two nodes can face each other: some normal of the one is opposite to some normal of the other, and both
+/// lie along some line between the nodes. To tolerance; true for NaN.
 #[inline]
-fn may_face(placement: &Placement, body: &NormalCone, obstacle: &NormalCone) -> bool {
-    let angle = body.angle + obstacle.angle;
-    if angle + LOOK_AHEAD_TILT >= std::f64::consts::PI {
+fn may_face(
+    placement: &Placement,
+    (body, obstacle): (&Node, &Node),
+    (body_cone, obstacle_cone): (&NormalCone, &NormalCone),
+    line: &Vector3<f64>,
+) -> bool {
+    let body_axis = placement.rotation * body_cone.axis;
+    let angle = body_cone.angle + obstacle_cone.angle + LOOK_AHEAD_TILT;
+    if angle < std::f64::consts::PI {
+        // cos(sum + tilt) >= cos(sum) - tilt.
+        let [a, b] = [body_cone.cos_sin, obstacle_cone.cos_sin];
+        if -obstacle_cone.axis.dot(&body_axis) < a[0] * b[0] - a[1] * b[1] - LOOK_AHEAD_TILT {
+            return false;
+        }
+    }
+    // Directions from a point of the obstacle's sphere to one of the body's make a cone about the line of the centres, with
+    // the sine `spread / |line|`. All lengths: no division.
+    let spread = body.radius + obstacle.radius;
+    let squared = line.norm_squared() - spread * spread;
+    let apart = squared > 0.0; // false for NaN
+    if !apart {
         return true;
     }
-    let cosine = -obstacle.axis.dot(&(placement.rotation * body.axis));
-    let least = body.cos_sin[0] * obstacle.cos_sin[0] - body.cos_sin[1] * obstacle.cos_sin[1];
-    // cos(angle + tilt) >= cos(angle) - tilt.
-    let turned_away = cosine < least - LOOK_AHEAD_TILT;
-    !turned_away
+    let along = squared.sqrt();
+    let tilt = LOOK_AHEAD_TILT * (line.x.abs() + line.y.abs() + line.z.abs());
+    let off_line = |cosine: f64, cone: &NormalCone| {
+        // cos(sum + tilt) >= cos(sum) - tilt, for cones narrower than a right angle.
+        let [cos, sin] = cone.cos_sin;
+        cos > LOOK_AHEAD_TILT && cosine < cos * along - sin * spread - tilt
+    };
+    !off_line(obstacle_cone.axis.dot(line), obstacle_cone)
+        && !off_line(-body_axis.dot(line), body_cone)
 }
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.

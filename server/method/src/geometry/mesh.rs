@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::mesh_error::MeshError;
+use super::normal_cone::triangle_cones;
 use super::topology::{Edge, Topology};
 use super::tree::Tree;
 
@@ -33,14 +34,15 @@ impl Mesh {
             let normal = face_normal(&corners.map(|v| vertices[v as usize]));
             face_normals.push(normal.ok_or(MeshError::ZeroArea { triangle })?);
         }
-        let topology = Topology::build(&vertices, &triangles, &face_normals)?;
+        let mut topology = Topology::build(&vertices, &triangles, &face_normals)?;
         let volume = signed_volume(&vertices, &triangles);
         let outward = volume > 0.0; // false for NaN
         if !outward {
             return Err(MeshError::InsideOut { volume });
         }
 
-        let tree = Tree::build(&vertices, &triangles, &face_normals);
+        let cones = triangle_cones(&vertices, &triangles, &face_normals, &mut topology);
+        let tree = Tree::build(&vertices, &triangles, &cones);
         let mut bounding_box = [vertices[0]; 2];
         for v in &vertices {
             bounding_box = [bounding_box[0].inf(v), bounding_box[1].sup(v)];
@@ -100,11 +102,7 @@ impl Mesh {
     /// Vertices that share an edge with vertex `v`.
     #[inline]
     pub fn neighbours(&self, v: u32) -> &[u32] {
-        let (from, to) = (
-            self.topology.ring_start[v as usize],
-            self.topology.ring_start[v as usize + 1],
-        );
-        &self.topology.neighbours[from as usize..to as usize]
+        self.topology.ring(v)
     }
 
     /// The triangle that owns vertex `v` in contact collection; `None` for a vertex without triangles.

@@ -60,6 +60,13 @@ struct Side {
 }
 
 impl Topology {
+    /// Vertices that share an edge with vertex `v`.
+    #[inline]
+    pub(crate) fn ring(&self, v: u32) -> &[u32] {
+        let (from, to) = (self.ring_start[v as usize], self.ring_start[v as usize + 1]);
+        &self.neighbours[from as usize..to as usize]
+    }
+
     /// Pairs the triangles' sides into edges; says which edge is open, disputed or crowded.
     pub(crate) fn build(
         vertices: &[Point3<f64>],

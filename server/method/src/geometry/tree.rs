@@ -4,6 +4,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::normal_cone::NormalCone;
+
 /// Bins of the surface-area heuristic along the longest axis.
 const BINS: usize = 16;
 /// Depth below which a subtree is halved by count, so that the depth is bounded whatever the mesh.
@@ -36,27 +38,6 @@ impl Node {
     }
 }
 
-/// A cone that holds the normals of every feature below a node.
-#[derive(Clone, Copy, Debug)]
-pub struct NormalCone {
-    /// Unit axis.
-    pub axis: Vector3<f64>,
-    /// Half-angle, rad; pi holds every direction.
-    pub angle: f64,
-    /// Cosine and sine of `angle`.
-    pub cos_sin: [f64; 2],
-}
-
-impl NormalCone {
-    fn new(axis: Vector3<f64>, angle: f64) -> Self {
-        Self {
-            axis,
-            angle,
-            cos_sin: [angle.cos(), angle.sin()],
-        }
-    }
-}
-
 /// The tree. Node 0 is the root.
 #[derive(Clone, Debug)]
 pub struct Tree {
@@ -77,7 +58,7 @@ impl Tree {
     pub(crate) fn build(
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
-        face_normals: &[Vector3<f64>],
+        leaf_cones: &[NormalCone],
     ) -> Self {
         let mut items: Vec<Item> = triangles
             .iter()
@@ -86,7 +67,6 @@ impl Tree {
             .collect();
         let mut nodes = Vec::with_capacity(2 * triangles.len() - 1);
         grow(&mut items, 0, &mut nodes);
-        let leaf_cones = leaf_cones(vertices.len(), triangles, face_normals);
         let mut cones = vec![NormalCone::new(Vector3::z(), 0.0); nodes.len()];
         // Children follow their parent: from the back, every child is done before its parent.
         for index in (0..nodes.len()).rev() {
@@ -94,7 +74,7 @@ impl Tree {
             cones[index] = if node.is_leaf() {
                 leaf_cones[node.triangle as usize]
             } else {
-                merge(&cones[index + 1], &cones[node.second as usize])
+                cones[index + 1].merge(&cones[node.second as usize])
             };
         }
         Self { nodes, cones }
@@ -230,61 +210,4 @@ fn split_by_area(items: &mut [Item]) -> Option<usize> {
 
 fn half_area(sides: &Vector3<f64>) -> f64 {
     sides.x * sides.y + sides.y * sides.z + sides.z * sides.x
-}
-
-/// For each triangle the cone about its normal that holds the normals of all faces that share a vertex with it.
-///
-/// A direction in which a vertex is a local maximum lies in the spherical hull of the normals around that vertex, so the cone
-/// holds the normal cones of the triangle's vertices, edges and face; wider than a right angle it holds everything.
-fn leaf_cones(
-    vertices: usize,
-    triangles: &[[u32; 3]],
-    face_normals: &[Vector3<f64>],
-) -> Vec<NormalCone> {
-    let mut start = vec![0_u32; vertices + 1];
-    for v in triangles.iter().flatten() {
-        start[*v as usize + 1] += 1;
-    }
-    for v in 0..vertices {
-        start[v + 1] += start[v];
-    }
-    let mut next = start.clone();
-    let mut around = vec![0_u32; 3 * triangles.len()];
-    for (t, corners) in triangles.iter().enumerate() {
-        for v in corners {
-            around[next[*v as usize] as usize] = t as u32;
-            next[*v as usize] += 1;
-        }
-    }
-    let cone = |(corners, axis): (&[u32; 3], &Vector3<f64>)| {
-        let least = corners
-            .iter()
-            .flat_map(|v| &around[start[*v as usize] as usize..start[*v as usize + 1] as usize])
-            .map(|t| axis.dot(&face_normals[*t as usize]))
-            .fold(1.0, f64::min);
-        let angle = if least > 0.0 {
-            least.min(1.0).acos()
-        } else {
-            std::f64::consts::PI
-        };
-        NormalCone::new(*axis, angle)
-    };
-    triangles.iter().zip(face_normals).map(cone).collect()
-}
-
-fn merge(a: &NormalCone, b: &NormalCone) -> NormalCone {
-    let sum = a.axis + b.axis;
-    let length = sum.norm();
-    let everything = NormalCone::new(a.axis, std::f64::consts::PI);
-    if length < f64::EPSILON.sqrt() {
-        return everything;
-    }
-    let axis = sum / length;
-    let reach = |c: &NormalCone| axis.dot(&c.axis).clamp(-1.0, 1.0).acos() + c.angle;
-    let angle = reach(a).max(reach(b));
-    if angle < std::f64::consts::PI {
-        NormalCone::new(axis, angle)
-    } else {
-        everything
-    }
 }

@@ -1,0 +1,134 @@
+//! Normal cones of features: the directions in which a vertex, an edge or a face is a local maximum of its surface.
+//!
+//! The normal cone of a vertex is `{n : n.e <= 0}` over the edges e that leave it. Its extreme rays are among the products of two
+//! edges; a saddle or a hollow has none, and can never be touched there. That of an edge is the arc between its two face
+//! normals where it is convex; that of a face is its normal. A triangle's cone holds its normal and the normal cones of
+//! the features that it owns.
+
+use nalgebra::{Point3, Vector3};
+
+use super::topology::Topology;
+
+/// A product of two edges this far above a third is above it: some rounding of unit vectors.
+const RAY_TOLERANCE: f64 = 1e-9;
+/// Edges nearer to parallel than this have no product, as its squared length.
+const PARALLEL: f64 = 1e-16;
+/// Vertices with more edges, tips of fans, are taken as corners without looking: the look costs the cube of their number.
+const MAX_RING: usize = 32;
+
+/// A cone that holds the normal cones of every feature below a node of the tree.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalCone {
+    /// Unit axis.
+    pub axis: Vector3<f64>,
+    /// Half-angle, rad; pi holds every direction.
+    pub angle: f64,
+    /// Cosine and sine of `angle`.
+    pub cos_sin: [f64; 2],
+}
+
+impl NormalCone {
+    pub(crate) fn new(axis: Vector3<f64>, angle: f64) -> Self {
+        Self {
+            axis,
+            angle,
+            cos_sin: [angle.cos(), angle.sin()],
+        }
+    }
+
+    /// A cone that holds both.
+    pub(crate) fn merge(&self, other: &Self) -> Self {
+        let sum = self.axis + other.axis;
+        let length = sum.norm();
+        let everything = Self::new(self.axis, std::f64::consts::PI);
+        if length < f64::EPSILON.sqrt() {
+            return everything;
+        }
+        let axis = sum / length;
+        let reach = |c: &Self| axis.dot(&c.axis).clamp(-1.0, 1.0).acos() + c.angle;
+        let angle = reach(self).max(reach(other));
+        if angle < std::f64::consts::PI {
+            Self::new(axis, angle)
+        } else {
+            everything
+        }
+    }
+}
+
+/// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at.
+fn vertex_rays(
+    vertices: &[Point3<f64>],
+    topology: &Topology,
+    v: u32,
+    rays: &mut Vec<Vector3<f64>>,
+) -> Option<()> {
+    rays.clear();
+    let ring = topology.ring(v);
+    if ring.len() > MAX_RING {
+        return None;
+    }
+    let apex = vertices[v as usize];
+    let mut edges = [Vector3::zeros(); MAX_RING];
+    for (edge, w) in edges.iter_mut().zip(ring) {
+        let along = vertices[*w as usize] - apex;
+        *edge = along / along.norm();
+    }
+    let edges = &edges[..ring.len()];
+    for (i, a) in edges.iter().enumerate() {
+        for b in &edges[i + 1..] {
+            let cross = a.cross(b);
+            let squared = cross.norm_squared();
+            if squared < PARALLEL {
+                continue;
+            }
+            let ray = cross / squared.sqrt();
+            for n in [ray, -ray] {
+                if edges.iter().all(|e| n.dot(e) <= RAY_TOLERANCE) {
+                    rays.push(n);
+                }
+            }
+        }
+    }
+    Some(())
+}
+
+/// Takes the corners away whose normal cone is empty, and gives each triangle the cone of its features.
+pub(crate) fn triangle_cones(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    face_normals: &[Vector3<f64>],
+    topology: &mut Topology,
+) -> Vec<NormalCone> {
+    let mut rays = Vec::new();
+    let mut cones = Vec::with_capacity(triangles.len());
+    for (t, corners) in triangles.iter().enumerate() {
+        let axis = face_normals[t];
+        let mut least: f64 = 1.0;
+        for (k, &corner) in corners.iter().enumerate() {
+            if topology.owned[t] & (8 << k) != 0 {
+                let edge = &topology.edges[topology.triangle_edges[t][k] as usize];
+                let other = edge.faces[0] ^ edge.faces[1] ^ t as u32;
+                least = least.min(axis.dot(&face_normals[other as usize]));
+            }
+            if topology.owned[t] & (1 << k) == 0 {
+                continue;
+            }
+            let looked = vertex_rays(vertices, topology, corner, &mut rays);
+            if looked.is_some() && rays.is_empty() {
+                topology.owned[t] &= !(1 << k);
+            }
+            least = match looked {
+                Some(()) => rays.iter().map(|n| axis.dot(n)).fold(least, f64::min),
+                None => -1.0,
+            };
+        }
+        // Rays within a right angle of the axis span a cone within their farthest; wider ones may hold anything.
+        let angle = if least > 0.0 {
+            least.min(1.0).acos()
+        } else {
+            std::f64::consts::PI
+        };
+        cones.push(NormalCone::new(axis, angle));
+    }
+    cones
+}

@@ -1,0 +1,94 @@
+//! What a session is made of: bodies, device, addresses, rates. Plain data; [`crate::session`] brings it to life.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use god_object::{Pose, Settings, World};
+use taut_bridge::{Device, DeviceLimits, SafetySettings};
+use taut_link::{ClusterKey, Content};
+
+use crate::head::Head;
+use crate::monitor::MonitorSettings;
+use crate::realtime::RealtimePolicy;
+
+/// Everything that a session is made of.
+pub struct SessionSetup {
+    /// Bodies.
+    pub world: Arc<World>,
+    /// Of the method.
+    pub settings: Settings,
+    /// Where god-object and device start.
+    pub start: Pose,
+    /// What moves the god-object.
+    pub device: DeviceSource,
+    /// Limits and times of the force.
+    pub safety: SafetySettings,
+    /// The viewer.
+    pub head: Head,
+    /// What clients fetch at join.
+    pub content: Content,
+    /// Addresses, key and limits of the network.
+    pub link: LinkSettings,
+    /// Rates and scheduling.
+    pub realtime: RealtimeSettings,
+    /// Where the monitor is served; `None` does without.
+    pub monitor: Option<MonitorSettings>,
+}
+
+/// What moves the god-object.
+pub enum DeviceSource {
+    /// A device on this machine, in the haptics loop.
+    Local(Box<dyn Device>),
+    /// A device behind a bridge.
+    Remote {
+        /// What the device there can bear.
+        limits: DeviceLimits,
+        /// Silence after which it counts as lost.
+        max_age: Duration,
+    },
+}
+
+/// Addresses, key and limits of the network.
+#[derive(Clone, Debug)]
+pub struct LinkSettings {
+    /// Of the control plane.
+    pub quic: SocketAddr,
+    /// Of the state plane.
+    pub udp: SocketAddr,
+    /// The cluster key.
+    pub key: ClusterKey,
+    /// Most clients at a time.
+    pub max_clients: usize,
+}
+
+/// Rates and scheduling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RealtimeSettings {
+    /// What a refusal by the system means.
+    pub policy: RealtimePolicy,
+    /// Period of the haptics loop.
+    pub haptics_period: Duration,
+    /// Shortest period of the god-object loop.
+    pub god_object_period: Duration,
+    /// Time between two states to a client.
+    pub broadcast_period: Duration,
+    /// Real-time priority of the haptics loop.
+    pub haptics_priority: u8,
+    /// Real-time priority of the coupling; below that of the haptics loop.
+    pub coupling_priority: u8,
+    /// Real-time priority of the broadcaster; below that of the coupling.
+    pub broadcast_priority: u8,
+    /// Real-time priority of the network's threads; below that of the broadcaster.
+    pub network_priority: u8,
+    /// Real-time priority of the god-object loop; `None` is the normal class, because an update may take long.
+    pub god_object_priority: Option<u8>,
+    /// Core of the haptics loop; `None` is the system's choice.
+    pub haptics_core: Option<usize>,
+    /// Core of the coupling.
+    pub coupling_core: Option<usize>,
+    /// Core of the god-object loop.
+    pub god_object_core: Option<usize>,
+    /// Keep all memory in RAM.
+    pub lock_memory: bool,
+}

@@ -1,0 +1,65 @@
+//! The haptics loop and the coupling allocate nothing, in contact and out of it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use god_object::GodObject;
+use taut::devices::device;
+use taut::loops::wiring::WiredLoops;
+use taut::setup::DeviceSource;
+use taut_bridge::SafetySettings;
+use taut_scene::{Device, Scene};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+#[test]
+fn loops_two_and_three_allocate_nothing() {
+    for name in ["sphere-on-plane", "peg-in-a-hole"] {
+        let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
+            Ok(scene) => scene,
+            Err(error) => panic!("{error}"),
+        };
+        let wanted = Device::Simulated {
+            hand: None,
+            path: None,
+            tremor: 5e-5,
+            seed: 1,
+        };
+        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene) else {
+            panic!("no simulated device");
+        };
+        let world = Arc::new(scene.world);
+        let Ok(god_object) = GodObject::new(world.clone(), scene.settings, scene.start) else {
+            panic!("{name} starts in penetration");
+        };
+        let mut loops = WiredLoops::new(
+            &world,
+            &scene.settings,
+            god_object,
+            device,
+            SafetySettings::default(),
+        );
+        let mut most_contacts = 0;
+        for tick in 1..=4000_u64 {
+            let now = Duration::from_millis(tick);
+            assert_no_alloc(|| {
+                loops.haptics.tick(now);
+                loops.coupling.tick(now);
+            });
+            loops.god_object.tick(|| now);
+            most_contacts = most_contacts.max(
+                loops
+                    .observers
+                    .monitor
+                    .contacts
+                    .newest()
+                    .set
+                    .constraints
+                    .len(),
+            );
+        }
+        assert!(most_contacts > 0, "{name}: nothing was touched");
+    }
+}

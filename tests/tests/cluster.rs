@@ -1,0 +1,454 @@
+//! A workbench in pieces on loopback: server, bridge, render node and recorder as processes, two more clients in this one.
+
+use std::collections::HashMap;
+use std::net::UdpSocket;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use taut_link::{
+    ClientLink, ClientOptions, LinkError, ReceivedState, Role, Transport, connect, create_key_file,
+};
+use taut_proto::PoseF32;
+use taut_proto::control::RefusalCode;
+use taut_scene::Scene;
+use taut_tests::patience::wait_for;
+use taut_tests::process::Process;
+use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
+use tokio::runtime::Runtime;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
+const SCENE: &str = "sphere-on-plane";
+/// Longest wait for a client that joins, or for something that joined to happen.
+const JOIN_LIMIT: Duration = Duration::from_secs(20);
+/// Longest silence that counts as undisturbed: a debug build on a busy machine, where states come every millisecond.
+const UNDISTURBED: Duration = Duration::from_millis(500);
+
+/// A server whose device is behind a bridge, and that bridge, in whose hand the sphere goes round on the plane.
+fn workbench_with_bridge(workbench: &mut TestWorkbench) -> (Server, Process) {
+    workbench.set("scene", SCENE);
+    workbench.set(
+        "device",
+        toml::Table::from_iter([("kind".to_owned(), toml::Value::from("remote"))]),
+    );
+    let server = workbench.serve(&[]);
+    let hand = Scene::named_or_file(SCENE)
+        .and_then(|scene| scene.hand_path())
+        .unwrap_or_else(|error| panic!("{error}"));
+    let path = workbench
+        .write("hand.csv", hand.expect("the scene has a hand").to_csv())
+        .display()
+        .to_string();
+    let bridge = workbench.join(
+        "bridge",
+        "bridge",
+        &server,
+        &["--json", "--hand", "firm", "--path", &path, "--loop"],
+    );
+    (server, bridge)
+}
+
+/// A client in this process: takes every state until it is told to stop.
+struct Client {
+    link: Arc<ClientLink>,
+    stop: Arc<AtomicBool>,
+    felt: Arc<AtomicBool>,
+    taker: JoinHandle<Vec<ReceivedState>>,
+}
+
+impl Client {
+    fn options(
+        workbench: &TestWorkbench,
+        server: &Server,
+        node: &str,
+        transport: Transport,
+    ) -> ClientOptions {
+        ClientOptions {
+            transport,
+            ..ClientOptions::new(server.quic.clone(), workbench.key(), Role::Render, node)
+        }
+    }
+
+    fn join(runtime: &Runtime, options: ClientOptions) -> Self {
+        let name = options.node.clone();
+        let link = Arc::new(
+            runtime
+                .block_on(connect(options))
+                .unwrap_or_else(|error| panic!("{error}")),
+        );
+        let stop = Arc::new(AtomicBool::new(false));
+        let felt = Arc::new(AtomicBool::new(false));
+        let (taken_from, stopped, feels) = (link.clone(), stop.clone(), felt.clone());
+        let take = move || {
+            let mut states = Vec::new();
+            while !stopped.load(Ordering::Relaxed) {
+                taken_from.drain_states(&mut states);
+                feels.store(
+                    states.last().is_some_and(|newest| force(newest) > 1.0),
+                    Ordering::Relaxed,
+                );
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            states
+        };
+        let taker = std::thread::Builder::new()
+            .name(name)
+            .spawn(take)
+            .expect("a thread");
+        Self {
+            link,
+            stop,
+            felt,
+            taker,
+        }
+    }
+
+    /// Whether the newest state has a force of more than a newton.
+    fn saw_force(&self) -> bool {
+        self.felt.load(Ordering::Relaxed)
+    }
+
+    /// Everything that arrived.
+    fn leave(self) -> Vec<ReceivedState> {
+        assert_eq!(self.link.is_closed(), None);
+        self.stop.store(true, Ordering::Relaxed);
+        self.taker.join().expect("the taker does not panic")
+    }
+}
+
+fn god_objects(states: &[ReceivedState]) -> HashMap<u64, PoseF32> {
+    states
+        .iter()
+        .map(|received| (received.state.tick, received.state.tools[0].god_object))
+        .collect()
+}
+
+fn force(received: &ReceivedState) -> f32 {
+    received.state.tools[0]
+        .force
+        .iter()
+        .map(|f| f * f)
+        .sum::<f32>()
+        .sqrt()
+}
+
+/// Longest time without a state after `from`.
+fn longest_silence(states: &[ReceivedState], from: Instant) -> Duration {
+    let after: Vec<Instant> = states
+        .iter()
+        .map(|state| state.received)
+        .filter(|moment| *moment >= from)
+        .collect();
+    assert!(
+        after.len() > 100,
+        "only {} states after that moment",
+        after.len()
+    );
+    after
+        .windows(2)
+        .map(|two| two[1] - two[0])
+        .max()
+        .unwrap_or_default()
+}
+
+#[test]
+fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    let adapter = workbench.adapter();
+    let (mut server, bridge) = workbench_with_bridge(&mut workbench);
+    let runtime = Runtime::new().expect("a runtime");
+    let early = Client::join(
+        &runtime,
+        Client::options(&workbench, &server, "early", Transport::Udp),
+    );
+    let over_quic = Client::join(
+        &runtime,
+        Client::options(&workbench, &server, "over-quic", Transport::QuicDatagram),
+    );
+    let recorded = workbench
+        .directory()
+        .join("recorded.csv")
+        .display()
+        .to_string();
+    let key = workbench.key_path();
+    let mut victim = workbench.start(
+        "recorder",
+        &[
+            "record",
+            "--server",
+            &server.quic,
+            "--key",
+            &key,
+            "--out",
+            &recorded,
+        ],
+    );
+    let drawing = adapter.is_ok().then(|| {
+        workbench.join(
+            "render",
+            "front",
+            &server,
+            &["--headless", "--width", "320", "--height", "240"],
+        )
+    });
+
+    // A late client learns the scene, and gets each mesh by its hash.
+    std::thread::sleep(Duration::from_secs(2));
+    let late = Client::join(
+        &runtime,
+        Client::options(&workbench, &server, "late", Transport::Udp),
+    );
+    let scene = Scene::named_or_file(SCENE)
+        .and_then(|scene| scene.build())
+        .unwrap_or_else(|error| panic!("{error}"));
+    let description = late.link.description();
+    assert_eq!(description, early.link.description());
+    assert_eq!(description.name, SCENE);
+    let told = std::iter::once(&description.god_object).chain(&description.obstacles);
+    assert_eq!(description.obstacles.len() + 1, scene.bodies.len());
+    for (body, built) in told.zip(&scene.bodies) {
+        let mesh = runtime
+            .block_on(late.link.mesh(body.mesh))
+            .unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(body.name, built.name);
+        assert_eq!(
+            (mesh.positions_f64().len(), mesh.triangles().len()),
+            (built.mesh.vertices.len(), built.mesh.triangles.len())
+        );
+    }
+
+    // One is killed without a goodbye; after it the others go on for three seconds.
+    assert!(victim.is_running(), "the recorder ended by itself");
+    victim.kill();
+    let killed = Instant::now();
+    std::thread::sleep(Duration::from_secs(3));
+    assert!(server.process.is_running());
+
+    let (early, over_quic, late) = (early.leave(), over_quic.leave(), late.leave());
+    for (name, states) in [
+        ("early", &early),
+        ("over-quic", &over_quic),
+        ("late", &late),
+    ] {
+        assert!(
+            states
+                .windows(2)
+                .all(|two| two[0].state.tick < two[1].state.tick),
+            "{name} saw ticks out of order"
+        );
+        assert!(
+            states
+                .windows(2)
+                .all(|two| two[0].state.sample_time_ns <= two[1].state.sample_time_ns),
+            "{name} saw time run back"
+        );
+        let silence = longest_silence(states, killed);
+        println!(
+            "{name}: {} states, longest silence {silence:?}",
+            states.len()
+        );
+        assert!(
+            silence < UNDISTURBED,
+            "{name} heard nothing for {silence:?}"
+        );
+    }
+    let reference = god_objects(&early);
+    for (name, states) in [("over-quic", &over_quic), ("late", &late)] {
+        let mut common = 0;
+        for (tick, pose) in god_objects(states) {
+            if let Some(other) = reference.get(&tick) {
+                assert_eq!(*other, pose, "{name} sees another world at tick {tick}");
+                common += 1;
+            }
+        }
+        assert!(common > 1000, "{name} shares only {common} ticks");
+    }
+    assert!(
+        early
+            .windows(2)
+            .any(|two| two[0].state.tools[0].god_object != two[1].state.tools[0].god_object),
+        "nothing moves"
+    );
+
+    // The sphere touches and pushes back, and the push reaches the device.
+    let strongest = early.iter().map(force).fold(0.0, f32::max);
+    assert!(strongest > 1.0, "the largest force told is {strongest} N");
+    assert!(
+        early
+            .iter()
+            .any(|received| !received.state.contacts.is_empty() && force(received) > 1.0)
+    );
+    bridge.interrupt();
+    let ended = bridge.end(END_LIMIT);
+    assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
+    let report = ended.json();
+    assert!(
+        report["max_force_n"].as_f64() > Some(1.0),
+        "the device felt {} N",
+        report["max_force_n"]
+    );
+    assert!(
+        report["wrenches"].as_u64() > Some(1000),
+        "{} wrenches",
+        report["wrenches"]
+    );
+
+    if let Some(drawing) = drawing {
+        drawing.interrupt();
+        assert!(drawing.end(END_LIMIT).status.success());
+    } else {
+        println!("skipped: the render node, because there is no adapter");
+    }
+    let report = server.stop();
+    assert_eq!(report["penetrations"], 0);
+    let node = |name: &str| {
+        report["clients"]
+            .as_array()
+            .and_then(|all| all.iter().find(|client| client["node"] == name))
+            .cloned()
+    };
+    assert!(
+        ["early", "over-quic", "late", "bridge"]
+            .iter()
+            .all(|name| node(name).is_some()),
+        "{}",
+        report["clients"]
+    );
+    assert_eq!(node("over-quic").expect("listed")["transport"], "quic");
+    if adapter.is_ok() {
+        let front = node("front").expect("listed");
+        assert!(front["frames"].as_u64() >= Some(10), "{front}");
+        assert_eq!(front["state_hash_mismatches"], 0);
+    }
+    assert_eq!(report["observers"], 1);
+}
+
+#[test]
+fn garbage_is_counted_and_harmless() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", SCENE);
+    let server = workbench.serve(&[]);
+    let runtime = Runtime::new().expect("a runtime");
+    let client = Client::join(
+        &runtime,
+        Client::options(&workbench, &server, "client", Transport::Udp),
+    );
+
+    const DATAGRAMS: u32 = 600;
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a socket");
+    let mut state = 7_u32;
+    for number in 0..DATAGRAMS {
+        let mut bytes: Vec<u8> = (0..number % 300)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u8
+            })
+            .collect();
+        if number % 3 == 0 && bytes.len() >= 24 {
+            // A header of taut in front: with its version, and with another one.
+            bytes[..2].copy_from_slice(&taut_proto::version::MAGIC.to_le_bytes());
+            bytes[2] = taut_proto::PROTOCOL_VERSION.wrapping_add((number % 2) as u8);
+        }
+        let to = if number % 10 == 9 {
+            &server.quic
+        } else {
+            &server.udp
+        };
+        let _ = socket.send_to(&bytes, to); // a full buffer loses some, as the network does
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    let sent = Instant::now();
+    wait_for("a second of states after the garbage", JOIN_LIMIT, || {
+        (sent.elapsed() > Duration::from_secs(1)).then_some(())
+    });
+    let states = client.leave();
+    assert!(longest_silence(&states, sent) < UNDISTURBED);
+    let report = server.stop();
+    let refused = report["packets_refused"].as_u64().expect("a number");
+    assert!(
+        refused >= u64::from(DATAGRAMS) / 2,
+        "only {refused} of {DATAGRAMS} counted"
+    );
+    assert_eq!(report["safety_events"], 0);
+}
+
+#[test]
+fn a_second_node_of_the_same_name_and_one_with_another_key_are_refused_in_one_sentence() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", SCENE);
+    let server = workbench.serve(&[]);
+    let runtime = Runtime::new().expect("a runtime");
+    let options = Client::options(&workbench, &server, "front", Transport::Udp);
+    let first = Client::join(&runtime, options.clone());
+    match runtime.block_on(connect(options)) {
+        Err(LinkError::Refused { code, text, .. }) => {
+            assert_eq!(code, RefusalCode::NameTaken);
+            assert!(text.contains("front"), "{text}");
+        }
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("two nodes are called front"),
+    }
+
+    let other_key = workbench.directory().join("other.key");
+    create_key_file(&other_key).unwrap_or_else(|error| panic!("{error}"));
+    let other_key = other_key.display().to_string();
+    for (role, arguments) in [
+        ("bridge", vec!["--node", "b"]),
+        ("record", vec!["--out", "trace.csv"]),
+    ] {
+        let always = [role, "--server", &server.quic, "--key", &other_key];
+        let ended = workbench.run(role, &[&always[..], &arguments].concat());
+        assert_eq!(ended.status.code(), Some(2), "{role}: {}", ended.stderr);
+        let sentence = ended.one_sentence();
+        assert!(
+            sentence.contains("cluster key")
+                && sentence.contains(&server.quic)
+                && sentence.contains("--key"),
+            "{sentence}"
+        );
+    }
+    assert!(
+        !workbench.directory().join("trace.csv").exists(),
+        "a refused recorder left a file"
+    );
+
+    first.leave();
+    server.stop();
+}
+
+#[test]
+fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    let adapter = workbench.adapter();
+    let (mut server, bridge) = workbench_with_bridge(&mut workbench);
+    let drawing = adapter.is_ok().then(|| {
+        workbench.join(
+            "render",
+            "front",
+            &server,
+            &["--headless", "--width", "64", "--height", "64"],
+        )
+    });
+    let runtime = Runtime::new().expect("a runtime");
+    let client = Client::join(
+        &runtime,
+        Client::options(&workbench, &server, "client", Transport::Udp),
+    );
+    wait_for("a force from the device's touch", JOIN_LIMIT, || {
+        client.saw_force().then_some(())
+    });
+    server.process.kill();
+    for process in std::iter::once(bridge).chain(drawing) {
+        let ended = process.end(END_LIMIT);
+        assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains(&server.quic) && ended.stderr.contains("lost"),
+            "{}",
+            ended.stderr
+        );
+    }
+    wait_for("the client to learn of it", END_LIMIT, || {
+        client.link.is_closed()
+    });
+}

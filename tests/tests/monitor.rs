@@ -1,0 +1,122 @@
+//! What a remote observer gets: a recording that rerun's own reader opens, and the web viewer's page.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::Duration;
+
+use taut_monitor::inspect;
+use taut_tests::workbench::{END_LIMIT, START_LIMIT, TestWorkbench};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
+
+#[test]
+fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", "sphere-on-plane");
+    let path = workbench.directory().join("session.rrd");
+    const DURATION_S: f64 = 4.0;
+    let server = workbench.serve(&[
+        "--duration",
+        &DURATION_S.to_string(),
+        "--record",
+        &path.display().to_string(),
+    ]);
+    let ended = server.process.end(START_LIMIT + END_LIMIT);
+    assert!(ended.status.success(), "{}", ended.status);
+
+    let summary = inspect(&path).unwrap_or_else(|error| panic!("{error}"));
+    println!(
+        "{} rows in {} entities",
+        summary.total_rows(),
+        summary.entities.len()
+    );
+    let wanted = [
+        "/world/god_object",
+        "/world/device",
+        "/world/contacts",
+        "/world/force",
+        "/plots/force",
+        "/plots/torque",
+        "/plots/loops",
+        "/plots/contacts",
+        "/plots/gap",
+        "/plots/constraint_age",
+        "/plots/network",
+        "/log",
+    ];
+    for entity in wanted {
+        assert!(
+            summary.entities.iter().any(|path| path.starts_with(entity)),
+            "{entity} is missing in {:?}",
+            summary.entities
+        );
+    }
+    assert!(
+        summary.entities.iter().any(|path| path.contains("plane")),
+        "the obstacle is missing in {:?}",
+        summary.entities
+    );
+    assert!(summary.blueprints >= 1, "the recording has no layout");
+    let (first, last) = summary
+        .first_time_s
+        .zip(summary.last_time_s)
+        .expect("the recording has times");
+    assert!(
+        first < 1.5 && last - first > DURATION_S - 1.5,
+        "the recording covers {first} s to {last} s"
+    );
+    let poses = summary
+        .rows
+        .get("/world/god_object")
+        .copied()
+        .unwrap_or_default();
+    assert!(
+        poses > 30,
+        "only {poses} poses of the god-object in {DURATION_S} s"
+    );
+}
+
+#[test]
+fn the_web_viewer_s_page_is_served_while_the_session_runs() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", "sphere-on-plane");
+    workbench.set("monitoring.enabled", true);
+    let mut server = workbench.serve(&[]);
+    let page = server
+        .process
+        .line_after("watch it in a browser: ", START_LIMIT);
+    let address = page
+        .strip_prefix("http://")
+        .and_then(|rest| rest.split(['/', '?']).next())
+        .unwrap_or_else(|| panic!("no address: {page}"));
+    let mut stream =
+        TcpStream::connect(address).unwrap_or_else(|error| panic!("{address}: {error}"));
+    stream
+        .set_read_timeout(Some(Duration::from_secs(10)))
+        .expect("a time limit");
+    write!(stream, "GET / HTTP/1.0\r\nHost: {address}\r\n\r\n").expect("a request");
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).expect("an answer");
+    let answer = String::from_utf8_lossy(&answer);
+    assert!(
+        answer
+            .lines()
+            .next()
+            .is_some_and(|status| status.contains(" 200 ")),
+        "{answer}"
+    );
+    assert!(answer.contains("<html"), "no page: {answer}");
+    // The page finds the stream by the address's own query.
+    assert!(page.contains("url="), "{page}");
+    let mut stream = server
+        .process
+        .line_after("or in the rerun viewer: rerun ", START_LIMIT);
+    stream = stream
+        .split("://")
+        .nth(1)
+        .and_then(|rest| rest.split('/').next())
+        .unwrap_or_default()
+        .to_owned();
+    TcpStream::connect(&stream).unwrap_or_else(|error| panic!("{stream}: {error}"));
+    server.stop();
+}
