@@ -10,6 +10,11 @@ use taut_bridge::realtime::{RealtimeGrant, request_fifo, sharpen_timers};
 
 use crate::report::RealtimeReport;
 
+/// Ahead of all normal work, behind the real-time class.
+const AHEAD_NICE: i32 = -10;
+/// Behind all normal work, before idle.
+const BACKGROUND_NICE: i32 = 15;
+
 /// How a refusal by the operating system is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RealtimePolicy {
@@ -24,8 +29,9 @@ pub enum RealtimePolicy {
 pub enum Scheduling {
     /// Real-time class, first in first out, with this priority; timers as sharp as they get either way.
     Fifo(u8),
-    /// The normal class, with sharp timers.
-    Normal,
+    /// The normal class, ahead of everybody else in it, with sharp timers: for work that may take long. A thread of the real-time
+    /// class that used up a core would be throttled, and the loops with it.
+    Ahead,
     /// The normal class, behind everybody else.
     Background,
 }
@@ -46,8 +52,11 @@ impl RealtimeLedger {
                 }
                 granted
             }
-            Scheduling::Normal => self.note(name, sharpen_timers()),
-            Scheduling::Background => os::be_nice(),
+            Scheduling::Ahead => {
+                self.note(name, sharpen_timers());
+                self.note(name, request_nice(AHEAD_NICE))
+            }
+            Scheduling::Background => request_nice(BACKGROUND_NICE).is_granted(),
         }
     }
 
@@ -76,6 +85,18 @@ impl RealtimeLedger {
         report.enforced.sort();
         report.waived.sort();
         report
+    }
+}
+
+/// Asks for this nice value for the calling thread.
+fn request_nice(value: i32) -> RealtimeGrant {
+    let what = format!("nice {value}");
+    if os::set_nice(value) {
+        RealtimeGrant::Granted { what }
+    } else {
+        let why = "this user may not; run as root, or grant it: LimitNICE=-10 in the service unit"
+            .to_owned();
+        RealtimeGrant::Waived { what, why }
     }
 }
 
@@ -111,8 +132,6 @@ mod os {
     use std::os::unix::process::CommandExt;
     use std::time::Duration;
 
-    /// Behind all normal work, before idle.
-    const BACKGROUND_NICE: libc::c_int = 15;
     /// Behind this process's normal threads, before background work.
     const CHILD_NICE: libc::c_int = 5;
 
@@ -126,9 +145,9 @@ mod os {
         Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
     }
 
-    pub(super) fn be_nice() -> bool {
+    pub(super) fn set_nice(value: i32) -> bool {
         // SAFETY: takes integers only; 0 names the calling thread (on Linux the nice value is the thread's).
-        unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, BACKGROUND_NICE) == 0 }
+        unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, value) == 0 }
     }
 
     pub(super) fn after_parent(command: &mut std::process::Command) {
@@ -176,7 +195,7 @@ mod os {
         START.get_or_init(Instant::now).elapsed()
     }
 
-    pub(super) fn be_nice() -> bool {
+    pub(super) fn set_nice(_value: i32) -> bool {
         false
     }
 

@@ -186,7 +186,7 @@ impl Session {
         );
         let scheduling = realtime
             .god_object_priority
-            .map_or(Scheduling::Normal, Scheduling::Fifo);
+            .map_or(Scheduling::Ahead, Scheduling::Fifo);
         self.start_thread(
             "god-object",
             scheduling,

@@ -81,7 +81,7 @@ pub struct RealtimeSettings {
     pub broadcast_priority: u8,
     /// Real-time priority of the network's threads; below that of the broadcaster.
     pub network_priority: u8,
-    /// Real-time priority of the god-object loop; `None` is the normal class, because an update may take long.
+    /// Real-time priority of the god-object loop; `None` is the normal class, ahead of others, because an update may take long.
     pub god_object_priority: Option<u8>,
     /// Core of the haptics loop; `None` is the system's choice.
     pub haptics_core: Option<usize>,

@@ -132,7 +132,15 @@ fn a_broken_scene_or_mesh_is_refused_by_file_and_key() {
     refused(
         &workbench,
         "no such shipped scene",
-        &["demo", "--no-monitor", "--scene", "three-bunnies"],
+        &[
+            "replay",
+            "--scene",
+            "three-bunnies",
+            "--trace",
+            &trace,
+            "--out",
+            "answer.csv",
+        ],
         &["three-bunnies", "two-bunnies"],
     );
     let set = [

@@ -38,8 +38,10 @@ const CLIENT_KEYS: [&str; 8] = [
     "packets_lost",
     "state_hash_mismatches",
 ];
-/// Share by which the haptics loop may be off its rate here: a debug build beside other work. The workbench itself is held to 1 %.
-const RATE_TOLERANCE: f64 = 0.05;
+/// Share by which the haptics loop may be off its rate where the system granted real-time scheduling.
+const RATE_TOLERANCE: f64 = 0.01;
+/// The same where it did not, and the loop takes turns with software renderers and other tests.
+const RATE_TOLERANCE_WAIVED: f64 = 0.25;
 
 fn has_keys(object: &Value, keys: &[&str]) {
     for key in keys {
@@ -71,8 +73,18 @@ fn the_demo_brings_everything_up_and_reports_it() {
         "haptics {hz:.1} Hz, {} deadlines missed, realtime {}",
         report["deadline_misses"], report["realtime"]
     );
+    let enforced = report["realtime"]["enforced"].as_array().expect("a list");
+    let scheduled = enforced.iter().any(|line| {
+        line.as_str()
+            .is_some_and(|line| line.starts_with("haptics: SCHED_FIFO"))
+    });
+    let tolerance = if scheduled {
+        RATE_TOLERANCE
+    } else {
+        RATE_TOLERANCE_WAIVED
+    };
     assert!(
-        (hz - 1000.0).abs() <= 1000.0 * RATE_TOLERANCE,
+        (hz - 1000.0).abs() <= 1000.0 * tolerance,
         "haptics at {hz} Hz"
     );
     assert!(

@@ -60,25 +60,38 @@ impl AdaptationState {
             let room = self.arrivals.capacity();
             let new = rows.iter().map(|row| row.features);
             let known = &self.known;
-            self.arrivals.extend(new.filter(|f| known.binary_search(f).is_err()).take(room));
+            self.arrivals
+                .extend(new.filter(|f| known.binary_search(f).is_err()).take(room));
         }
         self.known.clear();
         let room = self.known.capacity();
-        self.known.extend(rows.iter().map(|row| row.features).take(room));
+        self.known
+            .extend(rows.iter().map(|row| row.features).take(room));
         let known = &self.known;
-        self.ramps.retain(|ramp| known.binary_search(&ramp.features).is_ok());
+        self.ramps
+            .retain(|ramp| known.binary_search(&ramp.features).is_ok());
         self.sequence = Some(sequence);
     }
 
     /// The bound in force now for one row: `bound` itself, or less while the row is on its way in.
     ///
     /// `reached` is `J_k (a_u + c)` at the present device pose, `time` in seconds never runs back.
-    pub(crate) fn bound(&mut self, time: f64, features: FeaturePair, bound: f64, reached: f64) -> f64 {
+    pub(crate) fn bound(
+        &mut self,
+        time: f64,
+        features: FeaturePair,
+        bound: f64,
+        reached: f64,
+    ) -> f64 {
         if self.arrivals.binary_search(&features).is_ok()
             && reached - bound <= self.adaptation.threshold
             && self.ramps.len() < self.ramps.capacity()
         {
-            self.ramps.push(Ramp { features, violation_at_entry: reached, start: time });
+            self.ramps.push(Ramp {
+                features,
+                violation_at_entry: reached,
+                start: time,
+            });
         }
         let Some(ramp) = self.ramps.iter().find(|ramp| ramp.features == features) else {
             return bound;

@@ -66,8 +66,15 @@ pub struct CouplingOutput {
 impl Coupling {
     /// Prepares the loop; every buffer gets its final size.
     pub fn new(world: &World, settings: &Settings) -> Self {
-        let textured = world.obstacles.iter().any(|obstacle| obstacle.surface.texture.is_some());
-        let surfaces = if textured { world.obstacles.iter().map(Into::into).collect() } else { Vec::new() };
+        let textured = world
+            .obstacles
+            .iter()
+            .any(|obstacle| obstacle.surface.texture.is_some());
+        let surfaces = if textured {
+            world.obstacles.iter().map(Into::into).collect()
+        } else {
+            Vec::new()
+        };
         let capacity = settings.max_constraints;
         Self {
             settings: *settings,
@@ -78,7 +85,9 @@ impl Coupling {
             },
             surfaces,
             projector: Projector::new(settings.solver, capacity),
-            adaptation: settings.adaptation.map(|a| AdaptationState::new(a, capacity)),
+            adaptation: settings
+                .adaptation
+                .map(|a| AdaptationState::new(a, capacity)),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
             rotation: Vector3::zeros(),
@@ -106,13 +115,16 @@ impl Coupling {
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
         let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
         let shaded = self.gather_rows(time, &reached, &center, set);
-        let projection = self.projector.project(&metric, &unconstrained, &self.rows, &self.warm_start);
+        let projection =
+            self.projector
+                .project(&metric, &unconstrained, &self.rows, &self.warm_start);
         if projection.status != ProjectionStatus::Solved {
             self.warm_start.clear();
             return CouplingOutput::without_force(projection.status);
         }
         self.warm_start.clear();
-        self.warm_start.extend(projection.active.iter().map(|row| row.row));
+        self.warm_start
+            .extend(projection.active.iter().map(|row| row.row));
 
         // F_c = k_h M (a_c - a_u)
         let change = projection.acceleration - unconstrained;
@@ -178,7 +190,11 @@ impl Coupling {
         };
         let contacts = projection.active.iter().filter_map(|active| {
             let constraint = set.constraints.get(active.row as usize)?;
-            Some((constraint.features.obstacle, moved(&constraint.point), constraint.normal))
+            Some((
+                constraint.features.obstacle,
+                moved(&constraint.point),
+                constraint.normal,
+            ))
         });
         perturb_force(wrench, center, &self.surfaces, contacts)
     }
@@ -187,7 +203,11 @@ impl Coupling {
     fn limited(&self, wrench: &Vector6) -> (Vector6, bool) {
         let clamp = |v: Vector3<f64>, limit: f64| {
             let norm = v.norm();
-            if norm <= limit { (v, false) } else { (v * (limit / norm), true) }
+            if norm <= limit {
+                (v, false)
+            } else {
+                (v * (limit / norm), true)
+            }
         };
         let (force, force_clamped) = clamp(linear(wrench), self.settings.force_limit);
         let (torque, torque_clamped) = clamp(angular(wrench), self.settings.torque_limit);

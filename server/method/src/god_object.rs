@@ -35,6 +35,9 @@ use crate::world::World;
 const TRUSTED_SHARE: f64 = 0.5;
 /// How much shorter the motions become when one turns back on the last.
 const TURNING_BACK_DAMPING: f64 = 0.5;
+/// How much shorter a look-ahead becomes that costs too much, and how much longer one that costs little.
+const LOOK_AHEAD_SHRINKS: f64 = 0.5;
+const LOOK_AHEAD_GROWS: f64 = 1.25;
 /// The paper's cone has touching contacts only: gaps up to this many rest distances touch.
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
@@ -55,8 +58,10 @@ pub struct GodObject {
     radius: f64,
     trust_length: f64,
     last_device: Option<Pose>,
-    /// How far the present set looks ahead beyond the activation distance, m.
-    looks_ahead: f64,
+    /// Distance within which the present set has every row, m.
+    collected_within: f64,
+    /// Longest look-ahead that the last ones' cost allows, m.
+    affordable: f64,
 }
 
 /// What the sub-steps of one update hand on.
@@ -101,7 +106,9 @@ pub struct StepReport {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StartError {
     /// The body starts inside an obstacle.
-    #[error("the god-object starts in penetration of obstacle \"{obstacle}\": move god_object.pose until they are apart")]
+    #[error(
+        "the god-object starts in penetration of obstacle \"{obstacle}\": move god_object.pose until they are apart"
+    )]
     Penetration {
         /// The obstacle's name.
         obstacle: String,
@@ -110,7 +117,9 @@ pub enum StartError {
     #[error("the god-object's start pose is not finite: give numbers in god_object.pose")]
     PoseNotFinite,
     /// Mass and inertia make no metric.
-    #[error("the god-object's mass ({mass} kg) and inertia are not positive definite: give a mass above zero and a body with volume")]
+    #[error(
+        "the god-object's mass ({mass} kg) and inertia are not positive definite: give a mass above zero and a body with volume"
+    )]
     Metric {
         /// The mass given, kg.
         mass: f64,
@@ -127,12 +136,20 @@ impl GodObject {
         if !pose_is_finite(&start) {
             return Err(StartError::PoseNotFinite);
         }
-        if world.body.metric(settings.rotation_metric, &start).is_none() {
-            return Err(StartError::Metric { mass: world.body.mass });
+        if world
+            .body
+            .metric(settings.rotation_metric, &start)
+            .is_none()
+        {
+            return Err(StartError::Metric {
+                mass: world.body.mass,
+            });
         }
         for obstacle in &world.obstacles {
             if meshes_intersect(&world.body.mesh, &start, &obstacle.mesh, &obstacle.pose) {
-                return Err(StartError::Penetration { obstacle: obstacle.name.clone() });
+                return Err(StartError::Penetration {
+                    obstacle: obstacle.name.clone(),
+                });
             }
         }
 
@@ -153,9 +170,10 @@ impl GodObject {
             radius,
             trust_length: f64::INFINITY,
             last_device: None,
-            looks_ahead: 0.0,
+            collected_within: 0.0,
+            affordable: settings.look_ahead_limit,
         };
-        god_object.collect(0.0, &mut Work::default());
+        god_object.collect(settings.activation_distance, &mut Work::default());
         Ok(god_object)
     }
 
@@ -203,10 +221,18 @@ impl GodObject {
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
-        let mut update = Update { device_moved, look_ahead: device_moved, last_motion: Vector6::zeros(), damping: 1.0 };
+        let mut update = Update {
+            device_moved,
+            look_ahead: device_moved,
+            last_motion: Vector6::zeros(),
+            damping: 1.0,
+        };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {
-            let budget_left = self.settings.work_budget.is_none_or(|b| report.work.advancement_steps < b);
+            let budget_left = self
+                .settings
+                .work_budget
+                .is_none_or(|b| report.work.advancement_steps < b);
             if !budget_left {
                 break;
             }
@@ -219,8 +245,8 @@ impl GodObject {
             }
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
-        let published = update.look_ahead.min(self.settings.look_ahead_limit);
-        if self.settings.look_ahead && self.looks_ahead < published {
+        let published = self.published_distance(&update);
+        if self.collected_within < published {
             self.collect(published, &mut report.work);
         }
         self.describe_set(&mut report);
@@ -236,7 +262,11 @@ impl GodObject {
             return false;
         }
         // 3. Project, on no more of the way than the linear constraints are trusted for.
-        let trusted = if length > self.trust_length { left * (self.trust_length / length) } else { *left };
+        let trusted = if length > self.trust_length {
+            left * (self.trust_length / length)
+        } else {
+            *left
+        };
         let Some(mut constrained) = self.project(&trusted, report) else {
             return false;
         };
@@ -249,7 +279,8 @@ impl GodObject {
         let covered = self.motion_length(&constrained);
         if report.substeps == 1 {
             // This update covers the share k_s of what is free, the next sets must serve the rest.
-            update.look_ahead = update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+            update.look_ahead =
+                update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
         if !worth_moving {
@@ -269,16 +300,24 @@ impl GodObject {
             self.trust_length *= 2.0;
         }
 
-        // 5. Collect at the pose reached. A motion that arrived is likely the last of the update.
-        let arrived = time >= 1.0 && length <= self.trust_length;
-        let beyond = if arrived { update.look_ahead.min(self.settings.look_ahead_limit) } else { 0.0 };
-        self.collect(beyond, &mut report.work);
+        // 5. Collect at the pose reached: for the next sub-step what it can reach, or all when it is likely the last.
+        let distance = if covered < self.settings.rest_distance {
+            self.published_distance(update)
+        } else {
+            self.settings
+                .activation_distance
+                .min(2.0 * self.settings.rest_distance + covered)
+        };
+        self.collect(distance, &mut report.work);
         true
     }
 
     /// Eq. (1) on the present constraint set; `None` when there is no certified answer.
     fn project(&mut self, unconstrained: &Vector6, report: &mut StepReport) -> Option<Vector6> {
-        let metric = self.world.body.metric(self.settings.rotation_metric, &self.pose)?;
+        let metric = self
+            .world
+            .body
+            .metric(self.settings.rotation_metric, &self.pose)?;
         let center = Point3::from(self.pose_at_reference_point().translation.vector);
         self.rows.clear();
         for constraint in &self.set.constraints {
@@ -288,12 +327,15 @@ impl GodObject {
             });
         }
         report.work.projections += 1;
-        let projection = self.projector.project(&metric, unconstrained, &self.rows, &self.warm_start);
+        let projection =
+            self.projector
+                .project(&metric, unconstrained, &self.rows, &self.warm_start);
         report.kkt = report.kkt.max(projection.kkt_residual);
         report.active = projection.active.len();
         report.solver_fallbacks += u32::from(projection.producer != self.settings.solver);
         self.warm_start.clear();
-        self.warm_start.extend(projection.active.iter().map(|row| row.row));
+        self.warm_start
+            .extend(projection.active.iter().map(|row| row.row));
         match projection.status {
             ProjectionStatus::Solved => Some(projection.acceleration),
             // Two walls nearer to each other than twice the rest distance: the answer without easing out.
@@ -351,15 +393,19 @@ impl GodObject {
         free
     }
 
-    /// Replaces the constraint set by the one that holds at the present pose, with look-ahead `beyond` the activation
-    /// distance.
-    fn collect(&mut self, beyond: f64, work: &mut Work) {
-        let distance = if self.settings.look_ahead {
-            self.settings.activation_distance + beyond
+    /// How far the set that an update publishes collects, m.
+    fn published_distance(&self, update: &Update) -> f64 {
+        if self.settings.look_ahead {
+            self.settings.activation_distance + update.look_ahead.min(self.affordable)
         } else {
             TOUCHING_REST_DISTANCES * self.settings.rest_distance
-        };
-        self.looks_ahead = beyond;
+        }
+    }
+
+    /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
+    fn collect(&mut self, distance: f64, work: &mut Work) {
+        let pairs_before = work.triangle_pairs;
+        self.collected_within = distance;
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;
         self.set.gap_min = f64::INFINITY;
@@ -383,7 +429,12 @@ impl GodObject {
             self.set.truncated |= collected.truncated || self.contacts.len() > room;
             for contact in self.contacts.iter().take(room) {
                 let shading_normal = self.shading[index].as_ref().and_then(|normals| {
-                    normals.at(obstacle, contact.obstacle_triangle, &contact.barycentric, &contact.normal)
+                    normals.at(
+                        obstacle,
+                        contact.obstacle_triangle,
+                        &contact.barycentric,
+                        &contact.normal,
+                    )
                 });
                 self.set.constraints.push(NonPenetrationConstraint {
                     features: contact.features,
@@ -394,8 +445,19 @@ impl GodObject {
                 });
             }
         }
+        let pairs = work.triangle_pairs - pairs_before;
+        if pairs > self.settings.look_ahead_pairs {
+            let beyond = (distance - self.settings.activation_distance).max(0.0);
+            self.affordable = beyond.min(self.affordable) * LOOK_AHEAD_SHRINKS;
+        } else if pairs < self.settings.look_ahead_pairs / 4 {
+            self.affordable = (self.affordable * LOOK_AHEAD_GROWS)
+                .max(self.settings.activation_distance)
+                .min(self.settings.look_ahead_limit);
+        }
         // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
-        self.set.constraints.sort_unstable_by_key(|row| row.features);
+        self.set
+            .constraints
+            .sort_unstable_by_key(|row| row.features);
         self.warm_start.clear();
     }
 

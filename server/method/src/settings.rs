@@ -19,10 +19,11 @@ use crate::quasi_statics::SolverKind;
 const REST_DISTANCE_PER_SIZE: f64 = 1e-4;
 /// Minimum gap per metre of body size: 1 um for a body of 0.1 m, a tenth of the rest distance.
 const MINIMUM_GAP_PER_SIZE: f64 = 1e-5;
-/// Activation distance per metre of body size: 1 mm for a body of 0.1 m, which a hand at 0.3 m/s covers in three updates.
-const ACTIVATION_DISTANCE_PER_SIZE: f64 = 1e-2;
-/// Longest look-ahead per metre of body size: half of it, which a hand at 0.3 m/s covers in 50 ms for a body of 0.04 m.
-const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.5;
+/// Activation distance per metre of body size: 0.4 mm for a body of 0.1 m. What moves is covered by look-ahead; this is for
+/// what begins to move.
+const ACTIVATION_DISTANCE_PER_SIZE: f64 = 4e-3;
+/// Longest look-ahead per metre of body size: a quarter, which a hand at 0.3 m/s covers in 33 ms for a body of 0.04 m.
+const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.25;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
 const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
 
@@ -72,6 +73,9 @@ pub struct Settings {
     pub activation_distance: f64,
     /// Most that look-ahead adds to the activation distance, m.
     pub look_ahead_limit: f64,
+    /// Triangle pairs that one look-ahead may cost. One that costs more shortens the next: late updates must not make
+    /// later ones still later.
+    pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less than this is none, m.
     pub motion_tolerance: f64,
     /// Capacity of the constraint set. The nearest are kept and the set says that it is truncated.
@@ -93,7 +97,10 @@ impl Settings {
             k_s: 0.5,
             k_h: 2000.0,
             rotation_metric: RotationMetric::Inertia,
-            adaptation: Some(Adaptation { duration: 0.02, threshold: -1e-3 }),
+            adaptation: Some(Adaptation {
+                duration: 0.02,
+                threshold: -1e-3,
+            }),
             look_ahead: true,
             force_limit: 20.0,
             torque_limit: 0.5,
@@ -102,6 +109,7 @@ impl Settings {
             gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
             activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
             look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
+            look_ahead_pairs: 8_000,
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,
@@ -113,7 +121,11 @@ impl Settings {
 
     /// The method as published: a cone of touching contacts, one projection and one collision search per update.
     pub fn paper(size: f64) -> Self {
-        Self { look_ahead: false, max_substeps: 1, ..Self::for_size(size) }
+        Self {
+            look_ahead: false,
+            max_substeps: 1,
+            ..Self::for_size(size)
+        }
     }
 
     /// The translational stiffness that the hand feels, `k_h k_s m`, N/m.
@@ -126,14 +138,22 @@ impl Settings {
     #[inline]
     pub(crate) fn motion_bound(&self, gap: f64) -> f64 {
         let bound = self.rest_distance - gap;
-        if self.look_ahead { bound } else { bound.max(0.0) }
+        if self.look_ahead {
+            bound
+        } else {
+            bound.max(0.0)
+        }
     }
 
     /// Bound of a row in the coupling loop, m: the same, but a_u is only the fraction k_s of the difference, and a body
     /// nearer than the rest distance is not pushed: there is no force at a distance.
     #[inline]
     pub(crate) fn coupling_bound(&self, gap: f64) -> f64 {
-        if self.look_ahead { (self.k_s * (self.rest_distance - gap)).min(0.0) } else { 0.0 }
+        if self.look_ahead {
+            (self.k_s * (self.rest_distance - gap)).min(0.0)
+        } else {
+            0.0
+        }
     }
 
     /// Says what is out of range, by the key's name.
@@ -153,33 +173,65 @@ impl Settings {
             }
         }
         if self.k_s > 1.0 {
-            return Err(SettingsError::Above { key: "k_s", value: self.k_s, limit: 1.0 });
+            return Err(SettingsError::Above {
+                key: "k_s",
+                value: self.k_s,
+                limit: 1.0,
+            });
         }
         if let RotationMetric::RadiusOfGyration(radius) = self.rotation_metric
             && !(radius.is_finite() && radius > 0.0)
         {
-            return Err(SettingsError::NotPositive { key: "rotation_metric", value: radius });
+            return Err(SettingsError::NotPositive {
+                key: "rotation_metric",
+                value: radius,
+            });
         }
         if let Some(adaptation) = self.adaptation {
             if !(adaptation.duration.is_finite() && adaptation.duration >= 0.0) {
-                return Err(SettingsError::NotPositive { key: "adaptation.duration", value: adaptation.duration });
+                return Err(SettingsError::NotPositive {
+                    key: "adaptation.duration",
+                    value: adaptation.duration,
+                });
             }
             if !(adaptation.threshold.is_finite() && adaptation.threshold <= 0.0) {
-                return Err(SettingsError::Above { key: "adaptation.threshold", value: adaptation.threshold, limit: 0.0 });
+                return Err(SettingsError::Above {
+                    key: "adaptation.threshold",
+                    value: adaptation.threshold,
+                    limit: 0.0,
+                });
             }
         }
         let ordered = [
-            ("minimum_gap + gap_tolerance", self.minimum_gap + self.gap_tolerance, "rest_distance", self.rest_distance),
-            ("rest_distance", self.rest_distance, "activation_distance", self.activation_distance),
+            (
+                "minimum_gap + gap_tolerance",
+                self.minimum_gap + self.gap_tolerance,
+                "rest_distance",
+                self.rest_distance,
+            ),
+            (
+                "rest_distance",
+                self.rest_distance,
+                "activation_distance",
+                self.activation_distance,
+            ),
         ];
         for (smaller, small, larger, large) in ordered {
             let in_order = small < large; // false for NaN
             if !in_order {
-                return Err(SettingsError::NotOrdered { smaller, small, larger, large });
+                return Err(SettingsError::NotOrdered {
+                    smaller,
+                    small,
+                    larger,
+                    large,
+                });
             }
         }
         if !(self.look_ahead_limit.is_finite() && self.look_ahead_limit >= 0.0) {
-            return Err(SettingsError::NotPositive { key: "look_ahead_limit", value: self.look_ahead_limit });
+            return Err(SettingsError::NotPositive {
+                key: "look_ahead_limit",
+                value: self.look_ahead_limit,
+            });
         }
         if self.max_constraints == 0 || self.max_substeps == 0 || self.max_advancement_steps == 0 {
             return Err(SettingsError::ZeroCapacity);
@@ -242,10 +294,18 @@ mod tests {
     fn lengths_out_of_order_and_nan_are_named() {
         let mut settings = Settings::for_size(0.1);
         settings.rest_distance = settings.activation_distance;
-        assert!(settings.validate().is_err_and(|e| e.to_string().contains("activation_distance")));
+        assert!(
+            settings
+                .validate()
+                .is_err_and(|e| e.to_string().contains("activation_distance"))
+        );
         settings = Settings::for_size(0.1);
         settings.k_h = f64::NAN;
-        assert!(settings.validate().is_err_and(|e| e.to_string().contains("k_h")));
+        assert!(
+            settings
+                .validate()
+                .is_err_and(|e| e.to_string().contains("k_h"))
+        );
         settings = Settings::for_size(0.1);
         settings.rest_distance = f64::NAN;
         assert!(settings.validate().is_err());

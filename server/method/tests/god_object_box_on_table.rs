@@ -23,7 +23,11 @@ fn loops() -> (GodObject, Coupling, Settings) {
     let world = box_on_table();
     let settings = Settings::for_size(0.04);
     let coupling = Coupling::new(&world, &settings);
-    (GodObject::new(world, settings, start()).expect("a free start"), coupling, settings)
+    (
+        GodObject::new(world, settings, start()).expect("a free start"),
+        coupling,
+        settings,
+    )
 }
 
 #[test]
@@ -37,7 +41,11 @@ fn free_space_has_no_force_and_the_body_follows() {
         );
         god_object.step(&device, None);
         let felt = coupling.step(t, &device, god_object.constraint_set());
-        assert!(felt.wrench.iter().all(|&component| component == 0.0), "{}", felt.wrench);
+        assert!(
+            felt.wrench.iter().all(|&component| component == 0.0),
+            "{}",
+            felt.wrench
+        );
         if i > 60 {
             let lag = (god_object.pose().translation.vector - device.translation.vector).norm();
             assert!(lag < 3e-3, "{lag}");
@@ -56,11 +64,18 @@ fn pushing_down_gives_stiffness_times_depth_and_nothing_else() {
     let felt = coupling.step(1.0, &device, god_object.constraint_set());
     // The surface felt lies one rest distance above the true one.
     let expected = STIFFNESS * (depth + settings.rest_distance);
-    assert!((linear(&felt.wrench).z - expected).abs() < 1e-6, "{}", felt.wrench);
+    assert!(
+        (linear(&felt.wrench).z - expected).abs() < 1e-6,
+        "{}",
+        felt.wrench
+    );
     assert!(linear(&felt.wrench).xy().norm() < 1e-6, "{}", felt.wrench);
     assert!(angular(&felt.wrench).norm() < 1e-6, "{}", felt.wrench);
     let rest = god_object.pose().translation.vector.z - HALF_HEIGHT;
-    assert!((rest - settings.rest_distance).abs() < 0.01 * settings.rest_distance, "{rest}");
+    assert!(
+        (rest - settings.rest_distance).abs() < 0.01 * settings.rest_distance,
+        "{rest}"
+    );
 }
 
 #[test]
@@ -68,11 +83,19 @@ fn push_slide_lift_has_no_friction_and_no_sticking() {
     let (mut god_object, mut coupling, _) = loops();
     for i in 0..2000 {
         let t = f64::from(i) * 1e-3;
-        let z = if t < 1.0 { HALF_HEIGHT - 5e-3 } else { HALF_HEIGHT - 5e-3 + 0.05 * (t - 1.0) };
+        let z = if t < 1.0 {
+            HALF_HEIGHT - 5e-3
+        } else {
+            HALF_HEIGHT - 5e-3 + 0.05 * (t - 1.0)
+        };
         let device = at(0.1 * t, 0.0, z);
         god_object.step(&device, None);
         let felt = coupling.step(t, &device, god_object.constraint_set());
-        assert!(felt.wrench[0].abs() <= 1e-9 * linear(&felt.wrench).norm().max(1.0), "{t} {}", felt.wrench);
+        assert!(
+            felt.wrench[0].abs() <= 1e-9 * linear(&felt.wrench).norm().max(1.0),
+            "{t} {}",
+            felt.wrench
+        );
         if t > 0.1 && t < 1.0 {
             assert!((felt.wrench[2] - 5.0).abs() < 0.02, "{t} {}", felt.wrench);
         }
@@ -94,9 +117,14 @@ fn look_ahead_makes_the_force_grow_smoothly_at_any_update_rate() {
             if i % period_ms == 0 {
                 god_object.step(&device, None);
             }
-            let force = coupling.step(t, &device, god_object.constraint_set()).wrench[2];
+            let force = coupling
+                .step(t, &device, god_object.constraint_set())
+                .wrench[2];
             if force < 15.0 {
-                assert!(force - last <= 0.301, "{period_ms} ms: {last} to {force} N at {t}");
+                assert!(
+                    force - last <= 0.301,
+                    "{period_ms} ms: {last} to {force} N at {t}"
+                );
             }
             last = force;
         }
@@ -107,16 +135,23 @@ fn look_ahead_makes_the_force_grow_smoothly_at_any_update_rate() {
 #[test]
 fn a_body_at_rest_does_not_move_by_a_single_bit() {
     let (mut god_object, mut coupling, _) = loops();
-    let device = Pose::new(Vector3::new(0.003, -0.002, 0.005), Vector3::new(0.2, -0.1, 0.4));
+    let device = Pose::new(
+        Vector3::new(0.003, -0.002, 0.005),
+        Vector3::new(0.2, -0.1, 0.4),
+    );
     for _ in 0..200 {
         god_object.step(&device, None);
     }
     let rest = *god_object.pose();
-    let force = coupling.step(0.0, &device, god_object.constraint_set()).wrench;
+    let force = coupling
+        .step(0.0, &device, god_object.constraint_set())
+        .wrench;
     for i in 1..200 {
         god_object.step(&device, None);
         assert_eq!(*god_object.pose(), rest);
-        let now = coupling.step(f64::from(i) * 1e-3, &device, god_object.constraint_set()).wrench;
+        let now = coupling
+            .step(f64::from(i) * 1e-3, &device, god_object.constraint_set())
+            .wrench;
         assert!((now - force).norm() < 1e-12);
     }
 }
@@ -160,7 +195,10 @@ fn a_broken_device_pose_moves_nothing_and_gives_no_force() {
 fn a_jump_through_the_table_stops_above_it() {
     let (mut god_object, _, _) = loops();
     for _ in 0..100 {
-        god_object.step(&Pose::new(Vector3::new(0.05, 0.0, -0.4), Vector3::new(2.0, 0.0, 0.0)), None);
+        god_object.step(
+            &Pose::new(Vector3::new(0.05, 0.0, -0.4), Vector3::new(2.0, 0.0, 0.0)),
+            None,
+        );
         assert!(god_object.pose().translation.vector.z > 0.0);
         assert!(!penetrates(&box_on_table(), god_object.pose()));
     }
@@ -185,7 +223,11 @@ fn force_is_clamped_by_norm_with_its_direction_kept() {
     }
     let felt = coupling.step(1.0, &device, god_object.constraint_set());
     assert!(felt.saturated);
-    assert!((linear(&felt.wrench) - Vector3::z() * settings.force_limit).norm() < 1e-6, "{}", felt.wrench);
+    assert!(
+        (linear(&felt.wrench) - Vector3::z() * settings.force_limit).norm() < 1e-6,
+        "{}",
+        felt.wrench
+    );
 }
 
 proptest! {

@@ -15,7 +15,11 @@ fn god_object_and_coupling_steps_allocate_nothing() {
     let mut world = World::clone(&support::box_on_table());
     world.obstacles[0].surface = Surface {
         shading: Some(ForceShading { crease_angle: 0.6 }),
-        texture: Some(SineTexture { axis: Vector3::x(), wavelength: 2e-3, amplitude: 0.2 }),
+        texture: Some(SineTexture {
+            axis: Vector3::x(),
+            wavelength: 2e-3,
+            amplitude: 0.2,
+        }),
     };
     let world = Arc::new(world);
     let settings = Settings::for_size(0.04);
@@ -28,8 +32,15 @@ fn god_object_and_coupling_steps_allocate_nothing() {
     for i in 0..600 {
         let t = f64::from(i) * 1e-3;
         // Lands on a corner, presses, rolls over edges, jumps away and through.
-        let z = if i % 200 == 199 { -0.3 } else { 0.02 - 0.03 * (9.0 * t).sin() };
-        let device = Pose::new(Vector3::new(0.1 * t, 0.02 * (5.0 * t).sin(), z), Vector3::new(3.0 * t, 0.4, 2.0 * t));
+        let z = if i % 200 == 199 {
+            -0.3
+        } else {
+            0.02 - 0.03 * (9.0 * t).sin()
+        };
+        let device = Pose::new(
+            Vector3::new(0.1 * t, 0.02 * (5.0 * t).sin(), z),
+            Vector3::new(3.0 * t, 0.4, 2.0 * t),
+        );
         assert_no_alloc(|| {
             let shaded = coupling.step(t, &device, &published).shaded;
             touched += god_object.step(&device, shaded.as_ref()).contacts;

@@ -51,7 +51,9 @@ impl ShadingNormals {
         let sum = corners
             .iter()
             .zip(barycentric)
-            .fold(Vector3::zeros(), |sum, (normal, weight)| sum + normal * *weight);
+            .fold(Vector3::zeros(), |sum, (normal, weight)| {
+                sum + normal * *weight
+            });
         let normal = obstacle.pose.rotation * sum.try_normalize(LEAST_COSINE)?;
         let agrees = normal.dot(true_normal) > LEAST_COSINE; // false for NaN
         agrees.then_some(normal)

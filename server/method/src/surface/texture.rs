@@ -24,7 +24,10 @@ pub struct TexturedSurface {
 
 impl From<&Obstacle> for TexturedSurface {
     fn from(obstacle: &Obstacle) -> Self {
-        Self { pose: obstacle.pose, texture: obstacle.surface.texture }
+        Self {
+            pose: obstacle.pose,
+            texture: obstacle.surface.texture,
+        }
     }
 }
 
@@ -51,10 +54,18 @@ pub fn perturb_force(
     for (obstacle, point, normal) in contacts {
         count += 1.0;
         arm += point - reference_point;
-        let Some(surface) = surfaces.get(usize::from(obstacle)) else { continue };
-        let Some(texture) = &surface.texture else { continue };
+        let Some(surface) = surfaces.get(usize::from(obstacle)) else {
+            continue;
+        };
+        let Some(texture) = &surface.texture else {
+            continue;
+        };
         textured = true;
-        let along = surface.pose.inverse_transform_point(&point).coords.dot(&texture.axis);
+        let along = surface
+            .pose
+            .inverse_transform_point(&point)
+            .coords
+            .dot(&texture.axis);
         let axis = surface.pose.rotation * texture.axis;
         let tangent = axis - normal * axis.dot(&normal);
         let phase = std::f64::consts::TAU * along / texture.wavelength;
@@ -65,7 +76,9 @@ pub fn perturb_force(
     }
 
     let tilted = force / magnitude + tilt / count;
-    let Some(direction) = tilted.try_normalize(SMALLEST_FORCE) else { return *wrench };
+    let Some(direction) = tilted.try_normalize(SMALLEST_FORCE) else {
+        return *wrench;
+    };
     let change = direction * magnitude - force;
     wrench + six(&change, &(arm / count).cross(&change))
 }
@@ -76,7 +89,10 @@ mod tests {
     use crate::spatial::angular;
 
     fn plate(texture: Option<SineTexture>) -> TexturedSurface {
-        TexturedSurface { pose: Pose::identity(), texture }
+        TexturedSurface {
+            pose: Pose::identity(),
+            texture,
+        }
     }
 
     const TEXTURE: SineTexture = SineTexture {
@@ -94,7 +110,10 @@ mod tests {
         let felt = perturb_force(&wrench, &Point3::origin(), &surfaces, contacts.into_iter());
         assert!((linear(&felt).norm() - 5.0).abs() < 1e-12);
         assert!((felt[0] / felt[2] - 0.2).abs() < 1e-12);
-        assert!((angular(&felt) - crest.coords.cross(&(linear(&felt) - Vector3::z() * 5.0))).norm() < 1e-12);
+        assert!(
+            (angular(&felt) - crest.coords.cross(&(linear(&felt) - Vector3::z() * 5.0))).norm()
+                < 1e-12
+        );
     }
 
     #[test]
@@ -103,7 +122,12 @@ mod tests {
         let crest = (0, Point3::new(0.5e-3, 0.0, 0.0), Vector3::z());
         let trough = (0, Point3::new(1.5e-3, 0.0, 0.0), Vector3::z());
         let surfaces = [plate(Some(TEXTURE))];
-        let felt = perturb_force(&wrench, &Point3::origin(), &surfaces, [crest, trough].into_iter());
+        let felt = perturb_force(
+            &wrench,
+            &Point3::origin(),
+            &surfaces,
+            [crest, trough].into_iter(),
+        );
         assert!((felt - wrench).norm() < 1e-12);
     }
 
@@ -111,6 +135,14 @@ mod tests {
     fn a_plain_surface_changes_nothing() {
         let wrench = Vector6::new(1.0, 2.0, 5.0, 0.1, 0.2, 0.3);
         let contacts = [(0, Point3::new(0.5e-3, 0.0, 0.0), Vector3::z())];
-        assert_eq!(perturb_force(&wrench, &Point3::origin(), &[plate(None)], contacts.into_iter()), wrench);
+        assert_eq!(
+            perturb_force(
+                &wrench,
+                &Point3::origin(),
+                &[plate(None)],
+                contacts.into_iter()
+            ),
+            wrench
+        );
     }
 }

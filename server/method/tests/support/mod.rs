@@ -15,8 +15,18 @@ pub fn box_mesh(half: Vector3<f64>) -> Mesh {
         let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
         Point3::new(sign(1) * half.x, sign(2) * half.y, sign(4) * half.z)
     };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = quads
+        .iter()
+        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
+        .collect();
     Mesh::new((0..8).map(corner).collect(), triangles).expect("a box is closed")
 }
 
@@ -40,7 +50,10 @@ pub fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>) -> Obs
     Obstacle {
         name: name.into(),
         mesh: box_mesh(half),
-        pose: Pose::from_parts(center.into(), god_object::nalgebra::UnitQuaternion::identity()),
+        pose: Pose::from_parts(
+            center.into(),
+            god_object::nalgebra::UnitQuaternion::identity(),
+        ),
         surface: Surface::default(),
     }
 }
@@ -49,7 +62,11 @@ pub fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>) -> Obs
 pub fn box_on_table() -> Arc<World> {
     Arc::new(World {
         body: box_body(Vector3::new(0.02, 0.02, 0.01)),
-        obstacles: vec![box_obstacle("table", Vector3::new(0.5, 0.5, 0.05), Vector3::new(0.0, 0.0, -0.05))],
+        obstacles: vec![box_obstacle(
+            "table",
+            Vector3::new(0.5, 0.5, 0.05),
+            Vector3::new(0.0, 0.0, -0.05),
+        )],
     })
 }
 
@@ -61,7 +78,9 @@ pub fn penetrates(world: &World, pose: &Pose) -> bool {
         let identity = math::Pose::IDENTITY;
         body.iter().any(|a| {
             others.iter().any(|b| {
-                intersection_test(&identity, a, &identity, b).expect("triangles are supported").intersecting
+                intersection_test(&identity, a, &identity, b)
+                    .expect("triangles are supported")
+                    .intersecting
             })
         })
     })
@@ -72,5 +91,8 @@ fn triangles_in_world(mesh: &Mesh, pose: &Pose) -> Vec<Triangle> {
         let p = pose * mesh.vertices()[index as usize];
         math::Vector::new(p.x, p.y, p.z)
     };
-    mesh.triangles().iter().map(|t| Triangle::new(vertex(t[0]), vertex(t[1]), vertex(t[2]))).collect()
+    mesh.triangles()
+        .iter()
+        .map(|t| Triangle::new(vertex(t[0]), vertex(t[1]), vertex(t[2])))
+        .collect()
 }
