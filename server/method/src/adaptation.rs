@@ -97,9 +97,8 @@ impl AdaptationState {
             return bound;
         };
         let progress = ((time - ramp.start) / self.adaptation.duration).clamp(0.0, 1.0);
-        // Also true for NaN: a broken clock or duration lets the constraint in at once.
-        let arrived = !(progress < 1.0);
-        if arrived {
+        let on_its_way = progress < 1.0; // false for NaN: a broken clock lets the constraint in at once
+        if !on_its_way {
             return bound;
         }
         let entering = ramp.violation_at_entry + (bound - ramp.violation_at_entry) * progress;
