@@ -141,7 +141,8 @@ impl ClientRecord {
             frames,
             fps: f64::from(self.newest.fps),
             pose_age_ms: of_reports(&self.age_medians_ms, self.age_p99_ms, self.age_max_ms),
-            swap_skew_us: of_reports(&self.skew_medians_us, self.skew_max_us, self.skew_max_us),
+            swap_skew_us: (self.skew_max_us > 0.0)
+                .then(|| of_reports(&self.skew_medians_us, self.skew_max_us, self.skew_max_us)),
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,
         }

@@ -32,10 +32,6 @@ use crate::timing::distribution_of;
 
 /// A replay that takes longer shows its progress.
 const SILENT_TIME: Duration = Duration::from_secs(2);
-/// What `--budget-us` counts in: a step of conservative advancement is taken for this much work, us. Nominal, so that the answer is
-/// the same on every machine; two bunnies of 27,000 triangles cost about as much.
-const ADVANCEMENT_STEP_US: u64 = 10;
-
 /// A share of the virtual period by which a row may come early and still trigger the update: traces are written in decimals.
 const EARLY_SHARE: f64 = 1e-6;
 
@@ -49,7 +45,7 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
         settings.solver = solver.into();
     }
     if let Some(microseconds) = args.budget_us {
-        settings.work_budget = Some(microseconds.div_ceil(ADVANCEMENT_STEP_US));
+        settings.work_budget = Some(microseconds);
     }
     let MethodChoice::GodObject = args.method;
     let mut replay = Replay::new(

@@ -75,8 +75,8 @@ pub struct ClientReport {
     pub fps: f64,
     /// Age of the pose at the frame that showed it.
     pub pose_age_ms: Distribution,
-    /// Difference of the swap times between nodes.
-    pub swap_skew_us: Distribution,
+    /// Difference of the swap times between nodes; `null` where frames are not locked, since nothing is measured then.
+    pub swap_skew_us: Option<Distribution>,
     /// Datagrams that never arrived.
     pub packets_lost: u64,
     /// Frames whose state differed from another node's.

@@ -232,7 +232,7 @@ impl GodObject {
             let budget_left = self
                 .settings
                 .work_budget
-                .is_none_or(|b| report.work.advancement_steps < b);
+                .is_none_or(|budget| report.work.nominal_us() < budget);
             if !budget_left {
                 break;
             }

@@ -84,7 +84,8 @@ pub struct Settings {
     pub max_substeps: u32,
     /// Most evaluations of one feature pair's gap in one collision search.
     pub max_advancement_steps: u32,
-    /// Advancement steps after which an update starts no further sub-step; `None` is no budget.
+    /// Nominal microseconds of work ([`Work::nominal_us`](crate::collision::Work::nominal_us)) after which an update starts
+    /// no further sub-step; `None` is no budget.
     pub work_budget: Option<u64>,
     /// Solver of the god-object loop's and the coupling's projections.
     pub solver: SolverKind,

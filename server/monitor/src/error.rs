@@ -20,7 +20,7 @@ pub enum MonitorError {
     },
     /// The stream's server did not come up although its port was free.
     #[error(
-        "the monitoring stream did not start on {address} within {waited_s} s; look for a rerun message above, or choose another monitor.grpc_port"
+        "the monitoring stream did not start on {address} within {waited_s} s; look for a rerun message above, or choose another monitoring.grpc_port"
     )]
     NoAnswer {
         /// Address and port asked for.
@@ -29,7 +29,7 @@ pub enum MonitorError {
         waited_s: u64,
     },
     /// The recording cannot be written.
-    #[error("the recording {} cannot be written ({reason}); check monitor.record", path.display())]
+    #[error("the recording {} cannot be written ({reason}); check monitoring.record", path.display())]
     Record {
         /// The file asked for.
         path: PathBuf,

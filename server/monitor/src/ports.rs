@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use crate::error::MonitorError;
 
 /// Configuration key of the stream's port, for messages.
-pub(crate) const GRPC_KEY: &str = "monitor.grpc_port";
+pub(crate) const GRPC_KEY: &str = "monitoring.grpc_port";
 /// Configuration key of the web page's port, for messages.
-pub(crate) const WEB_KEY: &str = "monitor.web_port";
+pub(crate) const WEB_KEY: &str = "monitoring.web_port";
 
 /// How long the stream's server may take to listen; it needs milliseconds on an idle machine.
 const LISTEN_TIMEOUT: Duration = Duration::from_secs(10);

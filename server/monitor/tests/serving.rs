@@ -106,8 +106,8 @@ fn an_occupied_port_is_an_error_that_names_port_and_key() {
         ..on_free_ports()
     };
     for (options, key) in [
-        (stream_taken, "monitor.grpc_port"),
-        (page_taken, "monitor.web_port"),
+        (stream_taken, "monitoring.grpc_port"),
+        (page_taken, "monitoring.web_port"),
     ] {
         let error = Monitor::start(&options, MonitorScene::new("empty")).unwrap_err();
         assert!(matches!(error, MonitorError::Listen { .. }));

@@ -10,7 +10,7 @@ use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::Triangle;
 
 /// A box with the given half extents, 12 triangles, outward.
-pub fn box_mesh(half: Vector3<f64>) -> Mesh {
+pub(crate) fn box_mesh(half: Vector3<f64>) -> Mesh {
     let corner = |i: u32| {
         let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
         Point3::new(sign(1) * half.x, sign(2) * half.y, sign(4) * half.z)
@@ -31,7 +31,7 @@ pub fn box_mesh(half: Vector3<f64>) -> Mesh {
 }
 
 /// A box of 1 kg with its centre of mass in the middle.
-pub fn box_body(half: Vector3<f64>) -> Body {
+pub(crate) fn box_body(half: Vector3<f64>) -> Body {
     let square = half.component_mul(&half) * (4.0 / 12.0);
     Body {
         mesh: box_mesh(half),
@@ -46,7 +46,7 @@ pub fn box_body(half: Vector3<f64>) -> Body {
 }
 
 /// A box-shaped obstacle.
-pub fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>) -> Obstacle {
+pub(crate) fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>) -> Obstacle {
     Obstacle {
         name: name.into(),
         mesh: box_mesh(half),
@@ -59,7 +59,7 @@ pub fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>) -> Obs
 }
 
 /// A box of 40 x 40 x 20 mm over a table whose surface is z = 0.
-pub fn box_on_table() -> Arc<World> {
+pub(crate) fn box_on_table() -> Arc<World> {
     Arc::new(World {
         body: box_body(Vector3::new(0.02, 0.02, 0.01)),
         obstacles: vec![box_obstacle(
@@ -71,7 +71,7 @@ pub fn box_on_table() -> Arc<World> {
 }
 
 /// Whether any triangle of `body` at `pose` intersects any triangle of an obstacle: every pair, by parry.
-pub fn penetrates(world: &World, pose: &Pose) -> bool {
+pub(crate) fn penetrates(world: &World, pose: &Pose) -> bool {
     let body = triangles_in_world(&world.body.mesh, pose);
     world.obstacles.iter().any(|obstacle| {
         let others = triangles_in_world(&obstacle.mesh, &obstacle.pose);

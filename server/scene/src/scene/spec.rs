@@ -171,7 +171,7 @@ pub struct MethodSpec {
     pub max_substeps: Option<u32>,
     /// Evaluations in one collision search.
     pub max_advancement_steps: Option<u32>,
-    /// Advancement steps of one update.
+    /// Nominal microseconds of work of one update.
     pub work_budget: Option<u64>,
     /// Solver of the projections.
     pub solver: Option<SolverKind>,
