@@ -2,7 +2,7 @@
 //!
 //! | symbol  | name in code          | unit | meaning                                                   |
 //! |---------|-----------------------|------|-----------------------------------------------------------|
-//! | [pqrs]  | `side(p, q, r, s)`    | –    | sign of det(q - p, r - p, s - p); 0 when rounding decides |
+//! | \[pqrs\]  | `side(p, q, r, s)`    | –    | sign of det(q - p, r - p, s - p); 0 when rounding decides |
 //!
 //! A sign that rounding decides counts as touching, so the answer may say yes for triangles apart by some 1e-15 of their size, and
 //! never no for triangles that cross. (parry's own test of triangles says yes at gaps of a thousandth of their size: see the tests.)
