@@ -19,7 +19,7 @@ use std::time::Duration;
 use nalgebra::Point3;
 use taut_link::proto::SceneDescription;
 use taut_link::proto::control::LogLevel;
-use taut_link::{ClientLink, ClientOptions, LinkError, Role, connect, read_key_file};
+use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
 use crate::bridge_loop::{BridgeLoop, Notice};
 use crate::cli::{BridgeArgs, DeviceChoice};
@@ -130,7 +130,7 @@ impl BridgeError {
     }
 }
 
-/// Runs a bridge until `--duration`, a signal, the end of its trace, or the loss of the server.
+/// Runs a bridge until `--duration`, a signal, the end of its trace, or that of the server.
 ///
 /// # Errors
 /// [`BridgeError`]: bad input is found before anything is started.
@@ -279,6 +279,9 @@ enum SessionEnd {
     Duration,
     Signal,
     TraceEnded,
+    /// The server told its clients that it stops.
+    ServerStopped,
+    /// It is gone for another reason.
     ServerLost(String),
 }
 
@@ -311,6 +314,14 @@ impl Run<'_> {
                 SessionEnd::Duration => return Ok(self.report(&bridge, "done")),
                 SessionEnd::Signal => return Ok(self.report(&bridge, "stopped by a signal")),
                 SessionEnd::TraceEnded => return Ok(self.report(&bridge, "the trace ended")),
+                SessionEnd::ServerStopped if self.args.reconnect => {
+                    tracing::info!("the server stopped: the force is zero; waiting for it");
+                    link = self.reconnect();
+                }
+                SessionEnd::ServerStopped => {
+                    tracing::info!("the server stopped: the force is zero");
+                    return Ok(self.report(&bridge, "the server stopped"));
+                }
                 SessionEnd::ServerLost(reason) if self.args.reconnect => {
                     tracing::warn!(
                         "the server was lost ({reason}): the force is zero; trying again"
@@ -388,7 +399,10 @@ impl Run<'_> {
             thread::sleep(WATCH_PERIOD);
             end = self.session_end(&link, &notices);
         }
-        if matches!(end, Some(SessionEnd::ServerLost(_))) {
+        if matches!(
+            end,
+            Some(SessionEnd::ServerStopped | SessionEnd::ServerLost(_))
+        ) {
             // Let the force fade as on any silence, rather than cut it.
             let settings = SafetySettings::default();
             thread::sleep(settings.hold + settings.ramp_out);
@@ -419,7 +433,13 @@ impl Run<'_> {
         } else if self.is_over() {
             Some(SessionEnd::Duration)
         } else {
-            link.is_closed().map(SessionEnd::ServerLost)
+            link.is_closed().map(|reason| {
+                if reason.contains(STOP_REASON) {
+                    SessionEnd::ServerStopped
+                } else {
+                    SessionEnd::ServerLost(reason)
+                }
+            })
         }
     }
 

@@ -112,7 +112,7 @@ fn parse_transport(text: &str) -> Result<Transport, String> {
 }
 
 /// Runs a bridge as a process: report on standard output, one sentence per mistake on standard error. Returns the exit
-/// code: 0 done, 1 the server was lost, 2 bad input.
+/// code: 0 done or the server stopped, 1 the server was lost, 2 bad input.
 #[must_use]
 pub fn execute(args: &BridgeArgs) -> ExitCode {
     let (report, code) = match run(args) {

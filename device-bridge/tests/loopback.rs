@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use nalgebra::Vector6;
 use taut_bridge::{
-    BridgeArgs, BridgeError, DEFAULT_MAX_AGE, Device, DeviceLimits, RemoteDevice, run,
+    BridgeArgs, BridgeError, BridgeReport, DEFAULT_MAX_AGE, Device, DeviceLimits, RemoteDevice, run,
 };
 use taut_link::proto::mesh_blob::Positions;
 use taut_link::proto::scene::{BodyDescription, ShowOptions};
@@ -172,6 +172,16 @@ impl Workbench {
         }
     }
 
+    /// The server is gone without a word, as when its cable is pulled.
+    fn vanish(&mut self) {
+        let link = self.link.take().expect("running");
+        let empty = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .expect("a runtime");
+        std::mem::replace(&mut self.runtime, empty).shutdown_timeout(Duration::from_secs(1));
+        drop(link); // nothing is left that could send its farewell
+    }
+
     fn finish(mut self) -> Seen {
         self.stop.store(true, Ordering::Relaxed);
         let haptics = self.haptics.take().expect("started");
@@ -257,16 +267,34 @@ fn a_trace_is_replayed_to_its_end() {
     assert!(seen.lowest_z < -0.015, "{} m", seen.lowest_z);
 }
 
+fn run_in_background(args: BridgeArgs) -> JoinHandle<Result<BridgeReport, BridgeError>> {
+    thread::Builder::new()
+        .name("bridge".to_owned())
+        .spawn(move || run(&args))
+        .expect("a thread")
+}
+
+#[test]
+fn a_server_that_stops_in_good_order_ends_the_bridge_without_an_error() {
+    let mut workbench = Workbench::start();
+    let bridge = run_in_background(workbench.args(&["--duration", "60"]));
+    workbench.wait_for_inputs(50);
+    workbench.shut_down();
+    let report = bridge
+        .join()
+        .expect("no panic")
+        .expect("the end of the session is no failure");
+    assert_eq!(report.ended, "the server stopped");
+    assert!(report.ticks > 50 && report.sessions == 1, "{report}");
+    workbench.finish();
+}
+
 #[test]
 fn a_lost_server_ends_the_bridge_with_a_sentence_and_code_1() {
     let mut workbench = Workbench::start();
-    let args = workbench.args(&["--duration", "60"]);
-    let bridge = thread::Builder::new()
-        .name("bridge".to_owned())
-        .spawn(move || run(&args))
-        .expect("a thread");
+    let bridge = run_in_background(workbench.args(&["--duration", "60"]));
     workbench.wait_for_inputs(50);
-    workbench.shut_down();
+    workbench.vanish();
     let error = bridge
         .join()
         .expect("no panic")

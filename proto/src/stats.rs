@@ -9,12 +9,18 @@ pub struct ClientStats {
     pub frames: u64,
     /// Frames per second since the last report.
     pub fps: f32,
-    /// Median age of the drawn state when it was taken to be drawn, ms.
+    /// Median age of the drawn state's sample when it was taken to be drawn, ms.
     pub pose_age_ms_p50: f32,
     /// 99th percentile of the same, ms.
     pub pose_age_ms_p99: f32,
     /// Largest of the same, ms.
     pub pose_age_ms_max: f32,
+    /// Median age of the same sample when the frame was finished: drawn by the graphics card and handed to the screen, ms.
+    pub drawn_age_ms_p50: f32,
+    /// 99th percentile of the same, ms.
+    pub drawn_age_ms_p99: f32,
+    /// Largest of the same, ms.
+    pub drawn_age_ms_max: f32,
     /// Median difference of the present call to the planned time, ms; 0 where frames are not locked.
     pub swap_skew_ms_p50: f32,
     /// Largest of the same, ms.
@@ -44,6 +50,9 @@ wire_struct!(ClientStats {
     pose_age_ms_p50,
     pose_age_ms_p99,
     pose_age_ms_max,
+    drawn_age_ms_p50,
+    drawn_age_ms_p99,
+    drawn_age_ms_max,
     swap_skew_ms_p50,
     swap_skew_ms_max,
     packets_lost,

@@ -70,7 +70,7 @@ pub(crate) fn run(
                 last_drawn = drawn;
                 canvas.draw(&latched, plan.show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
-                statistics.frame(&latched.state, latched.stale, taken_ns, drawn_ns);
+                statistics.frame(&latched, taken_ns, drawn_ns);
                 write_pictures(canvas, plan, statistics.frames)?;
                 if plan
                     .frames

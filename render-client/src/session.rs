@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{Point3, Vector3};
-use taut_link::{ClientLink, ClientOptions, ReceivedState, connect};
+use taut_link::{ClientLink, ClientOptions, ReceivedState, STOP_REASON, connect};
 use taut_proto::state::HEAD_TRACKED;
 use taut_proto::{ClientStats, Role};
 
@@ -12,9 +12,6 @@ use crate::description::{self, Overrides};
 use crate::error::RenderError;
 use crate::stage::{Show, Stage};
 use crate::timeline::{Contact, Head, State, Timeline};
-
-/// What the server says when it ends in good order.
-const STOP_REASON: &str = "server is stopping";
 
 /// An open session. The link runs on a thread of its own, so that drawing never delays it.
 pub(crate) struct Session {
@@ -69,7 +66,12 @@ impl Session {
         let node = description::find_node(described, &self.node)?;
         let mut meshes = Vec::with_capacity(1 + described.obstacles.len());
         for body in std::iter::once(&described.god_object).chain(&described.obstacles) {
-            meshes.push(self.runtime.block_on(self.link.mesh(body.mesh))?);
+            let fetched = self.runtime.block_on(self.link.mesh(body.mesh));
+            // A server that goes while it hands out its meshes is lost like one that goes later.
+            meshes.push(fetched.map_err(|error| match self.link.is_closed() {
+                Some(reason) => self.lost(reason),
+                None => error.into(),
+            })?);
         }
         let stage = description::stage(described, node, &meshes, overrides)?;
         Ok((stage, description::show(&described.show)))

@@ -6,7 +6,7 @@ use hdrhistogram::Histogram;
 use taut_proto::ClientStats;
 use taut_proto::stats::DrawnState;
 
-use crate::timeline::State;
+use crate::timeline::Latched;
 
 /// Time between two reports to the server.
 pub(crate) const REPORT_PERIOD: Duration = Duration::from_secs(1);
@@ -62,9 +62,9 @@ pub struct RenderReport {
     pub stale_frames: u64,
     /// Frames per second between the first and the last.
     pub fps: f64,
-    /// Age of the state when it was taken to be drawn.
+    /// Age of the drawn sample when it was taken to be drawn.
     pub pose_age_ms: Distribution,
-    /// Age of the state when the graphics card had drawn it.
+    /// Age of the same sample when the frame was finished.
     pub drawn_age_ms: Distribution,
     /// States that were sent and did not arrive.
     pub packets_lost: u64,
@@ -74,14 +74,44 @@ pub struct RenderReport {
     pub ended: Ended,
 }
 
+/// Ages of the drawn samples, in microseconds.
+#[derive(Debug)]
+struct Ages {
+    /// When taken to be drawn.
+    taken: Histogram<u64>,
+    /// When the frame was finished.
+    drawn: Histogram<u64>,
+}
+
+impl Ages {
+    fn new() -> Self {
+        Self {
+            taken: histogram(),
+            drawn: histogram(),
+        }
+    }
+
+    /// Session times in nanoseconds.
+    fn record(&mut self, sample_ns: u64, taken_ns: u64, drawn_ns: u64) {
+        let age_us = |now: u64| (now.saturating_sub(sample_ns) / 1000).min(MAX_AGE_US);
+        self.taken.saturating_record(age_us(taken_ns));
+        self.drawn.saturating_record(age_us(drawn_ns));
+    }
+
+    fn reset(&mut self) {
+        self.taken.reset();
+        self.drawn.reset();
+    }
+}
+
 /// Counts of a running node.
 #[derive(Debug)]
 pub(crate) struct Statistics {
     pub(crate) frames: u64,
     pub(crate) stale_frames: u64,
-    pose_age: Histogram<u64>,
-    drawn_age: Histogram<u64>,
-    since_report: Histogram<u64>,
+    /// Since the start.
+    ages: Ages,
+    since_report: Ages,
     frames_at_report: u64,
     drawn: Vec<DrawnState>,
     first_frame: Option<Instant>,
@@ -94,9 +124,8 @@ impl Statistics {
         Self {
             frames: 0,
             stale_frames: 0,
-            pose_age: histogram(),
-            drawn_age: histogram(),
-            since_report: histogram(),
+            ages: Ages::new(),
+            since_report: Ages::new(),
             frames_at_report: 0,
             drawn: Vec::with_capacity(MAX_DRAWN),
             first_frame: None,
@@ -105,15 +134,14 @@ impl Statistics {
         }
     }
 
-    /// Counts a frame: its state, session time when the state was taken and when it was drawn.
-    pub(crate) fn frame(&mut self, state: &State, stale: bool, taken_ns: u64, drawn_ns: u64) {
-        let age_us = |now: u64| (now.saturating_sub(state.time_ns) / 1000).min(MAX_AGE_US);
-        self.pose_age.saturating_record(age_us(taken_ns));
-        self.since_report.saturating_record(age_us(taken_ns));
-        self.drawn_age.saturating_record(age_us(drawn_ns));
+    /// Counts a frame: what it showed, session time when that was taken and when the frame was finished.
+    pub(crate) fn frame(&mut self, shown: &Latched, taken_ns: u64, drawn_ns: u64) {
+        for ages in [&mut self.ages, &mut self.since_report] {
+            ages.record(shown.sample_ns, taken_ns, drawn_ns);
+        }
         self.frames += 1;
-        self.stale_frames += u64::from(stale);
-        let (tick, state_hash) = state.source;
+        self.stale_frames += u64::from(shown.stale);
+        let (tick, state_hash) = shown.state.source;
         if self.drawn.len() < MAX_DRAWN {
             self.drawn.push(DrawnState { tick, state_hash });
         }
@@ -129,14 +157,17 @@ impl Statistics {
             return None;
         }
         let ms = |us: u64| us as f32 / 1000.0;
-        let ages = &self.since_report;
+        let Ages { taken, drawn } = &self.since_report;
         let frames = self.frames - self.frames_at_report;
         let stats = ClientStats {
             frames: self.frames,
             fps: frames as f32 / elapsed.as_secs_f32().max(1e-3),
-            pose_age_ms_p50: ms(ages.value_at_quantile(0.5)),
-            pose_age_ms_p99: ms(ages.value_at_quantile(0.99)),
-            pose_age_ms_max: ms(ages.max()),
+            pose_age_ms_p50: ms(taken.value_at_quantile(0.5)),
+            pose_age_ms_p99: ms(taken.value_at_quantile(0.99)),
+            pose_age_ms_max: ms(taken.max()),
+            drawn_age_ms_p50: ms(drawn.value_at_quantile(0.5)),
+            drawn_age_ms_p99: ms(drawn.value_at_quantile(0.99)),
+            drawn_age_ms_max: ms(drawn.max()),
             drawn: std::mem::take(&mut self.drawn),
             ..Default::default()
         };
@@ -158,7 +189,10 @@ impl Statistics {
 
     /// Ages when taken and when drawn.
     pub(crate) fn ages(&self) -> (Distribution, Distribution) {
-        (distribution(&self.pose_age), distribution(&self.drawn_age))
+        (
+            distribution(&self.ages.taken),
+            distribution(&self.ages.drawn),
+        )
     }
 }
 
@@ -185,14 +219,15 @@ impl std::fmt::Display for RenderReport {
             frames,
             fps,
             pose_age_ms: age,
+            drawn_age_ms: drawn,
             packets_lost,
             packets_received,
             ..
         } = self;
         write!(
             f,
-            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most; {packets_received} states received, {packets_lost} lost",
-            age.p50, age.max
+            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost",
+            age.p50, age.max, drawn.p50
         )
     }
 }
@@ -200,25 +235,32 @@ impl std::fmt::Display for RenderReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::timeline::State;
     use nalgebra::{Isometry3, Vector3};
 
-    fn state(time_ns: u64) -> State {
-        State {
-            time_ns,
-            source: (time_ns, 7),
+    fn shown(sample_ns: u64) -> Latched {
+        let state = State {
+            time_ns: sample_ns + 500_000,
+            source: (sample_ns, 7),
             god_object: Isometry3::identity(),
             device: Isometry3::identity(),
             force: Vector3::zeros(),
             head: None,
             bodies: Vec::new(),
             contacts: Vec::new(),
+        };
+        Latched {
+            state,
+            sample_ns,
+            held: false,
+            stale: false,
         }
     }
 
     #[test]
     fn ages_are_told_from_the_moment_taken_and_the_moment_drawn() {
         let mut statistics = Statistics::new();
-        statistics.frame(&state(1_000_000), false, 4_000_000, 14_000_000);
+        statistics.frame(&shown(1_000_000), 4_000_000, 14_000_000);
         let (taken, drawn) = statistics.ages();
         assert!((taken.max - 3.0).abs() < 0.01 && (drawn.max - 13.0).abs() < 0.02);
         let report = statistics.report(true).expect("asked for");
@@ -231,12 +273,15 @@ mod tests {
             }]
         );
         assert!((report.pose_age_ms_max - 3.0).abs() < 0.01);
+        assert!((report.drawn_age_ms_p50 - 13.0).abs() < 0.02);
+        let after = statistics.report(true).expect("asked for");
+        assert_eq!((after.pose_age_ms_max, after.drawn_age_ms_max), (0.0, 0.0));
     }
 
     #[test]
     fn a_state_from_the_future_has_no_age() {
         let mut statistics = Statistics::new();
-        statistics.frame(&state(9_000_000), false, 4_000_000, 5_000_000);
+        statistics.frame(&shown(9_000_000), 4_000_000, 5_000_000);
         assert_eq!(statistics.ages().0.max, 0.0);
     }
 

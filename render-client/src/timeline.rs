@@ -62,6 +62,8 @@ pub struct Contact {
 pub struct Latched {
     /// Interpolated state; `state.time_ns` is the time it stands for.
     pub state: State,
+    /// Session time of the received sample that it rests on, in nanoseconds: of the earlier one where two are interpolated.
+    pub sample_ns: u64,
     /// No sample brackets the time asked for: the newest (or oldest) is held.
     pub held: bool,
     /// The newest sample is older than [`STALE_AFTER_NS`].
@@ -123,6 +125,7 @@ impl Timeline {
         let wanted = now_ns.saturating_sub(self.delay_ns);
         let held = |state: &State| Latched {
             state: state.clone(),
+            sample_ns: state.time_ns,
             held: true,
             stale,
         };
@@ -142,6 +145,7 @@ impl Timeline {
         state.head = newest.head;
         Some(Latched {
             state,
+            sample_ns: from.time_ns,
             held: false,
             stale,
         })
@@ -224,6 +228,7 @@ mod tests {
         assert!((turned - 0.5).abs() < 1e-12);
         assert!(!latched.held && !latched.stale);
         assert_eq!(latched.state.time_ns, 10 * MS + MS / 2);
+        assert_eq!(latched.sample_ns, 10 * MS, "no younger than its older half");
     }
 
     #[test]
@@ -239,6 +244,7 @@ mod tests {
             .latch(11 * MS + STALE_AFTER_NS + 1)
             .expect("a state");
         assert_eq!(late.state, state(11 * MS, 1.0));
+        assert_eq!(late.sample_ns, 11 * MS);
         assert!(late.held && late.stale);
     }
 

@@ -248,8 +248,7 @@ impl App<'_> {
         gpu.finish()?;
         self.last_drawn = drawn;
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
-        self.statistics
-            .frame(&latched.state, latched.stale, taken_ns, drawn_ns);
+        self.statistics.frame(&latched, taken_ns, drawn_ns);
         let enough = self
             .plan
             .frames

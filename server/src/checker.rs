@@ -3,6 +3,7 @@
 //! Published poses are sampled on a thread of low priority; every pair of triangles whose boxes overlap is tested by parry: does a
 //! side of one pass through the other? A pose that fails is counted, and told once.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -61,6 +62,8 @@ pub struct CheckCounts {
     pub checks: AtomicU64,
     /// Poses at which a triangle of the body intersected one of an obstacle.
     pub penetrations: AtomicU64,
+    /// The obstacle of the first of these.
+    pub first_penetrated: OnceLock<String>,
 }
 
 impl PenetrationChecker {
@@ -101,7 +104,9 @@ impl PenetrationChecker {
         }
         let penetrated = self.penetrated_obstacle(&contacts.held().set.god_object_pose);
         counts.checks.fetch_add(1, Ordering::Relaxed);
-        if penetrated.is_some() {
+        if let Some(obstacle) = penetrated {
+            // Told before it is counted: who sees the count finds the name.
+            counts.first_penetrated.get_or_init(|| obstacle.to_owned());
             counts.penetrations.fetch_add(1, Ordering::Relaxed);
         }
         penetrated

@@ -23,11 +23,26 @@ struct ClientRecord {
     transport: Transport,
     newest: ClientStats,
     state_hash_mismatches: u64,
-    age_medians_ms: Vec<f64>,
-    age_p99_ms: f64,
-    age_max_ms: f64,
+    pose_ages: AgesMs,
+    drawn_ages: AgesMs,
     skew_medians_us: Vec<f64>,
     skew_max_us: f64,
+}
+
+/// One age, of all reports of a client.
+#[derive(Debug, Default)]
+struct AgesMs {
+    medians: Vec<f64>,
+    p99: f64,
+    max: f64,
+}
+
+impl AgesMs {
+    fn follow(&mut self, median: f32, p99: f32, max: f32) {
+        self.medians.push(f64::from(median));
+        self.p99 = self.p99.max(f64::from(p99));
+        self.max = self.max.max(f64::from(max));
+    }
 }
 
 impl ClientLedger {
@@ -36,15 +51,33 @@ impl ClientLedger {
         match event {
             LinkEvent::Joined(status) => {
                 self.note(status);
-                Some(format!("{} joined from {}", status.node, status.address))
+                Some(format!(
+                    "{} joined as {} over {} from {}",
+                    status.node,
+                    role_name(status.role),
+                    transport_name(status.transport),
+                    status.address
+                ))
             }
             LinkEvent::Left { status, reason } => {
                 self.note(status);
-                Some(format!("{} left: {reason}", status.node))
+                Some(format!(
+                    "{} ({} over {}) left: {reason}",
+                    status.node,
+                    role_name(status.role),
+                    transport_name(status.transport)
+                ))
             }
-            LinkEvent::Refused { address, text, .. } => {
-                Some(format!("a client at {address} was refused: {text}"))
-            }
+            LinkEvent::Refused {
+                address,
+                node,
+                text,
+                ..
+            } => Some(if node.is_empty() {
+                format!("a client at {address} was refused: {text}")
+            } else {
+                format!("{node} at {address} was refused: {text}")
+            }),
             LinkEvent::Stats { node, stats } => {
                 self.follow_stats(node, stats);
                 None
@@ -82,9 +115,16 @@ impl ClientLedger {
             return;
         };
         client.newest = stats.clone();
-        client.age_medians_ms.push(f64::from(stats.pose_age_ms_p50));
-        client.age_p99_ms = client.age_p99_ms.max(f64::from(stats.pose_age_ms_p99));
-        client.age_max_ms = client.age_max_ms.max(f64::from(stats.pose_age_ms_max));
+        client.pose_ages.follow(
+            stats.pose_age_ms_p50,
+            stats.pose_age_ms_p99,
+            stats.pose_age_ms_max,
+        );
+        client.drawn_ages.follow(
+            stats.drawn_age_ms_p50,
+            stats.drawn_age_ms_p99,
+            stats.drawn_age_ms_max,
+        );
         client
             .skew_medians_us
             .push(f64::from(stats.swap_skew_ms_p50) * MICROSECONDS_PER_MILLISECOND);
@@ -115,9 +155,8 @@ impl ClientRecord {
             transport: status.transport,
             newest: ClientStats::default(),
             state_hash_mismatches: 0,
-            age_medians_ms: Vec::new(),
-            age_p99_ms: 0.0,
-            age_max_ms: 0.0,
+            pose_ages: AgesMs::default(),
+            drawn_ages: AgesMs::default(),
             skew_medians_us: Vec::new(),
             skew_max_us: 0.0,
         }
@@ -132,20 +171,35 @@ impl ClientRecord {
             max,
             count: frames,
         };
+        let of_ages = |ages: &AgesMs| of_reports(&ages.medians, ages.p99, ages.max);
         ClientReport {
             node: self.node.clone(),
-            transport: match self.transport {
-                Transport::Udp => "udp".into(),
-                Transport::QuicDatagram => "quic".into(),
-            },
+            transport: transport_name(self.transport).into(),
             frames,
             fps: f64::from(self.newest.fps),
-            pose_age_ms: of_reports(&self.age_medians_ms, self.age_p99_ms, self.age_max_ms),
+            pose_age_ms: of_ages(&self.pose_ages),
+            drawn_age_ms: of_ages(&self.drawn_ages),
             swap_skew_us: (self.skew_max_us > 0.0)
                 .then(|| of_reports(&self.skew_medians_us, self.skew_max_us, self.skew_max_us)),
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,
         }
+    }
+}
+
+fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Render => "render node",
+        Role::Device => "device bridge",
+        Role::Observer => "observer",
+        Role::Operator => "operator",
+    }
+}
+
+fn transport_name(transport: Transport) -> &'static str {
+    match transport {
+        Transport::Udp => "udp",
+        Transport::QuicDatagram => "quic",
     }
 }
 
@@ -181,6 +235,9 @@ mod tests {
             pose_age_ms_p50: age_ms,
             pose_age_ms_p99: 2.0 * age_ms,
             pose_age_ms_max: 3.0 * age_ms,
+            drawn_age_ms_p50: 4.0 * age_ms,
+            drawn_age_ms_p99: 5.0 * age_ms,
+            drawn_age_ms_max: 6.0 * age_ms,
             ..ClientStats::default()
         };
         LinkEvent::Stats {
@@ -195,7 +252,7 @@ mod tests {
         assert!(
             ledger
                 .follow(&joined("left", Role::Render))
-                .is_some_and(|line| line.contains("left joined"))
+                .is_some_and(|line| line.contains("left joined as render node over quic"))
         );
         ledger.follow(&joined("watcher", Role::Observer));
         for (frames, age) in [(60, 8.0), (120, 9.0), (180, 20.0)] {
@@ -220,6 +277,16 @@ mod tests {
                 p99: 40.0,
                 p999: 60.0,
                 max: 60.0,
+                count: 180
+            }
+        );
+        assert_eq!(
+            report.drawn_age_ms,
+            Distribution {
+                p50: 36.0,
+                p99: 100.0,
+                p999: 120.0,
+                max: 120.0,
                 count: 180
             }
         );

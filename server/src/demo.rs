@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use taut_link::create_key_file;
 use taut_scene::{Device, Scene, Workbench};
 
 use crate::children::{NamedChild, wait_or_kill};
 use crate::cli::DemoArgs;
 use crate::config::{Overrides, session_setup};
+use crate::demo_directory::DemoDirectory;
 use crate::failure::Failure;
 use crate::monitor::MonitorFeed;
 use crate::realtime::after_parent;
@@ -19,6 +19,7 @@ use crate::rendering;
 use crate::report::SessionReport;
 use crate::serve::{announce, watch};
 use crate::session::Session;
+use crate::setup::SessionSetup;
 use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
@@ -34,19 +35,10 @@ pub fn run(
     args: &DemoArgs,
     terminal: &Terminal,
 ) -> Result<(SessionReport, Option<Failure>), Failure> {
-    let directory = tempfile::Builder::new()
-        .prefix("taut-demo-")
-        .tempdir()
-        .map_err(|error| {
-            Failure::failed(format!(
-                "no temporary directory can be made ({error}); check TMPDIR"
-            ))
-        })?;
-    let key_path = directory.path().join("cluster.key");
-    let key = create_key_file(&key_path)?;
-
+    let (directory, key) = DemoDirectory::create()?;
     let mut workbench = Workbench::shipped()?;
-    take_free_ports(&mut workbench, terminal);
+    // A demonstration is nobody else's business.
+    workbench.network.bind = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let scene = args
         .scene
         .clone()
@@ -57,22 +49,24 @@ pub fn run(
     } else {
         None
     };
-    if !MonitorFeed::BUILT_IN {
-        terminal.say("this program was built without the monitor; the demo goes on without it");
-    }
     let overrides = Overrides {
         scene: Some(scene),
         no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
         record: args.record.clone(),
         ..Overrides::default()
     };
-    let setup = session_setup(&workbench, key, &overrides)?;
+    let mut setup = session_setup(&workbench, key, &overrides)?;
+    // A scene that is refused gets its one sentence and nothing else, so other lines come after this.
+    if !MonitorFeed::BUILT_IN {
+        terminal.say("this program was built without the monitor; the demo goes on without it");
+    }
+    take_free_ports(&mut setup, terminal);
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
     announce(&session, terminal);
 
     let mut children = Vec::new();
-    let launcher = Launcher::new(&session, key_path, args)?;
+    let launcher = Launcher::new(&session, &directory, args)?;
     if args.bridge {
         children.push(launcher.bridge(hand_path.as_ref(), terminal)?);
     }
@@ -97,6 +91,7 @@ pub fn run(
         }
     });
     terminal.end_status();
+    // One that is still joining would complain.
     children.iter().for_each(NamedChild::mute);
     let ended = session.stop(terminal);
     for name in wait_or_kill(children, GRACE) {
@@ -107,41 +102,31 @@ pub fn run(
     Ok(ended)
 }
 
-/// Replaces every port of the workbench that somebody else has by a free one, and says so.
-fn take_free_ports(workbench: &mut Workbench, terminal: &Terminal) {
-    // A demonstration is nobody else's business.
-    workbench.network.bind = IpAddr::V4(Ipv4Addr::LOCALHOST);
-    let (network, monitoring) = (&mut workbench.network, &mut workbench.monitoring);
-    let free_udp = |port: u16| UdpSocket::bind((network.bind, port)).is_ok();
-    let free_tcp = |port: u16| TcpListener::bind((monitoring.bind, port)).is_ok();
-    let usable = |port: u16, is_free: bool, what: &str| {
+/// Replaces every port that somebody else has by a free one, and says so.
+fn take_free_ports(setup: &mut SessionSetup, terminal: &Terminal) {
+    let make_usable = |port: &mut u16, is_free: bool, what: &str| {
         if !is_free {
             terminal.say(&format!("port {port} is in use; {what} takes a free one"));
+            *port = 0;
         }
-        if is_free { port } else { 0 }
     };
-    let quic = usable(
-        network.quic_port,
-        free_udp(network.quic_port),
-        "the control plane",
-    );
-    let udp = usable(
-        network.udp_port,
-        free_udp(network.udp_port),
-        "the pose stream",
-    );
-    let grpc = usable(
-        monitoring.grpc_port,
-        free_tcp(monitoring.grpc_port),
-        "the monitor's stream",
-    );
-    let web = usable(
-        monitoring.web_port,
-        free_tcp(monitoring.web_port),
-        "the monitor's page",
-    );
-    (network.quic_port, network.udp_port) = (quic, udp);
-    (monitoring.grpc_port, monitoring.web_port) = (grpc, web);
+    for (address, what) in [
+        (&mut setup.link.quic, "the control plane"),
+        (&mut setup.link.udp, "the pose stream"),
+    ] {
+        let mut port = address.port();
+        make_usable(&mut port, UdpSocket::bind(*address).is_ok(), what);
+        address.set_port(port);
+    }
+    if let Some(monitor) = setup.monitor.as_mut().filter(|monitor| monitor.serve) {
+        for (port, what) in [
+            (&mut monitor.grpc_port, "the monitor's stream"),
+            (&mut monitor.web_port, "the monitor's page"),
+        ] {
+            let is_free = TcpListener::bind((monitor.bind, *port)).is_ok();
+            make_usable(port, is_free, what);
+        }
+    }
 }
 
 /// The intention of the scene's hand as a file for the bridge, and how the hand holds.
@@ -174,13 +159,17 @@ fn write_hand_path(scene: &str, directory: &Path) -> Result<Option<HandPath>, Fa
 struct Launcher<'a> {
     program: PathBuf,
     server: SocketAddr,
-    key: PathBuf,
+    directory: &'a DemoDirectory,
     args: &'a DemoArgs,
     headless: bool,
 }
 
 impl<'a> Launcher<'a> {
-    fn new(session: &Session, key: PathBuf, args: &'a DemoArgs) -> Result<Self, Failure> {
+    fn new(
+        session: &Session,
+        directory: &'a DemoDirectory,
+        args: &'a DemoArgs,
+    ) -> Result<Self, Failure> {
         let program = std::env::current_exe().map_err(|error| {
             Failure::failed(format!(
                 "this program's own file is not known ({error}); start it by its path"
@@ -196,7 +185,7 @@ impl<'a> Launcher<'a> {
         Ok(Self {
             program,
             server,
-            key,
+            directory,
             args,
             headless,
         })
@@ -207,7 +196,7 @@ impl<'a> Launcher<'a> {
         command
             .arg(role)
             .args(["--server", &self.server.to_string(), "--node", node]);
-        command.arg("--key").arg(&self.key);
+        command.arg("--key").arg(self.directory.key_file());
         command.args(["--transport", self.args.transport.name()]);
         command
     }
@@ -218,12 +207,12 @@ impl<'a> Launcher<'a> {
         after_parent(&mut command);
         if self.headless {
             command.arg("--headless");
-            if std::env::var_os("XDG_RUNTIME_DIR").is_none()
-                && let Some(directory) = self.key.parent()
-            {
-                // Graphics drivers complain without it, though nothing is put there.
-                command.env("XDG_RUNTIME_DIR", directory);
-            }
+            // Without a display there is no compositor to ask which device it prefers; Mesa's layer would complain that there is none.
+            command.env("NODEVICE_SELECT", "1");
+        }
+        if std::env::var_os("XDG_RUNTIME_DIR").is_none_or(|directory| directory.is_empty()) {
+            // Graphics drivers complain without it, though nothing is put there.
+            command.env("XDG_RUNTIME_DIR", self.directory.path());
         }
         if let Some(frames) = self.args.frames {
             command.args(["--frames", &frames.to_string()]);

@@ -21,6 +21,7 @@ pub mod clock;
 pub mod config;
 pub mod content;
 pub mod demo;
+pub mod demo_directory;
 pub mod devices;
 pub mod doctor;
 pub mod failure;

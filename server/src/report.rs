@@ -73,8 +73,10 @@ pub struct ClientReport {
     pub frames: u64,
     /// Frames per second.
     pub fps: f64,
-    /// Age of the pose at the frame that showed it.
+    /// Age of the pose when a frame took it to draw it.
     pub pose_age_ms: Distribution,
+    /// Age of the same pose when that frame was finished.
+    pub drawn_age_ms: Distribution,
     /// Difference of the swap times between nodes; `null` where frames are not locked, since nothing is measured then.
     pub swap_skew_us: Option<Distribution>,
     /// Datagrams that never arrived.
@@ -172,14 +174,24 @@ impl fmt::Display for SessionReport {
             self.packets_sent, self.packets_refused
         )?;
         for client in &self.clients {
+            if client.frames == 0 {
+                // A bridge, or a node that was gone before its first frame.
+                write!(
+                    f,
+                    "\n{:<19} drew nothing, {} lost, by {}",
+                    client.node, client.packets_lost, client.transport
+                )?;
+                continue;
+            }
             write!(
                 f,
-                "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old (p99 {:.1} ms), {} lost, by {}",
+                "\n{:<19} {} frames, {:.0} fps, poses {:.1} ms old when taken, {:.1} ms when drawn (p99 {:.1} ms), {} lost, by {}",
                 client.node,
                 client.frames,
                 client.fps,
                 client.pose_age_ms.p50,
-                client.pose_age_ms.p99,
+                client.drawn_age_ms.p50,
+                client.drawn_age_ms.p99,
                 client.packets_lost,
                 client.transport
             )?;
@@ -278,6 +290,7 @@ mod tests {
                 "frames",
                 "fps",
                 "pose_age_ms",
+                "drawn_age_ms",
                 "swap_skew_us",
                 "packets_lost",
                 "state_hash_mismatches",

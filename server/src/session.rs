@@ -79,6 +79,7 @@ impl Session {
         let ledger = RealtimeLedger::default();
         let runtime = network_runtime(&ledger, setup.realtime.network_priority)?;
         let picture = picture(&setup);
+        let opening = opening(&setup);
         let scene_revision = setup.content.description.revision;
         let options = ServerOptions {
             quic: setup.link.quic,
@@ -149,7 +150,27 @@ impl Session {
         session.start_broadcast(states, broadcaster, bridge_commands, &setup.realtime)?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.enforce(setup.realtime.policy)?;
+        session.tell_start(&opening);
         Ok(session)
+    }
+
+    /// What runs here, and what of real time is in force, to the monitor's log.
+    fn tell_start(&self, opening: &str) {
+        let Some(monitor) = &self.monitor else {
+            return;
+        };
+        monitor.log(Severity::Info, opening);
+        let realtime = self.ledger.report();
+        if !realtime.enforced.is_empty() {
+            let line = format!("real time in force: {}", realtime.enforced.join("; "));
+            monitor.log(Severity::Info, &line);
+        }
+        for line in &realtime.waived {
+            monitor.log(
+                Severity::Warning,
+                &format!("real time not in force: {line}"),
+            );
+        }
     }
 
     fn start_coupling(
@@ -396,6 +417,12 @@ impl Session {
         self.follow_network(terminal);
         let duration = self.age();
         let mut report = self.statistics.report(duration);
+        if let Some(monitor) = &self.monitor {
+            monitor.log(
+                Severity::Info,
+                &format!("the session ends after {:.1} s", report.duration_s),
+            );
+        }
         if let Some(link) = &self.link {
             let counters = link.counters();
             report.packets_sent = counters.packets_sent;
@@ -474,6 +501,18 @@ fn connect_device(
     }
 }
 
+/// What the monitor's log begins with.
+fn opening(setup: &SessionSetup) -> String {
+    let (body, settings) = (&setup.world.body, &setup.settings);
+    format!(
+        "session with scene \"{}\": stiffness {:.0} N/m, at most {} N and {} N m",
+        setup.content.description.name,
+        settings.stiffness(body.mass),
+        settings.force_limit,
+        settings.torque_limit
+    )
+}
+
 /// What the monitor draws once.
 fn picture(setup: &SessionSetup) -> MonitorPicture {
     let description = &setup.content.description;
@@ -488,6 +527,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
             .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
         head: setup.head,
+        rest_distance: setup.settings.rest_distance,
     }
 }
 

@@ -214,7 +214,10 @@ fn broken_scenes_are_refused_with_file_and_reason() {
                 "inside.toml",
                 &format!("{sphere}mass = 1.0\npose = {{ position = [0, 0, 0.03] }}"),
             ),
-            ["penetration", "table"],
+            [
+                "inside.toml:",
+                "starts in penetration of obstacle \"table\"",
+            ],
         ),
         (
             scene(

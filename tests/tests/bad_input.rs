@@ -113,7 +113,7 @@ fn a_broken_scene_or_mesh_is_refused_by_file_and_key() {
     broken(
         "penetration",
         &replaced(SCENE, "0.0, 0.05]", "0.0, 0.01]"),
-        &["penetration", "\"plane\"", "god_object.pose"],
+        &["scene.toml:", "penetration", "\"plane\"", "god_object.pose"],
     );
     refused(
         &workbench,
@@ -281,7 +281,7 @@ fn a_broken_workbench_is_refused_and_nothing_of_it_starts() {
         &workbench,
         "start in penetration",
         &["--scene", &scene],
-        &["penetration", "\"plane\""],
+        &["inside.toml:", "penetration", "\"plane\""],
     );
 
     // Whichever of the two ports is taken, the other one is given back.

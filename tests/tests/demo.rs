@@ -28,12 +28,13 @@ const KEYS: [&str; 16] = [
     "clients",
     "observers",
 ];
-const CLIENT_KEYS: [&str; 8] = [
+const CLIENT_KEYS: [&str; 9] = [
     "node",
     "transport",
     "frames",
     "fps",
     "pose_age_ms",
+    "drawn_age_ms",
     "swap_skew_us",
     "packets_lost",
     "state_hash_mismatches",
@@ -120,6 +121,8 @@ fn the_demo_brings_everything_up_and_reports_it() {
         assert_eq!(client["transport"], "udp");
         let age = client["pose_age_ms"]["p50"].as_f64().expect("a number");
         assert!(age > 0.0 && age <= 50.0, "poses {age} ms old");
+        let drawn = client["drawn_age_ms"]["p50"].as_f64().expect("a number");
+        assert!(drawn > age, "drawn after {drawn} ms, taken after {age} ms");
     }
     assert!(
         report["packets_sent"].as_u64() > Some(1000 * DURATION_S),
@@ -175,6 +178,17 @@ fn a_demo_that_is_killed_takes_its_children_along() {
     wait_for("the end of the demo's children", END_LIMIT, || {
         (!demo.group_lives()).then_some(())
     });
+}
+
+#[test]
+fn a_scene_that_is_refused_gets_one_sentence_even_where_ports_are_taken() {
+    let workbench = TestWorkbench::new(PROGRAM);
+    // Taken here or by somebody else already: either way the demo would need another one.
+    let _taken = std::net::UdpSocket::bind(("127.0.0.1", taut_link::DEFAULT_QUIC_PORT));
+    let ended = workbench.run("demo", &["demo", "--headless", "--scene", "no-such-scene"]);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    let sentence = ended.one_sentence();
+    assert!(sentence.contains("no-such-scene"), "{sentence}");
 }
 
 /// How many processes the process of this number started and has not lost yet.

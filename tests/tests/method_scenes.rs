@@ -9,6 +9,8 @@ use taut_tests::motion::{Sample, intention, lead, sampled, shipped, traced};
 
 /// Stiffness that the hand feels in the shipped scenes, N/m.
 const STIFFNESS: f64 = 1000.0;
+/// The same for a peg that is in its hole, N: nothing but the lower side of the hole, which it is parallel to, touches it.
+const NO_AXIAL_FORCE: f64 = 1e-9;
 /// How deep the shipped hands press into what they slide on, m.
 const DEPTH: f64 = 0.006;
 /// Force that counts as none, N: of forces of several newtons, what rounding leaves.
@@ -114,8 +116,8 @@ fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11()
     assert!(between(&samples, 19.6, 22.0).all(|sample| force(sample).y >= -NO_FORCE));
     assert!(between(&samples, 20.9, 21.5).all(|sample| force(sample).y > 0.99 * STIFFNESS * DEPTH));
 
-    // (e): 50 mm in and out again. Inserted, nothing holds it along the hole, whose lower side carries it: the hand is 2 mm down, the
-    // clearance 0.5 mm, and facets add up to 22 um to that.
+    // (e): 50 mm in and out again, all on the axis of the hole but for a while at depth. The peg touches nothing or the lower
+    // side, which pushes straight up: nothing along the hole, and nothing that twists the round peg, from the mouth on.
     let deepest = samples
         .iter()
         .map(insertion)
@@ -125,22 +127,16 @@ fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11()
         insertion(&samples[samples.len() - 1]) < 0.0,
         "the peg did not come out"
     );
-    let inserted = |sample: &&Sample| insertion(sample) > 0.036;
+    let inserted = |sample: &&Sample| insertion(sample) > 0.0;
     assert!(
-        between(&samples, 22.4, 28.4).filter(inserted).count() > 2000,
+        between(&samples, 22.4, 28.4).filter(inserted).count() > 5000,
         "the peg was hardly inserted"
     );
     for sample in between(&samples, 22.4, 28.4).filter(inserted) {
         let (force, torque) = (force(sample), torque(sample));
         assert!(
-            force.y.abs() <= NO_FORCE && force.x.abs() <= NO_FORCE,
+            force.y.abs() <= NO_AXIAL_FORCE && force.x.abs() <= NO_AXIAL_FORCE,
             "inserted: {force} at {} s",
-            sample.time
-        );
-        assert!(
-            (1.478..=1.515).contains(&force.z),
-            "inserted: F_z {} at {} s",
-            force.z,
             sample.time
         );
         assert!(
@@ -150,11 +146,16 @@ fn the_peg_goes_into_the_hole_and_out_and_its_axial_force_is_that_of_figure_11()
             sample.time
         );
     }
-    // Partly inserted the peg may tilt in the clearance, and the mouth of the hole then pushes a little along it.
-    assert!(
-        between(&samples, 22.4, 28.4)
-            .all(|sample| force(sample).y.abs() < 0.01 * STIFFNESS * DEPTH)
-    );
+    // Pressed 2 mm down: the clearance is 0.5 mm, and facets add up to 22 um to that.
+    for sample in between(&samples, 25.3, 26.6) {
+        let force = force(sample);
+        assert!(
+            insertion(sample) >= 0.040 && (1.478..=1.515).contains(&force.z),
+            "pressed at depth: F_z {} at {} s",
+            force.z,
+            sample.time
+        );
+    }
 }
 
 /// How far the tip is in the hole, m, measured from the right face.

@@ -56,6 +56,9 @@ fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
         "the obstacle is missing in {:?}",
         summary.entities
     );
+    // The two lines about the scene, the session's start and end, and contacts of the hand.
+    let lines = summary.rows.get("/log").copied().unwrap_or_default();
+    assert!(lines >= 6, "only {lines} lines in the log");
     assert!(summary.blueprints >= 1, "the recording has no layout");
     let (first, last) = summary
         .first_time_s

@@ -37,3 +37,6 @@ pub use taut_proto::{ClientStats, ClusterKey, Role, Transport};
 pub const DEFAULT_QUIC_PORT: u16 = 4857;
 /// Default port of the hot plane.
 pub const DEFAULT_UDP_PORT: u16 = 4858;
+
+/// The reason that [`ClientLink::is_closed`] gives when the server ended the session in good order.
+pub const STOP_REASON: &str = "server is stopping";

@@ -104,6 +104,7 @@ pub(crate) fn box_with_hole(half: f32, radius: f32, facets: u32) -> TriangleMesh
 /// A fresh state with the god-object at `pose` and the device there too.
 pub(crate) fn state(pose: Isometry3<f64>) -> Latched {
     Latched {
+        sample_ns: 0,
         state: State {
             time_ns: 0,
             source: (0, 0),

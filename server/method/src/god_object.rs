@@ -130,29 +130,30 @@ pub enum StartError {
 }
 
 impl GodObject {
-    /// Checks the start, sizes every buffer and collects the first constraint set.
-    pub fn new(world: Arc<World>, settings: Settings, start: Pose) -> Result<Self, StartError> {
+    /// Whether [`GodObject::new`] would take this start.
+    pub fn check_start(world: &World, settings: &Settings, start: &Pose) -> Result<(), StartError> {
         settings.validate()?;
-        if !pose_is_finite(&start) {
+        if !pose_is_finite(start) {
             return Err(StartError::PoseNotFinite);
         }
-        if world
-            .body
-            .metric(settings.rotation_metric, &start)
-            .is_none()
-        {
+        if world.body.metric(settings.rotation_metric, start).is_none() {
             return Err(StartError::Metric {
                 mass: world.body.mass,
             });
         }
         for obstacle in &world.obstacles {
-            if meshes_intersect(&world.body.mesh, &start, &obstacle.mesh, &obstacle.pose) {
+            if meshes_intersect(&world.body.mesh, start, &obstacle.mesh, &obstacle.pose) {
                 return Err(StartError::Penetration {
                     obstacle: obstacle.name.clone(),
                 });
             }
         }
+        Ok(())
+    }
 
+    /// Checks the start, sizes every buffer and collects the first constraint set.
+    pub fn new(world: Arc<World>, settings: Settings, start: Pose) -> Result<Self, StartError> {
+        Self::check_start(&world, &settings, &start)?;
         let capacity = settings.max_constraints;
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {

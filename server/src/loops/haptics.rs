@@ -11,6 +11,7 @@ use std::time::Duration;
 use god_object::spatial::{Pose, Vector6};
 use taut_bridge::{Device, EnergyObserver, Safety};
 
+use super::incidents::{Incident, IncidentCounts};
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
@@ -43,6 +44,8 @@ pub struct HapticsStatistics {
     pub deadline_misses: AtomicU64,
     /// Times at which the safety stage or a device fault changed the force.
     pub safety_events: AtomicU64,
+    /// The same by kind, and the device's returns.
+    pub incidents: IncidentCounts,
     /// Energy given to the hand beyond what it had put in, J, as the bits of an `f64`.
     energy_injected_bits: AtomicU64,
     /// The device does not answer now.
@@ -123,14 +126,17 @@ impl HapticsLoop {
                 self.state.velocity = sample.velocity;
                 self.state.buttons = sample.buttons;
                 self.state.faulty = false;
+                if was_faulty {
+                    self.statistics.incidents.count(Incident::DeviceBack);
+                }
             }
-            Err(_) => {
+            Err(fault) => {
                 // The last good pose stands; the force drops at once and ramps in when the device is back.
                 self.state.velocity = Vector6::zeros();
                 self.state.faulty = true;
                 self.safety.reset();
                 if !was_faulty {
-                    self.count_event();
+                    self.count_event(Incident::from(&fault));
                 }
             }
         }
@@ -150,13 +156,14 @@ impl HapticsLoop {
             .saturating_sub(CONSTRAINT_AGE_ALLOWED);
         let made = command.time.saturating_sub(stale_constraints);
         let safe = self.safety.step(now, &command.wrench, made);
-        if safe.event.is_some() {
-            self.count_event();
+        if let Some(event) = &safe.event {
+            self.count_event(Incident::from(event));
         }
         safe.wrench
     }
 
-    fn count_event(&self) {
+    fn count_event(&self, incident: Incident) {
+        self.statistics.incidents.count(incident);
         let events = &self.statistics.safety_events;
         events.store(events.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
     }

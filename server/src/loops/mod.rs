@@ -12,5 +12,6 @@
 pub mod coupling;
 pub mod god_object;
 pub mod haptics;
+pub mod incidents;
 pub mod shell;
 pub mod wiring;

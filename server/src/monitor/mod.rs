@@ -5,6 +5,8 @@
 #[cfg(not(feature = "monitor"))]
 mod absent;
 #[cfg(feature = "monitor")]
+mod events;
+#[cfg(feature = "monitor")]
 mod streaming;
 
 #[cfg(not(feature = "monitor"))]
@@ -59,6 +61,8 @@ pub struct MonitorPicture {
     pub display_scale: f64,
     /// The viewer.
     pub head: Head,
+    /// Gap at which bodies touch, m.
+    pub rest_distance: f64,
 }
 
 /// The shared data that the monitor reads.

@@ -16,6 +16,7 @@ use taut_monitor::{
 };
 use taut_proto::scene::ScreenDescription;
 
+use super::events::EventLog;
 use super::{MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
 use crate::clock::nanoseconds;
 use crate::failure::Failure;
@@ -60,9 +61,12 @@ impl MonitorFeed {
         let scene = monitor_scene(picture, &frame);
         let (monitor, sender) = Monitor::start(&options, scene).map_err(failure)?;
         let asked = shutdown.clone();
+        let obstacles = picture.world.obstacles.iter();
+        let names = obstacles.map(|obstacle| obstacle.name.clone());
+        let events = EventLog::new(names, picture.rest_distance);
         let head = picture.head;
         let thread = spawn("monitor feed", shutdown, move || {
-            feed(sources, sender, &network, &head, &frame, &asked);
+            feed(sources, sender, events, &network, &head, &frame, &asked);
         })
         .map_err(Failure::failed)?;
         Ok(Self { monitor, thread })
@@ -80,12 +84,7 @@ impl MonitorFeed {
 
     /// Shows a line at the newest session time; never waits.
     pub fn log(&self, severity: Severity, line: &str) {
-        let level = match severity {
-            Severity::Info => LogLevel::Info,
-            Severity::Warning => LogLevel::Warn,
-            Severity::Error => LogLevel::Error,
-        };
-        self.monitor.log(level, line);
+        self.monitor.log(level(severity), line);
     }
 
     /// Ends it, after the end was asked for; how many samples were dropped.
@@ -94,6 +93,14 @@ impl MonitorFeed {
             .join()
             .map_err(|_| Failure::failed("the thread that feeds the monitor broke down"))?;
         Ok(self.monitor.stop().map_err(failure)?.samples_dropped)
+    }
+}
+
+fn level(severity: Severity) -> LogLevel {
+    match severity {
+        Severity::Info => LogLevel::Info,
+        Severity::Warning => LogLevel::Warn,
+        Severity::Error => LogLevel::Error,
     }
 }
 
@@ -190,6 +197,7 @@ fn outline(screen: &ScreenDescription, frame: &SceneFrame) -> MonitorScreen {
 fn feed(
     mut sources: MonitorSources,
     mut sender: MonitorSender,
+    mut events: EventLog,
     network: &NetworkCounts,
     head: &Head,
     frame: &SceneFrame,
@@ -205,8 +213,13 @@ fn feed(
         sample.packets_sent = network.packets_sent.load(Ordering::Relaxed);
         sample.packets_received = network.packets_received.load(Ordering::Relaxed);
         sample.clients = network.clients.load(Ordering::Relaxed);
-        // A sample that finds no room is counted by the queue.
+        // What finds no room is counted by the queue.
         sender.offer(sample);
+        let now = sources.clock.now();
+        let contacts = sources.shared.contacts.held();
+        events.follow(now, contacts, &sources.statistics, |severity, line| {
+            sender.log(nanoseconds(now), level(severity), line);
+        });
     }
 }
 

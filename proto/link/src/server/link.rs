@@ -9,7 +9,8 @@ use super::{
     shared::{Sessions, Shared},
 };
 use crate::{
-    Counters, LinkError, SessionClock, counters::CounterCells, framing::CLOSE_STOPPING, transport,
+    Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
+    framing::CLOSE_STOPPING, transport,
 };
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
@@ -29,8 +30,6 @@ use tokio::time::timeout;
 const MAX_EVENTS: usize = 1024;
 /// Time for the clients to hear that the server stops.
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
-/// What clients hear then.
-const STOP_REASON: &[u8] = b"server is stopping";
 
 /// A running server. Dropping it stops it at once; [`ServerLink::shutdown`] also waits until the clients have heard.
 pub struct ServerLink {
@@ -145,7 +144,7 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it.
     pub async fn shutdown(self) {
-        self.endpoint.close(CLOSE_STOPPING, STOP_REASON);
+        self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
             .is_err()
@@ -167,7 +166,7 @@ impl ServerLink {
 impl Drop for ServerLink {
     fn drop(&mut self) {
         self.shared.stopping.store(true, Ordering::Relaxed);
-        self.endpoint.close(CLOSE_STOPPING, STOP_REASON);
+        self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }
 }
 

@@ -1,7 +1,7 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
 use god_object::geometry::mass_properties;
-use god_object::{Body, Mesh, Obstacle, Pose, Settings, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::load::Scene;
@@ -112,9 +112,12 @@ impl Scene {
         let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, spec.god_object.pose)];
         bodies.extend(obstacles.iter().map(|o| drawn(&o.name, &o.mesh, o.pose)));
         let hand = spec.hand.as_ref().zip(hand_path);
+        let world = World { body, obstacles };
+        GodObject::check_start(&world, &settings, &spec.god_object.pose)
+            .map_err(|error| spec.god_object.at.problem(error.to_string()))?;
         Ok(BuiltScene {
             name: spec.name.clone(),
-            world: World { body, obstacles },
+            world,
             settings,
             start: spec.god_object.pose,
             hand: hand.map(|(hand, path)| BuiltHand {
