@@ -297,8 +297,9 @@ proptest! {
         let found = search(body, &motion, obstacle, &obstacle_pose);
         let end = match found {
             TimeOfImpact::Separated => 1.0,
-            TimeOfImpact::Impact { time } => time,
-            other => return Err(TestCaseError::fail(format!("{other:?}"))),
+            // Bodies that graze at nearly the minimum gap use up the iterations: early, and as safe.
+            TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => time,
+            TimeOfImpact::Overlapping => return Err(TestCaseError::fail("they start apart")),
         };
         for k in 0..=60 {
             let pose = body_pose(&motion, end * f64::from(k) / 60.0);
@@ -308,7 +309,7 @@ proptest! {
                 prop_assert!(!parry_intersects(body, &pose, obstacle, &obstacle_pose), "parry, at {k}");
             }
         }
-        if found != TimeOfImpact::Separated {
+        if matches!(found, TimeOfImpact::Impact { .. }) {
             let gap = distance(body, &body_pose(&motion, end), obstacle, &obstacle_pose);
             prop_assert!(gap <= SETTINGS.minimum_gap + SETTINGS.gap_tolerance, "early: {gap:e}");
         }
@@ -327,16 +328,21 @@ proptest! {
         let mut run = |interval_edges: f64| {
             let settings = AdvancementSettings { interval_edges, ..SETTINGS };
             match time_of_impact(body, &motion, obstacle, &Pose::identity(), &settings, &mut workspace, &mut Work::default()) {
-                TimeOfImpact::Separated => 1.0,
-                TimeOfImpact::Impact { time } => time,
-                other => panic!("{other:?}"),
+                TimeOfImpact::Separated => (1.0, true),
+                TimeOfImpact::Impact { time } => (time, true),
+                TimeOfImpact::IterationLimit { time } => (time, false),
+                TimeOfImpact::Overlapping => panic!("they start apart"),
             }
         };
-        let (first, hinted, other) = (run(0.5), run(0.5), run(edges));
-        for time in [first, hinted, other] {
+        let answers = [run(0.5), run(0.5), run(edges)];
+        let finished = |&&(_, finished): &&(f64, bool)| finished;
+        for (time, _) in answers {
             prop_assert!(distance(body, &motion.pose_at(time), obstacle, &Pose::identity()) >= SETTINGS.minimum_gap);
+        }
+        let first = answers.iter().find(finished);
+        for (time, _) in answers.iter().filter(finished) {
             // Slow grazing stretches the tolerance in time, not in distance.
-            prop_assert!((time - first).abs() < 1e-2, "{first} {time}");
+            prop_assert!(first.is_some_and(|(first, _)| (time - first).abs() < 1e-2), "{answers:?}");
         }
     }
 }
