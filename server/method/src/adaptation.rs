@@ -32,6 +32,7 @@ pub(crate) struct AdaptationState {
     sequence: Option<u64>,
     known: Vec<FeaturePair>,
     arrivals: Vec<FeaturePair>,
+    /// In ascending order of their features.
     ramps: Vec<Ramp>,
 }
 
@@ -83,18 +84,26 @@ impl AdaptationState {
         bound: f64,
         reached: f64,
     ) -> f64 {
-        if self.arrivals.binary_search(&features).is_ok()
-            && reached - bound <= self.adaptation.threshold
-            && self.ramps.len() < self.ramps.capacity()
-        {
-            self.ramps.push(Ramp {
-                features,
-                violation_at_entry: reached,
-                start: time,
-            });
-        }
-        let Some(ramp) = self.ramps.iter().find(|ramp| ramp.features == features) else {
-            return bound;
+        let position = self
+            .ramps
+            .binary_search_by_key(&features, |ramp| ramp.features);
+        let ramp = match position {
+            Ok(known) => self.ramps[known],
+            Err(place) => {
+                let enters = self.arrivals.binary_search(&features).is_ok()
+                    && reached - bound <= self.adaptation.threshold
+                    && self.ramps.len() < self.ramps.capacity();
+                if !enters {
+                    return bound;
+                }
+                let ramp = Ramp {
+                    features,
+                    violation_at_entry: reached,
+                    start: time,
+                };
+                self.ramps.insert(place, ramp);
+                ramp
+            }
         };
         let progress = ((time - ramp.start) / self.adaptation.duration).clamp(0.0, 1.0);
         let on_its_way = progress < 1.0; // false for NaN: a broken clock lets the constraint in at once
