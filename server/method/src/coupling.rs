@@ -7,6 +7,8 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//!
 //! No collision detection, no allocation, bounded work: the god-object stands still meanwhile.
 //! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
 
@@ -14,6 +16,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::quasi_statics::{HalfSpace, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -30,6 +33,7 @@ pub struct Coupling {
     /// Empty when no obstacle has a texture.
     surfaces: Vec<TexturedSurface>,
     projector: Projector,
+    implicit: ImplicitRounds,
     adaptation: Option<AdaptationState>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -85,6 +89,11 @@ impl Coupling {
             },
             surfaces,
             projector: Projector::new(settings.solver, capacity),
+            implicit: ImplicitRounds::new(
+                settings,
+                world.body.mesh.radius_about(&world.body.reference_point),
+                capacity,
+            ),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -115,7 +124,7 @@ impl Coupling {
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
         let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
         let shaded = self.gather_rows(time, &reached, &center, set);
-        let projection =
+        let mut projection =
             self.projector
                 .project(&metric, &unconstrained, &self.rows, &self.warm_start);
         if projection.status != ProjectionStatus::Solved {
@@ -127,9 +136,31 @@ impl Coupling {
             .extend(projection.active.iter().map(|row| row.row));
 
         // F_c = k_h M (a_c - a_u)
-        let change = projection.acceleration - unconstrained;
-        self.correction = change;
-        let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
+        let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let given = LinearAnswer {
+            constraints: &set.constraints,
+            rows: &self.rows,
+            start: &god_object,
+            goal: &device,
+            branch: self.rotation,
+            scale: self.settings.k_s,
+            shaded,
+            projection: &projection,
+        };
+        let implicit = self.implicit.solve(&mut self.projector, &given, |pose| {
+            self.body.metric(&self.settings, pose)
+        });
+        if let Some(answer) = implicit {
+            let change = answer.projection.acceleration - answer.unconstrained;
+            held = answer.metric.mass_matrix_times(&change);
+            // What follows counts from x_s.
+            let nearest = angular(&projection.acceleration) / self.settings.k_s;
+            let moved = pose_difference(&answer.reached, &god_object, &nearest);
+            projection = answer.projection;
+            projection.acceleration = moved * self.settings.k_s;
+        }
+        self.correction = projection.acceleration - unconstrained;
+        let mut wrench = held * self.settings.k_h;
         if !self.surfaces.is_empty() {
             wrench = self.textured(&wrench, &projection, &center, set);
         }
