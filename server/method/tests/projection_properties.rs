@@ -35,8 +35,18 @@ fn case() -> impl Strategy<Value = (u64, usize, usize, bool)> {
     (any::<u64>(), 0..FAMILIES.len(), 0..60_usize, any::<bool>())
 }
 
+/// 1500 cases, or as many as `PROPTEST_CASES` asks for beyond that.
+fn config() -> ProptestConfig {
+    let default = ProptestConfig::default();
+    ProptestConfig {
+        cases: default.cases.max(1500),
+        failure_persistence: None,
+        ..default
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn every_answer_is_certified_feasible_dissipative_and_bounded((seed, family, count, gaps) in case()) {

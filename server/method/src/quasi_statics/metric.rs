@@ -130,10 +130,10 @@ impl Metric {
     }
 
     /// `|L^-1 j|^2` for a block of rows, one array per component.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn squared_row_lengths(&self, rows: &[Lanes; 6]) -> Lanes {
         let l = &self.inverse_factor;
-        let per_mass = 1.0 / self.mass;
+        let per_mass = self.inverse_root_mass * self.inverse_root_mass;
         let mut squares = [0.0; LANES];
         for k in 0..LANES {
             let (x, y, z) = (rows[3][k], rows[4][k], rows[5][k]);

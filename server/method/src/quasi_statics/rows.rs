@@ -80,83 +80,23 @@ impl Rows {
         if rows.len() > self.max_rows {
             return Prepared::TooManyRows;
         }
-        let mut finite = true;
         let (whole, rest) = rows.as_chunks::<LANES>();
-        for chunk in whole {
-            finite &= self.push_block(metric, chunk);
-        }
+        let mut found = Found::default();
+        let blocks = whole.iter().map(|rows| found.block_of(metric, rows));
+        self.blocks.extend(blocks);
         if !rest.is_empty() {
             let mut last = [PADDING; LANES];
             last[..rest.len()].copy_from_slice(rest);
-            finite &= self.push_block(metric, &last);
+            self.blocks.push(found.block_of(metric, &last));
         }
-        if !finite {
+        if !found.all_finite() {
             self.blocks.clear();
             return Prepared::NotFinite;
         }
         self.len = rows.len();
+        self.has_positive_bound = found.largest_bound.iter().any(|b| *b > 0.0);
+        self.has_impossible_row = found.impossible_row;
         Prepared::Ready
-    }
-
-    /// Appends four rows; says whether all their numbers are finite.
-    #[inline]
-    fn push_block(&mut self, metric: &Metric, rows: &[HalfSpace; LANES]) -> bool {
-        let mut block = Block {
-            jacobian: std::array::from_fn(|i| std::array::from_fn(|k| rows[k].jacobian[i])),
-            bound: std::array::from_fn(|k| rows[k].bound),
-            length: [1.0; LANES],
-        };
-        // 0 x is NaN for an infinite or undefined x; one comparison for a whole row.
-        let mut probe = [0.0; LANES];
-        for values in block.jacobian.iter().chain([&block.bound]) {
-            for k in 0..LANES {
-                probe[k] += values[k] * 0.0;
-            }
-        }
-        let squares = metric.squared_row_lengths(&block.jacobian);
-        let mut safe = true;
-        let mut finite = true;
-        for k in 0..LANES {
-            finite &= probe[k] == 0.0;
-            safe &= (squares[k] > SAFE_SQUARES.0) & (squares[k] < SAFE_SQUARES.1);
-            self.has_positive_bound |= block.bound[k] > 0.0;
-            block.length[k] = squares[k].sqrt();
-        }
-        if !safe {
-            self.measure_extreme_rows(metric, &mut block);
-        }
-        let mut scale = [0.0; LANES];
-        for k in 0..LANES {
-            scale[k] = 1.0 / block.length[k];
-            block.bound[k] *= scale[k];
-        }
-        for component in &mut block.jacobian {
-            for k in 0..LANES {
-                component[k] *= scale[k];
-            }
-        }
-        self.blocks.push(block);
-        finite
-    }
-
-    /// Lengths near the ends of the number range, and rows without any.
-    #[cold]
-    #[inline(never)]
-    fn measure_extreme_rows(&mut self, metric: &Metric, block: &mut Block) {
-        for k in 0..LANES {
-            let row = Vector6::from_fn(|i, _| block.jacobian[i][k]);
-            let length = scaled_norm(&metric.whiten_row(&row));
-            if length >= ZERO_ROW {
-                block.length[k] = length;
-            } else {
-                self.has_impossible_row |= block.bound[k] > 0.0;
-                for component in &mut block.jacobian {
-                    component[k] = 0.0;
-                }
-                block.bound[k] = NEVER_VIOLATED;
-                block.length[k] = 1.0;
-            }
-        }
     }
 
     /// Number of rows, ignored ones included: row k here is row k of the call.
@@ -255,7 +195,87 @@ impl Rows {
     }
 }
 
+/// What is seen of the rows while they are prepared.
+#[derive(Default)]
+struct Found {
+    /// 0 x is NaN for an infinite or undefined x: a sum stands for one comparison each.
+    probe: Lanes,
+    largest_bound: Lanes,
+    impossible_row: bool,
+}
+
+impl Found {
+    #[inline(always)]
+    fn block_of(&mut self, metric: &Metric, rows: &[HalfSpace; LANES]) -> Block {
+        let bound: Lanes = std::array::from_fn(|k| rows[k].bound);
+        let jacobian: [Lanes; 6] =
+            std::array::from_fn(|i| std::array::from_fn(|k| rows[k].jacobian[i]));
+        for k in 0..LANES {
+            self.probe[k] += bound[k] * 0.0;
+            let largest = self.largest_bound[k];
+            self.largest_bound[k] = if bound[k] > largest {
+                bound[k]
+            } else {
+                largest
+            };
+        }
+        let squares = metric.squared_row_lengths(&jacobian);
+        let mut safe = true;
+        for square in squares {
+            // False for a row that is not finite.
+            safe &= (square > SAFE_SQUARES.0) & (square < SAFE_SQUARES.1);
+        }
+        if safe {
+            Block::new(jacobian, bound, squares.map(f64::sqrt))
+        } else {
+            // Nothing of the above is handed on: it stays in registers.
+            self.extreme_block(metric, rows)
+        }
+    }
+
+    /// Lengths near the ends of the number range, rows without any, and broken ones.
+    #[cold]
+    #[inline(never)]
+    fn extreme_block(&mut self, metric: &Metric, rows: &[HalfSpace; LANES]) -> Block {
+        let mut rows = *rows;
+        let mut lengths = [1.0; LANES];
+        for (k, row) in rows.iter_mut().enumerate() {
+            self.probe[k] += row.jacobian.iter().map(|x| x * 0.0).sum::<f64>();
+            let length = scaled_norm(&metric.whiten_row(&row.jacobian));
+            if length >= ZERO_ROW {
+                lengths[k] = length;
+            } else {
+                self.impossible_row |= row.bound > 0.0;
+                row.jacobian = Vector6::zeros();
+                row.bound = NEVER_VIOLATED;
+            }
+        }
+        let jacobian = std::array::from_fn(|i| std::array::from_fn(|k| rows[k].jacobian[i]));
+        Block::new(jacobian, rows.map(|row| row.bound), lengths)
+    }
+
+    fn all_finite(&self) -> bool {
+        self.probe.iter().all(|x| *x == 0.0)
+    }
+}
+
 impl Block {
+    /// Rows of these lengths, made unit.
+    #[inline(always)]
+    fn new(mut jacobian: [Lanes; 6], mut bound: Lanes, length: Lanes) -> Block {
+        let scale = length.map(|length| 1.0 / length);
+        for values in jacobian.iter_mut().chain([&mut bound]) {
+            for k in 0..LANES {
+                values[k] *= scale[k];
+            }
+        }
+        Block {
+            jacobian,
+            bound,
+            length,
+        }
+    }
+
     #[inline]
     fn violations(&self, acceleration: &Vector6, ceiling: f64) -> Lanes {
         let mut violation = self.bound;
