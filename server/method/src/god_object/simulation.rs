@@ -57,7 +57,12 @@ impl GodObject {
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
-            implicit: ImplicitRounds::new(&settings, radius, capacity),
+            implicit: ImplicitRounds::new(
+                &settings,
+                radius,
+                Projector::new(settings.solver, capacity).with_reference_fallback(true),
+                capacity,
+            ),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
             rotation: Vector3::zeros(),
