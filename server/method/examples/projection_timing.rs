@@ -33,6 +33,7 @@ fn main() {
 
     let mut cold = Vec::with_capacity(PROBLEMS);
     let mut warm = Vec::with_capacity(PROBLEMS);
+    let mut kept = Vec::with_capacity(PROBLEMS);
     let mut worst = Worst::default();
     for (rows, a_u) in &problems {
         // The next tick: the hand has moved by a hundredth, the rows of the last answer are known.
@@ -40,16 +41,23 @@ fn main() {
         let ticks = best_times(&mut projector, &metric, [a_u, &next], rows);
         cold.push(ticks.0);
         warm.push(ticks.1);
+        kept.push(best_time_prepared(
+            &mut projector,
+            &metric,
+            [a_u, &next],
+            rows,
+        ));
         worst.take(&metric, a_u, rows, &ticks.2);
         worst.take(&metric, &next, rows, &ticks.3);
     }
     println!("{PROBLEMS} problems, 1 to 60 rows, best of {REPEATS} each");
     report("cold", &mut cold);
     report("warm", &mut warm);
+    report("warm, rows kept", &mut kept);
     println!("{worst:?}");
 
     for count in [100, 1000, 5000] {
-        let (mut cold, mut warm) = (Vec::new(), Vec::new());
+        let (mut cold, mut warm, mut kept) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..100 {
             let rows = rows_of(k % 2, count, true, random);
             let a_u = hand_motion(random);
@@ -57,9 +65,16 @@ fn main() {
             let ticks = best_times(&mut projector, &metric, [&a_u, &next], &rows);
             cold.push(ticks.0);
             warm.push(ticks.1);
+            kept.push(best_time_prepared(
+                &mut projector,
+                &metric,
+                [&a_u, &next],
+                &rows,
+            ));
         }
         report(&format!("{count} rows, cold"), &mut cold);
         report(&format!("{count} rows, warm"), &mut warm);
+        report(&format!("{count} rows, kept"), &mut kept);
     }
 }
 
@@ -107,6 +122,27 @@ fn best_times(
         answers.1 = timed(1, &own);
     }
     (best[0], best[1], answers.0, answers.1)
+}
+
+/// Microseconds of the second tick where the rows were prepared before the first.
+fn best_time_prepared(
+    projector: &mut Projector,
+    metric: &Metric,
+    ticks: [&Vector6; 2],
+    rows: &[HalfSpace],
+) -> f64 {
+    let mut best = f64::INFINITY;
+    projector.prepare(metric, rows);
+    for _ in 0..REPEATS {
+        let first = projector.project_prepared(ticks[0], &[]);
+        let own: Vec<u32> = first.active.iter().map(|row| row.row).collect();
+        let start = Instant::now();
+        let own = std::hint::black_box(&own);
+        let answer = std::hint::black_box(projector.project_prepared(ticks[1], own));
+        best = best.min(start.elapsed().as_secs_f64() * 1e6);
+        assert!(answer.kkt_residual <= 1e-12);
+    }
+    best
 }
 
 fn report(name: &str, times: &mut [f64]) {

@@ -147,7 +147,8 @@ impl Rows {
     pub(crate) fn set_bound(&mut self, row: usize, bound: f64) {
         if self.can_bind(row) {
             let block = &mut self.blocks[row / LANES];
-            block.bound[row % LANES] = bound / block.length[row % LANES];
+            block.bound[row % LANES] = bound * (1.0 / block.length[row % LANES]);
+            // Never taken back: who says that there is no answer is believed a little longer, and checked all the same.
             self.has_positive_bound |= bound > 0.0;
         }
     }
