@@ -17,7 +17,7 @@ use nalgebra::{Point3, Vector3};
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
 use crate::implicit::{ImplicitRounds, LinearAnswer};
-use crate::quasi_statics::{HalfSpace, Projection, ProjectionStatus, Projector};
+use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
@@ -34,6 +34,7 @@ pub struct Coupling {
     surfaces: Vec<TexturedSurface>,
     projector: Projector,
     implicit: ImplicitRounds,
+    arrival: Arrival,
     adaptation: Option<AdaptationState>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -50,6 +51,32 @@ struct CoupledBody {
     reference_point: Point3<f64>,
 }
 
+/// When sets arrive: rows of obstacles that move go on with them until the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Arrival {
+    sequence: u64,
+    /// When the present set was first seen, s.
+    time: f64,
+    /// Time between the present set and the one before, s.
+    period: f64,
+}
+
+impl Arrival {
+    /// How much of an update's time has passed since the set of `sequence` came, in [0, 1]: 0 where it cannot be known.
+    fn share_of_an_update(&mut self, time: f64, sequence: u64) -> f64 {
+        if sequence != self.sequence {
+            *self = Self {
+                sequence,
+                time,
+                period: time - self.time,
+            };
+        }
+        let share = (time - self.time) / self.period;
+        let known = self.period > 0.0 && share > 0.0; // false for NaN
+        if known { share.min(1.0) } else { 0.0 }
+    }
+}
+
 /// The answer of one coupling step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingOutput {
@@ -61,7 +88,8 @@ pub struct CouplingOutput {
     pub active: usize,
     /// Relative KKT residual of the force's projection.
     pub kkt: f64,
-    /// How the projection ended. Anything but `Solved` comes with a zero wrench.
+    /// How the projection ended. Anything but `Solved` comes with a zero wrench, but for `Infeasible` between obstacles that
+    /// move: there it is the force as if they stood.
     pub status: ProjectionStatus,
     /// The norm clamp of force or torque was at work.
     pub saturated: bool,
@@ -89,6 +117,7 @@ impl Coupling {
             },
             surfaces,
             projector: Projector::new(settings.solver, capacity),
+            arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
                 world.body.mesh.radius_about(&world.body.reference_point),
@@ -127,7 +156,11 @@ impl Coupling {
         let mut projection =
             self.projector
                 .project(&metric, &unconstrained, &self.rows, &self.warm_start);
-        if projection.status != ProjectionStatus::Solved {
+        // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
+        let squeezed = projection.status == ProjectionStatus::Infeasible
+            && projection.kkt_residual <= KKT_TOLERANCE
+            && set.constraints.iter().any(|row| row.came != 0.0);
+        if projection.status != ProjectionStatus::Solved && !squeezed {
             self.warm_start.clear();
             return CouplingOutput::without_force(projection.status);
         }
@@ -189,6 +222,7 @@ impl Coupling {
         if let Some(adaptation) = &mut self.adaptation {
             adaptation.observe(set.sequence, &set.constraints);
         }
+        let arrival = self.arrival.share_of_an_update(time, set.sequence);
         self.rows.clear();
         let mut shaded = false;
         for constraint in set.constraints.iter().take(self.settings.max_constraints) {
@@ -196,6 +230,9 @@ impl Coupling {
             shaded |= constraint.shading_normal.is_some();
             let jacobian = contact_jacobian(&normal, &constraint.point, center);
             let mut bound = self.settings.coupling_bound(constraint.gap);
+            if constraint.came != 0.0 {
+                bound += self.settings.k_s * constraint.came * arrival;
+            }
             if let Some(adaptation) = &mut self.adaptation {
                 bound = adaptation.bound(time, constraint.features, bound, jacobian.dot(reached));
             }
