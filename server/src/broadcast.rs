@@ -294,6 +294,7 @@ mod tests {
             normal: Vector3::z(),
             gap,
             separation: Default::default(),
+            came: 0.0,
             shading_normal: None,
         }
     }

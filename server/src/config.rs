@@ -53,6 +53,12 @@ pub fn session_setup(
         None => workbench.load_scene()?,
     };
     let built = scene.build()?;
+    if let Some(motion) = built.motions.first() {
+        return Err(Failure::BadInput(format!(
+            "the obstacle \"{}\" has a motion, which only `taut replay` can follow: a session's checker and screens know obstacles at rest only; leave out `motion`",
+            built.world.obstacles[motion.obstacle].name
+        )));
+    }
     let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
     let network = &workbench.network;
     let link = LinkSettings {

@@ -2,8 +2,9 @@
 //!
 //! Per row of the trace, in this order:
 //! 1. the device is at the row's pose, the virtual clock at the row's time;
-//! 2. loop 1 updates the god-object, as often as its virtual period has passed since its last update (by default: once);
-//! 3. loop 2 computes the force from the device pose and the newest constraint set.
+//! 2. obstacles with a motion are sent to where their traces, which begin at the first row, are at that time;
+//! 3. loop 1 updates the god-object, as often as its virtual period has passed since its last update (by default: once);
+//! 4. loop 2 computes the force from the device pose and the newest constraint set.
 //!
 //! The shaded acceleration of a row reaches loop 1 at its next update. Everything is a function of scene, trace and options, so the same
 //! input gives the same bytes; only the columns of `--timings` are of this machine.
@@ -19,7 +20,7 @@ use god_object::{
 };
 use indicatif::ProgressBar;
 use taut_bridge::EnergyObserver;
-use taut_scene::{DeviceTrace, ReplayRow, ReplayWriter, Scene};
+use taut_scene::{BuiltMotion, DeviceTrace, ReplayRow, ReplayWriter, Scene};
 
 use crate::cli::{MethodChoice, ReplayArgs};
 use crate::failure::Failure;
@@ -53,7 +54,8 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
         settings,
         built.start,
         args.god_object_rate,
-    )?;
+    )?
+    .with_motions(built.motions);
 
     let interrupted = BlockingEndSignal::listen()
         .and_then(BlockingEndSignal::into_request)
@@ -112,6 +114,9 @@ pub struct Replay {
     god_object: GodObject,
     coupling: Coupling,
     clock: UpdateClock,
+    motions: Vec<BuiltMotion>,
+    /// Virtual time of the first row, at which the obstacles' traces begin, s.
+    began: Option<f64>,
     shaded: Option<ShadedAcceleration>,
     energy: EnergyObserver,
     last_force: Option<Vector3<f64>>,
@@ -160,6 +165,8 @@ impl Replay {
                 updates: 0,
                 last: 0.0,
             },
+            motions: Vec::new(),
+            began: None,
             shaded: None,
             energy,
             last_force: None,
@@ -170,10 +177,22 @@ impl Replay {
         })
     }
 
+    /// The same with obstacles that move, from the first row on.
+    #[must_use]
+    pub fn with_motions(mut self, motions: Vec<BuiltMotion>) -> Self {
+        self.motions = motions;
+        self
+    }
+
     /// One row of the trace: the device is at `device_pose` at `time`, s; times never run back.
     pub fn row(&mut self, time: f64, device_pose: &Pose) -> ReplayRow {
         let mut update_time = Duration::ZERO;
+        let elapsed = time - *self.began.get_or_insert(time);
         while self.clock.is_due(time) {
+            for motion in &self.motions {
+                self.god_object
+                    .move_obstacle(motion.obstacle, &motion.pose_at(elapsed));
+            }
             let before = thread_cpu_time();
             let report = self.god_object.step(device_pose, self.shaded.as_ref());
             let took = thread_cpu_time().saturating_sub(before);

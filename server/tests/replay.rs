@@ -198,3 +198,65 @@ fn a_failing_replay_leaves_no_file_and_says_one_sentence() {
         .collect();
     assert_eq!(files.len(), 1, "{files:?}");
 }
+
+#[test]
+fn an_obstacle_with_a_motion_pushes_the_body_and_the_hand() {
+    let directory = temporary();
+    let scene = directory.path().join("rising.toml");
+    let plate = directory.path().join("plate.csv");
+    let hand = directory.path().join("hand.csv");
+    let out = directory.path().join("out.csv");
+    std::fs::write(
+        &scene,
+        r#"
+name = "rising-plate"
+
+[god_object]
+shape = { box = { half_extents = [0.02, 0.02, 0.01] } }
+mass = 1.0
+pose = { position = [0.0, 0.0, 0.03] }
+
+[[obstacle]]
+name = "plate"
+shape = { box = { half_extents = [0.1, 0.1, 0.002] } }
+motion = { trace = "plate.csv" }
+"#,
+    )
+    .expect("a file");
+    // 0.1 m/s up for 0.2 s, then it stays there; the hand holds still.
+    std::fs::write(
+        &plate,
+        "t,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n0.2,0,0,0.02,1,0,0,0\n",
+    )
+    .expect("a file");
+    let mut still = String::from("t,x,y,z,qw,qx,qy,qz\n");
+    for row in 0..300 {
+        still.push_str(&format!("{},0,0,0.03,1,0,0,0\n", f64::from(row) * 1e-3));
+    }
+    std::fs::write(&hand, still).expect("a file");
+    let run = taut(&[
+        "replay",
+        "--scene",
+        path_text(&scene),
+        "--trace",
+        path_text(&hand),
+        "--out",
+        path_text(&out),
+    ]);
+    assert!(run.status.success(), "{run:?}");
+    let rows = std::fs::read_to_string(&out).expect("an answer");
+    let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
+    let column = |row: &str, name: &str| -> f64 {
+        let index = header.iter().position(|h| *h == name).expect("a column");
+        row.split(',')
+            .nth(index)
+            .and_then(|n| n.parse().ok())
+            .expect("a number")
+    };
+    let first = rows.lines().nth(1).expect("a row");
+    let last = rows.lines().last().expect("a row");
+    assert_eq!(column(first, "fz"), 0.0);
+    // The plate's face ends at 22 mm, the body's middle 10 mm above it: 2 mm over the hand, at 1000 N/m.
+    assert!((column(last, "fz") - 2.0).abs() < 0.01, "{last}");
+    assert!((column(last, "sz") - 0.032).abs() < 1e-5, "{last}");
+}

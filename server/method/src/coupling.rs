@@ -19,7 +19,9 @@ use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
-use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
+use crate::quasi_statics::{
+    HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus, Projector,
+};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
@@ -37,6 +39,7 @@ pub struct Coupling {
     prepared: PreparedSet,
     projector: Projector,
     implicit: ImplicitRounds,
+    arrival: Arrival,
     known: KnownRows,
     /// The bounds in force now: those of `rows`, lower where a row is on its way in.
     bounds: Vec<f64>,
@@ -60,6 +63,8 @@ struct PreparedSet {
     /// `None` where it is not positive definite, or the pose is not finite.
     metric: Option<Metric>,
     shaded: bool,
+    /// Whether a row belongs to an obstacle that moves.
+    moving: bool,
 }
 
 impl PreparedSet {
@@ -78,6 +83,32 @@ struct CoupledBody {
     reference_point: Point3<f64>,
 }
 
+/// When sets arrive: rows of obstacles that move go on with them until the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Arrival {
+    sequence: u64,
+    /// When the present set was first seen, s.
+    time: f64,
+    /// Time between the present set and the one before, s.
+    period: f64,
+}
+
+impl Arrival {
+    /// How much of an update's time has passed since the set of `sequence` came, in [0, 1]: 0 where it cannot be known.
+    fn share_of_an_update(&mut self, time: f64, sequence: u64) -> f64 {
+        if sequence != self.sequence {
+            *self = Self {
+                sequence,
+                time,
+                period: time - self.time,
+            };
+        }
+        let share = (time - self.time) / self.period;
+        let known = self.period > 0.0 && share > 0.0; // false for NaN
+        if known { share.min(1.0) } else { 0.0 }
+    }
+}
+
 /// The answer of one coupling step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingOutput {
@@ -89,7 +120,8 @@ pub struct CouplingOutput {
     pub active: usize,
     /// Relative KKT residual of the force's projection.
     pub kkt: f64,
-    /// How the projection ended. Anything but `Solved` comes with a zero wrench.
+    /// How the projection ended. Anything but `Solved` comes with a zero wrench, but for `Infeasible` between obstacles that
+    /// move: there it is the force as if they stood.
     pub status: ProjectionStatus,
     /// The norm clamp of force or torque was at work.
     pub saturated: bool,
@@ -121,8 +153,10 @@ impl Coupling {
                 god_object: Pose::identity(),
                 metric: None,
                 shaded: false,
+                moving: false,
             },
             projector: Projector::new(settings.solver, capacity),
+            arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
                 world.body.mesh.radius_about(&world.body.reference_point),
@@ -156,6 +190,10 @@ impl Coupling {
         let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
+        let arrival = self.arrival.share_of_an_update(time, set.sequence);
+        if self.prepared.moving {
+            self.follow_obstacles(arrival, set);
+        }
         let Some(metric) = &self.prepared.metric else {
             return CouplingOutput::without_force(ProjectionStatus::NotFinite);
         };
@@ -177,7 +215,11 @@ impl Coupling {
             .projector
             .project_prepared(&unconstrained, &self.warm_start);
         self.warm_start.clear();
-        if projection.status != ProjectionStatus::Solved {
+        // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
+        let squeezed = projection.status == ProjectionStatus::Infeasible
+            && projection.kkt_residual <= KKT_TOLERANCE
+            && self.prepared.moving;
+        if projection.status != ProjectionStatus::Solved && !squeezed {
             return CouplingOutput::without_force(projection.status);
         }
         self.warm_start
@@ -228,6 +270,17 @@ impl Coupling {
         }
     }
 
+    /// Bounds of rows of moving obstacles, which have come on since the set was made; `arrival` is the share of an update since.
+    fn follow_obstacles(&mut self, arrival: f64, set: &ConstraintSet) {
+        let rows = self.rows.iter_mut().zip(&set.constraints).enumerate();
+        for (index, (row, constraint)) in rows.filter(|(_, (_, c))| c.came != 0.0) {
+            row.bound = self.settings.coupling_bound(constraint.gap)
+                + self.settings.k_s * constraint.came * arrival;
+            self.projector.set_bound(index, row.bound);
+            self.bounds[index] = row.bound;
+        }
+    }
+
     /// Everything that the set decides, whatever the device does: rows, metric, and which rows are new.
     fn prepare(&mut self, set: &ConstraintSet) {
         let constraints =
@@ -235,10 +288,11 @@ impl Coupling {
         let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
         let center = Point3::from(god_object.translation.vector);
         self.rows.clear();
-        let mut shaded = false;
+        let (mut shaded, mut moving) = (false, false);
         for constraint in constraints {
             let normal = constraint.shading_normal.unwrap_or(constraint.normal);
             shaded |= constraint.shading_normal.is_some();
+            moving |= constraint.came != 0.0;
             self.rows.push(HalfSpace {
                 jacobian: contact_jacobian(&normal, &constraint.point, &center),
                 bound: self.settings.coupling_bound(constraint.gap),
@@ -267,6 +321,7 @@ impl Coupling {
             god_object,
             metric,
             shaded,
+            moving,
         };
     }
 

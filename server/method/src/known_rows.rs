@@ -91,6 +91,7 @@ mod tests {
                 point: Point3::origin(),
                 normal: Vector3::z(),
                 gap: 0.0,
+                came: 0.0,
                 separation: Separation::OfObstacle,
                 shading_normal: None,
             })

@@ -24,9 +24,10 @@ pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, write_ply};
 pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
-    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltScene, CouplingSpec, GOD_OBJECT_NAME,
-    HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, ObstacleSpec, ReferencePoint,
-    SHIPPED_SCENES, Scene, Shape, ShippedScene, View, shipped_scene_text,
+    AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
+    GOD_OBJECT_NAME, HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, MotionSpec,
+    ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
+    shipped_scene_text,
 };
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,

@@ -179,6 +179,7 @@ mod tests {
             normal,
             gap: 1e-3,
             separation,
+            came: 0.0,
             shading_normal: None,
         })
         .to_vec()

@@ -28,6 +28,8 @@ pub struct NonPenetrationConstraint {
     pub gap: f64,
     /// How the distance changes when the body turns.
     pub separation: Separation,
+    /// How far the obstacle's point came along the normal in the update that made the set, m: 0 for what stands still.
+    pub came: f64,
     /// Interpolated normal where the surface is shaded, Section 6.1.
     pub shading_normal: Option<Vector3<f64>>,
 }

@@ -6,19 +6,14 @@ use crate::collision::{AdvancementSettings, Motion, TimeOfImpact, time_of_impact
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
     pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
-        let settings = AdvancementSettings {
-            minimum_gap: self.settings.minimum_gap,
-            gap_tolerance: self.settings.gap_tolerance,
-            max_iterations: self.settings.max_advancement_steps,
-            ..AdvancementSettings::default()
-        };
+        let settings = self.advancement();
         let mut free = 1.0;
-        for obstacle in &self.world.obstacles {
+        for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
             let found = time_of_impact(
                 &self.world.body.mesh,
                 &motion,
                 &obstacle.mesh,
-                &obstacle.pose,
+                &placed.pose,
                 &settings,
                 &mut self.collision,
                 &mut report.work,
@@ -37,5 +32,15 @@ impl GodObject {
             }
         }
         free
+    }
+
+    /// Tolerances and limits of the collision searches.
+    pub(super) fn advancement(&self) -> AdvancementSettings {
+        AdvancementSettings {
+            minimum_gap: self.settings.minimum_gap,
+            gap_tolerance: self.settings.gap_tolerance,
+            max_iterations: self.settings.max_advancement_steps,
+            ..AdvancementSettings::default()
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::obstacles::Ahead;
 use super::{GodObject, StepReport};
 use crate::constraint::contact_jacobian;
 use crate::implicit::{ImplicitAnswer, LinearAnswer};
@@ -15,13 +16,16 @@ pub(super) struct Projected {
     pub(super) acceleration: Vector6,
     /// The point of the body that goes straight, body frame, m: the reference point, or one where the body is held.
     pub(super) straight: Point3<f64>,
+    /// Every row is satisfied; otherwise rows contradict, and nothing is eased out.
+    pub(super) feasible: bool,
 }
 
 impl GodObject {
-    /// Eq. (1) on the present constraint set; `None` when there is no certified answer.
+    /// Eq. (1) on the present constraint set, with room made for what is `ahead`; `None` when there is no certified answer.
     pub(super) fn project(
         &mut self,
         unconstrained: &Vector6,
+        ahead: Option<&Ahead>,
         report: &mut StepReport,
     ) -> Option<Projected> {
         let metric = self
@@ -34,7 +38,10 @@ impl GodObject {
         for constraint in &self.set.constraints {
             self.rows.push(HalfSpace {
                 jacobian: contact_jacobian(&constraint.normal, &constraint.point, &center),
-                bound: self.settings.motion_bound(constraint.gap),
+                bound: ahead.map_or_else(
+                    || self.settings.motion_bound(constraint.gap),
+                    |ahead| self.bound_ahead(constraint, ahead),
+                ),
             });
         }
         report.work.projections += 1;
@@ -52,7 +59,10 @@ impl GodObject {
             // Two walls nearer to each other than twice the rest distance: the answer without easing out.
             ProjectionStatus::Infeasible if projection.kkt_residual <= KKT_TOLERANCE => {
                 self.warm_start.clear();
-                Some(Projected::about(projection.acceleration, reference_point))
+                Some(Projected {
+                    feasible: false,
+                    ..Projected::about(projection.acceleration, reference_point)
+                })
             }
             ProjectionStatus::Infeasible
             | ProjectionStatus::IterationLimit
@@ -98,6 +108,7 @@ impl GodObject {
         Projected {
             acceleration: pose_difference(&answer.reached, &start, &nearest),
             straight: self.held_point(&answer).unwrap_or(reference_point),
+            feasible: true,
         }
     }
 
@@ -129,6 +140,7 @@ impl Projected {
         Self {
             acceleration,
             straight,
+            feasible: true,
         }
     }
 }

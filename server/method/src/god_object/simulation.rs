@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::obstacles::PlacedObstacle;
 use super::substep::Update;
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
@@ -23,6 +24,7 @@ use crate::world::World;
 pub struct GodObject {
     pub(super) world: Arc<World>,
     pub(super) settings: Settings,
+    pub(super) obstacles: Vec<PlacedObstacle>,
     pub(super) pose: Pose,
     pub(super) set: ConstraintSet,
     pub(super) shading: Vec<Option<ShadingNormals>>,
@@ -50,6 +52,11 @@ impl GodObject {
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
+            obstacles: world
+                .obstacles
+                .iter()
+                .map(PlacedObstacle::at_rest)
+                .collect(),
             world,
             settings,
             pose: start,
@@ -95,7 +102,8 @@ impl GodObject {
     /// constraint set there.
     ///
     /// `shaded` is the first pass of force shading; it replaces a_u when it was computed on the present set. The bodies
-    /// never intersect on the way, whatever the input; a pose that is not finite moves nothing.
+    /// never intersect on the way, whatever the input; a pose that is not finite moves nothing. Obstacles that
+    /// [`Self::move_obstacle`] sent somewhere go there first.
     pub fn step(&mut self, device_pose: &Pose, shaded: Option<&ShadedAcceleration>) -> StepReport {
         let mut report = StepReport::default();
         if !pose_is_finite(device_pose) {
@@ -118,11 +126,14 @@ impl GodObject {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
         });
 
+        // What moves by itself comes first: the body is out of its way before it follows the hand.
+        let obstacles_moved = self.carry_obstacles(&mut report);
+
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
         let mut update = Update {
-            device_moved,
-            look_ahead: device_moved,
+            all_moved: device_moved + obstacles_moved,
+            look_ahead: device_moved + obstacles_moved,
             made: 0.0,
             last_motion: Vector6::zeros(),
             damping: 1.0,

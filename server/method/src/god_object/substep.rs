@@ -5,6 +5,7 @@
 
 use nalgebra::Point3;
 
+use super::projection::Projected;
 use super::{GodObject, StepReport};
 use crate::collision::Motion;
 use crate::spatial::{
@@ -21,8 +22,8 @@ const TURNING_BACK_DAMPING: f64 = 0.5;
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
-    /// Path of the device since the last update, m: it may move as far again until the next.
-    pub(super) device_moved: f64,
+    /// Path of the device and of the fastest obstacle since the last update, m: they may move as far again until the next.
+    pub(super) all_moved: f64,
     /// That, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
@@ -53,7 +54,7 @@ impl GodObject {
         } else {
             *left
         };
-        let Some(projected) = self.project(&trusted, report) else {
+        let Some(projected) = self.project(&trusted, None, report) else {
             return false;
         };
         let mut constrained = projected.acceleration;
@@ -67,7 +68,7 @@ impl GodObject {
         if report.substeps == 1 {
             // This update covers the share k_s of what is free, the next sets must serve the rest.
             update.look_ahead =
-                update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+                update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway.
         let least = (WORTH_SHARE * update.made).max(self.settings.motion_tolerance);
@@ -77,12 +78,7 @@ impl GodObject {
         }
 
         // 4. Move as far as continuous collision detection allows.
-        let motion = self.motion(&constrained, &projected.straight);
-        let time = self.free_time(motion, report);
-        if time > 0.0 {
-            let reached = motion.pose_at(time);
-            self.pose = from_reference_point(&reached, &motion.reference_point);
-        }
+        let time = self.go(&projected, &constrained, report);
         update.made += covered * time;
         if time < TRUSTED_SHARE {
             self.trust_length = (covered * time).max(self.settings.rest_distance);
@@ -100,6 +96,22 @@ impl GodObject {
         };
         self.collect(distance, &mut report.work);
         true
+    }
+
+    /// Moves the body by `displacement`, as far as it is free; the share of it that was.
+    pub(super) fn go(
+        &mut self,
+        projected: &Projected,
+        displacement: &Vector6,
+        report: &mut StepReport,
+    ) -> f64 {
+        let motion = self.motion(displacement, &projected.straight);
+        let time = self.free_time(motion, report);
+        if time > 0.0 {
+            let reached = motion.pose_at(time);
+            self.pose = from_reference_point(&reached, &motion.reference_point);
+        }
+        time
     }
 
     /// The motion by `displacement` of the reference point in which the body's point `straight` goes straight.

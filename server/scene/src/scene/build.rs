@@ -1,6 +1,7 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
 use god_object::geometry::mass_properties;
+use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -24,6 +25,40 @@ pub struct BuiltBody {
     pub mesh: RawMesh,
     /// World from body, at the start.
     pub pose: Pose,
+}
+
+/// How an obstacle moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuiltMotion {
+    /// Index of the obstacle in the world.
+    pub obstacle: usize,
+    /// Its poses.
+    pub path: DeviceTrace,
+    /// Begin again at the end; otherwise it stays there.
+    pub repeat: bool,
+}
+
+impl BuiltMotion {
+    /// World from obstacle, `elapsed` seconds after the start of the scene: between two samples a straight line of its origin at constant
+    /// speed and a constant axis and rate of rotation.
+    pub fn pose_at(&self, elapsed: f64) -> Pose {
+        let samples = self.path.samples();
+        let duration = self.path.duration();
+        let within = if self.repeat && duration > 0.0 {
+            elapsed.rem_euclid(duration)
+        } else {
+            elapsed.clamp(0.0, duration)
+        };
+        let time = samples[0].time + within;
+        let next = samples.partition_point(|sample| sample.time <= time);
+        let before = &samples[next.saturating_sub(1)];
+        let Some(after) = samples.get(next) else {
+            return before.pose;
+        };
+        let share = (time - before.time) / (after.time - before.time);
+        let way = pose_difference(&after.pose, &before.pose, &Vector3::zeros());
+        advance_pose(&before.pose, &way, share)
+    }
 }
 
 /// The hand's intention.
@@ -50,6 +85,8 @@ pub struct BuiltScene {
     pub start: Pose,
     /// The hand's intention, if the scene has one.
     pub hand: Option<BuiltHand>,
+    /// How obstacles move; nothing for those that stand still.
+    pub motions: Vec<BuiltMotion>,
     /// What is drawn: the god-object first, then the obstacles in order.
     pub bodies: Vec<BuiltBody>,
     /// How the scene stands on the workbench.
@@ -77,6 +114,7 @@ impl Scene {
             problems.extend(error.into_problems());
             None
         });
+        let motions = self.motions(&mut problems);
         FileError::unless_empty(problems)?;
 
         let Some(mesh) = body_mesh else {
@@ -96,7 +134,7 @@ impl Scene {
             let text = "the mass or inertia of the god-object is out of range; check mass, density and the mesh's size (metres)";
             return Err(spec.god_object.at.problem(text).into());
         }
-        let obstacles: Vec<Obstacle> = spec
+        let mut obstacles: Vec<Obstacle> = spec
             .obstacles
             .iter()
             .zip(obstacle_meshes)
@@ -109,6 +147,9 @@ impl Scene {
                 })
             })
             .collect();
+        for motion in &motions {
+            obstacles[motion.obstacle].pose = motion.pose_at(0.0);
+        }
         let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, spec.god_object.pose)];
         bodies.extend(obstacles.iter().map(|o| drawn(&o.name, &o.mesh, o.pose)));
         let hand = spec.hand.as_ref().zip(hand_path);
@@ -125,10 +166,29 @@ impl Scene {
                 repeat: hand.repeat,
                 preset: hand.preset,
             }),
+            motions,
             bodies,
             view: spec.view,
             size,
         })
+    }
+
+    /// Traces of the obstacles that move.
+    fn motions(&self, problems: &mut Vec<Problem>) -> Vec<BuiltMotion> {
+        let obstacles = self.spec.obstacles.iter().enumerate();
+        let moving = obstacles.filter_map(|(index, o)| Some((index, o.motion.as_ref()?)));
+        let mut motions = Vec::new();
+        for (obstacle, motion) in moving {
+            match self.trace(&motion.trace, &motion.at) {
+                Ok(path) => motions.push(BuiltMotion {
+                    obstacle,
+                    path,
+                    repeat: motion.repeat,
+                }),
+                Err(error) => problems.extend(error.into_problems()),
+            }
+        }
+        motions
     }
 
     fn mesh(&self, shape: &Shape, at: &At, problems: &mut Vec<Problem>) -> Option<Mesh> {

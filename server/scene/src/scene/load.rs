@@ -145,12 +145,17 @@ impl Scene {
         let Some(hand) = &self.spec.hand else {
             return Ok(None);
         };
-        if let (Origin::Shipped, Some(text)) = (&self.origin, shipped_file(&hand.path)) {
-            return DeviceTrace::parse(&hand.path, text).map(Some);
+        self.trace(&hand.path, &hand.at).map(Some)
+    }
+
+    /// The trace of this name, as written in the scene.
+    pub(super) fn trace(&self, name: &str, at: &At) -> Result<DeviceTrace, FileError> {
+        if let (Origin::Shipped, Some(text)) = (&self.origin, shipped_file(name)) {
+            return DeviceTrace::parse(name, text);
         }
-        let path = self.locate(&hand.path, &hand.at)?;
+        let path = self.locate(name, at)?;
         let text = read_text(&path, MAX_TRACE_BYTES)?;
-        DeviceTrace::parse(&path.display().to_string(), &text).map(Some)
+        DeviceTrace::parse(&path.display().to_string(), &text)
     }
 
     /// The mesh file of this name, as written in the scene.

@@ -7,11 +7,11 @@ mod parse_shape;
 mod shipped;
 mod spec;
 
-pub use build::{BuiltBody, BuiltHand, BuiltScene, GOD_OBJECT_NAME};
+pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 pub use load::Scene;
 pub(crate) use parse_shape::pose_of;
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
-    MethodSpec, ObstacleSpec, ReferencePoint, Shape, View,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, Shape, View,
 };

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
-    MethodSpec, ObstacleSpec, ReferencePoint, View,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::problem::FileError;
@@ -156,6 +156,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
             );
         }
         let (shape, pose, surface) = (shape(&section), pose(&section), surface(&section));
+        let motion = section.section("motion").and_then(motion);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
             section.complain(
@@ -171,11 +172,29 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 shape,
                 pose,
                 surface,
+                motion,
                 shape_at,
             });
         }
     }
     obstacles
+}
+
+fn motion(section: Section<'_>) -> Option<MotionSpec> {
+    let at = section
+        .get("trace")
+        .map_or(section.at(), |node| &node.at)
+        .clone();
+    let trace = section
+        .required_text("trace", "trace = \"plate.csv\"")
+        .map(str::to_owned);
+    let repeat = section.boolean("loop").unwrap_or(false);
+    section.finish();
+    Some(MotionSpec {
+        trace: trace?,
+        repeat,
+        at,
+    })
 }
 
 fn coupling(section: Section<'_>) -> CouplingSpec {

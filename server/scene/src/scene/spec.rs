@@ -105,7 +105,7 @@ pub struct BodySpec {
     pub(crate) shape_at: At,
 }
 
-/// A body that stands still.
+/// A body that stands still, or moves as a trace says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObstacleSpec {
     /// Unique in the scene.
@@ -116,7 +116,19 @@ pub struct ObstacleSpec {
     pub pose: Pose,
     /// How it feels.
     pub surface: Surface,
+    /// How it moves; `None` stands still at its pose.
+    pub motion: Option<MotionSpec>,
     pub(crate) shape_at: At,
+}
+
+/// `motion = { trace = "plate.csv" }`: an obstacle is where the trace says, whatever its pose is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionSpec {
+    /// Poses in the trace format, relative to the scene file, else to the data directory.
+    pub trace: String,
+    /// Begin again at the end; otherwise it stays there.
+    pub repeat: bool,
+    pub(crate) at: At,
 }
 
 /// Constraint adaptation as written.
