@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use god_object::{Coupling, GodObject, Pose, Vector6};
+use god_object::{
+    Coupling, GodObject, Pose, Settings, ShadedAcceleration, StepReport, Vector6, World,
+};
 use taut_scene::{BuiltScene, DeviceTrace, Scene};
 
 /// One update of both loops.
@@ -20,6 +22,8 @@ pub struct Sample {
     pub gap_min: f64,
     /// Rows in the active set of the force.
     pub active: usize,
+    /// What the update did.
+    pub report: StepReport,
 }
 
 /// A shipped scene, ready to run; its meshes must be there.
@@ -43,23 +47,56 @@ pub fn lead(
     scene: &BuiltScene,
     device: impl Iterator<Item = (f64, Pose)>,
 ) -> impl Iterator<Item = Sample> {
-    let world = Arc::new(scene.world.clone());
-    let mut coupling = Coupling::new(&world, &scene.settings);
-    let mut god_object = GodObject::new(world, scene.settings, scene.start)
-        .unwrap_or_else(|error| panic!("{error}"));
-    let mut shaded = None;
-    device.map(move |(time, pose)| {
-        god_object.step(&pose, shaded.as_ref());
-        let set = god_object.constraint_set();
-        let output = coupling.step(time, &pose, set);
-        shaded = output.shaded;
+    let mut led = Led::new(scene);
+    device.map(move |(time, pose)| led.step(time, &pose))
+}
+
+/// Both loops of a scene, when neither is late.
+#[derive(Debug)]
+pub struct Led {
+    god_object: GodObject,
+    coupling: Coupling,
+    shaded: Option<ShadedAcceleration>,
+}
+
+impl Led {
+    /// At the scene's start.
+    #[must_use]
+    pub fn new(scene: &BuiltScene) -> Self {
+        Self::in_world(Arc::new(scene.world.clone()), &scene.settings, scene.start)
+    }
+
+    /// The body of this world, at this start, which must be free.
+    #[must_use]
+    pub fn in_world(world: Arc<World>, settings: &Settings, start: Pose) -> Self {
+        Self {
+            coupling: Coupling::new(&world, settings),
+            god_object: GodObject::new(world, *settings, start)
+                .unwrap_or_else(|error| panic!("{error}")),
+            shaded: None,
+        }
+    }
+
+    /// World from body.
+    #[must_use]
+    pub fn pose(&self) -> &Pose {
+        self.god_object.pose()
+    }
+
+    /// One update, then one force.
+    pub fn step(&mut self, time: f64, device: &Pose) -> Sample {
+        let report = self.god_object.step(device, self.shaded.as_ref());
+        let set = self.god_object.constraint_set();
+        let output = self.coupling.step(time, device, set);
+        self.shaded = output.shaded;
         Sample {
             time,
-            device: pose,
+            device: *device,
             god_object: set.god_object_pose,
             wrench: output.wrench,
             gap_min: set.gap_min,
             active: output.active,
+            report,
         }
-    })
+    }
 }
