@@ -5,12 +5,16 @@
 //! the roots of all conditions. Nothing here rounds, and nothing is shared with the method.
 #![allow(dead_code, reason = "each test file uses some of it")]
 
+mod outcome;
 mod polynomial;
 mod queries;
 
 use god_object::nalgebra::Point3;
 use num_bigint::BigInt;
+#[allow(unused_imports, reason = "each test file uses some of it")]
+pub(crate) use outcome::{Outcome, answer, judge};
 use polynomial::{Dyadic, Polynomial};
+#[allow(unused_imports, reason = "each test file uses some of it")]
 pub(crate) use queries::{Kind, Query, query_sets};
 
 type Vector = [Polynomial; 3];
