@@ -1,9 +1,12 @@
 //! The insertion scenes of the test data: pegs, a gear, a nut, each with the trace of a hand from start to goal.
 //!
 //! A hand does not push on blindly. Where the body stays behind by more than [`PATIENCE`], as a peg does that an offset holds
-//! on the face beside its hole, the hand stops on its way and corrects offset and tilt, and errs again as it goes on. At the goal it corrects
-//! itself and waits; its tremor never ends. (A hand that pushes a peg 10 mm into the face beside the hole tilts it,
-//! and it stays tilted when the hand corrects itself: the method's least constraint there is a true one.)
+//! on the face beside its hole, the hand goes back a little on its way, corrects offset and tilt meanwhile, and tries again;
+//! as it goes on it falls back into its error, slowly. At the goal it corrects itself and waits. Its tremor never ends.
+//!
+//! (A hand that keeps pressing a peg on the face beside the hole tilts it: the pressure has a lever to the centre of mass, and the body's
+//! inertia, which is its stiffness against rotation, is small. The tilted peg is at a true minimum, which correcting the hand alone does not
+//! remove: the peg must be lifted.)
 
 use god_object::Pose;
 use taut_scene::{BuiltScene, DeviceTrace, FileError, Scene, data_file};
@@ -12,14 +15,18 @@ use crate::checker::PenetrationChecker;
 use crate::hand::HandError;
 use crate::motion::{Led, Sample};
 
-/// How far the body may stay behind before the hand stops, m: a third of the pitch of the nut's thread.
+/// How far the body may stay behind before the hand goes back, m: a third of the pitch of the nut's thread.
 const PATIENCE: f64 = 1e-3;
-/// Time in which a hand corrects all its offset and tilt, or falls back into them, s.
+/// For how long it goes back, s.
+const RETREAT: f64 = 0.5;
+/// Time in which a hand corrects all its offset and tilt, s.
 const CORRECTION: f64 = 0.4;
+/// Time in which it falls back into all of them, s.
+const RELAPSE: f64 = 4.0;
 /// Time for which the hand waits at the goal, s.
 const WAITING: f64 = 0.6;
-/// A hand that is stopped for longer than this has failed, s.
-const LONGEST_STOP: f64 = 2.0;
+/// Most attempts: the next one is a failure.
+const MAX_ATTEMPTS: usize = 8;
 
 /// One of the insertion scenes.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +81,8 @@ pub struct Outcome {
     pub distance_to_goal: f64,
     /// The same for rotation, rad.
     pub turn_to_goal: f64,
+    /// How often the hand tried.
+    pub attempts: usize,
 }
 
 impl Assembly {
@@ -101,31 +110,34 @@ impl Assembly {
         let rows = trace.samples();
         let goal = rows[rows.len() - 1].pose;
         let period = rows[every].time - rows[0].time;
-        let share_per_update = period / CORRECTION;
         let waiting = (WAITING / period).ceil() as usize;
         let mut led = Led::new(scene);
         let mut samples: Vec<Sample> = Vec::new();
-        let (mut row, mut waited, mut stopped, mut constant) = (0, 0, 0.0, 1.0_f64);
-        while waited < waiting && stopped < LONGEST_STOP {
+        let (mut row, mut waited, mut constant, mut retreat) = (0_usize, 0, 1.0_f64, 0.0);
+        let mut attempts = 1;
+        while waited < waiting && attempts <= MAX_ATTEMPTS {
             let time = samples.len() as f64 * period;
             let meant = rows[row].pose;
             let device = hand.map_or(meant, |hand| hand.at(time, &meant, constant));
             samples.push(led.step(time, &device));
             let behind = (device.translation.vector - led.pose().translation.vector).norm();
-            let at_goal = row + 1 == rows.len();
-            if at_goal || (hand.is_some() && behind > PATIENCE) {
-                constant = (constant - share_per_update).max(0.0);
-            } else {
-                constant = (constant + share_per_update).min(1.0);
+            if retreat <= 0.0 && hand.is_some() && behind > PATIENCE {
+                retreat = RETREAT;
+                attempts += 1;
             }
-            if at_goal {
+            let arrived = row + 1 == rows.len();
+            if retreat > 0.0 {
+                retreat -= period;
+                row = row.saturating_sub(every);
+                constant -= period / CORRECTION;
+            } else if arrived {
                 waited += 1;
-            } else if hand.is_some() && behind > PATIENCE {
-                stopped += period;
+                constant -= period / CORRECTION;
             } else {
-                stopped = 0.0;
                 row = (row + every).min(rows.len() - 1);
+                constant += period / RELAPSE;
             }
+            constant = constant.clamp(0.0, 1.0);
             progress(row as f64 / rows.len() as f64);
         }
         let penetrations = samples
@@ -148,6 +160,7 @@ impl Assembly {
                 .fold(f64::INFINITY, f64::min),
             distance_to_goal: body.0 - hand.0,
             turn_to_goal: body.1 - hand.1,
+            attempts,
             samples,
         }
     }

@@ -35,6 +35,15 @@ impl HandError {
         }
     }
 
+    /// The same hand, resting on something.
+    #[must_use]
+    pub fn without_tremor(&self) -> Self {
+        Self {
+            tremor: 0.0,
+            ..self.clone()
+        }
+    }
+
     /// Where the hand is that means to be at `pose`, with the share `constant` of offset and tilt.
     #[must_use]
     pub fn at(&self, time: f64, pose: &Pose, constant: f64) -> Pose {
@@ -114,10 +123,7 @@ mod tests {
 
     #[test]
     fn offset_and_tilt_are_those_of_a_hand() {
-        let hand = HandError {
-            tremor: 0.0,
-            ..HandError::of_a_hand(3)
-        };
+        let hand = HandError::of_a_hand(3).without_tremor();
         let pose = Pose::translation(0.1, 0.2, 0.3);
         let there = hand.at(0.3, &pose, 1.0);
         assert!(((there.translation.vector - pose.translation.vector).norm() - 5e-4).abs() < 1e-15);

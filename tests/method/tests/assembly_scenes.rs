@@ -17,8 +17,9 @@ fn assembles(name: &str, seed: Option<u64>, every: usize) {
     let hand = seed.map(HandError::of_a_hand);
     let outcome = Assembly::run(&scene, &trace, hand.as_ref(), every, 2, |_| ());
     println!(
-        "{name}, hand {seed:?}: {} updates, least gap {:e} m, ends {:e} m and {:e} rad from where the hand is",
+        "{name}, hand {seed:?}: {} updates, {} attempts, least gap {:e} m, ends {:e} m and {:e} rad from where the hand is",
         outcome.samples.len(),
+        outcome.attempts,
         outcome.gap_min,
         outcome.distance_to_goal,
         outcome.turn_to_goal
