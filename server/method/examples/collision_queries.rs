@@ -237,6 +237,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .build_cartesian_2d(gaps.clone(), 0.0..15.0)?;
     chart
         .configure_mesh()
+        .light_line_style(TRANSPARENT)
         .x_desc("minimum gap / size")
         .y_desc("% of those without contact")
         .x_label_formatter(&|x| format!("{x:.0e}"))
@@ -270,6 +271,7 @@ fn draw(path: &std::path::Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         .build_cartesian_2d(gaps, (LEAST_EARLINESS..1.0).log_scale())?;
     chart
         .configure_mesh()
+        .light_line_style(TRANSPARENT)
         .x_desc("minimum gap / size")
         .y_desc("fraction of the motion")
         .x_label_formatter(&|x| format!("{x:.0e}"))
