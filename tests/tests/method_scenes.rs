@@ -3,9 +3,10 @@
 //! Poses are checked for penetration by code that shares nothing with the method. Source: Ortega et al. 2007, Figures 10 to 12.
 
 use nalgebra::Vector3;
-use taut_scene::{BuiltScene, DeviceTrace, Scene, data_file};
-use taut_tests::checker::PenetrationChecker;
-use taut_tests::motion::{Sample, intention, lead, sampled, shipped, traced};
+use taut_method_tests::checker::PenetrationChecker;
+use taut_method_tests::motion::{Sample, lead, shipped};
+use taut_scene::{BuiltScene, data_file};
+use taut_tests::motion::{intention, sampled};
 
 /// Stiffness that the hand feels in the shipped scenes, N/m.
 const STIFFNESS: f64 = 1000.0;
@@ -231,52 +232,6 @@ fn a_sphere_on_a_plane_feels_the_closed_form_force_and_never_loses_it() {
         } else if depth < -2.0 * rest {
             assert_eq!(force.z, 0.0, "a force in the air at {} s", sample.time);
         }
-    }
-}
-
-/// The device traces of these scenes run from the start to the goal without touching.
-#[test]
-fn assembly_scenes_are_followed_to_their_goal_without_penetration() {
-    // How many rows of the trace's end are used, and one in how many: the nut on its bolt touches nearly everywhere and takes its time.
-    const ALL: usize = usize::MAX;
-    for (name, rows_used, every) in [
-        ("peg_round_8mm_loose", ALL, 10),
-        ("peg_round_8mm_tight", ALL, 10),
-        ("peg_rect_16mm_loose", ALL, 10),
-        ("gear_on_pin", ALL, 40),
-        ("nut_bolt_m24", 200, 1),
-    ] {
-        let (Some(scene), Some(trace)) = (
-            data_file(format!("assembly/{name}.toml")),
-            data_file(format!("assembly/{name}_trace.csv")),
-        ) else {
-            println!("skipped: {name}, because assembly/{name}.toml is not in the data directory");
-            continue;
-        };
-        let mut built = Scene::load(&scene)
-            .and_then(|scene| scene.build())
-            .unwrap_or_else(|error| panic!("{error}"));
-        let trace = DeviceTrace::load(&trace).unwrap_or_else(|error| panic!("{error}"));
-        let rows: Vec<_> = traced(&trace).collect();
-        let rows = &rows[rows.len().saturating_sub(rows_used)..];
-        built.start = rows[0].1;
-        let thinned = rows.iter().copied().step_by(every);
-        // At the goal the hand waits for the body.
-        let goal = rows[rows.len() - 1];
-        let waiting = (1..=40).map(|step| (goal.0 + 0.001 * f64::from(step), goal.1));
-        let samples: Vec<Sample> = lead(&built, thinned.chain(waiting)).collect();
-        assert_apart(&built, &samples, 2);
-        let last = &samples[samples.len() - 1];
-        let left = (last.device.translation.vector - last.god_object.translation.vector).norm();
-        assert!(
-            left <= built.settings.rest_distance,
-            "{name}: the body ends {left:e} m from its goal"
-        );
-        assert!(
-            force(last).norm() <= STIFFNESS * built.settings.rest_distance,
-            "{name}: {} at the goal",
-            force(last)
-        );
     }
 }
 

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use taut_method_tests::motion::shipped;
 use taut_scene::{DeviceTrace, REPLAY_COLUMNS, TraceSample};
-use taut_tests::motion::{intention, sampled, shipped};
+use taut_tests::motion::{intention, sampled};
 use taut_tests::process::Ended;
 use taut_tests::workbench::TestWorkbench;
 

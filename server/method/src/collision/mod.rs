@@ -2,7 +2,9 @@
 
 mod advancement;
 mod distance;
+mod gaps;
 mod intersection;
+mod linear;
 mod motion;
 mod swept_box;
 mod time_of_impact;
@@ -11,6 +13,7 @@ mod workspace;
 
 pub use distance::distance;
 pub use intersection::meshes_intersect;
+pub use linear::{edge_edge_time_of_impact, vertex_face_time_of_impact};
 pub use motion::Motion;
 pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;

@@ -11,6 +11,7 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{PairOutcome, PairSearch, TrianglePair};
+use super::gaps::Gaps;
 use super::motion::{Motion, RelativeMotion};
 use super::swept_box::{SweptBoxes, for_triangle_pairs};
 use super::work::Work;
@@ -101,13 +102,11 @@ pub fn time_of_impact(
     let world_reach =
         motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
     let slack = ROUNDING * (relative.reach(radius) + obstacle_reach + world_reach);
-    let search = PairSearch::new(
-        &relative,
-        settings.minimum_gap,
-        settings.gap_tolerance,
-        slack,
-        settings.max_iterations,
-    );
+    let search = PairSearch {
+        motion: &relative,
+        gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
+        max_iterations: settings.max_iterations,
+    };
     let problem = Problem {
         body,
         obstacle,
@@ -121,7 +120,12 @@ pub fn time_of_impact(
         match problem.first_impact(&current, workspace, work) {
             Ok(answer) => return answer,
             // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
-            Err(gap) => tried = search.keeping(gap),
+            Err(gap) => {
+                tried = search
+                    .gaps
+                    .keeping(gap)
+                    .map(|gaps| PairSearch { gaps, ..search })
+            }
         }
     }
     TimeOfImpact::Impact { time: 0.0 }
@@ -195,7 +199,7 @@ impl Problem<'_> {
         workspace: &mut CollisionWorkspace,
         work: &mut Work,
     ) {
-        let boxes = SweptBoxes::over(self.relative, from, to, search.stop_gap);
+        let boxes = SweptBoxes::over(self.relative, from, to, search.gaps.stop);
         let placement = self.relative.at(from);
         let (body_nodes, obstacle_nodes) = (self.body.tree().nodes(), self.obstacle.tree().nodes());
         for_triangle_pairs(

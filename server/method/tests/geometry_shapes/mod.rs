@@ -1,11 +1,19 @@
 //! Shapes for the tests of geometry, collision and contact; a reader of test meshes; where test data lies.
-#![allow(dead_code, reason = "each test file uses some of the shapes")]
+#![allow(
+    dead_code,
+    unused_imports,
+    reason = "each test file uses some of the shapes"
+)]
+
+mod conforming;
 
 use std::collections::HashMap;
 use std::path::PathBuf;
 
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
+
+pub(crate) use conforming::{fine_hole, fine_peg};
 
 pub(crate) type Soup = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 

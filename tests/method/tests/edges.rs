@@ -1,0 +1,193 @@
+//! Where a surface bends or ends: stale constraints cost at most what theory says.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use god_object::{Coupling, GodObject, Pose, Settings, World};
+use nalgebra::Vector3;
+use taut_method_tests::solids::{body, cells, mesh, obstacle};
+use taut_scene::shapes::{Axis, cuboid, cylinder, sphere};
+
+/// Updates of the god-object in milliseconds: 1000, 333 and 71 Hz. Forces come at 1 kHz.
+const PERIODS: [u32; 3] = [1, 3, 14];
+
+/// Runs both loops over `device`, which is given every millisecond; hands every force to `felt`.
+fn run(
+    world: &Arc<World>,
+    settings: &Settings,
+    period: u32,
+    device: impl Iterator<Item = Pose>,
+    mut felt: impl FnMut(u32, &Pose, Vector3<f64>),
+) {
+    let mut device = device.peekable();
+    let start = *device.peek().expect("a path");
+    let mut coupling = Coupling::new(world, settings);
+    let mut god_object = GodObject::new(world.clone(), *settings, start).expect("a free start");
+    for (k, pose) in (0_u32..).zip(device) {
+        if k.is_multiple_of(period) {
+            god_object.step(&pose, None);
+        }
+        let output = coupling.step(f64::from(k) * 1e-3, &pose, god_object.constraint_set());
+        felt(k, &pose, Vector3::from(output.wrench.fixed_rows::<3>(0)));
+    }
+}
+
+#[test]
+fn the_plane_beyond_the_end_of_a_plate_is_felt_for_a_few_updates_only() {
+    let radius = 0.005;
+    let world = Arc::new(World {
+        body: body(mesh(sphere(radius, 3))),
+        obstacles: vec![obstacle(
+            "plate",
+            mesh(cuboid([0.05, 0.05, 0.01])),
+            Pose::translation(-0.05, 0.0, -0.01),
+        )],
+    });
+    let settings = Settings::for_size(2.0 * radius);
+    let (speed, depth) = (0.2, 0.005);
+    for period in PERIODS {
+        // Comes down in 50 ms at the left, then slides off the right end.
+        let path = (0..600).map(|k| {
+            let t = f64::from(k) * 1e-3;
+            let down = (t / 0.05).min(1.0);
+            let z = (radius + 1e-3) * (1.0 - down) + (radius - depth) * down;
+            Pose::translation(-0.05 + speed * (t - 0.05).max(0.0), 0.0, z)
+        });
+        let (mut pressed, mut ghost) = (0, 0.0);
+        run(&world, &settings, period, path, |_, pose, force| {
+            let x = pose.translation.x;
+            if x < -0.01 && pose.translation.z <= radius - depth {
+                pressed += 1;
+                assert!((force.z - 5.0).abs() < 0.05, "{force} at x = {x}");
+            }
+            // Beyond the end by its radius the body is free.
+            if x > radius {
+                ghost += force.norm() * 1e-3;
+                let late = (x - radius) / speed;
+                let allowed = (1.0 / settings.k_s + 1.0) * f64::from(period) * 1e-3 + 2e-3;
+                assert!(
+                    late <= allowed || force.norm() == 0.0,
+                    "{period} ms: {force} {late} s after the end"
+                );
+            }
+        });
+        println!("{period} ms: ghost of {ghost} N s");
+        assert!(pressed > 100);
+    }
+}
+
+#[test]
+fn the_force_on_a_cylinder_lags_by_no_more_than_its_staleness() {
+    let (ball, depth) = (0.002, 0.003);
+    for (radius, speed, facets) in [
+        (0.02, 0.05, 256),
+        (0.02, 0.2, 256),
+        (0.05, 0.2, 256),
+        (0.02, 0.2, 64),
+    ] {
+        let world = Arc::new(World {
+            body: body(mesh(sphere(ball, 3))),
+            obstacles: vec![obstacle(
+                "cylinder",
+                mesh(cylinder(radius, 0.05, facets, Axis::Z)),
+                Pose::identity(),
+            )],
+        });
+        let settings = Settings::for_size(2.0 * ball);
+        for period in PERIODS {
+            let angle = |k: u32| speed / radius * (f64::from(k) - 60.0).max(0.0) * 1e-3;
+            let path = (0..700).map(|k| {
+                let out =
+                    radius + ball - depth + 2.0 * depth * (1.0 - f64::from(k) / 60.0).max(0.0);
+                Pose::translation(out * angle(k).cos(), out * angle(k).sin(), 0.001)
+            });
+            let (mut sum, mut count) = (0.0, 0);
+            run(&world, &settings, period, path, |k, _, force| {
+                if k > 250 {
+                    let out = Vector3::new(angle(k).cos(), angle(k).sin(), 0.0);
+                    sum += (force.dot(&out) / force.norm()).min(1.0).acos();
+                    count += 1;
+                }
+            });
+            let mean = sum / f64::from(count);
+            let stale = speed / radius * f64::from(period) * 1e-3 * (1.0 / settings.k_s + 1.0);
+            let facet = PI / facets as f64;
+            println!(
+                "R {radius}, {speed} m/s, {facets} facets, {period} ms: {mean} rad, staleness {stale}, facet {facet}"
+            );
+            assert!(mean <= stale + facet, "{mean} {stale} {facet}");
+        }
+    }
+}
+
+/// Combs of eleven teeth, 4 mm apart, 2 mm wide, 10 mm deep.
+#[test]
+fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
+    let (pitch, tooth, depth, thick) = (4e-3, 2e-3, 10e-3, 3e-3);
+    for clearance in [0.2e-3, 0.05e-3] {
+        let comb = |width: f64, teeth: usize| -> Vec<f64> {
+            let first = -0.5 * (teeth - 1) as f64 * pitch;
+            (0..teeth)
+                .flat_map(|k| {
+                    let middle = first + k as f64 * pitch;
+                    [middle - 0.5 * width, middle + 0.5 * width]
+                })
+                .collect()
+        };
+        let y = [-5e-3, 5e-3];
+        // Teeth down, under a bar; teeth up, on a bar, in the gaps of the other and beyond.
+        let upper_x = comb(tooth, 11);
+        let upper = mesh(cells([&upper_x, &y, &[-depth, 0.0, thick]], |[i, _, k]| {
+            k == 1 || i % 2 == 0
+        }));
+        let lower_x = comb(pitch - tooth - 2.0 * clearance, 12);
+        let lower = mesh(cells([&lower_x, &y, &[-thick, 0.0, depth]], |[i, _, k]| {
+            k == 0 || i % 2 == 0
+        }));
+        let mut held = body(upper);
+        // In the middle of the teeth: a push to the side has no lever.
+        held.reference_point = nalgebra::Point3::new(0.0, 0.0, -0.5 * depth);
+        let world = Arc::new(World {
+            body: held,
+            obstacles: vec![obstacle("comb", lower, Pose::identity())],
+        });
+        let settings = Settings::for_size(0.044);
+        let mut coupling = Coupling::new(&world, &settings);
+        let mut god_object = GodObject::new(
+            world.clone(),
+            settings,
+            Pose::translation(0.0, 0.0, 2.0 * depth + 1e-3),
+        )
+        .expect("a free start");
+        let inserted = depth + 2e-3; // 8 mm of the teeth overlap
+        for k in 0..40 {
+            let z = 2.0 * depth + 1e-3 - f64::from(k + 1) / 40.0 * (depth - 1e-3);
+            god_object.step(&Pose::translation(0.0, 0.0, z), None);
+        }
+        for (side, x) in [(1.0, 1e-3), (-1.0, -1e-3)] {
+            let device = Pose::translation(x, 0.0, inserted);
+            for _ in 0..60 {
+                god_object.step(&device, None);
+            }
+            let felt = coupling.step(1.0 + side, &device, god_object.constraint_set());
+            let expected = -side * 1000.0 * (1e-3 - clearance);
+            assert!(
+                (felt.wrench[0] - expected).abs() <= 1000.0 * 2.0 * settings.rest_distance,
+                "c {clearance}: {} not {expected}",
+                felt.wrench
+            );
+            assert!(
+                felt.wrench.fixed_rows::<5>(1).norm() <= 1e-6,
+                "c {clearance}: {}",
+                felt.wrench
+            );
+            let touching = god_object
+                .constraint_set()
+                .constraints
+                .iter()
+                .filter(|row| row.gap < 2.0 * settings.rest_distance)
+                .count();
+            assert!(touching >= 20, "c {clearance}: {touching} contacts");
+        }
+    }
+}
