@@ -2,6 +2,7 @@
 
 mod advancement;
 mod distance;
+mod facing_volumes;
 mod gaps;
 mod intersection;
 mod linear;

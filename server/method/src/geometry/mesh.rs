@@ -6,6 +6,7 @@ use super::mesh_error::MeshError;
 use super::normal_cone::triangle_cones;
 use super::topology::{Edge, Topology};
 use super::tree::Tree;
+use super::wide_tree::WideTree;
 
 /// A triangle whose doubled area is below this share of its longest side squared has none: some units of rounding of the
 /// cross product. Slivers of CAD exports, some 1e-6 of their length high, are far above.
@@ -21,6 +22,7 @@ pub struct Mesh {
     face_normals: Vec<Vector3<f64>>,
     topology: Topology,
     tree: Tree,
+    wide_tree: WideTree,
     bounding_box: [Point3<f64>; 2],
     mean_edge_length: f64,
 }
@@ -43,6 +45,7 @@ impl Mesh {
 
         let cones = triangle_cones(&vertices, &triangles, &face_normals, &mut topology);
         let tree = Tree::build(&vertices, &triangles, &cones);
+        let wide_tree = WideTree::build(&vertices, &triangles, &face_normals, &cones, &tree);
         let mut bounding_box = [vertices[0]; 2];
         for v in &vertices {
             bounding_box = [bounding_box[0].inf(v), bounding_box[1].sup(v)];
@@ -58,6 +61,7 @@ impl Mesh {
             face_normals,
             topology,
             tree,
+            wide_tree,
             bounding_box,
             mean_edge_length,
         })
@@ -121,6 +125,12 @@ impl Mesh {
     #[inline]
     pub fn tree(&self) -> &Tree {
         &self.tree
+    }
+
+    /// The wide tree over the triangles.
+    #[inline]
+    pub(crate) fn wide_tree(&self) -> &WideTree {
+        &self.wide_tree
     }
 
     /// Lower and upper corner of the axis-aligned box around the vertices, m.
