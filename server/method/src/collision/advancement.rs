@@ -54,28 +54,35 @@ pub(super) struct TrianglePair {
 }
 
 impl PairSearch<'_> {
-    /// Follows the pair over `[from, to]`; `placement` is the body at `from`.
-    pub(super) fn advance(
+    /// The body's triangle at `from`, unless the planes of the two faces show that the pair is free up to `to`: they settle
+    /// most pairs, without closest points. `placement` is the body at `from`.
+    #[inline]
+    pub(super) fn begin(
         &self,
+        pair: &TrianglePair,
+        placement: &Placement,
+        from: f64,
+        to: f64,
+    ) -> Option<MovingTriangle> {
+        let moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
+        let out_of_body = -(placement.rotation * pair.body_normal);
+        let free = [pair.obstacle_normal, out_of_body].iter().any(|direction| {
+            let safe = moving.safe_step(direction, &pair.on_obstacle, self.gaps.stop);
+            safe.step >= to - from
+        });
+        (!free).then_some(moving)
+    }
+
+    /// Follows the pair over `[from, to]` from where it [begins](Self::begin).
+    pub(super) fn follow(
+        &self,
+        mut moving: MovingTriangle,
         pair: &TrianglePair,
         placement: &Placement,
         from: f64,
         to: f64,
         work: &mut Work,
     ) -> PairOutcome {
-        let mut moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
-        // The planes of the faces settle most pairs, without closest points.
-        let out_of_body = -(placement.rotation * pair.body_normal);
-        for direction in [pair.obstacle_normal, out_of_body] {
-            if moving
-                .safe_step(&direction, &pair.on_obstacle, self.gaps.stop)
-                .step
-                >= to - from
-            {
-                return PairOutcome::Free;
-            }
-        }
-
         let mut time = from;
         let mut placement = *placement;
         for iteration in 0..self.max_iterations {
@@ -119,7 +126,7 @@ struct SafeStep {
 
 /// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
 #[derive(Clone, Copy, Debug)]
-struct MovingTriangle {
+pub(super) struct MovingTriangle {
     corners: [Point3<f64>; 3],
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.
