@@ -144,17 +144,24 @@ impl MovingTriangle {
         on_body: &[Point3<f64>; 3],
         time_left: f64,
     ) -> Self {
-        let corners = on_body.map(|p| placement.point(&p));
-        let arms = corners.map(|x| x.coords - placement.center);
-        let turns = arms.map(|r| motion.spin.cross(&r));
         let cubic = motion.rate * time_left / 6.0;
-        Self {
-            corners,
-            velocities: turns.map(|turn| motion.velocity + turn),
-            bends: turns.map(|turn| motion.spin.cross(&turn) * 0.5),
-            remainders: turns.map(|turn| turn.norm() * cubic),
+        let mut moving = Self {
+            corners: [Point3::origin(); 3],
+            velocities: [Vector3::zeros(); 3],
+            bends: [Vector3::zeros(); 3],
+            remainders: [0.0; 3],
             spin: motion.spin,
+        };
+        // A plain loop: `map` on arrays is not always inlined.
+        for (i, p) in on_body.iter().enumerate() {
+            let corner = placement.point(p);
+            let turn = motion.spin.cross(&(corner.coords - placement.center));
+            moving.corners[i] = corner;
+            moving.velocities[i] = motion.velocity + turn;
+            moving.bends[i] = motion.spin.cross(&turn) * 0.5;
+            moving.remainders[i] = turn.norm() * cubic;
         }
+        moving
     }
 
     /// The longest of the safe steps along the closest points and the two face normals, and the largest gap.
@@ -166,18 +173,17 @@ impl MovingTriangle {
             pair.obstacle_normal,
             -(placement.rotation * pair.body_normal),
         ];
-        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, gap_to_keep));
-        // `max` prefers any number to NaN.
-        steps.iter().fold(
-            SafeStep {
-                step: 0.0,
-                gap: f64::NEG_INFINITY,
-            },
-            |best, s| SafeStep {
-                step: best.step.max(s.step),
-                gap: best.gap.max(s.gap),
-            },
-        )
+        let mut best = SafeStep {
+            step: 0.0,
+            gap: f64::NEG_INFINITY,
+        };
+        for n in &directions {
+            let safe = self.safe_step(n, &pair.on_obstacle, gap_to_keep);
+            // `max` prefers any number to NaN.
+            best.step = best.step.max(safe.step);
+            best.gap = best.gap.max(safe.gap);
+        }
+        best
     }
 
     /// How far in time the triangle may move so that it stays `gap_to_keep` off the other along `direction`. NaN goes nowhere.
@@ -188,8 +194,11 @@ impl MovingTriangle {
         other: &[Point3<f64>; 3],
         gap_to_keep: f64,
     ) -> SafeStep {
-        let heights = other.map(|y| direction.dot(&y.coords));
-        let support = heights[0].max(heights[1]).max(heights[2]);
+        let [p, q, r] = other;
+        let support = direction
+            .dot(&p.coords)
+            .max(direction.dot(&q.coords))
+            .max(direction.dot(&r.coords));
         let sideways = direction.cross(&self.spin).norm();
         let mut step = f64::INFINITY;
         let mut gap = f64::INFINITY;

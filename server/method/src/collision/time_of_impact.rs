@@ -270,8 +270,11 @@ impl Problem<'_> {
             }
             work.node_pairs += 1;
             let size = trees.0.radius(a).max(trees.1.radius(b));
-            let moving = trees.0.volume(a);
-            if index.ilog2() < cuts && interval.volumes.half_sweep(&moving) > longest * size {
+            if index.ilog2() < cuts
+                && interval
+                    .volumes
+                    .sweeps_more_than(longest * size, trees.0, a)
+            {
                 // Later half below the earlier one.
                 stack.push((a, b, 2 * index + 1));
                 stack.push((a, b, 2 * index));
