@@ -42,6 +42,8 @@ pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
     pub(super) gaps: Gaps,
     pub(super) max_iterations: u32,
+    /// `|w|^3 R / 6`, R the radius of the body about G, m: no corner's path bends by more in the cube of time.
+    pub(super) cubic: f64,
 }
 
 /// The two triangles of a pair: the body's in the body frame, the obstacle's in its own.
@@ -54,29 +56,53 @@ pub(super) struct TrianglePair {
 }
 
 impl PairSearch<'_> {
-    /// The body's triangle at `from`, unless the planes of the two faces show that the pair is free up to `to`: they settle
-    /// most pairs, without closest points. `placement` is the body at `from`.
+    /// Whether the plane of one of the two faces shows that the pair is free over `[from, to]`: it settles most pairs, without
+    /// closest points. `placement` is the body at `from`.
+    ///
+    /// Along a direction each corner stays above `height + speed h - max(bend, 0) h^2`, which is concave in h: above the
+    /// gap at both ends, it is so in between. No roots; the cubic term is that of the whole body.
     #[inline]
-    pub(super) fn begin(
+    pub(super) fn is_free(
         &self,
         pair: &TrianglePair,
         placement: &Placement,
         from: f64,
         to: f64,
-    ) -> Option<MovingTriangle> {
-        let moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
-        let out_of_body = -(placement.rotation * pair.body_normal);
-        let free = [pair.obstacle_normal, out_of_body].iter().any(|direction| {
-            let safe = moving.safe_step(direction, &pair.on_obstacle, self.gaps.stop);
-            safe.step >= to - from
+    ) -> bool {
+        let (motion, left) = (self.motion, to - from);
+        let directions = [
+            pair.obstacle_normal,
+            -(placement.rotation * pair.body_normal),
+        ];
+        let [p, q, r] = &pair.on_obstacle;
+        let kept = directions.map(|n| {
+            let support = n.dot(&p.coords).max(n.dot(&q.coords)).max(n.dot(&r.coords));
+            if support.is_finite() {
+                support + self.gaps.stop
+            } else {
+                f64::INFINITY
+            }
         });
-        (!free).then_some(moving)
+        let mut free = [true; 2];
+        for in_body in &pair.on_body {
+            let corner = placement.point(in_body).coords;
+            let turn = motion.spin.cross(&(corner - placement.center));
+            let velocity = motion.velocity + turn;
+            let bend = motion.spin.cross(&turn) * 0.5;
+            let cubic = self.cubic * left;
+            for (k, n) in directions.iter().enumerate() {
+                let above = n.dot(&corner) - kept[k];
+                let bend = (cubic - n.dot(&bend)).max(0.0);
+                let at_end = above + left * (n.dot(&velocity) - bend * left);
+                free[k] &= above >= 0.0 && at_end >= 0.0; // false for NaN
+            }
+        }
+        free[0] || free[1]
     }
 
-    /// Follows the pair over `[from, to]` from where it [begins](Self::begin).
+    /// Follows the pair over `[from, to]`.
     pub(super) fn follow(
         &self,
-        mut moving: MovingTriangle,
         pair: &TrianglePair,
         placement: &Placement,
         from: f64,
@@ -85,6 +111,7 @@ impl PairSearch<'_> {
     ) -> PairOutcome {
         let mut time = from;
         let mut placement = *placement;
+        let mut moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - from);
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
             let best = moving.best_step(pair, &placement, self.gaps.stop);
@@ -126,7 +153,7 @@ struct SafeStep {
 
 /// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MovingTriangle {
+struct MovingTriangle {
     corners: [Point3<f64>; 3],
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.

@@ -293,13 +293,13 @@ pub(crate) fn open_pair(
         (Below::Node(node), below)
             if matches!(below, Below::Triangle(_)) || body.radius(a) > obstacle.radius(b) =>
         {
-            let against = volumes.of_obstacle(&obstacle.volume(b));
+            let against = volumes.of_obstacle(obstacle.volume(b));
             for_each_child(node, against.facing(body.node(node)), |child| {
                 found((child, b));
             });
         }
         (_, Below::Node(node)) => {
-            let against = volumes.of_body(&body.volume(a));
+            let against = volumes.of_body(body.volume(a));
             for_each_child(node, against.facing(obstacle.node(node)), |child| {
                 found((a, child));
             });

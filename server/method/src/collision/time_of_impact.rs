@@ -121,6 +121,7 @@ pub fn time_of_impact(
         motion: &relative,
         gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
         max_iterations: settings.max_iterations,
+        cubic: relative.rate.powi(3) * radius / 6.0,
     };
     let problem = Problem {
         body,
@@ -211,11 +212,10 @@ impl Problem<'_> {
             .retain(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles);
         for &(a, b) in &workspace.hints {
             let pair = self.pair(a, b);
-            let outcome = match search.begin(&pair, &start, 0.0, first.time) {
-                Some(moving) => search.follow(moving, &pair, &start, 0.0, first.time, work),
-                None => PairOutcome::Free,
-            };
-            first.take(outcome, (a, b), 0.0);
+            if !search.is_free(&pair, &start, 0.0, first.time) {
+                let outcome = search.follow(&pair, &start, 0.0, first.time, work);
+                first.take(outcome, (a, b), 0.0);
+            }
         }
         self.descend(search, &mut first, workspace, work);
         if first.overlapping {
@@ -250,7 +250,11 @@ impl Problem<'_> {
         let longest = 2.0 * self.settings.interval_edges as f32;
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
-        while let Some((a, b, index)) = stack.pop() {
+        while let Some((a, b, mut index)) = stack.pop() {
+            // The half in which nothing more is looked for is left out.
+            while index.ilog2() < cuts && intervals.middle(index) >= first.time {
+                index *= 2;
+            }
             let interval = intervals.get(index, self.relative, trees);
             let [from, to] = [interval.from, interval.to.min(first.time)];
             let later = from >= first.time || (first.is_near() && from > 0.0);
@@ -260,10 +264,8 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if let Some(moving) = search.begin(&pair, &interval.start, from, to)
-                    && !hints.contains(&(t, s))
-                {
-                    let outcome = search.follow(moving, &pair, &interval.start, from, to, work);
+                if !search.is_free(&pair, &interval.start, from, to) && !hints.contains(&(t, s)) {
+                    let outcome = search.follow(&pair, &interval.start, from, to, work);
                     first.take(outcome, (t, s), from);
                 }
                 continue;

@@ -46,11 +46,11 @@ pub(crate) struct WideNode {
     pub(crate) radius: Lanes,
     pub(crate) cosine: Lanes,
     pub(crate) sine: Lanes,
-    below: [u32; LANES],
 }
 
-/// What a child holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a child holds, once more by itself: one line of the cache.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
 pub(crate) struct Volume {
     pub(crate) center: [f32; 3],
     pub(crate) half: [f32; 3],
@@ -60,6 +60,7 @@ pub(crate) struct Volume {
     pub(crate) radius: f32,
     pub(crate) cosine: f32,
     pub(crate) sine: f32,
+    below: u32,
 }
 
 /// What lies below a child.
@@ -75,6 +76,8 @@ pub(crate) enum Below {
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree {
     nodes: Vec<WideNode>,
+    /// The children of all nodes, by number.
+    volumes: Vec<Volume>,
     /// Point of the mesh's frame from which all coordinates are taken, m.
     pub(crate) origin: Point3<f64>,
     /// Largest distance of a vertex from `origin`, m.
@@ -135,14 +138,31 @@ impl WideTree {
             .map(|v| (v - source.origin).norm_squared())
             .fold(0.0, f64::max)
             .sqrt();
-        let mut nodes = vec![WideNode::empty()];
-        nodes[0].set(0, &source.volume(0));
-        nodes[0].below[0] = source.grow(0, &mut nodes);
-        Self {
-            nodes,
+        let mut tree = Self {
+            nodes: Vec::new(),
+            volumes: Vec::new(),
             origin: source.origin,
             reach,
-        }
+        };
+        tree.add_node();
+        tree.set(ROOT, source.volume(0));
+        let below = source.grow(0, &mut tree);
+        tree.volumes[ROOT as usize].below = below;
+        tree
+    }
+
+    /// Appends a node without children; its number.
+    fn add_node(&mut self) -> u32 {
+        let index = self.nodes.len() as u32;
+        self.nodes.push(WideNode::empty());
+        self.volumes
+            .resize(self.nodes.len() * LANES, Volume::default());
+        index
+    }
+
+    fn set(&mut self, child: Child, volume: Volume) {
+        self.nodes[child as usize / LANES].set(child as usize % LANES, &volume);
+        self.volumes[child as usize] = volume;
     }
 
     /// Node `index`.
@@ -153,31 +173,20 @@ impl WideTree {
 
     /// What a child holds.
     #[inline]
-    pub(crate) fn volume(&self, child: Child) -> Volume {
-        let (node, k) = (&self.nodes[child as usize / LANES], child as usize % LANES);
-        let three = |lanes: &[Lanes; 3]| [lanes[0].0[k], lanes[1].0[k], lanes[2].0[k]];
-        Volume {
-            center: three(&node.center),
-            half: three(&node.half),
-            axis: three(&node.axis),
-            middle: node.middle.0[k],
-            slab: node.slab.0[k],
-            radius: node.radius.0[k],
-            cosine: node.cosine.0[k],
-            sine: node.sine.0[k],
-        }
+    pub(crate) fn volume(&self, child: Child) -> &Volume {
+        &self.volumes[child as usize]
     }
 
     /// Radius of a child's ball, m.
     #[inline]
     pub(crate) fn radius(&self, child: Child) -> f32 {
-        self.nodes[child as usize / LANES].radius.0[child as usize % LANES]
+        self.volumes[child as usize].radius
     }
 
     /// What lies below a child.
     #[inline]
     pub(crate) fn below(&self, child: Child) -> Below {
-        let below = self.nodes[child as usize / LANES].below[child as usize % LANES];
+        let below = self.volumes[child as usize].below;
         if below & TRIANGLE != 0 {
             Below::Triangle(below & !TRIANGLE)
         } else {
@@ -198,7 +207,6 @@ impl WideNode {
             radius: zero,
             cosine: zero,
             sine: zero,
-            below: [0; LANES],
         }
     }
 
@@ -218,7 +226,7 @@ impl WideNode {
 
 impl Source<'_> {
     /// Appends what lies below node `top` of the binary tree; says what it is.
-    fn grow(&self, top: u32, nodes: &mut Vec<WideNode>) -> u32 {
+    fn grow(&self, top: u32, tree: &mut WideTree) -> u32 {
         let node = &self.binary[top as usize];
         if node.is_leaf() {
             return node.triangle | TRIANGLE;
@@ -238,14 +246,12 @@ impl Source<'_> {
             below[count] = self.binary[opened as usize].second;
             count += 1;
         }
-        let index = nodes.len();
-        nodes.push(WideNode::empty());
-        for (k, child) in below[..count].iter().enumerate() {
-            let volume = self.volume(*child);
-            nodes[index].set(k, &volume);
-            nodes[index].below[k] = self.grow(*child, nodes);
+        let index = tree.add_node();
+        for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
+            tree.set(child, self.volume(*opened));
+            tree.volumes[child as usize].below = self.grow(*opened, tree);
         }
-        index as u32
+        index
     }
 
     /// What node `index` of the binary tree holds, measured triangle by triangle.
@@ -291,6 +297,7 @@ impl Source<'_> {
             radius: outward(radius.sqrt()),
             cosine: angle.cos() as f32,
             sine: angle.sin() as f32,
+            below: 0,
         }
     }
 
