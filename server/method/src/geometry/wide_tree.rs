@@ -317,3 +317,84 @@ impl Source<'_> {
         sum.try_normalize(f64::MIN_POSITIVE).unwrap_or(first)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mesh;
+
+    /// A bumpy ball at `center`: a grid of parallels and meridians, with needles where `needles` is small.
+    fn ball(center: Vector3<f64>, needles: f64) -> Mesh {
+        let (rings, around) = (17_u32, 23_u32);
+        let mut vertices = vec![Point3::from(center + Vector3::z())];
+        for i in 1..rings {
+            let u = std::f64::consts::PI * f64::from(i) / f64::from(rings);
+            for j in 0..around {
+                let v = std::f64::consts::TAU * f64::from(j) / f64::from(around);
+                let r = 1.0 + 0.2 * (7.0 * u).sin() * (5.0 * v).cos();
+                let p = Vector3::new(u.sin() * v.cos(), needles * u.sin() * v.sin(), u.cos());
+                vertices.push(Point3::from(center + p * r));
+            }
+        }
+        vertices.push(Point3::from(center - Vector3::z()));
+        let at = |i: u32, j: u32| 1 + (i - 1) * around + j % around;
+        let last = vertices.len() as u32 - 1;
+        let mut triangles = Vec::new();
+        for j in 0..around {
+            triangles.push([0, at(1, j), at(1, j + 1)]);
+            triangles.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
+            for i in 1..rings - 1 {
+                triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        Mesh::new(vertices, triangles).expect("a ball is closed")
+    }
+
+    /// Checks a child against all triangles below it, which it returns.
+    fn below(mesh: &Mesh, child: Child) -> Vec<u32> {
+        let tree = mesh.wide_tree();
+        let triangles = match tree.below(child) {
+            Below::Triangle(t) => vec![t],
+            Below::Node(node) => (0..LANES as u32)
+                .map(|k| node * LANES as u32 + k)
+                .filter(|c| tree.node(node).half[0].0[*c as usize % LANES] >= 0.0)
+                .flat_map(|c| below(mesh, c))
+                .collect(),
+        };
+        let v = tree.volume(child);
+        let wide = |x: [f32; 3]| Vector3::from(x.map(f64::from));
+        let (center, axis) = (tree.origin + wide(v.center), wide(v.axis));
+        let cone = f64::from(v.sine).atan2(f64::from(v.cosine));
+        for t in &triangles {
+            for p in mesh.corners(*t) {
+                let arm = p - center;
+                for i in 0..3 {
+                    assert!(arm[i].abs() <= f64::from(v.half[i]));
+                }
+                assert!(arm.norm() <= f64::from(v.radius));
+                assert!((axis.dot(&arm) - f64::from(v.middle)).abs() <= f64::from(v.slab));
+            }
+            let normal = mesh.face_normal(*t);
+            let off = axis.cross(normal).norm().atan2(axis.dot(normal));
+            // The single-precision cosine holds an angle near zero to 4e-4; the test of facing allows for more.
+            assert!(off <= cone + 5e-4, "{off} {cone}");
+        }
+        triangles
+    }
+
+    #[test]
+    fn every_volume_holds_what_is_below_and_every_triangle_is_there_once() {
+        for (center, needles) in [
+            (Vector3::zeros(), 1.0),
+            (Vector3::new(1000.0, -700.0, 300.0), 1.0),
+            (Vector3::new(0.1, 0.0, 0.0), 1e-5),
+        ] {
+            let mesh = ball(center, needles);
+            let mut found = below(&mesh, ROOT);
+            found.sort_unstable();
+            let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+            assert_eq!(found, all);
+        }
+    }
+}
