@@ -42,6 +42,8 @@ pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
     pub(super) gaps: Gaps,
     pub(super) max_iterations: u32,
+    /// `|w|^3 R / 6`, R the radius of the body about G, m: no corner's path bends by more in the cube of time.
+    pub(super) cubic: f64,
 }
 
 /// The two triangles of a pair: the body's in the body frame, the obstacle's in its own.
@@ -54,8 +56,52 @@ pub(super) struct TrianglePair {
 }
 
 impl PairSearch<'_> {
-    /// Follows the pair over `[from, to]`; `placement` is the body at `from`.
-    pub(super) fn advance(
+    /// Whether the plane of one of the two faces shows that the pair is free over `[from, to]`: it settles most pairs, without
+    /// closest points. `placement` is the body at `from`.
+    ///
+    /// Along a direction each corner stays above `height + speed h - max(bend, 0) h^2`, which is concave in h: above the
+    /// gap at both ends, it is so in between. No roots; the cubic term is that of the whole body.
+    #[inline]
+    pub(super) fn is_free(
+        &self,
+        pair: &TrianglePair,
+        placement: &Placement,
+        from: f64,
+        to: f64,
+    ) -> bool {
+        let (motion, left) = (self.motion, to - from);
+        let directions = [
+            pair.obstacle_normal,
+            -(placement.rotation * pair.body_normal),
+        ];
+        let [p, q, r] = &pair.on_obstacle;
+        let kept = directions.map(|n| {
+            let support = n.dot(&p.coords).max(n.dot(&q.coords)).max(n.dot(&r.coords));
+            if support.is_finite() {
+                support + self.gaps.stop
+            } else {
+                f64::INFINITY
+            }
+        });
+        let mut free = [true; 2];
+        for in_body in &pair.on_body {
+            let corner = placement.point(in_body).coords;
+            let turn = motion.spin.cross(&(corner - placement.center));
+            let velocity = motion.velocity + turn;
+            let bend = motion.spin.cross(&turn) * 0.5;
+            let cubic = self.cubic * left;
+            for (k, n) in directions.iter().enumerate() {
+                let above = n.dot(&corner) - kept[k];
+                let bend = (cubic - n.dot(&bend)).max(0.0);
+                let at_end = above + left * (n.dot(&velocity) - bend * left);
+                free[k] &= above >= 0.0 && at_end >= 0.0; // false for NaN
+            }
+        }
+        free[0] || free[1]
+    }
+
+    /// Follows the pair over `[from, to]`.
+    pub(super) fn follow(
         &self,
         pair: &TrianglePair,
         placement: &Placement,
@@ -63,21 +109,9 @@ impl PairSearch<'_> {
         to: f64,
         work: &mut Work,
     ) -> PairOutcome {
-        let mut moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
-        // The planes of the faces settle most pairs, without closest points.
-        let out_of_body = -(placement.rotation * pair.body_normal);
-        for direction in [pair.obstacle_normal, out_of_body] {
-            if moving
-                .safe_step(&direction, &pair.on_obstacle, self.gaps.stop)
-                .step
-                >= to - from
-            {
-                return PairOutcome::Free;
-            }
-        }
-
         let mut time = from;
         let mut placement = *placement;
+        let mut moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - from);
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
             let best = moving.best_step(pair, &placement, self.gaps.stop);
@@ -137,17 +171,24 @@ impl MovingTriangle {
         on_body: &[Point3<f64>; 3],
         time_left: f64,
     ) -> Self {
-        let corners = on_body.map(|p| placement.point(&p));
-        let arms = corners.map(|x| x.coords - placement.center);
-        let turns = arms.map(|r| motion.spin.cross(&r));
         let cubic = motion.rate * time_left / 6.0;
-        Self {
-            corners,
-            velocities: turns.map(|turn| motion.velocity + turn),
-            bends: turns.map(|turn| motion.spin.cross(&turn) * 0.5),
-            remainders: turns.map(|turn| turn.norm() * cubic),
+        let mut moving = Self {
+            corners: [Point3::origin(); 3],
+            velocities: [Vector3::zeros(); 3],
+            bends: [Vector3::zeros(); 3],
+            remainders: [0.0; 3],
             spin: motion.spin,
+        };
+        // A plain loop: `map` on arrays is not always inlined.
+        for (i, p) in on_body.iter().enumerate() {
+            let corner = placement.point(p);
+            let turn = motion.spin.cross(&(corner.coords - placement.center));
+            moving.corners[i] = corner;
+            moving.velocities[i] = motion.velocity + turn;
+            moving.bends[i] = motion.spin.cross(&turn) * 0.5;
+            moving.remainders[i] = turn.norm() * cubic;
         }
+        moving
     }
 
     /// The longest of the safe steps along the closest points and the two face normals, and the largest gap.
@@ -159,18 +200,17 @@ impl MovingTriangle {
             pair.obstacle_normal,
             -(placement.rotation * pair.body_normal),
         ];
-        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, gap_to_keep));
-        // `max` prefers any number to NaN.
-        steps.iter().fold(
-            SafeStep {
-                step: 0.0,
-                gap: f64::NEG_INFINITY,
-            },
-            |best, s| SafeStep {
-                step: best.step.max(s.step),
-                gap: best.gap.max(s.gap),
-            },
-        )
+        let mut best = SafeStep {
+            step: 0.0,
+            gap: f64::NEG_INFINITY,
+        };
+        for n in &directions {
+            let safe = self.safe_step(n, &pair.on_obstacle, gap_to_keep);
+            // `max` prefers any number to NaN.
+            best.step = best.step.max(safe.step);
+            best.gap = best.gap.max(safe.gap);
+        }
+        best
     }
 
     /// How far in time the triangle may move so that it stays `gap_to_keep` off the other along `direction`. NaN goes nowhere.
@@ -181,8 +221,11 @@ impl MovingTriangle {
         other: &[Point3<f64>; 3],
         gap_to_keep: f64,
     ) -> SafeStep {
-        let heights = other.map(|y| direction.dot(&y.coords));
-        let support = heights[0].max(heights[1]).max(heights[2]);
+        let [p, q, r] = other;
+        let support = direction
+            .dot(&p.coords)
+            .max(direction.dot(&q.coords))
+            .max(direction.dot(&r.coords));
         let sideways = direction.cross(&self.spin).norm();
         let mut step = f64::INFINITY;
         let mut gap = f64::INFINITY;

@@ -157,11 +157,11 @@ impl Approach {
             unit
         };
         found.gap = f64::INFINITY;
-        for i in 0..A {
-            for j in 0..B {
-                let height = unit.dot(&(a[i] - b[j]));
+        for (i, (p, v)) in a.iter().zip(&first.velocities).enumerate() {
+            for (j, (q, w)) in b.iter().zip(&second.velocities).enumerate() {
+                let height = unit.dot(&(p - q));
                 found.heights[B * i + j] = height;
-                found.speeds[B * i + j] = unit.dot(&(first.velocities[i] - second.velocities[j]));
+                found.speeds[B * i + j] = unit.dot(&(v - w));
                 found.gap = found.gap.min(height);
             }
         }

@@ -2,11 +2,14 @@
 
 mod advancement;
 mod distance;
+mod facing_volumes;
 mod gaps;
 mod intersection;
+mod intervals;
+mod known_apart;
 mod linear;
 mod motion;
-mod swept_box;
+mod still_box;
 mod time_of_impact;
 mod work;
 mod workspace;
@@ -20,5 +23,5 @@ pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
 pub(crate) use motion::Placement;
-pub(crate) use swept_box::{StillBoxes, for_triangle_pairs};
+pub(crate) use still_box::{StillBoxes, for_triangle_pairs};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

@@ -49,7 +49,7 @@ pub fn collect_contacts(
     for_triangle_pairs(
         body_tree,
         obstacle_tree,
-        &mut workspace.stack,
+        &mut workspace.pairs,
         work,
         |i, j| {
             let nodes = (
