@@ -13,7 +13,7 @@ mod projection_support;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use god_object::constraint::{Feature, FeaturePair};
+use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::{
     ConstraintSet, Coupling, NonPenetrationConstraint, Pose, ProjectionStatus, Settings,
@@ -173,6 +173,7 @@ fn row(name: u32, arm: Vector3<f64>, normal: Vector3<f64>, gap: f64) -> NonPenet
         point: Point3::from(arm),
         normal,
         gap,
+        separation: Separation::OfObstacle,
         shading_normal: None,
     }
 }

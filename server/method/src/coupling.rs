@@ -7,6 +7,8 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//!
 //! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides is prepared once
 //! when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
 //! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
@@ -15,6 +17,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
 use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
@@ -33,7 +36,10 @@ pub struct Coupling {
     surfaces: Vec<TexturedSurface>,
     prepared: PreparedSet,
     projector: Projector,
+    implicit: ImplicitRounds,
     known: KnownRows,
+    /// The bounds in force now: those of `rows`, lower where a row is on its way in.
+    bounds: Vec<f64>,
     adaptation: Option<AdaptationState>,
     /// The rows of the present set, with the bounds where they belong.
     rows: Vec<HalfSpace>,
@@ -117,7 +123,14 @@ impl Coupling {
                 shaded: false,
             },
             projector: Projector::new(settings.solver, capacity),
+            implicit: ImplicitRounds::new(
+                settings,
+                world.body.mesh.radius_about(&world.body.reference_point),
+                Projector::new(settings.solver, capacity),
+                capacity,
+            ),
             known: KnownRows::new(capacity),
+            bounds: Vec::with_capacity(capacity),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -154,10 +167,13 @@ impl Coupling {
                 time,
                 |row| self.rows[row].bound,
                 |row| self.rows[row].jacobian.dot(&reached),
-                |row, bound| self.projector.set_bound(row, bound),
+                |row, bound| {
+                    self.projector.set_bound(row, bound);
+                    self.bounds[row] = bound;
+                },
             );
         }
-        let projection = self
+        let mut projection = self
             .projector
             .project_prepared(&unconstrained, &self.warm_start);
         self.warm_start.clear();
@@ -168,9 +184,32 @@ impl Coupling {
             .extend(projection.active.iter().map(|row| row.row));
 
         // F_c = k_h M (a_c - a_u)
-        let change = projection.acceleration - unconstrained;
-        self.correction = change;
-        let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
+        let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let given = LinearAnswer {
+            constraints: &set.constraints[..self.rows.len()],
+            start: &self.prepared.god_object,
+            goal: &device,
+            branch: self.rotation,
+            scale: self.settings.k_s,
+            shaded: self.prepared.shaded,
+            projection: &projection,
+        };
+        let implicit = self.implicit.solve(
+            &given,
+            |row| self.bounds[row],
+            |pose| self.body.metric(&self.settings, pose),
+        );
+        if let Some(answer) = implicit {
+            let change = answer.projection.acceleration - answer.unconstrained;
+            held = answer.metric.mass_matrix_times(&change);
+            // What follows counts from x_s.
+            let nearest = angular(&projection.acceleration) / self.settings.k_s;
+            let moved = pose_difference(&answer.reached, &self.prepared.god_object, &nearest);
+            projection = answer.projection;
+            projection.acceleration = moved * self.settings.k_s;
+        }
+        self.correction = projection.acceleration - unconstrained;
+        let mut wrench = held * self.settings.k_h;
         if !self.surfaces.is_empty() {
             let center = Point3::from(self.prepared.god_object.translation.vector);
             wrench = self.textured(&wrench, &projection, &center, set);
@@ -205,6 +244,8 @@ impl Coupling {
                 bound: self.settings.coupling_bound(constraint.gap),
             });
         }
+        self.bounds.clear();
+        self.bounds.extend(self.rows.iter().map(|row| row.bound));
         let metric = self.body.metric(&self.settings, &god_object);
         if let Some(metric) = &metric {
             self.projector.prepare(metric, &self.rows);

@@ -74,7 +74,7 @@ impl KnownRows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraint::Feature;
+    use crate::constraint::{Feature, Separation};
     use nalgebra::{Point3, Vector3};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
@@ -91,6 +91,7 @@ mod tests {
                 point: Point3::origin(),
                 normal: Vector3::z(),
                 gap: 0.0,
+                separation: Separation::OfObstacle,
                 shading_normal: None,
             })
             .collect()
