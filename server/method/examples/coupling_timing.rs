@@ -135,7 +135,7 @@ fn peg_row(name: u32) -> NonPenetrationConstraint {
     let angle = 7.0 * random.signed();
     let outward = Vector3::new(angle.cos(), angle.sin(), 0.0);
     let height = 0.03 * random.signed();
-    if name % 5 == 0 {
+    if name.is_multiple_of(5) {
         row(
             name,
             outward * 8e-3 - Vector3::z() * 0.03,
@@ -159,7 +159,7 @@ fn bunny_row(name: u32) -> NonPenetrationConstraint {
 fn row(name: u32, arm: Vector3<f64>, normal: Vector3<f64>, gap: f64) -> NonPenetrationConstraint {
     // Names in no order of place or time, vertices and edges.
     let scattered = name.wrapping_mul(2_654_435_761) >> 8;
-    let (on_body, on_obstacle) = if name % 2 == 0 {
+    let (on_body, on_obstacle) = if name.is_multiple_of(2) {
         (Feature::Vertex(scattered), Feature::Face(name))
     } else {
         (Feature::Edge(scattered), Feature::Edge(name))

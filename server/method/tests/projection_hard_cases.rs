@@ -336,7 +336,7 @@ fn rows_that_were_permuted_exchanged_or_repeated_mislead_no_warm_start() {
 fn five_thousand_ticks_leave_no_trace_in_the_factor_that_is_kept() {
     let metric = hand_sized_metric();
     let random = &mut Random(25);
-    for family in 0..FAMILIES.len() {
+    for (family, name) in FAMILIES.iter().enumerate() {
         let rows = rows_of(family, 30, true, random);
         let mut projector = Projector::new(SolverKind::ActiveSet, rows.len());
         projector.prepare(&metric, &rows);
@@ -347,7 +347,7 @@ fn five_thousand_ticks_leave_no_trace_in_the_factor_that_is_kept() {
             let answer = projector.project_prepared(&a_u, &warm_start);
             warm_start = answer.active.iter().map(|row| row.row).collect();
             if tick % 50 == 49 {
-                let case = format!("{}, tick {tick}", FAMILIES[family]);
+                let case = format!("{name}, tick {tick}");
                 assert_as_fresh(&metric, &a_u, &rows, &answer, 1e-7, &case);
             }
         }

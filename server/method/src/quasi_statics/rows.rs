@@ -35,7 +35,9 @@ const PADDING: HalfSpace = HalfSpace {
 /// Squared lengths between these neither overflowed nor lost digits.
 const SAFE_SQUARES: (f64, f64) = (1e-240, 1e240);
 
+/// Aligned to cache lines: a vector that lies across two of them costs twice.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 struct Block {
     jacobian: [Lanes; 6],
     bound: Lanes,
@@ -211,14 +213,11 @@ impl Found {
         let bound: Lanes = std::array::from_fn(|k| rows[k].bound);
         let jacobian: [Lanes; 6] =
             std::array::from_fn(|i| std::array::from_fn(|k| rows[k].jacobian[i]));
-        for k in 0..LANES {
-            self.probe[k] += bound[k] * 0.0;
-            let largest = self.largest_bound[k];
-            self.largest_bound[k] = if bound[k] > largest {
-                bound[k]
-            } else {
-                largest
-            };
+        for (probe, bound) in self.probe.iter_mut().zip(&bound) {
+            *probe += bound * 0.0;
+        }
+        for (largest, bound) in self.largest_bound.iter_mut().zip(&bound) {
+            *largest = if *bound > *largest { *bound } else { *largest };
         }
         let squares = metric.squared_row_lengths(&jacobian);
         let mut safe = true;

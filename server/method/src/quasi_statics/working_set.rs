@@ -327,10 +327,9 @@ pub(crate) enum Refinement {
 /// Turns columns k and k + 1: the first one loses what the second gains.
 #[inline]
 fn rotate(columns: &mut [Lanes8; MAX_ACTIVE], k: usize, cosine: f64, sine: f64) {
-    for lane in 0..8 {
-        let (x, y) = (columns[k][lane], columns[k + 1][lane]);
-        columns[k][lane] = cosine * x - sine * y;
-        columns[k + 1][lane] = cosine * y + sine * x;
+    let (before, after) = columns.split_at_mut(k + 1);
+    for (x, y) in before[k].iter_mut().zip(&mut after[0]) {
+        (*x, *y) = (cosine * *x - sine * *y, cosine * *y + sine * *x);
     }
 }
 
