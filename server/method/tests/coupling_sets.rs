@@ -26,6 +26,7 @@ fn set_of(names: &BTreeSet<u32>, sequence: u64, pose: Pose) -> ConstraintSet {
             point: Point3::from(random.vector3() * 0.03),
             normal: random.direction(),
             gap: 1e-4 * random.unit(),
+            came: 0.0,
             separation: god_object::constraint::Separation::default(),
             shading_normal: None,
         });
