@@ -121,6 +121,7 @@ impl Coupling {
             implicit: ImplicitRounds::new(
                 settings,
                 world.body.mesh.radius_about(&world.body.reference_point),
+                settings.motion_tolerance,
                 capacity,
             ),
             adaptation: settings

@@ -68,8 +68,9 @@ pub(crate) struct ImplicitAnswer {
 }
 
 impl ImplicitRounds {
-    /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m.
-    pub(crate) fn new(settings: &Settings, radius: f64, capacity: usize) -> Self {
+    /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m. Where points of the body
+    /// leave their tangents by less than `tolerance`, m, the linear rows are left as they are.
+    pub(crate) fn new(settings: &Settings, radius: f64, tolerance: f64, capacity: usize) -> Self {
         let capacity = if settings.implicit_rounds > 0 {
             capacity
         } else {
@@ -78,7 +79,7 @@ impl ImplicitRounds {
         Self {
             rounds: settings.implicit_rounds,
             radius,
-            tolerance: settings.motion_tolerance,
+            tolerance,
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
         }
