@@ -32,6 +32,8 @@ pub(crate) struct ImplicitRounds {
     radius: f64,
     /// Bending of a path below which a straight row is true, m.
     tolerance: f64,
+    /// Its own: the rows of the first projection stay prepared elsewhere.
+    projector: Projector,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
 }
@@ -40,8 +42,6 @@ pub(crate) struct ImplicitRounds {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinearAnswer<'a> {
     pub(crate) constraints: &'a [NonPenetrationConstraint],
-    /// Rows at x_s in the order of the constraints.
-    pub(crate) rows: &'a [HalfSpace],
     pub(crate) start: &'a Pose,
     pub(crate) goal: &'a Pose,
     /// The branch of the rotation from `start` to `goal`.
@@ -70,7 +70,13 @@ pub(crate) struct ImplicitAnswer {
 impl ImplicitRounds {
     /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m. Where points of the body
     /// leave their tangents by less than `tolerance`, m, the linear rows are left as they are.
-    pub(crate) fn new(settings: &Settings, radius: f64, tolerance: f64, capacity: usize) -> Self {
+    pub(crate) fn new(
+        settings: &Settings,
+        radius: f64,
+        tolerance: f64,
+        projector: Projector,
+        capacity: usize,
+    ) -> Self {
         let capacity = if settings.implicit_rounds > 0 {
             capacity
         } else {
@@ -80,6 +86,7 @@ impl ImplicitRounds {
             rounds: settings.implicit_rounds,
             radius,
             tolerance,
+            projector,
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
         }
@@ -87,11 +94,12 @@ impl ImplicitRounds {
 
     /// Projects again from where the linear rows led to. `None` when they were true, or when no round had a certified answer.
     ///
-    /// At most `implicit_rounds` projections; no allocation unless the projector allocates.
+    /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. At most `implicit_rounds` projections;
+    /// no allocation unless the projector allocates.
     pub(crate) fn solve(
         &mut self,
-        projector: &mut Projector,
         given: &LinearAnswer,
+        bound_at: impl Fn(usize) -> f64,
         metric_at: impl Fn(&Pose) -> Option<Metric>,
     ) -> Option<ImplicitAnswer> {
         let nothing_held = given.projection.active.is_empty();
@@ -115,9 +123,10 @@ impl ImplicitRounds {
             let Some(metric) = metric_at(&candidate) else {
                 break;
             };
-            self.relinearise(given, &candidate);
+            self.relinearise(given, &bound_at, &candidate);
             let projection =
-                projector.project(&metric, &unconstrained, &self.rows, &self.warm_start);
+                self.projector
+                    .project(&metric, &unconstrained, &self.rows, &self.warm_start);
             if projection.status != ProjectionStatus::Solved {
                 break;
             }
@@ -140,14 +149,19 @@ impl ImplicitRounds {
     }
 
     /// Every row as it is at `candidate`.
-    fn relinearise(&mut self, given: &LinearAnswer, candidate: &Pose) {
+    fn relinearise(
+        &mut self,
+        given: &LinearAnswer,
+        bound_at: impl Fn(usize) -> f64,
+        candidate: &Pose,
+    ) {
         let center = Point3::from(candidate.translation.vector);
         self.rows.clear();
-        for (constraint, row) in given.constraints.iter().zip(given.rows) {
+        for (row, constraint) in given.constraints.iter().enumerate() {
             let moved = constraint.moved(given.start, candidate, given.shaded);
             self.rows.push(HalfSpace {
                 jacobian: contact_jacobian(&moved.normal, &moved.point, &center),
-                bound: row.bound + given.scale * (constraint.gap - moved.gap),
+                bound: bound_at(row) + given.scale * (constraint.gap - moved.gap),
             });
         }
     }

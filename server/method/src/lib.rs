@@ -31,6 +31,7 @@ mod coupling;
 pub mod geometry;
 mod god_object;
 mod implicit;
+mod known_rows;
 pub mod quasi_statics;
 mod settings;
 pub mod spatial;

@@ -86,7 +86,6 @@ impl GodObject {
         let goal = advance_pose(&start, unconstrained, 1.0);
         let given = LinearAnswer {
             constraints: &self.set.constraints,
-            rows: &self.rows,
             start: &start,
             goal: &goal,
             branch: angular(unconstrained),
@@ -94,9 +93,11 @@ impl GodObject {
             shaded: false,
             projection: &linear,
         };
-        let answer = self.implicit.solve(&mut self.projector, &given, |pose| {
-            self.world.body.metric(self.settings.rotation_metric, pose)
-        });
+        let answer = self.implicit.solve(
+            &given,
+            |row| self.rows[row].bound,
+            |pose| self.world.body.metric(self.settings.rotation_metric, pose),
+        );
         let Some(answer) = answer else {
             return Projected::about(linear.acceleration, reference_point);
         };

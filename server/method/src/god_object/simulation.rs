@@ -65,7 +65,13 @@ impl GodObject {
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
             // Within the rest distance the linear rows do, and their sub-steps come to rest where those of the rounds may circle.
-            implicit: ImplicitRounds::new(&settings, radius, settings.rest_distance, capacity),
+            implicit: ImplicitRounds::new(
+                &settings,
+                radius,
+                settings.rest_distance,
+                Projector::new(settings.solver, capacity).with_reference_fallback(true),
+                capacity,
+            ),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
             rotation: Vector3::zeros(),
