@@ -63,7 +63,7 @@ struct PreparedSet {
     /// `None` where it is not positive definite, or the pose is not finite.
     metric: Option<Metric>,
     shaded: bool,
-    /// Whether a row belongs to an obstacle that moves.
+    /// Some obstacle came nearer or went away in the update that made the set.
     moving: bool,
 }
 
@@ -86,7 +86,6 @@ struct CoupledBody {
 /// When sets arrive: rows of obstacles that move go on with them until the next.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arrival {
-    sequence: u64,
     /// When the present set was first seen, s.
     time: f64,
     /// Time between the present set and the one before, s.
@@ -94,15 +93,15 @@ struct Arrival {
 }
 
 impl Arrival {
-    /// How much of an update's time has passed since the set of `sequence` came, in [0, 1]: 0 where it cannot be known.
-    fn share_of_an_update(&mut self, time: f64, sequence: u64) -> f64 {
-        if sequence != self.sequence {
-            *self = Self {
-                sequence,
-                time,
-                period: time - self.time,
-            };
-        }
+    fn observe(&mut self, time: f64) {
+        *self = Self {
+            time,
+            period: time - self.time,
+        };
+    }
+
+    /// How much of an update's time has passed since the set came, in [0, 1]: 0 where it cannot be known.
+    fn share_of_an_update(&self, time: f64) -> f64 {
         let share = (time - self.time) / self.period;
         let known = self.period > 0.0 && share > 0.0; // false for NaN
         if known { share.min(1.0) } else { 0.0 }
@@ -160,6 +159,7 @@ impl Coupling {
             implicit: ImplicitRounds::new(
                 settings,
                 world.body.mesh.radius_about(&world.body.reference_point),
+                settings.motion_tolerance,
                 Projector::new(settings.solver, capacity),
                 capacity,
             ),
@@ -185,15 +185,15 @@ impl Coupling {
         }
         if !self.prepared.serves(set) {
             self.prepare(set);
+            self.arrival.observe(time);
+        }
+        if self.prepared.moving {
+            self.carry_rows(time, set);
         }
         let device = at_reference_point(device_pose, &self.body.reference_point);
         let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
-        let arrival = self.arrival.share_of_an_update(time, set.sequence);
-        if self.prepared.moving {
-            self.follow_obstacles(arrival, set);
-        }
         let Some(metric) = &self.prepared.metric else {
             return CouplingOutput::without_force(ProjectionStatus::NotFinite);
         };
@@ -216,9 +216,9 @@ impl Coupling {
             .project_prepared(&unconstrained, &self.warm_start);
         self.warm_start.clear();
         // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
-        let squeezed = projection.status == ProjectionStatus::Infeasible
-            && projection.kkt_residual <= KKT_TOLERANCE
-            && self.prepared.moving;
+        let squeezed = self.prepared.moving
+            && projection.status == ProjectionStatus::Infeasible
+            && projection.kkt_residual <= KKT_TOLERANCE;
         if projection.status != ProjectionStatus::Solved && !squeezed {
             return CouplingOutput::without_force(projection.status);
         }
@@ -270,17 +270,6 @@ impl Coupling {
         }
     }
 
-    /// Bounds of rows of moving obstacles, which have come on since the set was made; `arrival` is the share of an update since.
-    fn follow_obstacles(&mut self, arrival: f64, set: &ConstraintSet) {
-        let rows = self.rows.iter_mut().zip(&set.constraints).enumerate();
-        for (index, (row, constraint)) in rows.filter(|(_, (_, c))| c.came != 0.0) {
-            row.bound = self.settings.coupling_bound(constraint.gap)
-                + self.settings.k_s * constraint.came * arrival;
-            self.projector.set_bound(index, row.bound);
-            self.bounds[index] = row.bound;
-        }
-    }
-
     /// Everything that the set decides, whatever the device does: rows, metric, and which rows are new.
     fn prepare(&mut self, set: &ConstraintSet) {
         let constraints =
@@ -288,11 +277,10 @@ impl Coupling {
         let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
         let center = Point3::from(god_object.translation.vector);
         self.rows.clear();
-        let (mut shaded, mut moving) = (false, false);
+        let mut shaded = false;
         for constraint in constraints {
             let normal = constraint.shading_normal.unwrap_or(constraint.normal);
             shaded |= constraint.shading_normal.is_some();
-            moving |= constraint.came != 0.0;
             self.rows.push(HalfSpace {
                 jacobian: contact_jacobian(&normal, &constraint.point, &center),
                 bound: self.settings.coupling_bound(constraint.gap),
@@ -321,8 +309,22 @@ impl Coupling {
             god_object,
             metric,
             shaded,
-            moving,
+            moving: constraints.iter().any(|row| row.came != 0.0),
         };
+    }
+
+    /// Rows of obstacles that move, where those will be by now.
+    fn carry_rows(&mut self, time: f64, set: &ConstraintSet) {
+        let arrival = self.arrival.share_of_an_update(time);
+        for (row, constraint) in set.constraints.iter().take(self.rows.len()).enumerate() {
+            if constraint.came != 0.0 {
+                let bound = self.settings.coupling_bound(constraint.gap)
+                    + self.settings.k_s * constraint.came * arrival;
+                self.rows[row].bound = bound;
+                self.bounds[row] = bound;
+                self.projector.set_bound(row, bound);
+            }
+        }
     }
 
     /// The wrench tilted by the textures under the active contacts, which the motion carries along.

@@ -68,10 +68,12 @@ pub(crate) struct ImplicitAnswer {
 }
 
 impl ImplicitRounds {
-    /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m.
+    /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m. Where points of the body
+    /// leave their tangents by less than `tolerance`, m, the linear rows are left as they are.
     pub(crate) fn new(
         settings: &Settings,
         radius: f64,
+        tolerance: f64,
         projector: Projector,
         capacity: usize,
     ) -> Self {
@@ -83,7 +85,7 @@ impl ImplicitRounds {
         Self {
             rounds: settings.implicit_rounds,
             radius,
-            tolerance: settings.motion_tolerance,
+            tolerance,
             projector,
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),

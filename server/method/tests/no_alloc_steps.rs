@@ -49,3 +49,34 @@ fn god_object_and_coupling_steps_allocate_nothing() {
     }
     assert!(touched > 100, "the path touches the table");
 }
+
+#[test]
+fn steps_among_moving_obstacles_with_implicit_rounds_allocate_nothing() {
+    let world = support::box_on_table();
+    let settings = Settings {
+        implicit_rounds: 3,
+        ..Settings::for_size(0.04)
+    };
+    let start = Pose::translation(0.0, 0.0, 0.03);
+    let table = world.obstacles[0].pose;
+    let mut coupling = Coupling::new(&world, &settings);
+    let mut god_object = GodObject::new(world, settings, start).expect("a free start");
+    let mut touched = 0;
+    for i in 0..600 {
+        let t = f64::from(i) * 1e-3;
+        let device = Pose::new(
+            Vector3::new(0.1 * t, 0.0, 0.015),
+            Vector3::new(2.0 * t, 0.4, t),
+        );
+        let rocking = Pose::new(
+            Vector3::new(0.0, 0.0, 0.02 * (20.0 * t).sin()),
+            Vector3::new(0.2 * (15.0 * t).sin(), 0.0, 0.0),
+        ) * table;
+        assert_no_alloc(|| {
+            god_object.move_obstacle(0, &rocking);
+            touched += god_object.step(&device, None).contacts;
+            coupling.step(t, &device, god_object.constraint_set());
+        });
+    }
+    assert!(touched > 100, "the table touches the body");
+}

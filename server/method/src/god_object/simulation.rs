@@ -64,9 +64,11 @@ impl GodObject {
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
+            // Within the rest distance the linear rows do, and their sub-steps come to rest where those of the rounds may circle.
             implicit: ImplicitRounds::new(
                 &settings,
                 radius,
+                settings.rest_distance,
                 Projector::new(settings.solver, capacity).with_reference_fallback(true),
                 capacity,
             ),

@@ -1,0 +1,77 @@
+//! With the device at rest the god-object comes to the constrained minimiser and stays there, bit for bit.
+
+mod support;
+
+use std::sync::Arc;
+
+use god_object::constraint::contact_jacobian;
+use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
+use god_object::quasi_statics::{HalfSpace, Projector, SolverKind};
+use god_object::spatial::{angular, linear, pose_difference};
+use god_object::{GodObject, Obstacle, Pose, Settings, World};
+use proptest::prelude::*;
+use support::{box_body, box_obstacle, penetrates};
+
+/// Updates after which nothing may move any more.
+const UPDATES: u32 = 600;
+
+fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
+    Obstacle {
+        pose: Pose::from_parts(
+            Vector3::from(center).into(),
+            UnitQuaternion::from_scaled_axis(Vector3::from(rotation)),
+        ),
+        ..box_obstacle("stone", Vector3::new(0.02, 0.015, 0.01), Vector3::zeros())
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 120, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_pressing_hand_at_rest_leads_to_the_minimiser_and_no_further(
+        stones in prop::collection::vec(
+            (prop::array::uniform3(-0.03..0.03f64), prop::array::uniform3(-3.0..3.0f64)), 0..4),
+        press in prop::array::uniform3(-0.02..0.02f64),
+        turn in prop::array::uniform3(-0.7..0.7f64),
+        rounds in prop::sample::select(vec![0, 1, 1, 3]),
+    ) {
+        let mut obstacles = vec![box_obstacle("table", Vector3::new(0.5, 0.5, 0.05), -0.05 * Vector3::z())];
+        obstacles.extend(stones.iter().map(|(center, rotation)| tilted(*center, *rotation)));
+        let world = Arc::new(World { body: box_body(Vector3::new(0.02, 0.02, 0.01)), obstacles });
+        let settings = Settings { implicit_rounds: rounds, ..Settings::for_size(0.04) };
+        let mut god_object =
+            GodObject::new(world.clone(), settings, Pose::translation(0.0, 0.0, 0.1)).expect("a free start");
+        let device = Pose::new(Vector3::from(press), Vector3::from(turn));
+        for _ in 0..UPDATES {
+            let report = god_object.step(&device, None);
+            prop_assert!(report.gap_min >= settings.minimum_gap);
+            prop_assert!(report.substeps <= settings.max_substeps);
+        }
+        let rest = *god_object.pose();
+        for _ in 0..20 {
+            god_object.step(&device, None);
+            prop_assert_eq!(*god_object.pose(), rest);
+        }
+        prop_assert!(!penetrates(&world, &rest));
+
+        // Eq. (1) on a set collected anew, by another solver: there is nowhere left to go.
+        let fresh = GodObject::new(world.clone(), settings, rest).expect("a free pose");
+        let center = Point3::from(rest.translation.vector);
+        let rows: Vec<HalfSpace> = fresh
+            .constraint_set()
+            .constraints
+            .iter()
+            .map(|row| HalfSpace {
+                jacobian: contact_jacobian(&row.normal, &row.point, &center),
+                bound: settings.rest_distance - row.gap,
+            })
+            .collect();
+        let wanted = pose_difference(&device, &rest, &Vector3::zeros()) * settings.k_s;
+        let metric = world.body.metric(settings.rotation_metric, &rest).expect("a metric");
+        let answer = Projector::new(SolverKind::Clarabel, rows.len()).project(&metric, &wanted, &rows, &[]);
+        let left = linear(&answer.acceleration).norm()
+            + world.body.mesh.radius_about(&Point3::origin()) * angular(&answer.acceleration).norm();
+        prop_assert!(left <= 2.0 * settings.motion_tolerance, "{left} m left to go, {:?}", answer.status);
+    }
+}

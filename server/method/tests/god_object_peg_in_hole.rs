@@ -1,0 +1,93 @@
+//! A peg in a hole, anywhere in the world: it slides without friction, and the wall pushes back straight.
+
+#[allow(unused_imports, reason = "shapes are shared by many tests")]
+mod geometry_shapes;
+mod support;
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use geometry_shapes::{hole, mesh, peg};
+use god_object::geometry::mass_properties;
+use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
+use god_object::spatial::{angular, linear};
+use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, World};
+use proptest::prelude::*;
+use support::penetrates;
+
+const SIDES: u32 = 72;
+const RADIUS: f64 = 0.01;
+const HALF_LENGTH: f64 = 0.03;
+/// How far the peg is out of the hole, m: 50 of its 60 mm are in.
+const OUT: f64 = 0.01;
+
+/// A peg of 72 sides and 1 kg, and a ring with a hole of the given clearance (m) about the obstacle's z axis, placed in the world.
+fn peg_in_hole(clearance: f64, placed: &Pose) -> Arc<World> {
+    let body = mesh(peg(RADIUS, HALF_LENGTH, SIDES));
+    let properties = mass_properties(&body);
+    let inertia = properties.inertia_per_density / properties.volume;
+    let inner = (RADIUS + clearance) / (PI / f64::from(SIDES)).cos();
+    Arc::new(World {
+        body: Body {
+            mesh: body,
+            mass: 1.0,
+            inertia,
+            reference_point: Point3::origin(),
+        },
+        obstacles: vec![Obstacle {
+            name: "hole".into(),
+            mesh: mesh(hole(inner, 0.03, HALF_LENGTH, SIDES)),
+            pose: *placed,
+            surface: Surface::default(),
+        }],
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn an_inserted_peg_feels_the_wall_and_neither_axial_force_nor_torque_about_the_axis(
+        rotation in prop::array::uniform3(-3.0..3.0f64),
+        position in prop::array::uniform3(-0.2..0.2f64),
+        // Towards a corner of the hole or the middle of a side: the peg's polygon is symmetric about both.
+        half_sides in 0..144u32,
+        // The hand pulls the peg along the hole, too.
+        pull in -0.02..0.02f64,
+        clearance in prop::sample::select(vec![5e-4, 1e-4, 5e-5]),
+    ) {
+        let placed = Pose::from_parts(
+            Vector3::from(position).into(),
+            UnitQuaternion::from_scaled_axis(Vector3::from(rotation)),
+        );
+        let world = peg_in_hole(clearance, &placed);
+        let settings = Settings { force_limit: 1e3, torque_limit: 1e3, ..Settings::for_size(2.0 * HALF_LENGTH) };
+        let start = placed * Pose::translation(0.0, 0.0, OUT);
+        let mut god_object = GodObject::new(world.clone(), settings, start).expect("the peg fits");
+        let mut coupling = Coupling::new(&world, &settings);
+        let angle = PI * f64::from(half_sides) / f64::from(SIDES);
+        let offset = 3e-3;
+        let device = placed * Pose::translation(offset * angle.cos(), offset * angle.sin(), OUT + pull);
+        for update in 0..80 {
+            let report = god_object.step(&device, None);
+            prop_assert!(report.gap_min >= settings.minimum_gap);
+            prop_assert_eq!(report.solver_failures, 0);
+            if update % 20 == 0 {
+                prop_assert!(!penetrates(&world, god_object.pose()));
+            }
+        }
+        let felt = coupling.step(0.0, &device, god_object.constraint_set()).wrench;
+        let (force, torque) = (placed.rotation.inverse() * linear(&felt), placed.rotation.inverse() * angular(&felt));
+        let expected = settings.stiffness(1.0) * (offset - clearance + settings.rest_distance);
+        // A facet is up to 2.5 degrees off the radius, and a corner of the hole a little deeper than a side.
+        prop_assert!((force.norm() - expected).abs() < 0.03 * expected, "{force} {expected}");
+        prop_assert!(force.z.abs() <= 1e-6 * expected, "axial {force}");
+        prop_assert!(torque.z.abs() <= 1e-6 * expected * RADIUS, "torque {torque}");
+        let outward = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        prop_assert!(force.dot(&outward) < 0.0);
+        prop_assert!(force.cross(&outward).norm() <= 1e-6 * expected, "sideways {force}");
+        // It slides to where the hand pulls it.
+        let slid = (placed.inverse() * god_object.pose()).translation.vector.z;
+        prop_assert!((slid - OUT - pull).abs() < 1e-6, "{slid} {pull}");
+    }
+}
