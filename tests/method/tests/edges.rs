@@ -124,15 +124,11 @@ fn the_force_on_a_cylinder_lags_by_no_more_than_its_staleness() {
 }
 
 #[test]
-#[ignore = "the body stays behind: it moves by short sub-steps at the minimum gap, 1.08 rad where 0.43 is allowed"]
-fn a_fast_hand_on_a_finely_cut_cylinder_lags_by_no_more_than_its_staleness_at_71_hertz() {
-    lags_by_its_staleness(0.02, 0.2, 256, 14);
-}
-
-#[test]
-fn a_fast_hand_on_a_coarser_or_wider_cylinder_lags_by_no_more_than_its_staleness_at_71_hertz() {
-    lags_by_its_staleness(0.02, 0.2, 64, 14);
-    lags_by_its_staleness(0.05, 0.2, 256, 14);
+#[ignore = "fails: the body stays behind, moving by short sub-steps at the minimum gap; 1.08 rad where 0.43 are allowed"]
+fn a_fast_hand_on_a_cylinder_lags_by_no_more_than_its_staleness_at_71_hertz() {
+    for (radius, facets) in [(0.05, 256), (0.02, 64), (0.02, 256)] {
+        lags_by_its_staleness(radius, 0.2, facets, 14);
+    }
 }
 
 /// Combs of eleven teeth, 4 mm apart, 2 mm wide, 10 mm deep.
