@@ -1,12 +1,15 @@
-//! The five assemblies on every row of their traces, led by exact and by erring hands: `cargo run --release -p taut-method-tests --example assembly_scenes [HANDS]`.
+//! The five assemblies on every row of their traces, led by exact and by erring hands:
+//! `cargo run --release -p taut-method-tests --example assembly_scenes [HANDS] [SCENE]`.
 //!
-//! Prints a table: a line for each scene and hand. Every pose is checked for penetration by code that shares nothing with the method.
+//! Prints a table: a line for each scene and hand; times are CPU time of the thread for an update, its force and the hand. Every pose is checked for penetration by code that shares nothing with the method.
 
-use std::time::Instant;
+#[path = "../../../server/method/examples/update_support/mod.rs"]
+mod update_support;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use taut_method_tests::assembly::{ASSEMBLIES, Assembly, Outcome};
 use taut_method_tests::hand::HandError;
+use update_support::thread_cpu_us;
 
 /// Length of the progress bar.
 const PARTS: u64 = 1000;
@@ -16,13 +19,14 @@ fn main() {
         .nth(1)
         .and_then(|text| text.parse().ok())
         .unwrap_or(1);
+    let only = std::env::args().nth(2).unwrap_or_default();
     println!(
         "scene                 hand  updates  tries  intersections  least gap  from the goal      turned  update p50    p99    max"
     );
     println!(
         "                                                                  um             um        mrad          us     us     us"
     );
-    for assembly in &ASSEMBLIES {
+    for assembly in ASSEMBLIES.iter().filter(|a| a.name.contains(&only)) {
         let Some(loaded) = assembly.load() else {
             println!("{:21} skipped: not in the data directory", assembly.name);
             continue;
@@ -42,11 +46,11 @@ fn main() {
             }
             bar.set_message(format!("{} hand {seed}", assembly.name));
             let mut times = Vec::new();
-            let mut last = Instant::now();
+            let mut last = thread_cpu_us();
             let outcome = Assembly::run(&scene, &trace, hand.as_ref(), 1, 1, |share| {
-                times.push(last.elapsed().as_secs_f64() * 1e6);
+                times.push(thread_cpu_us() - last);
                 bar.set_position((share * PARTS as f64) as u64);
-                last = Instant::now();
+                last = thread_cpu_us();
             });
             bar.finish_and_clear();
             print(assembly, seed, &outcome, &mut times);
