@@ -21,7 +21,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
-use super::advancement::{PairOutcome, PairSearch, TrianglePair};
+use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::facing_volumes::{FacingVolumes, for_facing_triangle_pairs, open_pair};
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
@@ -212,8 +212,9 @@ impl Problem<'_> {
             .retain(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles);
         for &(a, b) in &workspace.hints {
             let pair = self.pair(a, b);
-            if !search.is_free(&pair, &start, 0.0, first.time) {
-                let outcome = search.follow(&pair, &start, 0.0, first.time, work);
+            let interval = [0.0, first.time];
+            if !search.is_free(&pair, &start, interval, &first.lately) {
+                let outcome = search.follow(&pair, &start, interval, &mut first.lately, work);
                 first.take(outcome, (a, b), 0.0);
             }
         }
@@ -264,8 +265,11 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if !search.is_free(&pair, &interval.start, from, to) && !hints.contains(&(t, s)) {
-                    let outcome = search.follow(&pair, &interval.start, from, to, work);
+                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
+                    && !hints.contains(&(t, s))
+                {
+                    let outcome =
+                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
                 }
                 continue;
@@ -308,6 +312,7 @@ struct First {
     near: f64,
     /// Some pair intersects.
     overlapping: bool,
+    lately: Directions,
 }
 
 impl Default for First {
@@ -317,6 +322,7 @@ impl Default for First {
             hit: None,
             near: f64::INFINITY,
             overlapping: false,
+            lately: Directions::default(),
         }
     }
 }
