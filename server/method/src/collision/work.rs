@@ -5,7 +5,7 @@ use std::ops::AddAssign;
 /// Counts of what collision detection, contact collection and projection did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Pairs of boxes tested.
+    /// Pairs of volumes opened: one is tested against eight below the other.
     pub node_pairs: u64,
     /// Pairs of triangles that survived the boxes.
     pub triangle_pairs: u64,
