@@ -21,7 +21,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
-use super::advancement::{PairOutcome, PairSearch, TrianglePair};
+use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::facing_volumes::{FacingVolumes, for_facing_triangle_pairs, open_pair};
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
@@ -68,10 +68,10 @@ pub struct AdvancementSettings {
     pub gap_tolerance: f64,
     /// Most evaluations of the closest points of one pair of triangles in one interval. Bounds the worst-case time of the loop.
     pub max_iterations: u32,
-    /// A pair of volumes, triangles at last, is looked at in intervals in which it moves by less than this share of its
-    /// larger diameter.
+    /// A pair of volumes, down to single triangles, is looked at in intervals in which it moves by less than this share of
+    /// the larger one's diameter, as far as `max_intervals` allows.
     pub interval_edges: f64,
-    /// Most intervals of a motion; a power of two.
+    /// Most intervals of a motion: the next lower power of two, up to 256.
     pub max_intervals: u32,
 }
 
@@ -82,7 +82,7 @@ impl Default for AdvancementSettings {
             minimum_gap: 1e-6,
             gap_tolerance: 1e-7,
             max_iterations: 200,
-            interval_edges: 0.5,
+            interval_edges: 1.0,
             max_intervals: 64,
         }
     }
@@ -207,13 +207,15 @@ impl Problem<'_> {
         // The nearest pairs of the last search bound the time before the trees are touched.
         let start = self.relative.at(0.0);
         let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
-        workspace
+        for &(a, b) in workspace
             .hints
-            .retain(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles);
-        for &(a, b) in &workspace.hints {
+            .iter()
+            .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
+        {
             let pair = self.pair(a, b);
-            if !search.is_free(&pair, &start, 0.0, first.time) {
-                let outcome = search.follow(&pair, &start, 0.0, first.time, work);
+            let interval = [0.0, first.time];
+            if !search.is_free(&pair, &start, interval, &first.lately) {
+                let outcome = search.follow(&pair, &start, interval, &mut first.lately, work);
                 first.take(outcome, (a, b), 0.0);
             }
         }
@@ -247,7 +249,7 @@ impl Problem<'_> {
         } = workspace;
         intervals.restart(first.time, search.gaps.stop);
         let cuts = halvings(self.settings.max_intervals);
-        let longest = 2.0 * self.settings.interval_edges as f32;
+        let longest = self.settings.interval_edges as f32;
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
         while let Some((a, b, mut index)) = stack.pop() {
@@ -264,8 +266,11 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if !search.is_free(&pair, &interval.start, from, to) && !hints.contains(&(t, s)) {
-                    let outcome = search.follow(&pair, &interval.start, from, to, work);
+                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
+                    && !hints.contains(&(t, s))
+                {
+                    let outcome =
+                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
                 }
                 continue;
@@ -308,6 +313,7 @@ struct First {
     near: f64,
     /// Some pair intersects.
     overlapping: bool,
+    lately: Directions,
 }
 
 impl Default for First {
@@ -317,6 +323,7 @@ impl Default for First {
             hit: None,
             near: f64::INFINITY,
             overlapping: false,
+            lately: Directions::default(),
         }
     }
 }
