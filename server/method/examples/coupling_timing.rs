@@ -175,7 +175,6 @@ fn row(name: u32, arm: Vector3<f64>, normal: Vector3<f64>, gap: f64) -> NonPenet
         gap,
         came: 0.0,
         separation: Separation::OfObstacle,
-        came: 0.0,
         shading_normal: None,
     }
 }
