@@ -1,0 +1,57 @@
+//! Whether a god-object can start where it is, and why not.
+
+use super::GodObject;
+use crate::collision::meshes_intersect;
+use crate::settings::{Settings, SettingsError};
+use crate::spatial::{Pose, pose_is_finite};
+use crate::world::World;
+
+/// Why a god-object cannot start.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum StartError {
+    /// The body starts inside an obstacle.
+    #[error(
+        "the god-object starts in penetration of obstacle \"{obstacle}\": move god_object.pose until they are apart"
+    )]
+    Penetration {
+        /// The obstacle's name.
+        obstacle: String,
+    },
+    /// The start pose has a component that is not a finite number.
+    #[error("the god-object's start pose is not finite: give numbers in god_object.pose")]
+    PoseNotFinite,
+    /// Mass and inertia make no metric.
+    #[error(
+        "the god-object's mass ({mass} kg) and inertia are not positive definite: give a mass above zero and a body with volume"
+    )]
+    Metric {
+        /// The mass given, kg.
+        mass: f64,
+    },
+    /// A setting is out of range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+}
+
+impl GodObject {
+    /// Whether [`GodObject::new`] would take this start.
+    pub fn check_start(world: &World, settings: &Settings, start: &Pose) -> Result<(), StartError> {
+        settings.validate()?;
+        if !pose_is_finite(start) {
+            return Err(StartError::PoseNotFinite);
+        }
+        if world.body.metric(settings.rotation_metric, start).is_none() {
+            return Err(StartError::Metric {
+                mass: world.body.mass,
+            });
+        }
+        for obstacle in &world.obstacles {
+            if meshes_intersect(&world.body.mesh, start, &obstacle.mesh, &obstacle.pose) {
+                return Err(StartError::Penetration {
+                    obstacle: obstacle.name.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
