@@ -18,4 +18,4 @@ pub use workspace::CollisionWorkspace;
 
 pub(crate) use motion::Placement;
 pub(crate) use swept_box::{StillBoxes, for_triangle_pairs};
-pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};
+pub(crate) use workspace::MAX_HINTS;

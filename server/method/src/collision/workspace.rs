@@ -18,15 +18,22 @@ pub(crate) const MAX_HINTS: usize = 64;
 pub struct CollisionWorkspace {
     pub(crate) stack: Vec<(u32, u32)>,
     pub(crate) candidates: Vec<Contact>,
+    pub(crate) candidate_limit: usize,
     pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
 }
 
 impl CollisionWorkspace {
     /// Allocates everything that the searches will ever need.
     pub fn new() -> Self {
+        Self::with_candidates(MAX_CANDIDATES)
+    }
+
+    /// The same with room for `candidates` contacts to choose from: every one of a conforming contact, for references.
+    pub fn with_candidates(candidates: usize) -> Self {
         Self {
             stack: Vec::with_capacity(STACK_CAPACITY),
-            candidates: Vec::with_capacity(MAX_CANDIDATES),
+            candidates: Vec::with_capacity(candidates),
+            candidate_limit: candidates,
             hints: ArrayVec::new(),
         }
     }

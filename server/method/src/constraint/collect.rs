@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, StillBoxes, Work, for_triangle_pairs,
+    CollisionWorkspace, MAX_HINTS, Placement, StillBoxes, Work, for_triangle_pairs,
 };
-use crate::geometry::{Mesh, Node, NormalCone};
+use crate::geometry::{Mesh, NormalCone};
 use crate::spatial::Pose;
 
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
@@ -41,9 +41,10 @@ pub fn collect_contacts(
         obstacle_index,
         activation_distance,
     };
-    let room = (out.capacity() - out.len()).min(MAX_CANDIDATES / 2);
     let candidates = &mut workspace.candidates;
     candidates.clear();
+    let capacity = workspace.candidate_limit;
+    let room = (out.capacity() - out.len()).min(capacity / 2);
     let mut truncated = false;
     let (body_tree, obstacle_tree) = (body.tree(), obstacle.tree());
     for_triangle_pairs(
@@ -60,7 +61,7 @@ pub fn collect_contacts(
             boxes.spheres_meet(nodes.0, nodes.1, &offset)
                 && may_face(
                     &placement,
-                    nodes,
+                    (nodes.0.radius, nodes.1.radius),
                     (body_tree.cone(i), obstacle_tree.cone(j)),
                     &offset,
                 )
@@ -74,7 +75,7 @@ pub fn collect_contacts(
                 y: obstacle.corners(b),
             };
             for_contacts(&facing, &pair, work, |contact| {
-                if candidates.len() == MAX_CANDIDATES {
+                if candidates.len() == capacity {
                     keep_nearest(candidates, room);
                     truncated = true;
                 }
@@ -103,9 +104,9 @@ pub fn collect_contacts(
 /// Whether features below the two nodes can face each other: some normal of the one is opposite to some normal of the other, and both
 /// lie along some line between the nodes. To tolerance; true for NaN.
 #[inline]
-fn may_face(
+pub(super) fn may_face(
     placement: &Placement,
-    (body, obstacle): (&Node, &Node),
+    (body_radius, obstacle_radius): (f64, f64),
     (body_cone, obstacle_cone): (&NormalCone, &NormalCone),
     line: &Vector3<f64>,
 ) -> bool {
@@ -120,7 +121,7 @@ fn may_face(
     }
     // Directions from a point of the obstacle's sphere to one of the body's make a cone about the line of the centres, with
     // the sine `spread / |line|`. All lengths: no division.
-    let spread = body.radius + obstacle.radius;
+    let spread = body_radius + obstacle_radius;
     let squared = line.norm_squared() - spread * spread;
     let apart = squared > 0.0; // false for NaN
     if !apart {
@@ -138,7 +139,7 @@ fn may_face(
 }
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.
-fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl FnMut(Contact)) {
+pub(super) fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl FnMut(Contact)) {
     let (on_a, on_b) = (
         facing.body.owned_features(pair.a),
         facing.obstacle.owned_features(pair.b),
@@ -191,7 +192,7 @@ fn keep_nearest(candidates: &mut Vec<Contact>, count: usize) {
     }
 }
 
-fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
+pub(super) fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
     match feature {
         Feature::Vertex(v) => mesh.vertex_owner(v),
         Feature::Edge(e) => Some(mesh.edges()[e as usize].faces[0]),
@@ -199,7 +200,7 @@ fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
     }
 }
 
-fn in_world(contact: &Contact, obstacle_pose: &Pose) -> Contact {
+pub(super) fn in_world(contact: &Contact, obstacle_pose: &Pose) -> Contact {
     Contact {
         point_on_body: obstacle_pose * contact.point_on_body,
         point_on_obstacle: obstacle_pose * contact.point_on_obstacle,

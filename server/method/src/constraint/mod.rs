@@ -4,9 +4,11 @@ mod collect;
 mod contact;
 mod facing;
 mod feature;
+mod reduction;
 mod set;
 
 pub use collect::collect_contacts;
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
+pub(crate) use reduction::{At, Purpose, RowReduction};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::substep::Update;
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
-use crate::constraint::{ConstraintSet, Contact};
+use crate::constraint::{ConstraintSet, Contact, RowReduction};
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -38,6 +38,8 @@ pub struct GodObject {
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
     pub(super) affordable: f64,
+    /// Finds rows as they are needed; `None` where every pair is collected.
+    pub(super) reduction: Option<Box<RowReduction>>,
 }
 
 impl GodObject {
@@ -48,6 +50,7 @@ impl GodObject {
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
+            reduction: Self::reduction_for(&world, &settings),
             world,
             settings,
             pose: start,
@@ -140,6 +143,8 @@ impl GodObject {
         if self.collected_within < published {
             self.collect(published, &mut report.work);
         }
+        let difference = pose_difference(&device, &self.pose_at_reference_point(), &self.rotation);
+        self.publish(&difference, &update, &mut report);
         self.describe_set(&mut report);
         report
     }

@@ -44,6 +44,7 @@ impl GodObject {
         } else {
             *left
         };
+        self.complete(&trusted, report);
         let Some(mut constrained) = self.project(&trusted, report) else {
             return false;
         };
