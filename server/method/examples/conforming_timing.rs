@@ -1,4 +1,4 @@
-//! Times updates and forces of conforming contact: `cargo run --release --example conforming_timing -- [filter] [reference stride]`.
+//! Times updates and forces of conforming contact: `cargo run --release --example conforming_timing -- [filter] [reference stride] [pace]`.
 //!
 //! A peg of 27,000 triangles in a hole of 27,000 triangles at three clearances, exact and with vertices perturbed by a micrometre, and a
 //! nut on its bolt where `TAUT_DATA` or `../shared/data` has them. The device inserts, pushes sideways, tilts, slides along and turns at 1 kHz.
@@ -42,6 +42,9 @@ fn main() {
     let stride = std::env::args()
         .nth(2)
         .map_or(20, |s| s.parse().expect("a stride"));
+    let pace: u32 = std::env::args()
+        .nth(3)
+        .map_or(1, |s| s.parse().expect("a pace"));
     for clearance in [0.5e-3, 0.1e-3, 0.05e-3] {
         for noise in [0.0, 1e-6] {
             let name = format!("peg {:.2} mm, noise {:.0} um", clearance * 1e3, noise * 1e6);
@@ -52,8 +55,8 @@ fn main() {
                 Pose::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.7, -0.4, 1.1));
             let peg = mesh(perturbed(fine_peg(), noise, 1));
             let hole = mesh(perturbed(fine_hole(RADIUS + clearance), noise, 2));
-            let path: Vec<Pose> = (0..2200)
-                .map(|k| obstacle_pose * hand(f64::from(k) * 1e-3))
+            let path: Vec<Pose> = (0..2200 / pace)
+                .map(|k| obstacle_pose * hand(f64::from(k * pace) * 1e-3))
                 .collect();
             measure(&name, peg, hole, obstacle_pose, 0.06, &path, stride);
         }

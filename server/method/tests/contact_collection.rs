@@ -205,6 +205,7 @@ fn bodies_far_apart_have_no_contact_and_no_gap() {
         collected,
         Collected {
             truncated: false,
+            complete_within: 1e-2,
             gap_min: f64::INFINITY
         }
     );

@@ -16,17 +16,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::gaps::Gaps;
 use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
 use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
-
-/// Bodies nearer than the minimum gap at the start may come down to this share of their distance there: they are free to
-/// leave and to slide, and never touch.
-const KEPT_SHARE_OF_START_GAP: f64 = 0.9;
-/// Bodies at the minimum gap to rounding may lose this many units of slack: a push that never eases loses 0.1 pm in each search.
-const KEPT_SLACKS: f64 = 4.0;
-/// Share of the gap tolerance, above the minimum gap, at which an advance ends: rounding does not bring the next start below the minimum.
-const STOP_SHARE_OF_TOLERANCE: f64 = 0.5;
 
 /// What a pair of triangles does in an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,14 +40,7 @@ pub(super) enum PairOutcome {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
-    /// The gap that no pair may go below, m.
-    pub(super) minimum_gap: f64,
-    /// The gap at which an advance ends, m: above the minimum gap.
-    pub(super) stop_gap: f64,
-    /// A pair this far above `stop_gap` is at it, m.
-    pub(super) stop_tolerance: f64,
-    /// Bound on the rounding error of a distance, m.
-    pub(super) slack: f64,
+    pub(super) gaps: Gaps,
     pub(super) max_iterations: u32,
 }
 
@@ -67,81 +53,49 @@ pub(super) struct TrianglePair {
     pub(super) obstacle_normal: Vector3<f64>,
 }
 
-impl<'a> PairSearch<'a> {
-    /// A search that stops at most `gap_tolerance` above `minimum_gap`; `slack` is added for rounding.
-    pub(super) fn new(
-        motion: &'a RelativeMotion,
-        minimum_gap: f64,
-        gap_tolerance: f64,
-        slack: f64,
-        max_iterations: u32,
-    ) -> Self {
-        let stop_gap = minimum_gap + slack + STOP_SHARE_OF_TOLERANCE * gap_tolerance;
-        let stop_tolerance = (1.0 - STOP_SHARE_OF_TOLERANCE) * gap_tolerance;
-        Self {
-            motion,
-            minimum_gap,
-            stop_gap,
-            stop_tolerance,
-            slack,
-            max_iterations,
-        }
-    }
-
-    /// The same search for bodies whose distance at the start is `gap`, nearer than the gap to stop at; `None` when nothing is left to keep.
-    pub(super) fn keeping(&self, gap: f64) -> Option<Self> {
-        let above = gap - KEPT_SLACKS * self.slack;
-        let kept = if above >= self.minimum_gap {
-            above
-        } else {
-            KEPT_SHARE_OF_START_GAP * gap
-        };
-        let stop_gap = kept.min(self.stop_gap);
-        let stop_tolerance = self
-            .stop_tolerance
-            .min(STOP_SHARE_OF_TOLERANCE * (gap - stop_gap));
-        (kept > self.slack).then_some(Self {
-            stop_gap,
-            stop_tolerance,
-            ..*self
-        }) // None for NaN
-    }
-
-    /// Follows the pair over `[from, to]`; `placement` is the body at `from`.
-    pub(super) fn advance(
+impl PairSearch<'_> {
+    /// The body's triangle at `from`, unless the planes of the two faces show that the pair is free up to `to`: they settle
+    /// most pairs, without closest points. `placement` is the body at `from`.
+    #[inline]
+    pub(super) fn begin(
         &self,
+        pair: &TrianglePair,
+        placement: &Placement,
+        from: f64,
+        to: f64,
+    ) -> Option<MovingTriangle> {
+        let moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
+        let out_of_body = -(placement.rotation * pair.body_normal);
+        let free = [pair.obstacle_normal, out_of_body].iter().any(|direction| {
+            let safe = moving.safe_step(direction, &pair.on_obstacle, self.gaps.stop);
+            safe.step >= to - from
+        });
+        (!free).then_some(moving)
+    }
+
+    /// Follows the pair over `[from, to]` from where it [begins](Self::begin).
+    pub(super) fn follow(
+        &self,
+        mut moving: MovingTriangle,
         pair: &TrianglePair,
         placement: &Placement,
         from: f64,
         to: f64,
         work: &mut Work,
     ) -> PairOutcome {
-        let mut moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
-        // The planes of the faces settle most pairs, without closest points.
-        let out_of_body = -(placement.rotation * pair.body_normal);
-        for direction in [pair.obstacle_normal, out_of_body] {
-            if moving
-                .safe_step(&direction, &pair.on_obstacle, self.stop_gap)
-                .step
-                >= to - from
-            {
-                return PairOutcome::Free;
-            }
-        }
-
         let mut time = from;
         let mut placement = *placement;
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let best = moving.best_step(pair, &placement, self.stop_gap);
-            let far = best.gap >= self.stop_gap; // false for NaN
+            let best = moving.best_step(pair, &placement, self.gaps.stop);
+            let far = best.gap >= self.gaps.stop; // false for NaN
             if iteration == 0 && !far {
                 return self.near(&moving, pair, best.gap);
             }
             if best.step >= to - time {
                 return PairOutcome::Free;
             }
-            let apart = best.gap - self.stop_gap > self.stop_tolerance; // false for NaN
+            let apart = best.gap - self.gaps.stop > self.gaps.tolerance; // false for NaN
             time += best.step.max(0.0);
             if !apart {
                 return PairOutcome::Hit(time);
@@ -154,7 +108,7 @@ impl<'a> PairSearch<'a> {
 
     /// A pair that is nearer than the gap to stop at: along no direction is there more than `gap`.
     fn near(&self, moving: &MovingTriangle, pair: &TrianglePair, gap: f64) -> PairOutcome {
-        let apart = gap > self.slack; // false for NaN
+        let apart = gap > self.gaps.slack; // false for NaN
         if !apart && triangles_intersect(&moving.corners, &pair.on_obstacle) {
             PairOutcome::Overlap
         } else {
@@ -172,7 +126,7 @@ struct SafeStep {
 
 /// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
 #[derive(Clone, Copy, Debug)]
-struct MovingTriangle {
+pub(super) struct MovingTriangle {
     corners: [Point3<f64>; 3],
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.

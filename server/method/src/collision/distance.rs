@@ -1,7 +1,7 @@
 //! Distance between two surfaces at rest, by branch and bound over both trees.
 
 use super::motion::Placement;
-use super::swept_box::STACK_CAPACITY;
+use super::still_box::STACK_CAPACITY;
 use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
 use crate::geometry::{Mesh, Node};
 use crate::spatial::Pose;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3};
 
 use super::motion::Placement;
-use super::swept_box::{STACK_CAPACITY, StillBoxes, for_triangle_pairs};
+use super::still_box::{STACK_CAPACITY, StillBoxes, for_triangle_pairs};
 use super::work::Work;
 use crate::geometry::Mesh;
 use crate::geometry::distance::triangles_intersect;

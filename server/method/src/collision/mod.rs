@@ -2,20 +2,26 @@
 
 mod advancement;
 mod distance;
+mod facing_volumes;
+mod gaps;
 mod intersection;
+mod intervals;
+mod known_apart;
+mod linear;
 mod motion;
-mod swept_box;
+mod still_box;
 mod time_of_impact;
 mod work;
 mod workspace;
 
 pub use distance::distance;
 pub use intersection::meshes_intersect;
+pub use linear::{edge_edge_time_of_impact, vertex_face_time_of_impact};
 pub use motion::Motion;
 pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
 pub(crate) use motion::Placement;
-pub(crate) use swept_box::{StillBoxes, for_triangle_pairs};
+pub(crate) use facing_volumes::{FacingVolumes, for_facing_triangle_pairs};
 pub(crate) use workspace::MAX_HINTS;

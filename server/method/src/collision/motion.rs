@@ -58,6 +58,11 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
+    /// Bound on how far any point of a body with this radius about G is from its place at `other`, m.
+    pub(super) fn distance_to(&self, other: &Self, radius: f64) -> f64 {
+        (self.center - other.center).norm() + (self.rotation - other.rotation).norm() * radius
+    }
+
     /// A point of the body, obstacle frame.
     #[inline]
     pub(crate) fn point(&self, in_body: &Point3<f64>) -> Point3<f64> {
@@ -92,6 +97,25 @@ impl RelativeMotion {
         }
     }
 
+    /// The time at which G, or without a path the rotation, is nearest to that of `body`.
+    pub(super) fn time_nearest(&self, body: &Placement) -> f64 {
+        let squared = self.velocity.norm_squared();
+        if squared > 0.0 {
+            return self.velocity.dot(&(body.center - self.start)) / squared;
+        }
+        // The turn since the start: sine and cosine from its matrix.
+        let turn = body.rotation * self.rotation.transpose();
+        let axial = Vector3::new(
+            turn[(2, 1)] - turn[(1, 2)],
+            turn[(0, 2)] - turn[(2, 0)],
+            turn[(1, 0)] - turn[(0, 1)],
+        );
+        let angle = axial
+            .dot(&self.spin)
+            .atan2(self.rate * (turn.trace() - 1.0));
+        angle / self.rate // NaN without a motion
+    }
+
     /// Whether every number of the motion is finite.
     pub(crate) fn is_finite(&self) -> bool {
         let vectors = [&self.start, &self.velocity, &self.spin];
@@ -102,10 +126,5 @@ impl RelativeMotion {
     /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.
     pub(crate) fn reach(&self, radius: f64) -> f64 {
         self.start.amax() + self.velocity.amax() + radius + self.reference_point.coords.amax()
-    }
-
-    /// Bound on the path of the body's fastest point, m.
-    pub(crate) fn length(&self, radius: f64) -> f64 {
-        self.velocity.norm() + self.rate * radius
     }
 }

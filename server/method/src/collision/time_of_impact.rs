@@ -1,9 +1,20 @@
 //! Time of impact of a moving body with an obstacle.
 //!
-//! The motion is cut into intervals in which the body moves by about an edge's length; in each, boxes that sweep little room
-//! leave few pairs of triangles, and the first interval with a hit ends the search. A pair is followed by conservative advancement.
+//! Both trees are descended together; a pair of volumes that moves by more than its size in an interval of time is looked at in
+//! both halves of it, the earlier one first. A pair of triangles is followed by conservative advancement.
 //!
-//! **Never late.** Every bound is one-sided in exact arithmetic ([`advancement`](super), [`swept_box`](super)). In floating
+//! **Only what faces.** Let the surfaces start farther apart than the gap g, and let t be the first time at which their distance is
+//! g, between points x of the body and y of the obstacle. No other points are nearer, so x is a local minimum of the distance to
+//! y on the body, and y to x on the obstacle: n = (x - y) / g is in the normal cone of the feature that y is on, -n in that
+//! of x. (Not inside out: the open segment from y to x meets no surface, so it runs outside both solids.) Each feature
+//! is owned by a triangle, whose cone holds the feature's normal cone, and whose volumes on the way up hold triangle
+//! and cone. So pairs of volumes without normals opposite to each other at any time of an interval are left alone: the
+//! pair that arrives first is never among them. Bodies that start nearer are searched again with a gap below their distance,
+//! which the same pair of points at the start tells: x and y are a global minimum there, too, and so facing.
+//! Surfaces that cross at the start have no such pair; crossing is looked for first, wherever no search before has
+//! shown that they are apart.
+//!
+//! **Never late.** Every bound is one-sided in exact arithmetic ([`advancement`](super), [`still_box`](super)). In floating
 //! point the coordinates of both bodies are off by some units in the last place of the largest coordinate on the way
 //! from the poses to a distance: at most about forty roundings, each of half a unit. `slack`, 256 units, is added to the minimum gap,
 //! which so holds on the poses that the caller computes by itself.
@@ -11,11 +22,15 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{PairOutcome, PairSearch, TrianglePair};
+use super::facing_volumes::{FacingVolumes, for_facing_triangle_pairs, open_pair};
+use super::gaps::Gaps;
+use super::intervals::{WHOLE, halvings};
 use super::motion::{Motion, RelativeMotion};
-use super::swept_box::{SweptBoxes, for_triangle_pairs};
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
 use crate::geometry::Mesh;
+use crate::geometry::distance::triangles_intersect;
+use crate::geometry::wide_tree::{Below, ROOT};
 use crate::spatial::Pose;
 
 /// Rounding of a computed distance relative to the largest coordinate on the way: see the file's head.
@@ -53,9 +68,10 @@ pub struct AdvancementSettings {
     pub gap_tolerance: f64,
     /// Most evaluations of the closest points of one pair of triangles in one interval. Bounds the worst-case time of the loop.
     pub max_iterations: u32,
-    /// Path of the body's fastest point in one interval, in mean edge lengths of the finer mesh.
+    /// A pair of volumes, triangles at last, is looked at in intervals in which it moves by less than this share of its
+    /// larger diameter.
     pub interval_edges: f64,
-    /// Most intervals of a motion.
+    /// Most intervals of a motion; a power of two.
     pub max_intervals: u32,
 }
 
@@ -75,7 +91,7 @@ impl Default for AdvancementSettings {
 /// Finds a time up to which the body may move: the gap is at least `minimum_gap` all the way and there.
 ///
 /// Never late; early by at most what `gap_tolerance` leaves. Motions that slide or leave are free even at the minimum gap.
-/// A motion with NaN stops at 0. No allocation.
+/// A motion with NaN stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
 pub fn time_of_impact(
     body: &Mesh,
     motion: &Motion,
@@ -101,27 +117,43 @@ pub fn time_of_impact(
     let world_reach =
         motion.start.translation.vector.amax() + obstacle_pose.translation.vector.amax();
     let slack = ROUNDING * (relative.reach(radius) + obstacle_reach + world_reach);
-    let search = PairSearch::new(
-        &relative,
-        settings.minimum_gap,
-        settings.gap_tolerance,
-        slack,
-        settings.max_iterations,
-    );
+    let search = PairSearch {
+        motion: &relative,
+        gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
+        max_iterations: settings.max_iterations,
+    };
     let problem = Problem {
         body,
         obstacle,
         relative: &relative,
-        radius,
         settings,
     };
+    if problem.crosses_at_start(radius, workspace, work) {
+        return TimeOfImpact::Overlapping;
+    }
     let mut tried = Some(search);
     for _ in 0..MAX_SEARCHES {
         let Some(current) = tried else { break };
         match problem.first_impact(&current, workspace, work) {
-            Ok(answer) => return answer,
+            Ok(answer) => {
+                let until = match answer {
+                    TimeOfImpact::Separated => 1.0,
+                    TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => time,
+                    TimeOfImpact::Overlapping => return answer,
+                };
+                let kept = current.gaps.stop - current.gaps.slack;
+                workspace
+                    .apart
+                    .remember(problem.key(), &relative, until, kept);
+                return answer;
+            }
             // Nearer than the gap to stop at already: keep what there is, so that sliding and leaving stay free.
-            Err(gap) => tried = search.keeping(gap),
+            Err(gap) => {
+                tried = search
+                    .gaps
+                    .keeping(gap)
+                    .map(|gaps| PairSearch { gaps, ..search });
+            }
         }
     }
     TimeOfImpact::Impact { time: 0.0 }
@@ -132,11 +164,36 @@ struct Problem<'a> {
     body: &'a Mesh,
     obstacle: &'a Mesh,
     relative: &'a RelativeMotion,
-    radius: f64,
     settings: &'a AdvancementSettings,
 }
 
 impl Problem<'_> {
+    /// Whether the surfaces cross at the start: looked at where no search before this one has shown that they do not.
+    fn crosses_at_start(
+        &self,
+        radius: f64,
+        workspace: &mut CollisionWorkspace,
+        work: &mut Work,
+    ) -> bool {
+        let start = self.relative.at(0.0);
+        if workspace.apart.knows(self.key(), &start, radius) {
+            return false;
+        }
+        let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
+        let volumes = FacingVolumes::still(trees, &start, 0.0, std::f64::consts::PI);
+        let mut crosses = false;
+        for_facing_triangle_pairs(trees, &volumes, &mut workspace.pairs, work, |a, b, _| {
+            let on_body = self.body.corners(a).map(|p| start.point(&p));
+            crosses = triangles_intersect(&on_body, &self.obstacle.corners(b));
+            !crosses
+        });
+        crosses
+    }
+
+    fn key(&self) -> [u64; 2] {
+        [self.body.identity(), self.obstacle.identity()]
+    }
+
     /// The earliest impact; `Err` with the distance when some pair is nearer than the gap to stop at from the beginning.
     fn first_impact(
         &self,
@@ -149,37 +206,23 @@ impl Problem<'_> {
         // The nearest pairs of the last search bound the time before the trees are touched.
         let start = self.relative.at(0.0);
         let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
-        for &(a, b) in workspace
+        workspace
             .hints
-            .iter()
-            .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
-        {
-            first.take(
-                search.advance(&self.pair(a, b), &start, 0.0, first.time, work),
-                (a, b),
-            );
+            .retain(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles);
+        for &(a, b) in &workspace.hints {
+            let pair = self.pair(a, b);
+            let outcome = match search.begin(&pair, &start, 0.0, first.time) {
+                Some(moving) => search.follow(moving, &pair, &start, 0.0, first.time, work),
+                None => PairOutcome::Free,
+            };
+            first.take(outcome, (a, b), 0.0);
         }
-
-        let end = first.time;
-        let intervals = self.intervals(end);
-        for k in 0..intervals {
-            let [from, to] = [k, k + 1].map(|k| end * f64::from(k) / f64::from(intervals));
-            if !first.is_near() {
-                self.search_interval(search, [from, to], &mut first, workspace, work);
-            }
-            if first.overlapping {
-                return Ok(TimeOfImpact::Overlapping);
-            }
-            if first.is_near() && k == 0 {
-                return Err(first.near);
-            }
-            if first.is_near() {
-                // It came there in the interval before, within rounding.
-                return Ok(TimeOfImpact::Impact { time: from });
-            }
-            if first.time < to {
-                break;
-            }
+        self.descend(search, &mut first, workspace, work);
+        if first.overlapping {
+            return Ok(TimeOfImpact::Overlapping);
+        }
+        if first.is_near() {
+            return Err(first.near);
         }
         if let Some((pair, _)) = first.hit {
             workspace.remember(pair);
@@ -187,44 +230,57 @@ impl Problem<'_> {
         Ok(first.answer())
     }
 
-    fn search_interval(
+    /// Looks at every pair of triangles that may face each other within the gap at some time before the first impact so far.
+    fn descend(
         &self,
         search: &PairSearch,
-        [from, to]: [f64; 2],
         first: &mut First,
         workspace: &mut CollisionWorkspace,
         work: &mut Work,
     ) {
-        let boxes = SweptBoxes::over(self.relative, from, to, search.stop_gap);
-        let placement = self.relative.at(from);
-        let (body_nodes, obstacle_nodes) = (self.body.tree().nodes(), self.obstacle.tree().nodes());
-        for_triangle_pairs(
-            self.body.tree(),
-            self.obstacle.tree(),
-            &mut workspace.stack,
-            work,
-            |i, j| boxes.may_meet(&body_nodes[i as usize], &obstacle_nodes[j as usize]),
-            |a, b, work| {
-                first.take(
-                    search.advance(&self.pair(a, b), &placement, from, to.min(first.time), work),
-                    (a, b),
-                );
-                !first.overlapping
-            },
-        );
-    }
-
-    /// Intervals in which the body moves by about `interval_edges` of the finer mesh, up to time `end`.
-    fn intervals(&self, end: f64) -> u32 {
-        let finest = self
-            .body
-            .mean_edge_length()
-            .min(self.obstacle.mean_edge_length());
-        let wanted = (self.relative.length(self.radius) * end
-            / (finest * self.settings.interval_edges))
-            .ceil();
-        // `as` saturates, and makes NaN 0.
-        (wanted as u32).clamp(1, self.settings.max_intervals.max(1))
+        let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
+        let CollisionWorkspace {
+            stack,
+            hints,
+            intervals,
+            ..
+        } = workspace;
+        intervals.restart(first.time, search.gaps.stop);
+        let cuts = halvings(self.settings.max_intervals);
+        let longest = 2.0 * self.settings.interval_edges as f32;
+        stack.clear();
+        stack.push((ROOT, ROOT, WHOLE));
+        while let Some((a, b, index)) = stack.pop() {
+            let interval = intervals.get(index, self.relative, trees);
+            let [from, to] = [interval.from, interval.to.min(first.time)];
+            let later = from >= first.time || (first.is_near() && from > 0.0);
+            if (later && from > 0.0) || first.overlapping {
+                continue;
+            }
+            if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
+                work.triangle_pairs += 1;
+                let pair = self.pair(t, s);
+                if let Some(moving) = search.begin(&pair, &interval.start, from, to)
+                    && !hints.contains(&(t, s))
+                {
+                    let outcome = search.follow(moving, &pair, &interval.start, from, to, work);
+                    first.take(outcome, (t, s), from);
+                }
+                continue;
+            }
+            work.node_pairs += 1;
+            let size = trees.0.radius(a).max(trees.1.radius(b));
+            let moving = trees.0.volume(a);
+            if index.ilog2() < cuts && interval.volumes.half_sweep(&moving) > longest * size {
+                // Later half below the earlier one.
+                stack.push((a, b, 2 * index + 1));
+                stack.push((a, b, 2 * index));
+                continue;
+            }
+            open_pair(trees, &interval.volumes, (a, b), |(a, b)| {
+                stack.push((a, b, index));
+            });
+        }
     }
 
     #[inline]
@@ -261,10 +317,12 @@ impl Default for First {
 }
 
 impl First {
-    /// Takes an outcome into account.
-    fn take(&mut self, outcome: PairOutcome, pair: (u32, u32)) {
+    /// Takes the outcome of an interval that begins at `from` into account.
+    fn take(&mut self, outcome: PairOutcome, pair: (u32, u32), from: f64) {
         let (time, limit) = match outcome {
             PairOutcome::Free => return,
+            // It came there before, and some pair that faced each other with it.
+            PairOutcome::Near(_) | PairOutcome::Overlap if from > 0.0 => (from, false),
             PairOutcome::Near(gap) => {
                 self.near = self.near.min(if gap.is_nan() { 0.0 } else { gap });
                 return;

@@ -2,7 +2,10 @@
 
 use arrayvec::ArrayVec;
 
-use super::swept_box::STACK_CAPACITY;
+use super::facing_volumes::WIDE_STACK_CAPACITY;
+use super::intervals::{Intervals, MAX_HALVINGS};
+use super::known_apart::KnownApart;
+use super::still_box::STACK_CAPACITY;
 use crate::constraint::Contact;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
@@ -16,7 +19,11 @@ pub(crate) const MAX_HINTS: usize = 64;
 /// a valid one to look at.
 #[derive(Clone, Debug)]
 pub struct CollisionWorkspace {
-    pub(crate) stack: Vec<(u32, u32)>,
+    pub(crate) pairs: Vec<(u32, u32)>,
+    /// Pairs of volumes and an interval.
+    pub(super) stack: Vec<(u32, u32, u32)>,
+    pub(super) intervals: Intervals,
+    pub(super) apart: KnownApart,
     pub(crate) candidates: Vec<Contact>,
     pub(crate) candidate_limit: usize,
     pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
@@ -31,7 +38,10 @@ impl CollisionWorkspace {
     /// The same with room for `candidates` contacts to choose from: every one of a conforming contact, for references.
     pub fn with_candidates(candidates: usize) -> Self {
         Self {
-            stack: Vec::with_capacity(STACK_CAPACITY),
+            pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
+            stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
+            intervals: Intervals::new(),
+            apart: KnownApart::default(),
             candidates: Vec::with_capacity(candidates),
             candidate_limit: candidates,
             hints: ArrayVec::new(),

@@ -218,17 +218,23 @@ impl Facing<'_> {
         })
     }
 
+    /// A triangle of each.
+    #[inline]
+    pub(super) fn pair(&self, a: u32, b: u32) -> Pair {
+        Pair {
+            a,
+            b,
+            x: self.body.corners(a).map(|p| self.placement.point(&p)),
+            y: self.obstacle.corners(b),
+        }
+    }
+
     /// The contact between two features by their names, when they face each other here.
     pub(super) fn features(&self, features: &FeaturePair) -> Option<Contact> {
         let (body, obstacle) = (self.body, self.obstacle);
         let a = triangle_of(body, features.on_body)?;
         let b = triangle_of(obstacle, features.on_obstacle)?;
-        let pair = Pair {
-            a,
-            b,
-            x: body.corners(a).map(|p| self.placement.point(&p)),
-            y: obstacle.corners(b),
-        };
+        let pair = self.pair(a, b);
         let corner = |mesh: &Mesh, t: u32, v: u32| {
             let corners = mesh.triangles()[t as usize];
             corners.iter().position(|w| *w == v)

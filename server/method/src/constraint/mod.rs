@@ -7,6 +7,7 @@ mod feature;
 mod reduction;
 mod set;
 
+pub(crate) use collect::collect_bounded;
 pub use collect::collect_contacts;
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};

@@ -6,6 +6,7 @@ use super::mesh_error::MeshError;
 use super::normal_cone::triangle_cones;
 use super::topology::{Edge, Topology};
 use super::tree::Tree;
+use super::wide_tree::WideTree;
 
 /// A triangle whose doubled area is below this share of its longest side squared has none: some units of rounding of the
 /// cross product. Slivers of CAD exports, some 1e-6 of their length high, are far above.
@@ -21,6 +22,8 @@ pub struct Mesh {
     face_normals: Vec<Vector3<f64>>,
     topology: Topology,
     tree: Tree,
+    wide_tree: WideTree,
+    identity: u64,
     bounding_box: [Point3<f64>; 2],
     mean_edge_length: f64,
 }
@@ -43,6 +46,8 @@ impl Mesh {
 
         let cones = triangle_cones(&vertices, &triangles, &face_normals, &mut topology);
         let tree = Tree::build(&vertices, &triangles, &cones);
+        let wide_tree = WideTree::build(&vertices, &triangles, &face_normals, &cones, &tree);
+        let identity = identity(&vertices, &triangles);
         let mut bounding_box = [vertices[0]; 2];
         for v in &vertices {
             bounding_box = [bounding_box[0].inf(v), bounding_box[1].sup(v)];
@@ -58,6 +63,8 @@ impl Mesh {
             face_normals,
             topology,
             tree,
+            wide_tree,
+            identity,
             bounding_box,
             mean_edge_length,
         })
@@ -123,6 +130,18 @@ impl Mesh {
         &self.tree
     }
 
+    /// A number that meshes with other vertices or triangles do not share, but by a chance of 2^-64.
+    #[inline]
+    pub(crate) fn identity(&self) -> u64 {
+        self.identity
+    }
+
+    /// The wide tree over the triangles.
+    #[inline]
+    pub(crate) fn wide_tree(&self) -> &WideTree {
+        &self.wide_tree
+    }
+
     /// Lower and upper corner of the axis-aligned box around the vertices, m.
     pub fn bounding_box(&self) -> [Point3<f64>; 2] {
         self.bounding_box
@@ -148,6 +167,18 @@ impl Mesh {
             .fold(0.0, f64::max)
             .sqrt()
     }
+}
+
+/// Hash of vertices and triangles (Fowler, Noll and Vo's, a word at a time).
+fn identity(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> u64 {
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let coordinates = vertices.iter().flat_map(|v| v.iter()).map(|x| x.to_bits());
+    let corners = triangles.iter().flatten().map(|v| u64::from(*v));
+    coordinates.chain(corners).fold(OFFSET, |hash, word| {
+        let mixed = (hash ^ word).wrapping_mul(PRIME);
+        mixed ^ (mixed >> 32)
+    })
 }
 
 fn check_numbers(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<(), MeshError> {

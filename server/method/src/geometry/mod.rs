@@ -1,6 +1,7 @@
 //! Meshes: checked once, then read only. Tree, closest points, mass, normals.
 
 pub mod distance;
+pub(crate) mod lanes;
 mod mass;
 mod mesh;
 mod mesh_error;
@@ -9,6 +10,7 @@ mod normals;
 mod report;
 mod topology;
 mod tree;
+pub(crate) mod wide_tree;
 
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::Mesh;

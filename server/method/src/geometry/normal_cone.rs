@@ -7,12 +7,15 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::topology::Topology;
+use super::topology::{FLAT_EDGE_ANGLE, Topology};
 
-/// A product of two edges this far above a third is above it: some rounding of unit vectors.
-const RAY_TOLERANCE: f64 = 1e-9;
-/// Edges nearer to parallel than this have no product, as its squared length.
+/// Edges nearer to parallel than 1e-8 have no product, as its squared length.
 const PARALLEL: f64 = 1e-16;
+/// A product of two edges this far above a third is above it: the rounding of the product of edges that are nearly parallel,
+/// 2e-8, and the tilt of edges taken as parallel, 1e-8.
+const RAY_TOLERANCE: f64 = 1e-7;
+/// Rounding of a face's normal, times the product of two sides over the doubled area, rad.
+const NORMAL_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Vertices with more edges, tips of fans, are taken as corners without looking: the look costs the cube of their number.
 const MAX_RING: usize = 32;
 
@@ -79,6 +82,10 @@ fn vertex_rays(
             let cross = a.cross(b);
             let squared = cross.norm_squared();
             if squared < PARALLEL {
+                // A sliver's tip: the normal between its sides is not to be had from them.
+                if a.dot(b) > 0.0 {
+                    return None;
+                }
                 continue;
             }
             let ray = cross / squared.sqrt();
@@ -93,6 +100,10 @@ fn vertex_rays(
 }
 
 /// Takes the corners away whose normal cone is empty, and gives each triangle the cone of its features.
+///
+/// Each point of the surface lies on a feature that some triangle owns, and where the point is a local minimum of the
+/// distance to something outside, the direction there is in that triangle's cone. So flat edges and corners that stand
+/// for nothing in contact collection are in some cone, too.
 pub(crate) fn triangle_cones(
     vertices: &[Point3<f64>],
     triangles: &[[u32; 3]],
@@ -101,16 +112,19 @@ pub(crate) fn triangle_cones(
 ) -> Vec<NormalCone> {
     let mut rays = Vec::new();
     let mut cones = Vec::with_capacity(triangles.len());
+    let rounding = |t: u32| normal_rounding(&triangles[t as usize].map(|v| vertices[v as usize]));
     for (t, corners) in triangles.iter().enumerate() {
         let axis = face_normals[t];
         let mut least: f64 = 1.0;
+        let mut spread = rounding(t as u32);
         for (k, &corner) in corners.iter().enumerate() {
-            if topology.owned[t] & (8 << k) != 0 {
-                let edge = &topology.edges[topology.triangle_edges[t][k] as usize];
-                let other = edge.faces[0] ^ edge.faces[1] ^ t as u32;
+            let edge = &topology.edges[topology.triangle_edges[t][k] as usize];
+            if edge.faces[0] == t as u32 && edge.convexity > -FLAT_EDGE_ANGLE {
+                let other = edge.faces[1];
                 least = least.min(axis.dot(&face_normals[other as usize]));
+                spread = spread.max(rounding(other));
             }
-            if topology.owned[t] & (1 << k) == 0 {
+            if topology.vertex_owner[corner as usize] != t as u32 {
                 continue;
             }
             let looked = vertex_rays(vertices, topology, corner, &mut rays);
@@ -123,12 +137,17 @@ pub(crate) fn triangle_cones(
             };
         }
         // Rays within a right angle of the axis span a cone within their farthest; wider ones may hold anything.
-        let angle = if least > 0.0 {
-            least.min(1.0).acos()
-        } else {
-            std::f64::consts::PI
-        };
+        let angle = least.min(1.0).acos() + spread;
+        let narrow = least > 0.0 && angle < std::f64::consts::FRAC_PI_2; // false for NaN
+        let angle = if narrow { angle } else { std::f64::consts::PI };
         cones.push(NormalCone::new(axis, angle));
     }
     cones
+}
+
+/// Bound on the rounding of a triangle's normal, rad.
+fn normal_rounding(t: &[Point3<f64>; 3]) -> f64 {
+    let sides = [t[1] - t[0], t[2] - t[1]];
+    let doubled = sides[0].cross(&sides[1]).norm();
+    NORMAL_ROUNDING * sides[0].norm() * sides[1].norm() / doubled
 }

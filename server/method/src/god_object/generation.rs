@@ -2,18 +2,26 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
-
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::Work;
-use crate::constraint::{At, NonPenetrationConstraint, Purpose, RowReduction, collect_contacts};
+use crate::constraint::{At, NonPenetrationConstraint, Purpose, RowReduction, collect_bounded};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::world::World;
 
 /// A row that is violated by less than this share of the rest distance is left out: 1 um for a body of 0.1 m.
 const TOLERANCE_PER_REST_DISTANCE: f64 = 0.1;
+/// Pairs up to this many rest distances apart are always collected, whatever it costs.
+const TOUCHING_REST_DISTANCES: f64 = 2.0;
+/// Share of the distance collected that a body may go before the next collection, where the work allows no greater distance.
+const LONGER_WAY: f64 = 0.5;
+/// A collection that costs too much is given up, and done within this share of its distance; one that costs little lets the next go
+/// further.
+const LOOK_AHEAD_SHRINKS: f64 = 0.4;
+const LOOK_AHEAD_GROWS: f64 = 1.25;
+/// Most collections that are begun at one pose.
+const MAX_ATTEMPTS: u32 = 8;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: a shaded row is not the one that the surface has, and the
@@ -24,37 +32,71 @@ impl GodObject {
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 
-    /// The known rows at the present pose, and every facing pair within `distance` (m) to choose from; false where every pair
-    /// becomes a row.
+    /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
+    /// collected last do not reach as far. False where every pair becomes a row.
     pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
         let Some(mut reduction) = self.reduction.take() else {
             return false;
         };
-        let pairs_before = work.triangle_pairs;
-        self.set.gap_min = f64::INFINITY;
         if let Some(at) = self.place() {
-            reduction.move_to(&at, work);
+            reduction.move_to(&at, &self.collision.hints, work);
+            let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
+            // Where the work allows no more, a longer way is gone before the next collection.
+            let wanted = distance.min(LONGER_WAY * self.affordable);
+            let reaches = moved + wanted <= within
+                || (self.affordable <= distance && moved <= LONGER_WAY * self.affordable);
+            self.set.gap_min = reduction.gap_min();
+            if !reaches {
+                self.collect_candidates(&mut reduction, &at, distance, work);
+            }
+        }
+        self.reduction = Some(reduction);
+        self.write_set();
+        true
+    }
+
+    /// Every facing pair within `distance`, m, or within what the work allows.
+    fn collect_candidates(
+        &mut self,
+        reduction: &mut RowReduction,
+        at: &At,
+        distance: f64,
+        work: &mut Work,
+    ) {
+        let least = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
+        for _ in 0..MAX_ATTEMPTS {
+            let distance = distance.min(self.affordable).max(least);
+            let pairs_before = work.triangle_pairs;
+            reduction.begin(at);
+            self.set.gap_min = f64::INFINITY;
             for (index, obstacle) in at.world.obstacles.iter().enumerate() {
                 self.contacts.clear();
-                let collected = collect_contacts(
-                    &at.world.body.mesh,
-                    &at.pose,
-                    &obstacle.mesh,
-                    &obstacle.pose,
+                let spent = work.triangle_pairs - pairs_before;
+                let collected = collect_bounded(
+                    (&at.world.body.mesh, &at.pose),
+                    (&obstacle.mesh, &obstacle.pose),
                     u16::try_from(index).unwrap_or(u16::MAX),
                     distance,
+                    self.settings.look_ahead_pairs.saturating_sub(spent),
                     &mut self.collision,
                     &mut self.contacts,
                     work,
                 );
                 self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-                reduction.offer(&at, &self.contacts, collected.truncated);
+                reduction.offer(at, &self.contacts, &collected);
             }
+            let pairs = work.triangle_pairs - pairs_before;
+            if pairs > self.settings.look_ahead_pairs {
+                self.affordable = (distance * LOOK_AHEAD_SHRINKS).max(least);
+                if distance > least {
+                    continue;
+                }
+            } else if pairs < self.settings.look_ahead_pairs / 2 {
+                let limit = self.settings.activation_distance + self.settings.look_ahead_limit;
+                self.affordable = (self.affordable * LOOK_AHEAD_GROWS).min(limit);
+            }
+            break;
         }
-        self.reduction = Some(reduction);
-        self.afford_look_ahead(distance, work.triangle_pairs - pairs_before);
-        self.write_set();
-        true
     }
 
     /// Finds the rows that the projection of `unconstrained` needs.
@@ -69,9 +111,18 @@ impl GodObject {
         update: &Update,
         report: &mut StepReport,
     ) {
-        if self.reduction.is_none() {
+        let published = self.published_distance(update);
+        let Some(mut reduction) = self.reduction.take() else {
             return;
+        };
+        if let Some(at) = self.place() {
+            let moved = reduction.moved(self.radius) > 0.0;
+            let complete = reduction.complete_within() >= published || self.affordable <= published;
+            if moved || !complete {
+                self.collect_candidates(&mut reduction, &at, published, &mut report.work);
+            }
         }
+        self.reduction = Some(reduction);
         let reach = self.settings.activation_distance
             + update
                 .device_moved
@@ -114,7 +165,7 @@ impl GodObject {
         Some(At {
             world: Arc::clone(&self.world),
             pose: self.pose,
-            center: Point3::from(self.pose_at_reference_point().translation.vector),
+            reference: self.pose_at_reference_point(),
             metric,
             rest_distance: self.settings.rest_distance,
             tolerance: TOLERANCE_PER_REST_DISTANCE * self.settings.rest_distance,

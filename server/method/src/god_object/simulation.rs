@@ -65,7 +65,7 @@ impl GodObject {
             trust_length: f64::INFINITY,
             last_device: None,
             collected_within: 0.0,
-            affordable: settings.look_ahead_limit,
+            affordable: settings.activation_distance + settings.look_ahead_limit,
         };
         god_object.collect(settings.activation_distance, &mut Work::default());
         Ok(god_object)
@@ -140,7 +140,7 @@ impl GodObject {
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
-        if self.collected_within < published {
+        if self.reduction.is_none() && self.collected_within < published {
             self.collect(published, &mut report.work);
         }
         let difference = pose_difference(&device, &self.pose_at_reference_point(), &self.rotation);

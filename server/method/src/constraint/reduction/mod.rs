@@ -12,22 +12,32 @@
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
+mod candidates;
+
 use std::sync::Arc;
 
+use arrayvec::ArrayVec;
 use nalgebra::Point3;
 
-use super::collect::in_world;
+use super::collect::{for_contacts, in_world};
 use super::facing::Facing;
-use super::{Contact, contact_jacobian};
+use super::{Collected, Contact, FeaturePair, contact_jacobian};
 use crate::collision::{Placement, Work};
+use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
-use crate::spatial::{Pose, Vector6};
+use crate::spatial::{Pose, Vector6, angular, linear};
+use candidates::Candidates;
 use crate::world::World;
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
 /// Most repetitions of project and search for one motion.
 const MAX_ROUNDS: u32 = 24;
+/// Most candidates that turn out to face no more, in one round.
+const MAX_STALE: u32 = 64;
+/// Hints that are looked at, and how near a pair there must be to become a row.
+const HINTS_TAKEN: usize = 2;
+const HINT_REST_DISTANCES: f64 = 4.0;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
 const IDLE_UPDATES: u32 = 8;
 
@@ -44,12 +54,19 @@ struct Known {
 pub(crate) struct At {
     pub(crate) world: Arc<World>,
     pub(crate) pose: Pose,
-    /// G, world.
-    pub(crate) center: Point3<f64>,
+    /// Pose of the reference point.
+    pub(crate) reference: Pose,
     pub(crate) metric: Metric,
     pub(crate) rest_distance: f64,
     /// eps, m.
     pub(crate) tolerance: f64,
+}
+
+impl At {
+    /// G, world.
+    fn center(&self) -> Point3<f64> {
+        Point3::from(self.reference.translation.vector)
+    }
 }
 
 /// Rows of the god-object loop ease a body out that is nearer than the rest distance, those of the coupling do not.
@@ -102,40 +119,62 @@ impl RowReduction {
         self.truncated
     }
 
-    /// Takes the rows to a new pose, without candidates: pairs that face no more are let go.
-    pub(crate) fn move_to(&mut self, at: &At, work: &mut Work) {
+    /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
+    ///
+    /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
+    pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
         self.error = 0.0;
-        self.truncated = false;
-        self.candidates.clear();
-        let center = at.center;
         self.known.retain_mut(|row| {
-            let features = row.contact.features;
-            let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
-            let placement = Placement::of(&at.pose, &obstacle.pose);
-            let facing = Facing {
-                body: &at.world.body.mesh,
-                obstacle: &obstacle.mesh,
-                placement: &placement,
-                obstacle_index: features.obstacle,
-                activation_distance: f64::INFINITY,
-            };
-            work.feature_pairs += 1;
-            let contact = facing.features(&features);
+            let contact = face(at, &row.contact.features, work);
             if let Some(contact) = contact {
-                row.contact = in_world(&contact, &obstacle.pose);
-                row.jacobian = jacobian(&row.contact, &center);
+                row.contact = contact;
+                row.jacobian = jacobian(&contact, &at.center());
             }
             contact.is_some()
         });
+        self.candidates.move_to(&at.reference);
+        for &hint in hints.iter().take(HINTS_TAKEN) {
+            self.take_hint(at, hint, work);
+        }
     }
 
-    /// Adds contacts of the present pose to choose from, world frame; `truncated` when there are more.
-    pub(crate) fn offer(&mut self, at: &At, contacts: &[Contact], truncated: bool) {
+    /// How far the body may have gone since the candidates were collected, m: `radius` bounds its points' arms about G.
+    pub(crate) fn moved(&self, radius: f64) -> f64 {
+        let moved = &self.candidates.moved;
+        linear(moved).norm() + radius * angular(moved).norm()
+    }
+
+    /// Distance within which every pair was a candidate when they were collected, m.
+    pub(crate) fn complete_within(&self) -> f64 {
+        self.candidates.complete_within
+    }
+
+    /// Smallest gap of the rows and candidates, m; that of candidates to first order. Infinite when there are none.
+    pub(crate) fn gap_min(&self) -> f64 {
+        let known = self.known.iter().map(|row| row.contact.gap);
+        let carried = self.candidates.gap.iter().map(|gap| gap.max(0.0));
+        known.chain(carried).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Forgets the candidates; those of the present pose are to be offered.
+    pub(crate) fn begin(&mut self, at: &At) {
+        self.truncated = false;
+        self.candidates.clear(&at.reference);
+    }
+
+    /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m).
+    pub(crate) fn offer(&mut self, at: &At, contacts: &[Contact], collected: &Collected) {
         let room = self.candidates.room();
         for contact in contacts.iter().take(room) {
-            self.candidates.push(contact, &jacobian(contact, &at.center));
+            self.candidates
+                .push(contact, &jacobian(contact, &at.center()));
         }
-        self.truncated |= truncated || contacts.len() > room;
+        let mut within = collected.complete_within;
+        if contacts.len() > room {
+            within = within.min(contacts[room].gap);
+        }
+        self.truncated |= collected.truncated || contacts.len() > room;
+        self.candidates.complete_within = self.candidates.complete_within.min(within);
     }
 
     /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
@@ -169,20 +208,53 @@ impl RowReduction {
                 self.known[row.row as usize].idle = 0;
             }
             rounds += 1;
-            let worst = self
-                .candidates
-                .least_clearance(&projection.acceleration, least_gap);
-            let Some((k, clearance)) = worst else {
-                return projection;
-            };
-            let violation = at.rest_distance - clearance;
-            let done = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
-            let contact = self.candidates.contacts[k];
-            if done || !self.add(at, &contact) {
+            let violation = self.add_most_violated(at, &projection.acceleration, least_gap, work);
+            let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
+            if finished || !violation.is_finite() {
                 self.error = self.error.max(violation);
                 return projection;
             }
         }
+    }
+
+    /// Adds the candidate that `motion` violates most, if by more than the tolerance; by how much it is violated, m.
+    fn add_most_violated(
+        &mut self,
+        at: &At,
+        motion: &Vector6,
+        least_gap: f64,
+        work: &mut Work,
+    ) -> f64 {
+        for _ in 0..MAX_STALE {
+            let Some((k, clearance)) = self.candidates.least_clearance(motion, least_gap) else {
+                return 0.0;
+            };
+            let violation = at.rest_distance - clearance;
+            if violation <= at.tolerance {
+                return violation.max(0.0);
+            }
+            let features = self.candidates.contacts[k].features;
+            // Known rows are satisfied; one that was carried here to first order is looked at as it is.
+            self.candidates.gap[k] = f64::INFINITY;
+            if self.known.iter().any(|row| row.contact.features == features) {
+                continue;
+            }
+            let contact = if self.candidates.moved == Vector6::zeros() {
+                Some(self.candidates.contacts[k])
+            } else {
+                face(at, &features, work)
+            };
+            if let Some(contact) = contact {
+                let row = jacobian(&contact, &at.center());
+                let violation =
+                    at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
+                if violation > at.tolerance {
+                    self.add(at, &contact);
+                    return violation;
+                }
+            }
+        }
+        0.0
     }
 
     /// An update has ended: rows that were of no use for long are let go.
@@ -191,15 +263,7 @@ impl RowReduction {
         self.known.retain(|row| row.idle <= IDLE_UPDATES);
     }
 
-    /// Adds a row; false when it is known already.
-    fn add(&mut self, at: &At, contact: &Contact) -> bool {
-        let known = self
-            .known
-            .iter()
-            .any(|row| row.contact.features == contact.features);
-        if known {
-            return false;
-        }
+    fn add(&mut self, at: &At, contact: &Contact) {
         if self.known.len() == MAX_ROWS {
             let most_idle = (0..MAX_ROWS)
                 .max_by_key(|k| self.known[*k].idle)
@@ -209,72 +273,78 @@ impl RowReduction {
         }
         self.known.push(Known {
             contact: *contact,
-            jacobian: jacobian(contact, &at.center),
+            jacobian: jacobian(contact, &at.center()),
             idle: 0,
         });
-        true
     }
+
+    /// Adds what faces between two triangles that stopped a motion.
+    fn take_hint(&mut self, at: &At, (a, b): (u32, u32), work: &mut Work) {
+        // A hint does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
+        for (index, obstacle) in at.world.obstacles.iter().enumerate() {
+            let body = &at.world.body.mesh;
+            if a as usize >= body.triangles().len() || b as usize >= obstacle.mesh.triangles().len()
+            {
+                continue;
+            }
+            let placement = Placement::of(&at.pose, &obstacle.pose);
+            let facing = Facing {
+                body,
+                obstacle: &obstacle.mesh,
+                placement: &placement,
+                obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
+                activation_distance: HINT_REST_DISTANCES * at.rest_distance,
+            };
+            // The features that touch may be other triangles' to look at.
+            for a in owners(body, a) {
+                for b in owners(&obstacle.mesh, b) {
+                    for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+                        let known = self
+                            .known
+                            .iter()
+                            .any(|row| row.contact.features == contact.features);
+                        if !known {
+                            self.add(at, &in_world(&contact, &obstacle.pose));
+                        }
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// A triangle, and those that own its corners and sides; each once.
+fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
+    let mut owners = ArrayVec::from_iter([t]);
+    let corners = mesh.triangles()[t as usize].map(|v| mesh.vertex_owner(v).unwrap_or(t));
+    let sides = mesh
+        .triangle_edges(t)
+        .map(|e| mesh.edges()[e as usize].faces[0]);
+    for owner in corners.into_iter().chain(sides) {
+        if !owners.contains(&owner) {
+            owners.push(owner);
+        }
+    }
+    owners
+}
+
+/// The contact between two features at a pose, world frame, when they face each other there.
+fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
+    let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
+    let placement = Placement::of(&at.pose, &obstacle.pose);
+    let facing = Facing {
+        body: &at.world.body.mesh,
+        obstacle: &obstacle.mesh,
+        placement: &placement,
+        obstacle_index: features.obstacle,
+        activation_distance: f64::INFINITY,
+    };
+    work.feature_pairs += 1;
+    facing
+        .features(features)
+        .map(|contact| in_world(&contact, &obstacle.pose))
 }
 
 fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {
     contact_jacobian(&contact.normal, &contact.point_on_obstacle, center)
-}
-
-/// Rows to choose from. Components lie apart, so that the compiler scans four rows at a time.
-#[derive(Debug)]
-struct Candidates {
-    contacts: Vec<Contact>,
-    jacobian: [Vec<f64>; 6],
-    gap: Vec<f64>,
-    clearance: Vec<f64>,
-    limit: usize,
-}
-
-impl Candidates {
-    fn with_capacity(limit: usize) -> Self {
-        Self {
-            contacts: Vec::with_capacity(limit),
-            jacobian: std::array::from_fn(|_| Vec::with_capacity(limit)),
-            gap: Vec::with_capacity(limit),
-            clearance: Vec::with_capacity(limit),
-            limit,
-        }
-    }
-
-    fn clear(&mut self) {
-        self.contacts.clear();
-        self.jacobian.iter_mut().for_each(Vec::clear);
-        self.gap.clear();
-    }
-
-    fn room(&self) -> usize {
-        self.limit - self.contacts.len()
-    }
-
-    fn push(&mut self, contact: &Contact, jacobian: &Vector6) {
-        self.contacts.push(*contact);
-        self.gap.push(contact.gap);
-        for (column, x) in self.jacobian.iter_mut().zip(jacobian.iter()) {
-            column.push(*x);
-        }
-    }
-
-    /// The candidate with the least `max(g, g_0) + J a`, and that.
-    fn least_clearance(&mut self, a: &Vector6, least_gap: f64) -> Option<(usize, f64)> {
-        self.clearance.clear();
-        self.clearance
-            .extend(self.gap.iter().map(|gap| gap.max(least_gap)));
-        for (column, x) in self.jacobian.iter().zip(a.iter()) {
-            for (sum, j) in self.clearance.iter_mut().zip(column) {
-                *sum += j * x;
-            }
-        }
-        let least = self
-            .clearance
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
-        let place = self.clearance.iter().position(|c| *c == least)?;
-        Some((place, least))
-    }
 }

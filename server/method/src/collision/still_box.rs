@@ -1,73 +1,15 @@
-//! Boxes of a moving body against boxes of an obstacle, and the traversal of both trees.
+//! Boxes of a body at rest against boxes of an obstacle, and the traversal of both binary trees.
 //!
-//! | symbol | name in code | unit | meaning                                                              |
-//! |--------|--------------|------|----------------------------------------------------------------------|
-//! | R, c   |              |      | rotation of the body and centre of its box at the middle of the interval |
-//! | s      | `sweep`      | m    | path of c in half the interval, to first order                       |
-//! | theta  | `angle`      | rad  | rotation in half the interval                                        |
-//! | rho    | radius       | m    | half diagonal of the body's box                                      |
-//!
-//! Over the interval a point at arm r from G strays from its place in the middle by `s` (that of the box's centre), by
-//! at most `theta rho` more because its arm differs, and by at most `theta^2 |r| / 2` because the path is curved. The
-//! box at the middle, inflated by those, holds the body's points at all times of the interval, along any axis.
 //! Source: separating axes of boxes: Gottschalk, Lin, Manocha 1996 (the six face axes).
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::motion::{Placement, RelativeMotion};
+use super::motion::Placement;
 use super::work::Work;
 use crate::geometry::{Node, Tree};
 
 /// Depth of two trees, and one: a pair that is popped leaves two, one of them a level deeper.
 pub(crate) const STACK_CAPACITY: usize = 2 * crate::geometry::MAX_DEPTH + 2;
-
-/// Tests boxes over an interval of a motion.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SweptBoxes {
-    placement: Placement,
-    rotation_abs: Matrix3<f64>,
-    half_path: Vector3<f64>,
-    half_turn: Vector3<f64>,
-    angle: f64,
-    margin: f64,
-}
-
-impl SweptBoxes {
-    /// Boxes over `[from, to]` that count as meeting within `margin`, m.
-    pub(crate) fn over(motion: &RelativeMotion, from: f64, to: f64, margin: f64) -> Self {
-        let half = 0.5 * (to - from);
-        let placement = motion.at(0.5 * (from + to));
-        Self {
-            rotation_abs: placement.rotation.abs(),
-            placement,
-            half_path: motion.velocity * half,
-            half_turn: motion.spin * half,
-            angle: motion.rate * half,
-            margin,
-        }
-    }
-
-    /// Whether the boxes may come within the margin at some time of the interval. True for NaN.
-    #[inline]
-    pub(crate) fn may_meet(&self, body: &Node, obstacle: &Node) -> bool {
-        let center = self.placement.point(&body.center).coords;
-        let arm = center - self.placement.center;
-        let sweep = self.half_path + self.half_turn.cross(&arm);
-        let stray = self.angle * (body.radius + 0.5 * self.angle * (arm.norm() + body.radius))
-            + self.margin;
-
-        let offset = center - obstacle.center.coords;
-        let extent = self.rotation_abs * body.half + obstacle.half + sweep.abs();
-        if (0..3).any(|k| offset[k].abs() > extent[k] + stray) {
-            return false;
-        }
-        let offset = self.placement.rotation.tr_mul(&offset);
-        let extent = self.rotation_abs.tr_mul(&obstacle.half)
-            + body.half
-            + self.placement.rotation.tr_mul(&sweep).abs();
-        !(0..3).any(|k| offset[k].abs() > extent[k] + stray)
-    }
-}
 
 /// Tests boxes of a body at rest.
 #[derive(Clone, Copy, Debug)]

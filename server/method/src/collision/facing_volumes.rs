@@ -1,0 +1,372 @@
+//! One volume of the one wide tree against eight of the other: can surfaces inside come near, facing each other?
+//!
+//! | symbol | name in code   | unit | meaning                                                                         |
+//! |--------|----------------|------|---------------------------------------------------------------------------------|
+//! | d      | `apart`        | m    | from the centre of one of the eight to that of the single volume                |
+//! | s      | `sweep`        | m    | path of the body's volume in half the interval, to first order                  |
+//! | theta  | `angle`        | rad  | rotation in half the interval                                                   |
+//! | a, b   | `axis`         | –    | axes of the slabs; b is turned round, so that a.b is 1 where they face each other |
+//! | u      |                | –    | half a unit in the last place of 1 in single precision, 2^-24                   |
+//!
+//! At the middle of the interval the body's volume is at its place; at other times of the interval it strays from there
+//! by `s`, by at most `theta rho` more because the arms of its points differ, and by at most `theta^2 |r| / 2` because
+//! the path is curved. The volumes do not come within the margin when that and their extents leave them apart along a side
+//! of the boxes or along the axis of a slab; and no features inside them face each other when no normal of the one,
+//! turned by at most theta, is opposite to one of the other: when the angle between a and b exceeds the sum of the cones.
+//!
+//! **Rounding.** Let L be the reach of both meshes about their origins, the distance of the origins and the path together. A
+//! coordinate of d comes with at most 10 u L (the rotation's rounding, its product and three sums), its product with a
+//! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 15 (their sine), 19 (sweep) and 13 u L (the
+//! other middle), sums with 9 u L: less than 128 u L, which the margin is widened by. Cosines come with less than 24 u.
+//!
+//! Source: Gottschalk, Lin, Manocha 1996 (separating axes); Larsson and Akenine-Moller 2009 (slab along a direction); the
+//! facing of cones as in normal-cone hierarchies, Johnson and Cohen 2001.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::motion::{Placement, RelativeMotion};
+use super::work::Work;
+use crate::geometry::lanes::{LANES, Lanes, cross, dot, dot_lanes};
+use crate::geometry::wide_tree::{Below, Child, ROOT, Volume, WideNode, WideTree};
+
+/// Half a unit in the last place of 1 in single precision.
+const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
+/// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
+const LENGTH_ROUNDING: f64 = 128.0 * HALF_UNIT;
+const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
+/// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
+const CONE_WIDENING: f64 = 1e-6;
+/// Pairs that a descent holds: each level of either tree adds seven, and there are fewer levels than in the binary trees.
+pub(crate) const WIDE_STACK_CAPACITY: usize = 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
+
+/// Tests volumes of a body against volumes of an obstacle over an interval of a motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FacingVolumes {
+    /// Obstacle from body axes at the middle of the interval.
+    rotation: [[f32; 3]; 3],
+    rotation_abs: [[f32; 3]; 3],
+    /// Origin of the body's tree, from that of the obstacle's, obstacle axes, m.
+    offset: [f32; 3],
+    /// Origin of the obstacle's tree, from that of the body's, body axes, m.
+    offset_back: [f32; 3],
+    /// Half the path of the origin of the body's tree, and half the rotation: obstacle axes, body axes.
+    half_path: [[f32; 3]; 2],
+    half_turn: [[f32; 3]; 2],
+    angle: f32,
+    /// What volumes stray by, all over the body, and the margin.
+    stray: f32,
+    /// Cosine and sine of what cones are widened by.
+    turn: [f32; 2],
+}
+
+/// One volume, ready to be tested against eight of the other tree, in that tree's frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Against {
+    center: [f32; 3],
+    half: [f32; 3],
+    axis: [f32; 3],
+    middle: f32,
+    slab: f32,
+    radius: f32,
+    cosine: f32,
+    sine: f32,
+    sweep: [f32; 3],
+    spin: [f32; 3],
+    stray: f32,
+    stray_per_radius: f32,
+}
+
+impl FacingVolumes {
+    /// Over `[from, to]`; volumes count as meeting within `margin`, m.
+    pub(crate) fn over(
+        trees: (&WideTree, &WideTree),
+        motion: &RelativeMotion,
+        [from, to]: [f64; 2],
+        margin: f64,
+    ) -> Self {
+        let half = 0.5 * (to - from);
+        let placement = motion.at(0.5 * (from + to));
+        Self::new(
+            trees,
+            &placement,
+            [motion.velocity * half, motion.spin * half],
+            margin,
+            CONE_WIDENING,
+        )
+    }
+
+    /// At rest; volumes count as meeting within `margin`, m, and as facing within `tilt`, rad.
+    #[allow(dead_code, reason = "for the collection of contacts")]
+    pub(crate) fn still(
+        trees: (&WideTree, &WideTree),
+        placement: &Placement,
+        margin: f64,
+        tilt: f64,
+    ) -> Self {
+        Self::new(
+            trees,
+            placement,
+            [Vector3::zeros(); 2],
+            margin,
+            tilt + CONE_WIDENING,
+        )
+    }
+
+    fn new(
+        (body, obstacle): (&WideTree, &WideTree),
+        placement: &Placement,
+        [half_path, half_turn]: [Vector3<f64>; 2],
+        margin: f64,
+        widening: f64,
+    ) -> Self {
+        let rotation = &placement.rotation;
+        let origin = placement.point(&body.origin).coords;
+        let offset = origin - obstacle.origin.coords;
+        let angle = half_turn.norm();
+        let path = half_path + half_turn.cross(&(origin - placement.center));
+        let arm = (origin - placement.center).norm() + body.reach;
+        let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
+        let stray = 0.5 * angle * angle * arm + margin + LENGTH_ROUNDING * reach;
+        let turn = (angle + widening).min(std::f64::consts::PI);
+        let to_body = |v: &Vector3<f64>| rotation.tr_mul(v);
+        Self {
+            rotation: single(rotation),
+            rotation_abs: single(&rotation.abs()),
+            offset: vector(&offset),
+            offset_back: vector(&-to_body(&offset)),
+            half_path: [vector(&path), vector(&to_body(&path))],
+            half_turn: [vector(&half_turn), vector(&to_body(&half_turn))],
+            angle: angle as f32,
+            stray: stray as f32,
+            turn: [turn.cos() as f32, turn.sin() as f32],
+        }
+    }
+
+    /// Half the path of a volume of the body, bound, m: what cutting the interval in two would halve.
+    #[inline]
+    pub(crate) fn half_sweep(&self, body: &Volume) -> f32 {
+        let turned = apply(&self.rotation, &body.center);
+        norm(&sum(
+            &self.half_path[0],
+            &product(&self.half_turn[0], &turned),
+        )) + self.angle * body.radius
+    }
+
+    /// A volume of the body, to be tested against volumes of the obstacle.
+    #[inline]
+    pub(crate) fn of_body(&self, v: &Volume) -> Against {
+        let arm = apply(&self.rotation, &v.center);
+        let axis = apply(&self.rotation, &v.axis);
+        let sweep = sum(&self.half_path[0], &product(&self.half_turn[0], &arm));
+        let (cosine, sine) = self.widened(v);
+        Against {
+            center: sum(&arm, &self.offset),
+            half: apply(&self.rotation_abs, &v.half),
+            axis: axis.map(|x| -x),
+            middle: -v.middle,
+            slab: v.slab,
+            radius: v.radius,
+            cosine,
+            sine,
+            sweep,
+            spin: [0.0; 3],
+            stray: self.stray + self.angle * v.radius,
+            stray_per_radius: 0.0,
+        }
+    }
+
+    /// A volume of the obstacle, to be tested against volumes of the body.
+    #[inline]
+    pub(crate) fn of_obstacle(&self, v: &Volume) -> Against {
+        let axis = apply_transposed(&self.rotation, &v.axis);
+        let (cosine, sine) = self.widened(v);
+        Against {
+            center: sum(
+                &apply_transposed(&self.rotation, &v.center),
+                &self.offset_back,
+            ),
+            half: apply_transposed(&self.rotation_abs, &v.half),
+            axis: axis.map(|x| -x),
+            middle: -v.middle,
+            slab: v.slab,
+            radius: v.radius,
+            cosine,
+            sine,
+            sweep: self.half_path[1],
+            spin: self.half_turn[1],
+            stray: self.stray,
+            stray_per_radius: self.angle,
+        }
+    }
+
+    /// Cosine and sine of a cone that is widened by the rotation; a cone of all directions stays one.
+    #[inline]
+    fn widened(&self, v: &Volume) -> (f32, f32) {
+        let [cosine, sine] = self.turn;
+        let wide = v.sine * cosine + v.cosine * sine;
+        if wide > 0.0 {
+            (v.cosine * cosine - v.sine * sine, wide)
+        } else {
+            (-1.0, 0.0)
+        }
+    }
+}
+
+impl Against {
+    /// Which of the eight may come within the margin of this volume, facing it: a bit each. All that NaN is in.
+    #[inline]
+    pub(crate) fn facing(&self, node: &WideNode) -> u32 {
+        let apart = [
+            Lanes::splat(self.center[0]) - node.center[0],
+            Lanes::splat(self.center[1]) - node.center[1],
+            Lanes::splat(self.center[2]) - node.center[2],
+        ];
+        let turned = cross(&self.spin, &node.center);
+        let sweep = [
+            turned[0] + Lanes::splat(self.sweep[0]),
+            turned[1] + Lanes::splat(self.sweep[1]),
+            turned[2] + Lanes::splat(self.sweep[2]),
+        ];
+        let stray = node.radius * self.stray_per_radius + Lanes::splat(self.stray);
+        let mut off = [0_u32; LANES];
+        let mut separate = |above: [u32; LANES]| {
+            for k in 0..LANES {
+                off[k] |= above[k];
+            }
+        };
+        for i in 0..3 {
+            let extent = node.half[i] + Lanes::splat(self.half[i]) + sweep[i].abs() + stray;
+            separate(apart[i].abs().above(extent));
+        }
+        let cosine = dot(&node.axis, &self.axis);
+        let crossed = cross(&self.axis, &node.axis);
+        let sine = dot_lanes(&crossed, &crossed).sqrt();
+        let slant = cosine.abs();
+        // Along the axes of the eight.
+        let height = dot_lanes(&node.axis, &apart) + cosine * self.middle - node.middle;
+        let extent = node.slab
+            + slant * self.slab
+            + sine * self.radius
+            + dot_lanes(&node.axis, &sweep).abs()
+            + stray;
+        separate(height.abs().above(extent));
+        // Along the axis of the one.
+        let height = dot(&apart, &self.axis) + Lanes::splat(self.middle) - cosine * node.middle;
+        let extent = slant * node.slab
+            + sine * node.radius
+            + dot(&sweep, &self.axis).abs()
+            + stray
+            + Lanes::splat(self.slab);
+        separate(height.abs().above(extent));
+        // Cones: the sum of two angles is above pi where its sine is below zero.
+        let sine_of_sum = node.sine * self.cosine + node.cosine * self.sine;
+        let cosine_of_sum = node.cosine * self.cosine - node.sine * self.sine;
+        let away = (cosine_of_sum - Lanes::splat(COSINE_ROUNDING)).above(cosine);
+        let narrow = sine_of_sum.above(Lanes::splat(0.0));
+        for k in 0..LANES {
+            off[k] |= away[k] & narrow[k];
+        }
+        let mut mask = 0;
+        for (k, off) in off.iter().enumerate() {
+            mask |= (off ^ 1) << k;
+        }
+        mask
+    }
+}
+
+/// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
+/// down; stops when it returns false.
+#[allow(dead_code, reason = "for the collection of contacts")]
+pub(crate) fn for_facing_triangle_pairs(
+    (body, obstacle): (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    stack: &mut Vec<(Child, Child)>,
+    work: &mut Work,
+    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+) {
+    stack.clear();
+    stack.push((ROOT, ROOT));
+    while let Some((a, b)) = stack.pop() {
+        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+            work.triangle_pairs += 1;
+            if !visit(t, s, work) {
+                return;
+            }
+            continue;
+        }
+        work.node_pairs += 1;
+        open_pair((body, obstacle), volumes, (a, b), |pair| stack.push(pair));
+    }
+}
+
+/// Opens the larger of two volumes that are not both triangles, and hands on its children that face the other.
+#[inline]
+pub(crate) fn open_pair(
+    (body, obstacle): (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    (a, b): (Child, Child),
+    mut found: impl FnMut((Child, Child)),
+) {
+    match (body.below(a), obstacle.below(b)) {
+        (Below::Node(node), below)
+            if matches!(below, Below::Triangle(_)) || body.radius(a) > obstacle.radius(b) =>
+        {
+            let against = volumes.of_obstacle(&obstacle.volume(b));
+            for_each_child(node, against.facing(body.node(node)), |child| {
+                found((child, b));
+            });
+        }
+        (_, Below::Node(node)) => {
+            let against = volumes.of_body(&body.volume(a));
+            for_each_child(node, against.facing(obstacle.node(node)), |child| {
+                found((a, child));
+            });
+        }
+        (_, Below::Triangle(_)) => found((a, b)),
+    }
+}
+
+#[inline(always)]
+fn for_each_child(node: u32, mut mask: u32, mut each: impl FnMut(Child)) {
+    while mask != 0 {
+        each(node * LANES as u32 + mask.trailing_zeros());
+        mask &= mask - 1;
+    }
+}
+
+fn single(m: &Matrix3<f64>) -> [[f32; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)] as f32))
+}
+
+fn vector(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+#[inline(always)]
+fn apply(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|i| m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2])
+}
+
+#[inline(always)]
+fn apply_transposed(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|i| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2])
+}
+
+#[inline(always)]
+fn sum(v: &[f32; 3], w: &[f32; 3]) -> [f32; 3] {
+    [v[0] + w[0], v[1] + w[1], v[2] + w[2]]
+}
+
+#[inline(always)]
+fn product(v: &[f32; 3], w: &[f32; 3]) -> [f32; 3] {
+    [
+        v[1] * w[2] - v[2] * w[1],
+        v[2] * w[0] - v[0] * w[2],
+        v[0] * w[1] - v[1] * w[0],
+    ]
+}
+
+#[inline(always)]
+fn norm(v: &[f32; 3]) -> f32 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}

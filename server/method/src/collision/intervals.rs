@@ -1,0 +1,91 @@
+//! Intervals of a motion, halved and halved again: made when they are asked for.
+
+use super::facing_volumes::FacingVolumes;
+use super::motion::{Placement, RelativeMotion};
+use crate::geometry::wide_tree::WideTree;
+
+/// Most halvings of a motion.
+pub(super) const MAX_HALVINGS: u32 = 8;
+/// Number of the whole motion; the halves of interval i are `2 i` and `2 i + 1`.
+pub(crate) const WHOLE: u32 = 1;
+
+/// One interval.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    /// The body at `from`.
+    pub(super) start: Placement,
+    pub(super) volumes: FacingVolumes,
+}
+
+/// The intervals of one search.
+#[derive(Clone, Debug)]
+pub(crate) struct Intervals {
+    made: Vec<Option<Interval>>,
+    /// Numbers of those made.
+    numbers: Vec<u32>,
+    end: f64,
+    margin: f64,
+}
+
+impl Intervals {
+    pub(crate) fn new() -> Self {
+        let count = 2 << MAX_HALVINGS;
+        Self {
+            made: vec![None; count],
+            numbers: Vec::with_capacity(count),
+            end: 1.0,
+            margin: 0.0,
+        }
+    }
+
+    /// Forgets all, for a search over `[0, end]` with this margin, m.
+    pub(super) fn restart(&mut self, end: f64, margin: f64) {
+        for number in self.numbers.drain(..) {
+            self.made[number as usize] = None;
+        }
+        (self.end, self.margin) = (end, margin);
+    }
+
+    /// Interval `number`, at most `MAX_HALVINGS` deep.
+    #[inline]
+    pub(super) fn get(
+        &mut self,
+        number: u32,
+        motion: &RelativeMotion,
+        trees: (&WideTree, &WideTree),
+    ) -> &Interval {
+        let place = &mut self.made[number as usize];
+        if place.is_none() {
+            self.numbers.push(number);
+        }
+        let (end, margin) = (self.end, self.margin);
+        place.get_or_insert_with(|| make(number, end, margin, motion, trees))
+    }
+}
+
+#[cold]
+fn make(
+    number: u32,
+    end: f64,
+    margin: f64,
+    motion: &RelativeMotion,
+    trees: (&WideTree, &WideTree),
+) -> Interval {
+    let halvings = number.ilog2();
+    let (k, count) = (number - (1 << halvings), f64::from(1_u32 << halvings));
+    // Neighbours share their ends to the bit.
+    let [from, to] = [k, k + 1].map(|k| end * (f64::from(k) / count));
+    Interval {
+        from,
+        to,
+        start: motion.at(from),
+        volumes: FacingVolumes::over(trees, motion, [from, to], margin),
+    }
+}
+
+/// Cuts of a motion into at most `count` intervals.
+pub(super) fn halvings(count: u32) -> u32 {
+    count.max(1).ilog2().min(MAX_HALVINGS)
+}
