@@ -206,6 +206,7 @@ fn bodies_far_apart_have_no_contact_and_no_gap() {
         Collected {
             truncated: false,
             complete_within: 1e-2,
+            looked_at: 0,
             gap_min: f64::INFINITY
         }
     );

@@ -42,7 +42,7 @@ pub fn collect_contacts(
     )
 }
 
-/// The same, given up when more than `pairs` triangle pairs come near: what was found by then is complete within no distance.
+/// The same, given up when more than `pairs` triangle pairs with features to look at come near: what was found by then is complete within no distance.
 #[allow(
     clippy::too_many_arguments,
     reason = "two placed meshes, two bounds, and memory to work in"
@@ -73,13 +73,17 @@ pub(crate) fn collect_bounded(
     let room = (out.capacity() - out.len()).min(capacity / 2);
     let mut truncated = false;
     let mut complete_within = activation_distance;
-    let limit = work.triangle_pairs.saturating_add(pairs);
+    let mut looked_at = 0;
     for_facing_triangle_pairs(
         trees,
         &volumes,
         &mut workspace.pairs,
         work,
         |a, b, work| {
+            if !can_touch(body.owned_features(a), obstacle.owned_features(b)) {
+                return true;
+            }
+            looked_at += 1;
             let pair = facing.pair(a, b);
             for_contacts(&facing, &pair, work, |contact| {
                 if candidates.len() == capacity {
@@ -88,7 +92,7 @@ pub(crate) fn collect_bounded(
                 }
                 candidates.push(contact);
             });
-            let affordable = work.triangle_pairs <= limit;
+            let affordable = looked_at <= pairs;
             if !affordable {
                 complete_within = 0.0;
             }
@@ -115,8 +119,16 @@ pub(crate) fn collect_bounded(
     Collected {
         truncated,
         complete_within,
+        looked_at,
         gap_min,
     }
+}
+
+/// Whether two triangles own features that can meet: a corner of either meets the other's face, sides meet sides.
+#[inline]
+fn can_touch(on_a: u8, on_b: u8) -> bool {
+    const CORNERS: u8 = 7;
+    (on_a | on_b) & CORNERS != 0 || (on_a != 0 && on_b != 0)
 }
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.

@@ -18,7 +18,7 @@ const TOUCHING_REST_DISTANCES: f64 = 2.0;
 const LONGER_WAY: f64 = 0.5;
 /// A collection that costs too much is given up, and done within this share of its distance; one that costs little lets the next go
 /// further.
-const LOOK_AHEAD_SHRINKS: f64 = 0.4;
+const LOOK_AHEAD_SHRINKS: f64 = 0.3;
 const LOOK_AHEAD_GROWS: f64 = 1.25;
 /// Most collections that are begun at one pose.
 const MAX_ATTEMPTS: u32 = 8;
@@ -66,26 +66,25 @@ impl GodObject {
         let least = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
         for _ in 0..MAX_ATTEMPTS {
             let distance = distance.min(self.affordable).max(least);
-            let pairs_before = work.triangle_pairs;
+            let mut pairs = 0;
             reduction.begin(at);
             self.set.gap_min = f64::INFINITY;
             for (index, obstacle) in at.world.obstacles.iter().enumerate() {
                 self.contacts.clear();
-                let spent = work.triangle_pairs - pairs_before;
                 let collected = collect_bounded(
                     (&at.world.body.mesh, &at.pose),
                     (&obstacle.mesh, &obstacle.pose),
                     u16::try_from(index).unwrap_or(u16::MAX),
                     distance,
-                    self.settings.look_ahead_pairs.saturating_sub(spent),
+                    self.settings.look_ahead_pairs.saturating_sub(pairs),
                     &mut self.collision,
                     &mut self.contacts,
                     work,
                 );
+                pairs += collected.looked_at;
                 self.set.gap_min = self.set.gap_min.min(collected.gap_min);
                 reduction.offer(at, &self.contacts, &collected);
             }
-            let pairs = work.triangle_pairs - pairs_before;
             if pairs > self.settings.look_ahead_pairs {
                 self.affordable = (distance * LOOK_AHEAD_SHRINKS).max(least);
                 if distance > least {
@@ -97,6 +96,8 @@ impl GodObject {
             }
             break;
         }
+        // Known rows may be nearer than what a collection that was given up has found.
+        self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
     }
 
     /// Finds the rows that the projection of `unconstrained` needs.
