@@ -138,10 +138,12 @@ fn fine_hole(inner: f64) -> Soup {
     for i in 0..AROUND {
         // Facets of hole and peg are not aligned.
         let u = std::f64::consts::TAU * (f64::from(i) + 0.3) / f64::from(AROUND);
-        let mut push =
-            |r: f64, z: f64| vertices.push(Point3::new(r * u.cos(), r * u.sin(), z));
+        let mut push = |r: f64, z: f64| vertices.push(Point3::new(r * u.cos(), r * u.sin(), z));
         for k in 0..=HOLE_ALONG {
-            push(inner, HALF_HOLE * (2.0 * f64::from(k) / f64::from(HOLE_ALONG) - 1.0));
+            push(
+                inner,
+                HALF_HOLE * (2.0 * f64::from(k) / f64::from(HOLE_ALONG) - 1.0),
+            );
         }
         push(outer, -HALF_HOLE);
         push(outer, HALF_HOLE);
@@ -150,7 +152,12 @@ fn fine_hole(inner: f64) -> Soup {
         for k in 0..HOLE_ALONG {
             quad([at(i, k), at(i, k + 1), at(i + 1, k + 1), at(i + 1, k)]);
         }
-        quad([at(i, HOLE_ALONG), at(i, high), at(i + 1, high), at(i + 1, HOLE_ALONG)]);
+        quad([
+            at(i, HOLE_ALONG),
+            at(i, high),
+            at(i + 1, high),
+            at(i + 1, HOLE_ALONG),
+        ]);
         quad([at(i, high), at(i, low), at(i + 1, low), at(i + 1, high)]);
         quad([at(i, low), at(i, 0), at(i + 1, 0), at(i + 1, low)]);
     }
@@ -262,9 +269,8 @@ fn measure(
             let error = felt.wrench - expected;
             errors.push(linear(&error).norm());
             torques.push(angular(&error).norm());
-            relative.push(
-                100.0 * linear(&error).norm() / linear(&expected).norm().max(LEAST_FORCE),
-            );
+            relative
+                .push(100.0 * linear(&error).norm() / linear(&expected).norm().max(LEAST_FORCE));
             reference_rows.push(count as f64);
         }
     }

@@ -74,31 +74,25 @@ pub(crate) fn collect_bounded(
     let mut truncated = false;
     let mut complete_within = activation_distance;
     let mut looked_at = 0;
-    for_facing_triangle_pairs(
-        trees,
-        &volumes,
-        &mut workspace.pairs,
-        work,
-        |a, b, work| {
-            if !can_touch(body.owned_features(a), obstacle.owned_features(b)) {
-                return true;
+    for_facing_triangle_pairs(trees, &volumes, &mut workspace.pairs, work, |a, b, work| {
+        if !can_touch(body.owned_features(a), obstacle.owned_features(b)) {
+            return true;
+        }
+        looked_at += 1;
+        let pair = facing.pair(a, b);
+        for_contacts(&facing, &pair, work, |contact| {
+            if candidates.len() == capacity {
+                keep_nearest(candidates, room);
+                truncated = true;
             }
-            looked_at += 1;
-            let pair = facing.pair(a, b);
-            for_contacts(&facing, &pair, work, |contact| {
-                if candidates.len() == capacity {
-                    keep_nearest(candidates, room);
-                    truncated = true;
-                }
-                candidates.push(contact);
-            });
-            let affordable = looked_at <= pairs;
-            if !affordable {
-                complete_within = 0.0;
-            }
-            affordable
-        },
-    );
+            candidates.push(contact);
+        });
+        let affordable = looked_at <= pairs;
+        if !affordable {
+            complete_within = 0.0;
+        }
+        affordable
+    });
 
     if candidates.len() > room {
         keep_nearest(candidates, room);
@@ -132,7 +126,12 @@ fn can_touch(on_a: u8, on_b: u8) -> bool {
 }
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.
-pub(super) fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl FnMut(Contact)) {
+pub(super) fn for_contacts(
+    facing: &Facing,
+    pair: &Pair,
+    work: &mut Work,
+    mut found: impl FnMut(Contact),
+) {
     let (on_a, on_b) = (
         facing.body.owned_features(pair.a),
         facing.obstacle.owned_features(pair.b),

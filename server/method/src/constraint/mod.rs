@@ -5,6 +5,7 @@ mod contact;
 mod facing;
 mod feature;
 mod reduction;
+mod separation;
 mod set;
 
 pub(crate) use collect::collect_bounded;
@@ -12,4 +13,5 @@ pub use collect::collect_contacts;
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, Purpose, RowReduction};
+pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};

@@ -2,7 +2,7 @@
 
 use super::GodObject;
 use crate::collision::Work;
-use crate::constraint::{NonPenetrationConstraint, collect_contacts};
+use crate::constraint::{NonPenetrationConstraint, Separation, collect_contacts};
 
 impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
@@ -47,6 +47,11 @@ impl GodObject {
                     point: contact.point_on_obstacle,
                     normal: contact.normal,
                     gap: contact.gap,
+                    separation: Separation::of(
+                        &contact.features,
+                        (&self.world.body.mesh, &self.pose),
+                        (&obstacle.mesh, &obstacle.pose),
+                    ),
                     shading_normal,
                 });
             }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::Work;
-use crate::constraint::{At, NonPenetrationConstraint, Purpose, RowReduction, collect_bounded};
+use crate::constraint::{
+    At, NonPenetrationConstraint, Purpose, RowReduction, Separation, collect_bounded,
+};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::world::World;
@@ -24,11 +26,12 @@ const LOOK_AHEAD_GROWS: f64 = 1.25;
 const MAX_ATTEMPTS: u32 = 8;
 
 impl GodObject {
-    /// Whether this world's rows can be chosen by their geometry: a shaded row is not the one that the surface has, and the
-    /// paper's cone has every touching contact.
+    /// Whether this world's rows can be chosen by their geometry: a shaded row is not the one that the surface has, one that is
+    /// re-linearised is needed elsewhere, and the paper's cone has every touching contact.
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
         let shaded = world.obstacles.iter().any(|o| o.surface.shading.is_some());
-        (settings.look_ahead && !shaded)
+        let linear = settings.implicit_rounds == 0;
+        (settings.look_ahead && linear && !shaded)
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 
@@ -125,9 +128,7 @@ impl GodObject {
         }
         self.reduction = Some(reduction);
         let reach = self.settings.activation_distance
-            + update
-                .device_moved
-                .min(self.settings.look_ahead_limit);
+            + update.device_moved.min(self.settings.look_ahead_limit);
         let mut probes = [(*difference, Purpose::Force); 13];
         for (k, probe) in probes[1..].iter_mut().enumerate() {
             let size = if k % 2 == 0 { reach } else { -reach };
@@ -185,11 +186,17 @@ impl GodObject {
         self.set.constraints.clear();
         let room = self.settings.max_constraints;
         for contact in reduction.contacts().take(room) {
+            let obstacle = &self.world.obstacles[usize::from(contact.features.obstacle)];
             self.set.constraints.push(NonPenetrationConstraint {
                 features: contact.features,
                 point: contact.point_on_obstacle,
                 normal: contact.normal,
                 gap: contact.gap,
+                separation: Separation::of(
+                    &contact.features,
+                    (&self.world.body.mesh, &self.pose),
+                    (&obstacle.mesh, &obstacle.pose),
+                ),
                 shading_normal: None,
             });
         }

@@ -26,8 +26,8 @@ use crate::collision::{Placement, Work};
 use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6, angular, linear};
-use candidates::Candidates;
 use crate::world::World;
+use candidates::Candidates;
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
@@ -236,7 +236,11 @@ impl RowReduction {
             let features = self.candidates.contacts[k].features;
             // Known rows are satisfied; one that was carried here to first order is looked at as it is.
             self.candidates.gap[k] = f64::INFINITY;
-            if self.known.iter().any(|row| row.contact.features == features) {
+            if self
+                .known
+                .iter()
+                .any(|row| row.contact.features == features)
+            {
                 continue;
             }
             let contact = if self.candidates.moved == Vector6::zeros() {
@@ -246,8 +250,7 @@ impl RowReduction {
             };
             if let Some(contact) = contact {
                 let row = jacobian(&contact, &at.center());
-                let violation =
-                    at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
+                let violation = at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
                 if violation > at.tolerance {
                     self.add(at, &contact);
                     return violation;
