@@ -205,6 +205,8 @@ fn bodies_far_apart_have_no_contact_and_no_gap() {
         collected,
         Collected {
             truncated: false,
+            complete_within: 1e-2,
+            looked_at: 0,
             gap_min: f64::INFINITY
         }
     );

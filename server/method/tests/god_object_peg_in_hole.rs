@@ -1,6 +1,5 @@
 //! A peg in a hole, anywhere in the world: it slides without friction, and the wall pushes back straight.
 
-#[allow(unused_imports, reason = "shapes are shared by many tests")]
 mod geometry_shapes;
 mod support;
 

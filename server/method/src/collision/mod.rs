@@ -22,6 +22,6 @@ pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
+pub(crate) use facing_volumes::{FacingVolumes, for_facing_triangle_pairs};
 pub(crate) use motion::Placement;
-pub(crate) use still_box::{StillBoxes, for_triangle_pairs};
-pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};
+pub(crate) use workspace::MAX_HINTS;

@@ -25,18 +25,25 @@ pub struct CollisionWorkspace {
     pub(super) intervals: Intervals,
     pub(super) apart: KnownApart,
     pub(crate) candidates: Vec<Contact>,
+    pub(crate) candidate_limit: usize,
     pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
 }
 
 impl CollisionWorkspace {
     /// Allocates everything that the searches will ever need.
     pub fn new() -> Self {
+        Self::with_candidates(MAX_CANDIDATES)
+    }
+
+    /// The same with room for `candidates` contacts to choose from: every one of a conforming contact, for references.
+    pub fn with_candidates(candidates: usize) -> Self {
         Self {
             pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),
-            candidates: Vec::with_capacity(MAX_CANDIDATES),
+            candidates: Vec::with_capacity(candidates),
+            candidate_limit: candidates,
             hints: ArrayVec::new(),
         }
     }

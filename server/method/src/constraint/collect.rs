@@ -3,14 +3,12 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
-use nalgebra::Vector3;
-
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, MAX_CANDIDATES, MAX_HINTS, Placement, StillBoxes, Work, for_triangle_pairs,
+    CollisionWorkspace, FacingVolumes, MAX_HINTS, Placement, Work, for_facing_triangle_pairs,
 };
-use crate::geometry::{Mesh, Node, NormalCone};
+use crate::geometry::Mesh;
 use crate::spatial::Pose;
 
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
@@ -32,8 +30,36 @@ pub fn collect_contacts(
     out: &mut Vec<Contact>,
     work: &mut Work,
 ) -> Collected {
+    collect_bounded(
+        (body, body_pose),
+        (obstacle, obstacle_pose),
+        obstacle_index,
+        activation_distance,
+        u64::MAX,
+        workspace,
+        out,
+        work,
+    )
+}
+
+/// The same, given up when more than `pairs` triangle pairs with features to look at come near: what was found by then is complete within no distance.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "two placed meshes, two bounds, and memory to work in"
+)]
+pub(crate) fn collect_bounded(
+    (body, body_pose): (&Mesh, &Pose),
+    (obstacle, obstacle_pose): (&Mesh, &Pose),
+    obstacle_index: u16,
+    activation_distance: f64,
+    pairs: u64,
+    workspace: &mut CollisionWorkspace,
+    out: &mut Vec<Contact>,
+    work: &mut Work,
+) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
-    let boxes = StillBoxes::new(&placement, activation_distance);
+    let trees = (body.wide_tree(), obstacle.wide_tree());
+    let volumes = FacingVolumes::still(trees, &placement, activation_distance, LOOK_AHEAD_TILT);
     let facing = Facing {
         body,
         obstacle,
@@ -41,54 +67,41 @@ pub fn collect_contacts(
         obstacle_index,
         activation_distance,
     };
-    let room = (out.capacity() - out.len()).min(MAX_CANDIDATES / 2);
     let candidates = &mut workspace.candidates;
     candidates.clear();
+    let capacity = workspace.candidate_limit;
+    let room = (out.capacity() - out.len()).min(capacity / 2);
     let mut truncated = false;
-    let (body_tree, obstacle_tree) = (body.tree(), obstacle.tree());
-    for_triangle_pairs(
-        body_tree,
-        obstacle_tree,
-        &mut workspace.pairs,
-        work,
-        |i, j| {
-            let nodes = (
-                &body_tree.nodes()[i as usize],
-                &obstacle_tree.nodes()[j as usize],
-            );
-            let offset = boxes.offset(nodes.0, nodes.1);
-            boxes.spheres_meet(nodes.0, nodes.1, &offset)
-                && may_face(
-                    &placement,
-                    nodes,
-                    (body_tree.cone(i), obstacle_tree.cone(j)),
-                    &offset,
-                )
-                && boxes.boxes_meet(nodes.0, nodes.1, &offset)
-        },
-        |a, b, work| {
-            let pair = Pair {
-                a,
-                b,
-                x: body.corners(a).map(|p| placement.point(&p)),
-                y: obstacle.corners(b),
-            };
-            for_contacts(&facing, &pair, work, |contact| {
-                if candidates.len() == MAX_CANDIDATES {
-                    keep_nearest(candidates, room);
-                    truncated = true;
-                }
-                candidates.push(contact);
-            });
-            true
-        },
-    );
+    let mut complete_within = activation_distance;
+    let mut looked_at = 0;
+    for_facing_triangle_pairs(trees, &volumes, &mut workspace.pairs, work, |a, b, work| {
+        if !can_touch(body.owned_features(a), obstacle.owned_features(b)) {
+            return true;
+        }
+        looked_at += 1;
+        let pair = facing.pair(a, b);
+        for_contacts(&facing, &pair, work, |contact| {
+            if candidates.len() == capacity {
+                keep_nearest(candidates, room);
+                truncated = true;
+            }
+            candidates.push(contact);
+        });
+        let affordable = looked_at <= pairs;
+        if !affordable {
+            complete_within = 0.0;
+        }
+        affordable
+    });
 
     if candidates.len() > room {
         keep_nearest(candidates, room);
         truncated = true;
     }
     candidates.sort_unstable_by(nearer);
+    if truncated {
+        complete_within = complete_within.min(candidates.last().map_or(0.0, |c| c.gap));
+    }
     workspace.hints.clear();
     for contact in candidates.iter().take(MAX_HINTS) {
         if let Some(triangle) = triangle_of(body, contact.features.on_body) {
@@ -97,48 +110,28 @@ pub fn collect_contacts(
     }
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
     out.extend(candidates.iter().map(|c| in_world(c, obstacle_pose)));
-    Collected { truncated, gap_min }
+    Collected {
+        truncated,
+        complete_within,
+        looked_at,
+        gap_min,
+    }
 }
 
-/// Whether features below the two nodes can face each other: some normal of the one is opposite to some normal of the other, and both
-/// lie along some line between the nodes. To tolerance; true for NaN.
+/// Whether two triangles own features that can meet: a corner of either meets the other's face, sides meet sides.
 #[inline]
-fn may_face(
-    placement: &Placement,
-    (body, obstacle): (&Node, &Node),
-    (body_cone, obstacle_cone): (&NormalCone, &NormalCone),
-    line: &Vector3<f64>,
-) -> bool {
-    let body_axis = placement.rotation * body_cone.axis;
-    let angle = body_cone.angle + obstacle_cone.angle + LOOK_AHEAD_TILT;
-    if angle < std::f64::consts::PI {
-        // cos(sum + tilt) >= cos(sum) - tilt.
-        let [a, b] = [body_cone.cos_sin, obstacle_cone.cos_sin];
-        if -obstacle_cone.axis.dot(&body_axis) < a[0] * b[0] - a[1] * b[1] - LOOK_AHEAD_TILT {
-            return false;
-        }
-    }
-    // Directions from a point of the obstacle's sphere to one of the body's make a cone about the line of the centres, with
-    // the sine `spread / |line|`. All lengths: no division.
-    let spread = body.radius + obstacle.radius;
-    let squared = line.norm_squared() - spread * spread;
-    let apart = squared > 0.0; // false for NaN
-    if !apart {
-        return true;
-    }
-    let along = squared.sqrt();
-    let tilt = LOOK_AHEAD_TILT * (line.x.abs() + line.y.abs() + line.z.abs());
-    let off_line = |cosine: f64, cone: &NormalCone| {
-        // cos(sum + tilt) >= cos(sum) - tilt, for cones narrower than a right angle.
-        let [cos, sin] = cone.cos_sin;
-        cos > LOOK_AHEAD_TILT && cosine < cos * along - sin * spread - tilt
-    };
-    !off_line(obstacle_cone.axis.dot(line), obstacle_cone)
-        && !off_line(-body_axis.dot(line), body_cone)
+fn can_touch(on_a: u8, on_b: u8) -> bool {
+    const CORNERS: u8 = 7;
+    (on_a | on_b) & CORNERS != 0 || (on_a != 0 && on_b != 0)
 }
 
 /// Every contact between features that the two triangles own, or that one owns with the other's face.
-fn for_contacts(facing: &Facing, pair: &Pair, work: &mut Work, mut found: impl FnMut(Contact)) {
+pub(super) fn for_contacts(
+    facing: &Facing,
+    pair: &Pair,
+    work: &mut Work,
+    mut found: impl FnMut(Contact),
+) {
     let (on_a, on_b) = (
         facing.body.owned_features(pair.a),
         facing.obstacle.owned_features(pair.b),
@@ -191,7 +184,7 @@ fn keep_nearest(candidates: &mut Vec<Contact>, count: usize) {
     }
 }
 
-fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
+pub(super) fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
     match feature {
         Feature::Vertex(v) => mesh.vertex_owner(v),
         Feature::Edge(e) => Some(mesh.edges()[e as usize].faces[0]),
@@ -199,7 +192,7 @@ fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
     }
 }
 
-fn in_world(contact: &Contact, obstacle_pose: &Pose) -> Contact {
+pub(super) fn in_world(contact: &Contact, obstacle_pose: &Pose) -> Contact {
     Contact {
         point_on_body: obstacle_pose * contact.point_on_body,
         point_on_obstacle: obstacle_pose * contact.point_on_obstacle,

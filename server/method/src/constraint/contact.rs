@@ -29,6 +29,10 @@ pub struct Contact {
 pub struct Collected {
     /// More contacts than capacity: the nearest were kept.
     pub truncated: bool,
+    /// Every contact with a smaller gap was found and kept, m: the distance asked for, less where room or work did not suffice.
+    pub complete_within: f64,
+    /// Triangle pairs whose features were looked at.
+    pub looked_at: u64,
     /// Smallest gap, m; infinite when no contact is within the activation distance.
     pub gap_min: f64,
 }

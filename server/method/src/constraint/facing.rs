@@ -13,6 +13,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::collect::triangle_of;
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::Placement;
 use crate::geometry::Mesh;
@@ -215,6 +216,53 @@ impl Facing<'_> {
                 (pair.b, at_corner(j)),
             )
         })
+    }
+
+    /// A triangle of each.
+    #[inline]
+    pub(super) fn pair(&self, a: u32, b: u32) -> Pair {
+        Pair {
+            a,
+            b,
+            x: self.body.corners(a).map(|p| self.placement.point(&p)),
+            y: self.obstacle.corners(b),
+        }
+    }
+
+    /// The contact between two features by their names, when they face each other here.
+    pub(super) fn features(&self, features: &FeaturePair) -> Option<Contact> {
+        let (body, obstacle) = (self.body, self.obstacle);
+        let a = triangle_of(body, features.on_body)?;
+        let b = triangle_of(obstacle, features.on_obstacle)?;
+        let pair = self.pair(a, b);
+        let corner = |mesh: &Mesh, t: u32, v: u32| {
+            let corners = mesh.triangles()[t as usize];
+            corners.iter().position(|w| *w == v)
+        };
+        let side = |mesh: &Mesh, t: u32, e: u32| {
+            let edges = mesh.triangle_edges(t);
+            edges.iter().position(|f| *f == e)
+        };
+        match (features.on_body, features.on_obstacle) {
+            (Feature::Vertex(v), Feature::Face(_)) => self.vertex_face(&pair, corner(body, a, v)?),
+            (Feature::Face(_), Feature::Vertex(w)) => {
+                self.face_vertex(&pair, corner(obstacle, b, w)?)
+            }
+            (Feature::Edge(e), Feature::Edge(f)) => {
+                self.edge_edge(&pair, side(body, a, e)?, side(obstacle, b, f)?)
+            }
+            (Feature::Vertex(v), Feature::Edge(f)) => {
+                self.vertex_edge(&pair, corner(body, a, v)?, side(obstacle, b, f)?)
+            }
+            (Feature::Edge(e), Feature::Vertex(w)) => {
+                self.edge_vertex(&pair, side(body, a, e)?, corner(obstacle, b, w)?)
+            }
+            (Feature::Vertex(v), Feature::Vertex(w)) => {
+                self.vertex_vertex(&pair, corner(body, a, v)?, corner(obstacle, b, w)?)
+            }
+            (Feature::Edge(_), Feature::Face(_))
+            | (Feature::Face(_), Feature::Edge(_) | Feature::Face(_)) => None,
+        }
     }
 
     #[inline]

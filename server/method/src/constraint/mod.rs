@@ -4,11 +4,14 @@ mod collect;
 mod contact;
 mod facing;
 mod feature;
+mod reduction;
 mod separation;
 mod set;
 
+pub(crate) use collect::collect_bounded;
 pub use collect::collect_contacts;
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
+pub(crate) use reduction::{At, Purpose, RowReduction};
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};

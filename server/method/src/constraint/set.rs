@@ -47,6 +47,8 @@ pub struct ConstraintSet {
     pub gap_min: f64,
     /// The capacity did not hold every row; the nearest were kept.
     pub truncated: bool,
+    /// Most by which a row that was left out is violated by a motion that the rows were chosen for, m; zero for a full set.
+    pub reduction_error: f64,
 }
 
 impl ConstraintSet {
@@ -74,6 +76,7 @@ impl Clone for ConstraintSet {
         self.constraints.clone_from(&source.constraints);
         self.gap_min = source.gap_min;
         self.truncated = source.truncated;
+        self.reduction_error = source.reduction_error;
     }
 }
 

@@ -7,8 +7,11 @@ use crate::constraint::{NonPenetrationConstraint, Separation, collect_contacts};
 impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
     pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
-        let pairs_before = work.triangle_pairs;
         self.collected_within = distance;
+        if self.refresh(distance, work) {
+            return;
+        }
+        let pairs_before = work.triangle_pairs;
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;
         self.set.gap_min = f64::INFINITY;

@@ -19,12 +19,14 @@
 //! | `projection.rs` | the rows of the present set and Eq. (1) on them                                   |
 //! | `free_motion.rs`| how far a motion is free of every obstacle                                        |
 //! | `collection.rs` | the constraint set of a pose                                                      |
+//! | `generation.rs` | rows as motions need them                                                          |
 //! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
 //! | `report.rs`     | what one update did                                                               |
 
 mod collection;
 mod free_motion;
+mod generation;
 mod look_ahead;
 mod obstacles;
 mod projection;

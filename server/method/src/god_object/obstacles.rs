@@ -136,6 +136,8 @@ impl GodObject {
             }
             return 0.0;
         }
+        // Rows that are carried on between collections count on obstacles that stand.
+        self.reduction = None;
         let mut share = 1.0;
         for _ in 0..MAX_ALTERNATIONS {
             let gone = self.advance_obstacles(share, report);

@@ -8,7 +8,7 @@ use super::obstacles::PlacedObstacle;
 use super::substep::Update;
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
-use crate::constraint::{ConstraintSet, Contact};
+use crate::constraint::{ConstraintSet, Contact, RowReduction};
 use crate::implicit::ImplicitRounds;
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
@@ -42,6 +42,8 @@ pub struct GodObject {
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
     pub(super) affordable: f64,
+    /// Finds rows as they are needed; `None` where every pair is collected.
+    pub(super) reduction: Option<Box<RowReduction>>,
 }
 
 impl GodObject {
@@ -57,6 +59,7 @@ impl GodObject {
                 .iter()
                 .map(PlacedObstacle::at_rest)
                 .collect(),
+            reduction: Self::reduction_for(&world, &settings),
             world,
             settings,
             pose: start,
@@ -79,7 +82,7 @@ impl GodObject {
             trust_length: f64::INFINITY,
             last_device: None,
             collected_within: 0.0,
-            affordable: settings.look_ahead_limit,
+            affordable: settings.activation_distance + settings.look_ahead_limit,
         };
         god_object.collect(settings.activation_distance, &mut Work::default());
         Ok(god_object)
@@ -159,9 +162,11 @@ impl GodObject {
         }
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
-        if self.collected_within < published {
+        if self.reduction.is_none() && self.collected_within < published {
             self.collect(published, &mut report.work);
         }
+        let difference = pose_difference(&device, &self.pose_at_reference_point(), &self.rotation);
+        self.publish(&difference, &update, &mut report);
         self.describe_set(&mut report);
         report
     }

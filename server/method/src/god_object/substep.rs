@@ -54,6 +54,7 @@ impl GodObject {
         } else {
             *left
         };
+        self.complete(&trusted, report);
         let Some(projected) = self.project(&trusted, None, report) else {
             return false;
         };
@@ -70,8 +71,14 @@ impl GodObject {
             update.look_ahead =
                 update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
-        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway.
-        let least = (WORTH_SHARE * update.made).max(self.settings.motion_tolerance);
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
+        // but for easing out, which is little always: a body left below the rest distance stops at every motion.
+        let little = if eases {
+            0.0
+        } else {
+            WORTH_SHARE * update.made
+        };
+        let least = little.max(self.settings.motion_tolerance);
         let worth_moving = covered > least; // false for NaN
         if !worth_moving {
             return false;

@@ -1,0 +1,90 @@
+//! Rows to choose from: every pair that faced within a distance at the pose where it was collected.
+//!
+//! | symbol | name in code | unit   | meaning                                                            |
+//! |--------|--------------|--------|--------------------------------------------------------------------|
+//! | J_k    | `jacobian`   |        | at the pose of collection, one column after the other              |
+//! | g_k    | `gap`        | m      | `g + J d`, d the motion since: exact at the pose of collection      |
+//! | d      | `moved`      | m, rad | from the pose of collection to the present one                     |
+
+use nalgebra::Vector3;
+
+use super::super::Contact;
+use crate::spatial::{Pose, Vector6, pose_difference};
+
+/// The rows. Components lie apart, so that the compiler scans four rows at a time. No allocation after `with_capacity`.
+#[derive(Debug)]
+pub(super) struct Candidates {
+    pub(super) contacts: Vec<Contact>,
+    jacobian: [Vec<f64>; 6],
+    /// Gaps at the present pose, m; infinite for a candidate that is out of the question there.
+    pub(super) gap: Vec<f64>,
+    clearance: Vec<f64>,
+    limit: usize,
+    collected_at: Pose,
+    pub(super) moved: Vector6,
+    pub(super) complete_within: f64,
+}
+
+impl Candidates {
+    pub(super) fn with_capacity(limit: usize) -> Self {
+        Self {
+            contacts: Vec::with_capacity(limit),
+            jacobian: std::array::from_fn(|_| Vec::with_capacity(limit)),
+            gap: Vec::with_capacity(limit),
+            clearance: Vec::with_capacity(limit),
+            limit,
+            collected_at: Pose::identity(),
+            moved: Vector6::zeros(),
+            complete_within: 0.0,
+        }
+    }
+
+    /// No candidates; the next are collected at this pose of the reference point.
+    pub(super) fn clear(&mut self, reference: &Pose) {
+        self.contacts.clear();
+        self.jacobian.iter_mut().for_each(Vec::clear);
+        self.gap.clear();
+        self.collected_at = *reference;
+        self.moved = Vector6::zeros();
+        self.complete_within = f64::INFINITY;
+    }
+
+    pub(super) fn room(&self) -> usize {
+        self.limit - self.contacts.len()
+    }
+
+    pub(super) fn push(&mut self, contact: &Contact, jacobian: &Vector6) {
+        self.contacts.push(*contact);
+        self.gap.push(contact.gap);
+        for (column, x) in self.jacobian.iter_mut().zip(jacobian.iter()) {
+            column.push(*x);
+        }
+    }
+
+    /// Carries the gaps on to another pose of the reference point.
+    pub(super) fn move_to(&mut self, reference: &Pose) {
+        self.moved = pose_difference(reference, &self.collected_at, &Vector3::zeros());
+        self.gap.clear();
+        self.gap.extend(self.contacts.iter().map(|c| c.gap));
+        add_products(&mut self.gap, &self.jacobian, &self.moved);
+    }
+
+    /// The candidate with the least `max(g, g_0) + J a`, and that.
+    pub(super) fn least_clearance(&mut self, a: &Vector6, least_gap: f64) -> Option<(usize, f64)> {
+        self.clearance.clear();
+        self.clearance
+            .extend(self.gap.iter().map(|gap| gap.max(least_gap)));
+        add_products(&mut self.clearance, &self.jacobian, a);
+        let least = self.clearance.iter().copied().fold(f64::INFINITY, f64::min);
+        let place = self.clearance.iter().position(|c| *c == least)?;
+        Some((place, least))
+    }
+}
+
+fn add_products(sums: &mut [f64], columns: &[Vec<f64>; 6], a: &Vector6) {
+    for (column, x) in columns.iter().zip(a.iter()) {
+        for (sum, j) in sums.iter_mut().zip(column) {
+            *sum += j * x;
+        }
+    }
+}

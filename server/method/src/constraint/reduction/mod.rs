@@ -1,0 +1,353 @@
+//! Few rows instead of all: rows are found when a motion would violate them.
+//!
+//! | symbol | name in code    | unit   | meaning                                                              |
+//! |--------|-----------------|--------|----------------------------------------------------------------------|
+//! | a_u    | `unconstrained` | m, rad | a motion that is wanted                                              |
+//! | a_c    |                 | m, rad | its projection on the rows known                                     |
+//! | eps    | `tolerance`     | m      | a row that a_c violates by less is left out                          |
+//!
+//! Conforming surfaces have tens of thousands of facing pairs, of which a projection needs at most six. Rows are added one
+//! after the other: project on the rows known, search the trees for the row that the answer violates most, add it, repeat.
+//! The answer is then that of the full set: it is optimal on a part of the rows, and no other row is violated by more than eps.
+//!
+//! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
+
+mod candidates;
+
+use std::sync::Arc;
+
+use arrayvec::ArrayVec;
+use nalgebra::Point3;
+
+use super::collect::{for_contacts, in_world};
+use super::facing::Facing;
+use super::{Collected, Contact, FeaturePair, contact_jacobian};
+use crate::collision::{Placement, Work};
+use crate::geometry::Mesh;
+use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
+use crate::spatial::{Pose, Vector6, angular, linear};
+use crate::world::World;
+use candidates::Candidates;
+
+/// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
+pub(crate) const MAX_ROWS: usize = 160;
+/// Most repetitions of project and search for one motion.
+const MAX_ROUNDS: u32 = 24;
+/// Most candidates that turn out to face no more, in one round.
+const MAX_STALE: u32 = 64;
+/// Hints that are looked at, and how near a pair there must be to become a row.
+const HINTS_TAKEN: usize = 2;
+const HINT_REST_DISTANCES: f64 = 4.0;
+/// Updates that a row outlives its last use: rows do not come and go with every tremor.
+const IDLE_UPDATES: u32 = 8;
+
+/// A row, and when it was last of use.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    contact: Contact,
+    jacobian: Vector6,
+    idle: u32,
+}
+
+/// Where the rows are to hold.
+#[derive(Clone, Debug)]
+pub(crate) struct At {
+    pub(crate) world: Arc<World>,
+    pub(crate) pose: Pose,
+    /// Pose of the reference point.
+    pub(crate) reference: Pose,
+    pub(crate) metric: Metric,
+    pub(crate) rest_distance: f64,
+    /// eps, m.
+    pub(crate) tolerance: f64,
+}
+
+impl At {
+    /// G, world.
+    fn center(&self) -> Point3<f64> {
+        Point3::from(self.reference.translation.vector)
+    }
+}
+
+/// Rows of the god-object loop ease a body out that is nearer than the rest distance, those of the coupling do not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    Motion,
+    Force,
+}
+
+/// Finds rows as motions need them.
+#[derive(Debug)]
+pub(crate) struct RowReduction {
+    projector: Projector,
+    candidates: Candidates,
+    known: Vec<Known>,
+    rows: Vec<HalfSpace>,
+    warm_start: Vec<u32>,
+    /// Largest violation that a motion asked for was left with, m.
+    error: f64,
+    /// A search or a row did not find room.
+    truncated: bool,
+}
+
+impl RowReduction {
+    /// A reduction of at most `candidates` rows. Allocates everything that it will ever need.
+    pub(crate) fn with_capacity(candidates: usize) -> Self {
+        Self {
+            projector: Projector::new(SolverKind::ActiveSet, MAX_ROWS),
+            candidates: Candidates::with_capacity(candidates),
+            known: Vec::with_capacity(MAX_ROWS),
+            rows: Vec::with_capacity(MAX_ROWS),
+            warm_start: Vec::with_capacity(6),
+            error: 0.0,
+            truncated: false,
+        }
+    }
+
+    /// The rows known, world frame.
+    pub(crate) fn contacts(&self) -> impl Iterator<Item = &Contact> {
+        self.known.iter().map(|row| &row.contact)
+    }
+
+    /// Largest violation that a completed motion was left with since the last call of [`Self::move_to`], m.
+    pub(crate) fn error(&self) -> f64 {
+        self.error
+    }
+
+    /// Whether a search ran out of its budget, or a row of room, since then.
+    pub(crate) fn truncated(&self) -> bool {
+        self.truncated
+    }
+
+    /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
+    ///
+    /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
+    pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
+        self.error = 0.0;
+        self.known.retain_mut(|row| {
+            let contact = face(at, &row.contact.features, work);
+            if let Some(contact) = contact {
+                row.contact = contact;
+                row.jacobian = jacobian(&contact, &at.center());
+            }
+            contact.is_some()
+        });
+        self.candidates.move_to(&at.reference);
+        for &hint in hints.iter().take(HINTS_TAKEN) {
+            self.take_hint(at, hint, work);
+        }
+    }
+
+    /// How far the body may have gone since the candidates were collected, m: `radius` bounds its points' arms about G.
+    pub(crate) fn moved(&self, radius: f64) -> f64 {
+        let moved = &self.candidates.moved;
+        linear(moved).norm() + radius * angular(moved).norm()
+    }
+
+    /// Distance within which every pair was a candidate when they were collected, m.
+    pub(crate) fn complete_within(&self) -> f64 {
+        self.candidates.complete_within
+    }
+
+    /// Smallest gap of the rows and candidates, m; that of candidates to first order. Infinite when there are none.
+    pub(crate) fn gap_min(&self) -> f64 {
+        let known = self.known.iter().map(|row| row.contact.gap);
+        let carried = self.candidates.gap.iter().map(|gap| gap.max(0.0));
+        known.chain(carried).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Forgets the candidates; those of the present pose are to be offered.
+    pub(crate) fn begin(&mut self, at: &At) {
+        self.truncated = false;
+        self.candidates.clear(&at.reference);
+    }
+
+    /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m).
+    pub(crate) fn offer(&mut self, at: &At, contacts: &[Contact], collected: &Collected) {
+        let room = self.candidates.room();
+        for contact in contacts.iter().take(room) {
+            self.candidates
+                .push(contact, &jacobian(contact, &at.center()));
+        }
+        let mut within = collected.complete_within;
+        if contacts.len() > room {
+            within = within.min(contacts[room].gap);
+        }
+        self.truncated |= collected.truncated || contacts.len() > room;
+        self.candidates.complete_within = self.candidates.complete_within.min(within);
+    }
+
+    /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
+    pub(crate) fn complete(
+        &mut self,
+        at: &At,
+        unconstrained: &Vector6,
+        purpose: Purpose,
+        work: &mut Work,
+    ) -> Projection {
+        let least_gap = match purpose {
+            Purpose::Motion => 0.0,
+            Purpose::Force => at.rest_distance,
+        };
+        self.warm_start.clear();
+        let mut rounds = 0;
+        loop {
+            self.rows.clear();
+            self.rows.extend(self.known.iter().map(|row| HalfSpace {
+                jacobian: row.jacobian,
+                bound: at.rest_distance - row.contact.gap.max(least_gap),
+            }));
+            work.projections += 1;
+            let projection =
+                self.projector
+                    .project(&at.metric, unconstrained, &self.rows, &self.warm_start);
+            self.warm_start.clear();
+            self.warm_start
+                .extend(projection.active.iter().map(|row| row.row));
+            for row in &projection.active {
+                self.known[row.row as usize].idle = 0;
+            }
+            rounds += 1;
+            let violation = self.add_most_violated(at, &projection.acceleration, least_gap, work);
+            let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
+            if finished || !violation.is_finite() {
+                self.error = self.error.max(violation);
+                return projection;
+            }
+        }
+    }
+
+    /// Adds the candidate that `motion` violates most, if by more than the tolerance; by how much it is violated, m.
+    fn add_most_violated(
+        &mut self,
+        at: &At,
+        motion: &Vector6,
+        least_gap: f64,
+        work: &mut Work,
+    ) -> f64 {
+        for _ in 0..MAX_STALE {
+            let Some((k, clearance)) = self.candidates.least_clearance(motion, least_gap) else {
+                return 0.0;
+            };
+            let violation = at.rest_distance - clearance;
+            if violation <= at.tolerance {
+                return violation.max(0.0);
+            }
+            let features = self.candidates.contacts[k].features;
+            // Known rows are satisfied; one that was carried here to first order is looked at as it is.
+            self.candidates.gap[k] = f64::INFINITY;
+            if self
+                .known
+                .iter()
+                .any(|row| row.contact.features == features)
+            {
+                continue;
+            }
+            let contact = if self.candidates.moved == Vector6::zeros() {
+                Some(self.candidates.contacts[k])
+            } else {
+                face(at, &features, work)
+            };
+            if let Some(contact) = contact {
+                let row = jacobian(&contact, &at.center());
+                let violation = at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
+                if violation > at.tolerance {
+                    self.add(at, &contact);
+                    return violation;
+                }
+            }
+        }
+        0.0
+    }
+
+    /// An update has ended: rows that were of no use for long are let go.
+    pub(crate) fn retire(&mut self) {
+        self.known.iter_mut().for_each(|row| row.idle += 1);
+        self.known.retain(|row| row.idle <= IDLE_UPDATES);
+    }
+
+    fn add(&mut self, at: &At, contact: &Contact) {
+        if self.known.len() == MAX_ROWS {
+            let most_idle = (0..MAX_ROWS)
+                .max_by_key(|k| self.known[*k].idle)
+                .unwrap_or(0);
+            self.known.swap_remove(most_idle);
+            self.truncated = true;
+        }
+        self.known.push(Known {
+            contact: *contact,
+            jacobian: jacobian(contact, &at.center()),
+            idle: 0,
+        });
+    }
+
+    /// Adds what faces between two triangles that stopped a motion.
+    fn take_hint(&mut self, at: &At, (a, b): (u32, u32), work: &mut Work) {
+        // A hint does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
+        for (index, obstacle) in at.world.obstacles.iter().enumerate() {
+            let body = &at.world.body.mesh;
+            if a as usize >= body.triangles().len() || b as usize >= obstacle.mesh.triangles().len()
+            {
+                continue;
+            }
+            let placement = Placement::of(&at.pose, &obstacle.pose);
+            let facing = Facing {
+                body,
+                obstacle: &obstacle.mesh,
+                placement: &placement,
+                obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
+                activation_distance: HINT_REST_DISTANCES * at.rest_distance,
+            };
+            // The features that touch may be other triangles' to look at.
+            for a in owners(body, a) {
+                for b in owners(&obstacle.mesh, b) {
+                    for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+                        let known = self
+                            .known
+                            .iter()
+                            .any(|row| row.contact.features == contact.features);
+                        if !known {
+                            self.add(at, &in_world(&contact, &obstacle.pose));
+                        }
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// A triangle, and those that own its corners and sides; each once.
+fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
+    let mut owners = ArrayVec::from_iter([t]);
+    let corners = mesh.triangles()[t as usize].map(|v| mesh.vertex_owner(v).unwrap_or(t));
+    let sides = mesh
+        .triangle_edges(t)
+        .map(|e| mesh.edges()[e as usize].faces[0]);
+    for owner in corners.into_iter().chain(sides) {
+        if !owners.contains(&owner) {
+            owners.push(owner);
+        }
+    }
+    owners
+}
+
+/// The contact between two features at a pose, world frame, when they face each other there.
+fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
+    let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
+    let placement = Placement::of(&at.pose, &obstacle.pose);
+    let facing = Facing {
+        body: &at.world.body.mesh,
+        obstacle: &obstacle.mesh,
+        placement: &placement,
+        obstacle_index: features.obstacle,
+        activation_distance: f64::INFINITY,
+    };
+    work.feature_pairs += 1;
+    facing
+        .features(features)
+        .map(|contact| in_world(&contact, &obstacle.pose))
+}
+
+fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {
+    contact_jacobian(&contact.normal, &contact.point_on_obstacle, center)
+}

@@ -1,0 +1,209 @@
+//! Rows as motions need them: the set holds what this update's motions and the device's next poses press against.
+
+use std::sync::Arc;
+
+use super::substep::Update;
+use super::{GodObject, StepReport};
+use crate::collision::Work;
+use crate::constraint::{
+    At, NonPenetrationConstraint, Purpose, RowReduction, Separation, collect_bounded,
+};
+use crate::settings::Settings;
+use crate::spatial::{Vector6, six};
+use crate::world::World;
+
+/// A row that is violated by less than this share of the rest distance is left out: 1 um for a body of 0.1 m.
+const TOLERANCE_PER_REST_DISTANCE: f64 = 0.1;
+/// Pairs up to this many rest distances apart are always collected, whatever it costs.
+const TOUCHING_REST_DISTANCES: f64 = 2.0;
+/// Share of the distance collected that a body may go before the next collection, where the work allows no greater distance.
+const LONGER_WAY: f64 = 0.5;
+/// A collection that costs too much is given up, and done within this share of its distance; one that costs little lets the next go
+/// further.
+const LOOK_AHEAD_SHRINKS: f64 = 0.3;
+const LOOK_AHEAD_GROWS: f64 = 1.25;
+/// Most collections that are begun at one pose.
+const MAX_ATTEMPTS: u32 = 8;
+
+impl GodObject {
+    /// Whether this world's rows can be chosen by their geometry: a shaded row is not the one that the surface has, and the
+    /// paper's cone has every touching contact.
+    pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
+        let shaded = world.obstacles.iter().any(|o| o.surface.shading.is_some());
+        (settings.look_ahead && !shaded)
+            .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
+    }
+
+    /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
+    /// collected last do not reach as far. False where every pair becomes a row.
+    pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
+        let Some(mut reduction) = self.reduction.take() else {
+            return false;
+        };
+        if let Some(at) = self.place() {
+            reduction.move_to(&at, &self.collision.hints, work);
+            let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
+            // Where the work allows no more, a longer way is gone before the next collection.
+            let wanted = distance.min(LONGER_WAY * self.affordable);
+            let reaches = moved + wanted <= within
+                || (self.affordable <= distance && moved <= LONGER_WAY * self.affordable);
+            self.set.gap_min = reduction.gap_min();
+            if !reaches {
+                self.collect_candidates(&mut reduction, &at, distance, work);
+            }
+        }
+        self.reduction = Some(reduction);
+        self.write_set();
+        true
+    }
+
+    /// Every facing pair within `distance`, m, or within what the work allows.
+    fn collect_candidates(
+        &mut self,
+        reduction: &mut RowReduction,
+        at: &At,
+        distance: f64,
+        work: &mut Work,
+    ) {
+        let least = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
+        for _ in 0..MAX_ATTEMPTS {
+            let distance = distance.min(self.affordable).max(least);
+            let mut pairs = 0;
+            reduction.begin(at);
+            self.set.gap_min = f64::INFINITY;
+            for (index, obstacle) in at.world.obstacles.iter().enumerate() {
+                self.contacts.clear();
+                let collected = collect_bounded(
+                    (&at.world.body.mesh, &at.pose),
+                    (&obstacle.mesh, &obstacle.pose),
+                    u16::try_from(index).unwrap_or(u16::MAX),
+                    distance,
+                    self.settings.look_ahead_pairs.saturating_sub(pairs),
+                    &mut self.collision,
+                    &mut self.contacts,
+                    work,
+                );
+                pairs += collected.looked_at;
+                self.set.gap_min = self.set.gap_min.min(collected.gap_min);
+                reduction.offer(at, &self.contacts, &collected);
+            }
+            if pairs > self.settings.look_ahead_pairs {
+                self.affordable = (distance * LOOK_AHEAD_SHRINKS).max(least);
+                if distance > least {
+                    continue;
+                }
+            } else if pairs < self.settings.look_ahead_pairs / 2 {
+                let limit = self.settings.activation_distance + self.settings.look_ahead_limit;
+                self.affordable = (self.affordable * LOOK_AHEAD_GROWS).min(limit);
+            }
+            break;
+        }
+        // Known rows may be nearer than what a collection that was given up has found.
+        self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
+    }
+
+    /// Finds the rows that the projection of `unconstrained` needs.
+    pub(super) fn complete(&mut self, unconstrained: &Vector6, report: &mut StepReport) {
+        self.complete_for(&[(*unconstrained, Purpose::Motion)], &mut report.work);
+    }
+
+    /// Finds the rows that the force needs: for the device's present pose, and for those that it may take until the next set.
+    pub(super) fn publish(
+        &mut self,
+        difference: &Vector6,
+        update: &Update,
+        report: &mut StepReport,
+    ) {
+        let published = self.published_distance(update);
+        let Some(mut reduction) = self.reduction.take() else {
+            return;
+        };
+        if let Some(at) = self.place() {
+            let moved = reduction.moved(self.radius) > 0.0;
+            let complete = reduction.complete_within() >= published || self.affordable <= published;
+            if moved || !complete {
+                self.collect_candidates(&mut reduction, &at, published, &mut report.work);
+            }
+        }
+        self.reduction = Some(reduction);
+        let reach = self.settings.activation_distance
+            + update.all_moved.min(self.settings.look_ahead_limit);
+        let mut probes = [(*difference, Purpose::Force); 13];
+        for (k, probe) in probes[1..].iter_mut().enumerate() {
+            let size = if k % 2 == 0 { reach } else { -reach };
+            let axis = nalgebra::Vector3::ith(k / 2 % 3, size);
+            let zero = nalgebra::Vector3::zeros();
+            probe.0 += if k < 6 {
+                six(&axis, &zero)
+            } else {
+                six(&zero, &(axis / self.radius))
+            };
+        }
+        self.complete_for(&probes, &mut report.work);
+        if let Some(reduction) = &mut self.reduction {
+            reduction.retire();
+        }
+    }
+
+    fn complete_for(&mut self, motions: &[(Vector6, Purpose)], work: &mut Work) {
+        let Some(mut reduction) = self.reduction.take() else {
+            return;
+        };
+        if let Some(at) = self.place() {
+            for (motion, purpose) in motions {
+                let _ = reduction.complete(&at, motion, *purpose, work);
+            }
+        }
+        self.reduction = Some(reduction);
+        self.write_set();
+    }
+
+    fn place(&self) -> Option<At> {
+        let metric = self
+            .world
+            .body
+            .metric(self.settings.rotation_metric, &self.pose)?;
+        Some(At {
+            world: Arc::clone(&self.world),
+            pose: self.pose,
+            reference: self.pose_at_reference_point(),
+            metric,
+            rest_distance: self.settings.rest_distance,
+            tolerance: TOLERANCE_PER_REST_DISTANCE * self.settings.rest_distance,
+        })
+    }
+
+    /// The rows known become the constraint set.
+    fn write_set(&mut self) {
+        let Some(reduction) = &self.reduction else {
+            return;
+        };
+        self.set.sequence += 1;
+        self.set.god_object_pose = self.pose;
+        self.set.truncated = reduction.truncated();
+        self.set.reduction_error = reduction.error();
+        self.set.constraints.clear();
+        let room = self.settings.max_constraints;
+        for contact in reduction.contacts().take(room) {
+            let obstacle = &self.world.obstacles[usize::from(contact.features.obstacle)];
+            self.set.constraints.push(NonPenetrationConstraint {
+                features: contact.features,
+                point: contact.point_on_obstacle,
+                normal: contact.normal,
+                gap: contact.gap,
+                separation: Separation::of(
+                    &contact.features,
+                    (&self.world.body.mesh, &self.pose),
+                    (&obstacle.mesh, &obstacle.pose),
+                ),
+                came: 0.0,
+                shading_normal: None,
+            });
+        }
+        // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
+        self.set
+            .constraints
+            .sort_unstable_by_key(|row| row.features);
+        self.warm_start.clear();
+    }
+}

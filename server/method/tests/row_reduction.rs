@@ -1,0 +1,281 @@
+//! Few rows instead of all: same force and motion as every facing pair, no ghost edges, no flicker, no allocation.
+
+mod geometry_shapes;
+
+use std::sync::Arc;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use geometry_shapes::{Soup, cuboid, grid_box, hole, mesh, peg};
+use god_object::collision::{CollisionWorkspace, Work};
+use god_object::constraint::{FeaturePair, collect_contacts, contact_jacobian};
+use god_object::geometry::mass_properties;
+use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
+use god_object::quasi_statics::{HalfSpace, Projector, SolverKind};
+use god_object::spatial::{angular, linear, pose_difference, six};
+use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, Vector6, World};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+const STEPS: usize = 300;
+
+fn world(body: Soup, obstacle: Soup, pose: Pose) -> Arc<World> {
+    let body = mesh(body);
+    let solid = mass_properties(&body);
+    Arc::new(World {
+        body: Body {
+            mesh: body,
+            mass: 1.0,
+            inertia: solid.inertia_per_density / solid.volume,
+            reference_point: Point3::origin(),
+        },
+        obstacles: vec![Obstacle {
+            name: "obstacle".into(),
+            mesh: mesh(obstacle),
+            pose,
+            surface: Surface::default(),
+        }],
+    })
+}
+
+/// No ramps: the force is that of the set.
+fn settings(size: f64) -> Settings {
+    Settings {
+        adaptation: None,
+        force_limit: 1e3,
+        torque_limit: 1e3,
+        ..Settings::for_size(size)
+    }
+}
+
+fn hole_pose() -> Pose {
+    Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.7, -0.4, 1.1))
+}
+
+fn peg_in_hole() -> Arc<World> {
+    world(
+        peg(8e-3, 0.025, 72),
+        hole(8.06e-3, 0.025, 0.02, 72),
+        hole_pose(),
+    )
+}
+
+/// Pressed to the side in the hole, around it, along it, tilted and turned.
+fn hand(k: usize) -> Pose {
+    let t = k as f64 * 1e-3;
+    let push = 1.5e-3 * (20.0 * t).min(1.0);
+    let at = Vector3::new(
+        push * (4.0 * t).cos(),
+        push * (4.0 * t).sin(),
+        3e-3 * (20.0 * t).sin(),
+    );
+    let tilt = Vector3::new(0.02 * (15.0 * t).sin(), 0.01 * (11.0 * t).sin(), t);
+    hole_pose() * Pose::from_parts(at.into(), UnitQuaternion::from_scaled_axis(tilt))
+}
+
+/// Every facing pair within `reach` (m) of a pose, as rows of the coupling for the whole difference.
+fn every_row(world: &World, pose: &Pose, reach: f64, rest_distance: f64) -> Vec<HalfSpace> {
+    let mut contacts = Vec::with_capacity(1 << 15);
+    let obstacle = &world.obstacles[0];
+    let collected = collect_contacts(
+        &world.body.mesh,
+        pose,
+        &obstacle.mesh,
+        &obstacle.pose,
+        0,
+        reach,
+        &mut CollisionWorkspace::with_candidates(1 << 16),
+        &mut contacts,
+        &mut Work::default(),
+    );
+    assert!(!collected.truncated);
+    let center = Point3::from(pose.translation.vector);
+    contacts
+        .iter()
+        .map(|c| HalfSpace {
+            jacobian: contact_jacobian(&c.normal, &c.point_on_obstacle, &center),
+            bound: (rest_distance - c.gap).min(0.0),
+        })
+        .collect()
+}
+
+fn set_rows(god_object: &GodObject, rest_distance: f64) -> Vec<HalfSpace> {
+    let set = god_object.constraint_set();
+    let center = Point3::from(god_object.pose().translation.vector);
+    set.constraints
+        .iter()
+        .map(|c| HalfSpace {
+            jacobian: contact_jacobian(&c.normal, &c.point, &center),
+            bound: (rest_distance - c.gap).min(0.0),
+        })
+        .collect()
+}
+
+fn projected(world: &World, god_object: &GodObject, rows: &[HalfSpace], a: &Vector6) -> Vector6 {
+    let metric = world
+        .body
+        .metric(god_object.settings().rotation_metric, god_object.pose())
+        .expect("a metric");
+    let mut projector = Projector::new(SolverKind::ActiveSet, rows.len());
+    projector.project(&metric, a, rows, &[]).acceleration
+}
+
+#[test]
+fn few_rows_give_the_force_of_all_that_are_within_reach() {
+    let world = peg_in_hole();
+    let settings = settings(0.05);
+    let mut god_object =
+        GodObject::new(Arc::clone(&world), settings, hole_pose()).expect("a free start");
+    let mut coupling = Coupling::new(&world, &settings);
+    let radius = world.body.mesh.radius_about(&Point3::origin());
+    let (mut compared, mut most_rows) = (0, 0);
+    for k in 0..STEPS {
+        god_object.step(&hand(k), None);
+        let set = god_object.constraint_set();
+        most_rows = most_rows.max(set.constraints.len());
+        if k % 10 != 0 {
+            continue;
+        }
+        // The device has gone on when the force is computed.
+        for device in [hand(k), hand(k + 1)] {
+            let felt = coupling.step(k as f64 * 1e-3, &device, set);
+            let difference = pose_difference(&device, god_object.pose(), &Vector3::zeros());
+            let reach = linear(&difference).norm()
+                + radius * angular(&difference).norm()
+                + 2.0 * settings.rest_distance;
+            let rows = every_row(&world, god_object.pose(), reach, settings.rest_distance);
+            let a_c = projected(&world, &god_object, &rows, &difference);
+            let expected = (linear(&a_c) - linear(&difference)) * settings.stiffness(1.0);
+            let error = (linear(&felt.wrench) - expected).norm();
+            assert!(
+                error <= 0.01 * expected.norm().max(0.2),
+                "step {k}: {} N instead of {} N by {} rows",
+                linear(&felt.wrench).norm(),
+                expected.norm(),
+                rows.len()
+            );
+            compared += usize::from(expected.norm() > 0.5);
+        }
+    }
+    assert!(compared > 30 && most_rows <= 150, "{compared} {most_rows}");
+}
+
+#[test]
+fn motions_within_reach_of_the_device_violate_no_row_by_more_than_the_rest_distance() {
+    let world = peg_in_hole();
+    let settings = settings(0.05);
+    let mut god_object =
+        GodObject::new(Arc::clone(&world), settings, hole_pose()).expect("a free start");
+    let mut seed = 1_u64;
+    let mut signed = || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let mut held = 0;
+    for k in 0..STEPS {
+        god_object.step(&hand(k), None);
+        if k < 60 || k % 20 != 0 {
+            continue;
+        }
+        let stated = god_object.constraint_set().reduction_error;
+        assert!(stated <= 0.11 * settings.rest_distance, "{stated}");
+        let all = every_row(&world, god_object.pose(), 6e-3, settings.rest_distance);
+        let few = set_rows(&god_object, settings.rest_distance);
+        let difference = pose_difference(&hand(k), god_object.pose(), &Vector3::zeros());
+        for _ in 0..20 {
+            let reach = 0.5 * settings.activation_distance;
+            let random = six(
+                &(Vector3::new(signed(), signed(), signed()) * reach),
+                &(Vector3::new(signed(), signed(), signed()) * (reach / 0.026)),
+            );
+            let a_c = projected(&world, &god_object, &few, &(difference + random));
+            held += usize::from(a_c != difference + random);
+            let worst = all
+                .iter()
+                .map(|row| row.bound - row.jacobian.dot(&a_c))
+                .fold(0.0, f64::max);
+            assert!(
+                worst <= settings.rest_distance,
+                "step {k}: violated by {worst} m"
+            );
+        }
+    }
+    assert!(held > 100, "{held}");
+}
+
+#[test]
+fn a_plane_of_ten_thousand_triangles_feels_like_one_of_two() {
+    let size = 0.04;
+    let start = Pose::translation(-0.05, 0.01, 0.03);
+    let run = |cells: usize| {
+        let floor = grid_box([0.1, 0.1, 0.01], [cells, cells, 1]);
+        let world = world(
+            cuboid([0.02, 0.015, 0.01]),
+            floor,
+            Pose::translation(0.0, 0.0, -0.01),
+        );
+        let settings = settings(size);
+        let mut coupling = Coupling::new(&world, &settings);
+        let mut god_object = GodObject::new(world, settings, start).expect("a free start");
+        (0..400)
+            .map(|k| {
+                let t = f64::from(k) * 1e-3;
+                let turn = Vector3::new(0.02 * (9.0 * t).sin(), 0.01, 0.5 * t);
+                let device = Pose::new(Vector3::new(-0.05 + 0.2 * t, 0.01, 0.008), turn);
+                god_object.step(&device, None);
+                coupling
+                    .step(t, &device, god_object.constraint_set())
+                    .wrench
+            })
+            .collect::<Vec<_>>()
+    };
+    let (fine, coarse) = (run(71), run(1));
+    let mut pressed = 0;
+    for (k, (a, b)) in fine.iter().zip(&coarse).enumerate() {
+        let scale = linear(b).norm().max(0.1);
+        pressed += usize::from(scale > 0.5);
+        assert!((a - b).norm() <= 1e-9 * scale, "step {k}: {a} {b}");
+    }
+    assert!(pressed > 300, "{pressed}");
+}
+
+#[test]
+fn a_hand_at_rest_has_the_same_rows_in_every_set_and_runs_repeat() {
+    let run = || {
+        let world = peg_in_hole();
+        let mut god_object =
+            GodObject::new(world, settings(0.05), hole_pose()).expect("a free start");
+        let mut rows: Vec<Vec<FeaturePair>> = Vec::new();
+        for k in 0..200 {
+            god_object.step(&hand(k.min(100)), None);
+            let set = god_object.constraint_set();
+            rows.push(set.constraints.iter().map(|row| row.features).collect());
+        }
+        rows
+    };
+    let rows = run();
+    assert!(!rows[199].is_empty());
+    for k in 180..200 {
+        assert_eq!(rows[k], rows[179], "step {k}");
+    }
+    assert_eq!(rows, run());
+}
+
+#[test]
+fn choosing_rows_does_not_allocate() {
+    let world = peg_in_hole();
+    let settings = settings(0.05);
+    let mut coupling = Coupling::new(&world, &settings);
+    let mut god_object = GodObject::new(world, settings, hole_pose()).expect("a free start");
+    let mut rows = 0;
+    for k in 0..STEPS {
+        let device = hand(k);
+        assert_no_alloc(|| {
+            rows += god_object.step(&device, None).contacts;
+            let _ = coupling.step(k as f64 * 1e-3, &device, god_object.constraint_set());
+        });
+    }
+    assert!(rows > STEPS);
+}
