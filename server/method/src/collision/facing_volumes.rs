@@ -98,7 +98,6 @@ impl FacingVolumes {
     }
 
     /// At rest; volumes count as meeting within `margin`, m, and as facing within `tilt`, rad.
-    #[allow(dead_code, reason = "for the collection of contacts")]
     pub(crate) fn still(
         trees: (&WideTree, &WideTree),
         placement: &Placement,
@@ -258,7 +257,6 @@ impl Against {
 
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
 /// down; stops when it returns false.
-#[allow(dead_code, reason = "for the collection of contacts")]
 pub(crate) fn for_facing_triangle_pairs(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,

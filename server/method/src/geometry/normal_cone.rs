@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::topology::{FLAT_EDGE_ANGLE, Topology};
+use super::topology::{CORNER_EDGES, FLAT_EDGE_ANGLE, Topology};
 
 /// Edges nearer to parallel than 1e-8 have no product, as its squared length.
 const PARALLEL: f64 = 1e-16;
@@ -110,6 +110,15 @@ pub(crate) fn triangle_cones(
     face_normals: &[Vector3<f64>],
     topology: &mut Topology,
 ) -> Vec<NormalCone> {
+    // A corner that can be touched from outside has three edges that are not hollow: those at the rim of its normal cone. A pit
+    // has products of edges below every edge, too, but they point into the solid. Corners along a ridge are in its edges' arcs.
+    let mut standing = vec![0_u8; vertices.len()];
+    for edge in &topology.edges {
+        for v in edge.vertices {
+            let counts = edge.convexity > -FLAT_EDGE_ANGLE;
+            standing[v as usize] = standing[v as usize].saturating_add(u8::from(counts));
+        }
+    }
     let mut rays = Vec::new();
     let mut cones = Vec::with_capacity(triangles.len());
     let rounding = |t: u32| normal_rounding(&triangles[t as usize].map(|v| vertices[v as usize]));
@@ -124,7 +133,9 @@ pub(crate) fn triangle_cones(
                 least = least.min(axis.dot(&face_normals[other as usize]));
                 spread = spread.max(rounding(other));
             }
-            if topology.vertex_owner[corner as usize] != t as u32 {
+            let owned = topology.vertex_owner[corner as usize] == t as u32;
+            let rim = usize::from(CORNER_EDGES).min(topology.ring(corner).len());
+            if !owned || usize::from(standing[corner as usize]) < rim {
                 continue;
             }
             let looked = vertex_rays(vertices, topology, corner, &mut rays);

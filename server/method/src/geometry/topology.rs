@@ -13,7 +13,7 @@ use super::mesh_error::MeshError;
 /// 3e-6 rad at 0.1 m from the origin; nobody feels a bend of 1e-5.
 pub(crate) const FLAT_EDGE_ANGLE: f64 = 1e-5;
 /// Fewest convex edges at a vertex whose normal cone has an interior.
-const CORNER_EDGES: u8 = 3;
+pub(crate) const CORNER_EDGES: u8 = 3;
 
 /// An edge and the two faces that meet there.
 #[derive(Clone, Copy, Debug, PartialEq)]
