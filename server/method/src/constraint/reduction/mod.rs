@@ -31,6 +31,8 @@ use candidates::Candidates;
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
+/// So many candidates all become rows of a published set.
+const FEW: usize = 64;
 /// Most repetitions of project and search for one motion.
 const MAX_ROUNDS: u32 = 24;
 /// Most candidates that turn out to face no more, in one round.
@@ -173,7 +175,8 @@ impl RowReduction {
         if contacts.len() > room {
             within = within.min(contacts[room].gap);
         }
-        self.truncated |= collected.truncated || contacts.len() > room;
+        let given_up = collected.complete_within == 0.0;
+        self.truncated |= collected.truncated || given_up || contacts.len() > room;
         self.candidates.complete_within = self.candidates.complete_within.min(within);
     }
 
@@ -258,6 +261,25 @@ impl RowReduction {
             }
         }
         0.0
+    }
+
+    /// Makes every candidate a row where they are few; false where they are many. At the pose where they were collected.
+    pub(crate) fn take_all(&mut self, at: &At) -> bool {
+        if self.candidates.contacts.len() > FEW {
+            return false;
+        }
+        for k in 0..self.candidates.contacts.len() {
+            let contact = self.candidates.contacts[k];
+            match self
+                .known
+                .iter_mut()
+                .find(|row| row.contact.features == contact.features)
+            {
+                Some(row) => row.idle = 0,
+                None => self.add(at, &contact),
+            }
+        }
+        true
     }
 
     /// An update has ended: rows that were of no use for long are let go.
