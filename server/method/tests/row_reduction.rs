@@ -133,7 +133,7 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
         god_object.step(&hand(k), None);
         let set = god_object.constraint_set();
         most_rows = most_rows.max(set.constraints.len());
-        if k % 10 != 0 {
+        if !k.is_multiple_of(10) {
             continue;
         }
         // The device has gone on when the force is computed.
@@ -176,7 +176,7 @@ fn motions_within_reach_of_the_device_violate_no_row_by_more_than_the_rest_dista
     let mut held = 0;
     for k in 0..STEPS {
         god_object.step(&hand(k), None);
-        if k < 60 || k % 20 != 0 {
+        if k < 60 || !k.is_multiple_of(20) {
             continue;
         }
         let stated = god_object.constraint_set().reduction_error;
