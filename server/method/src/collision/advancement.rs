@@ -14,12 +14,18 @@
 //! closest points were worth, and a tangential or departing motion is passed in one step.
 //! Source: Mirtich 1996 (conservative advancement); Tang et al. 2009 (directional bound); the second-order bound is ours.
 
+use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
 
 use super::gaps::Gaps;
 use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
 use crate::geometry::distance::{closest_on_triangles, triangles_intersect};
+
+/// Share of the last step, within the tolerance, that an advance makes.
+const LAST_SHARE: f64 = 0.5;
+/// Directions kept to be tried on neighbours of a pair that was followed.
+const MAX_DIRECTIONS: usize = 4;
 
 /// What a pair of triangles does in an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +48,8 @@ pub(super) struct PairSearch<'a> {
     pub(super) motion: &'a RelativeMotion,
     pub(super) gaps: Gaps,
     pub(super) max_iterations: u32,
+    /// `|w|^3 R / 6`, R the radius of the body about G, m: no corner's path bends by more in the cube of time.
+    pub(super) cubic: f64,
 }
 
 /// The two triangles of a pair: the body's in the body frame, the obstacle's in its own.
@@ -54,40 +62,39 @@ pub(super) struct TrianglePair {
 }
 
 impl PairSearch<'_> {
-    /// The body's triangle at `from`, unless the planes of the two faces show that the pair is free up to `to`: they settle
-    /// most pairs, without closest points. `placement` is the body at `from`.
+    /// Whether some direction shows at once that the pair is free over `[from, to]`: those of the two faces, and those along
+    /// which pairs were followed `lately`, which serve their neighbours. It settles most pairs, without closest points.
+    /// `placement` is the body at `from`.
     #[inline]
-    pub(super) fn begin(
+    pub(super) fn is_free(
         &self,
         pair: &TrianglePair,
         placement: &Placement,
-        from: f64,
-        to: f64,
-    ) -> Option<MovingTriangle> {
-        let moving = MovingTriangle::at(self.motion, placement, &pair.on_body, to - from);
-        let out_of_body = -(placement.rotation * pair.body_normal);
-        let free = [pair.obstacle_normal, out_of_body].iter().any(|direction| {
-            let safe = moving.safe_step(direction, &pair.on_obstacle, self.gaps.stop);
-            safe.step >= to - from
-        });
-        (!free).then_some(moving)
+        [from, to]: [f64; 2],
+        lately: &Directions,
+    ) -> bool {
+        let path = Path::new(self, pair, placement, to - from);
+        path.is_free_along(&pair.obstacle_normal, pair)
+            || path.is_free_along(&-(placement.rotation * pair.body_normal), pair)
+            || lately.newest.iter().any(|n| path.is_free_along(n, pair))
     }
 
-    /// Follows the pair over `[from, to]` from where it [begins](Self::begin).
+    /// Follows the pair over `[from, to]`.
     pub(super) fn follow(
         &self,
-        mut moving: MovingTriangle,
         pair: &TrianglePair,
         placement: &Placement,
-        from: f64,
-        to: f64,
+        [from, to]: [f64; 2],
+        lately: &mut Directions,
         work: &mut Work,
     ) -> PairOutcome {
         let mut time = from;
         let mut placement = *placement;
+        let mut moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - from);
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let best = moving.best_step(pair, &placement, self.gaps.stop);
+            let best = moving.best_step(pair, &placement, self.gaps.stop, to - time);
+            lately.add(&best.direction);
             let far = best.gap >= self.gaps.stop; // false for NaN
             if iteration == 0 && !far {
                 return self.near(&moving, pair, best.gap);
@@ -96,10 +103,12 @@ impl PairSearch<'_> {
                 return PairOutcome::Free;
             }
             let apart = best.gap - self.gaps.stop > self.gaps.tolerance; // false for NaN
-            time += best.step.max(0.0);
             if !apart {
-                return PairOutcome::Hit(time);
+                // Not all the way: along the last direction the neighbours then are free by more than rounding, and so is
+                // the next start.
+                return PairOutcome::Hit(time + LAST_SHARE * best.step.max(0.0));
             }
+            time += best.step.max(0.0);
             placement = self.motion.at(time);
             moving = MovingTriangle::at(self.motion, &placement, &pair.on_body, to - time);
         }
@@ -117,16 +126,86 @@ impl PairSearch<'_> {
     }
 }
 
+/// The directions along which pairs were followed last, obstacle frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Directions {
+    newest: ArrayVec<Vector3<f64>, MAX_DIRECTIONS>,
+    oldest: usize,
+}
+
+impl Directions {
+    fn add(&mut self, direction: &Vector3<f64>) {
+        if self.newest.is_full() {
+            self.newest[self.oldest] = *direction;
+            self.oldest = (self.oldest + 1) % MAX_DIRECTIONS;
+        } else {
+            self.newest.push(*direction);
+        }
+    }
+}
+
+/// The corners of a triangle of the body, obstacle frame, over an interval.
+struct Path<'a> {
+    motion: &'a RelativeMotion,
+    corners: [Vector3<f64>; 3],
+    turns: [Vector3<f64>; 3],
+    left: f64,
+    /// Bound on the cubic term over the square of time, m.
+    cubic: f64,
+    kept: f64,
+}
+
+impl<'a> Path<'a> {
+    #[inline(always)]
+    fn new(search: &PairSearch<'a>, pair: &TrianglePair, placement: &Placement, left: f64) -> Self {
+        let corner = |p: &Point3<f64>| placement.point(p).coords;
+        let [p, q, r] = &pair.on_body;
+        let corners = [corner(p), corner(q), corner(r)];
+        let turn = |x: &Vector3<f64>| search.motion.spin.cross(&(x - placement.center));
+        Self {
+            motion: search.motion,
+            turns: [turn(&corners[0]), turn(&corners[1]), turn(&corners[2])],
+            corners,
+            left,
+            cubic: search.cubic * left,
+            kept: search.gaps.stop,
+        }
+    }
+
+    /// Along a direction each corner stays above `height + speed h - max(bend, 0) h^2`, which is concave in h: above the
+    /// gap at both ends, it is so in between. No roots; the cubic term is that of the whole body. False for NaN.
+    #[inline(always)]
+    fn is_free_along(&self, n: &Vector3<f64>, pair: &TrianglePair) -> bool {
+        let [p, q, r] = &pair.on_obstacle;
+        let support = n.dot(&p.coords).max(n.dot(&q.coords)).max(n.dot(&r.coords));
+        if !support.is_finite() {
+            return false;
+        }
+        let speed = n.dot(&self.motion.velocity);
+        // `n.(w x turn) = (n x w).turn`.
+        let sideways = n.cross(&self.motion.spin) * 0.5;
+        let mut free = true;
+        for (corner, turn) in self.corners.iter().zip(&self.turns) {
+            let above = n.dot(corner) - support - self.kept;
+            let bend = (self.cubic - sideways.dot(turn)).max(0.0);
+            let at_end = above + self.left * (speed + n.dot(turn) - bend * self.left);
+            free &= above >= 0.0 && at_end >= 0.0; // false for NaN
+        }
+        free
+    }
+}
+
 /// A step in time that is safe along some direction, and the gap along it.
 #[derive(Clone, Copy, Debug)]
 struct SafeStep {
     step: f64,
     gap: f64,
+    direction: Vector3<f64>,
 }
 
 /// A triangle of the body at one time, obstacle frame, with what bounds its path from there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MovingTriangle {
+struct MovingTriangle {
     corners: [Point3<f64>; 3],
     velocities: [Vector3<f64>; 3],
     /// Half of the accelerations.
@@ -144,40 +223,53 @@ impl MovingTriangle {
         on_body: &[Point3<f64>; 3],
         time_left: f64,
     ) -> Self {
-        let corners = on_body.map(|p| placement.point(&p));
-        let arms = corners.map(|x| x.coords - placement.center);
-        let turns = arms.map(|r| motion.spin.cross(&r));
         let cubic = motion.rate * time_left / 6.0;
-        Self {
-            corners,
-            velocities: turns.map(|turn| motion.velocity + turn),
-            bends: turns.map(|turn| motion.spin.cross(&turn) * 0.5),
-            remainders: turns.map(|turn| turn.norm() * cubic),
+        let mut moving = Self {
+            corners: [Point3::origin(); 3],
+            velocities: [Vector3::zeros(); 3],
+            bends: [Vector3::zeros(); 3],
+            remainders: [0.0; 3],
             spin: motion.spin,
+        };
+        // A plain loop: `map` on arrays is not always inlined.
+        for (i, p) in on_body.iter().enumerate() {
+            let corner = placement.point(p);
+            let turn = motion.spin.cross(&(corner.coords - placement.center));
+            moving.corners[i] = corner;
+            moving.velocities[i] = motion.velocity + turn;
+            moving.bends[i] = motion.spin.cross(&turn) * 0.5;
+            moving.remainders[i] = turn.norm() * cubic;
         }
+        moving
     }
 
-    /// The longest of the safe steps along the closest points and the two face normals, and the largest gap.
-    fn best_step(&self, pair: &TrianglePair, placement: &Placement, gap_to_keep: f64) -> SafeStep {
+    /// The longest of the safe steps along the closest points and the two face normals, the largest gap, and the first
+    /// direction; the normals are not asked where the closest points allow all that is `wanted`.
+    fn best_step(
+        &self,
+        pair: &TrianglePair,
+        placement: &Placement,
+        gap_to_keep: f64,
+        wanted: f64,
+    ) -> SafeStep {
         let closest = closest_on_triangles(&self.corners, &pair.on_obstacle);
         let along_points = (closest.on_first - closest.on_second) / closest.squared_distance.sqrt(); // NaN where they touch
-        let directions = [
-            along_points,
+        let along = |n: &Vector3<f64>| self.safe_step(n, &pair.on_obstacle, gap_to_keep);
+        let mut best = along(&along_points);
+        // `max` prefers any number to NaN.
+        best.step = best.step.max(0.0);
+        if best.step >= wanted && best.gap >= gap_to_keep {
+            return best;
+        }
+        for n in [
             pair.obstacle_normal,
             -(placement.rotation * pair.body_normal),
-        ];
-        let steps = directions.map(|n| self.safe_step(&n, &pair.on_obstacle, gap_to_keep));
-        // `max` prefers any number to NaN.
-        steps.iter().fold(
-            SafeStep {
-                step: 0.0,
-                gap: f64::NEG_INFINITY,
-            },
-            |best, s| SafeStep {
-                step: best.step.max(s.step),
-                gap: best.gap.max(s.gap),
-            },
-        )
+        ] {
+            let other = along(&n);
+            best.step = best.step.max(other.step);
+            best.gap = best.gap.max(other.gap);
+        }
+        best
     }
 
     /// How far in time the triangle may move so that it stays `gap_to_keep` off the other along `direction`. NaN goes nowhere.
@@ -188,8 +280,11 @@ impl MovingTriangle {
         other: &[Point3<f64>; 3],
         gap_to_keep: f64,
     ) -> SafeStep {
-        let heights = other.map(|y| direction.dot(&y.coords));
-        let support = heights[0].max(heights[1]).max(heights[2]);
+        let [p, q, r] = other;
+        let support = direction
+            .dot(&p.coords)
+            .max(direction.dot(&q.coords))
+            .max(direction.dot(&r.coords));
         let sideways = direction.cross(&self.spin).norm();
         let mut step = f64::INFINITY;
         let mut gap = f64::INFINITY;
@@ -208,6 +303,7 @@ impl MovingTriangle {
         SafeStep {
             step: if known { step } else { 0.0 },
             gap: if known { gap } else { f64::NEG_INFINITY },
+            direction: *direction,
         }
     }
 }

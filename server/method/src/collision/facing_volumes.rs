@@ -26,7 +26,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
-use crate::geometry::lanes::{LANES, Lanes, cross, dot, dot_lanes};
+use crate::geometry::lanes::LANES;
 use crate::geometry::wide_tree::{Below, Child, ROOT, Volume, WideNode, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
@@ -53,6 +53,8 @@ pub(crate) struct FacingVolumes {
     half_path: [[f32; 3]; 2],
     half_turn: [[f32; 3]; 2],
     angle: f32,
+    /// Bound on half the path of any point of the body, m.
+    longest_half_sweep: f32,
     /// What volumes stray by, all over the body, and the margin.
     stray: f32,
     /// Cosine and sine of what cones are widened by.
@@ -137,19 +139,21 @@ impl FacingVolumes {
             half_path: [vector(&path), vector(&to_body(&path))],
             half_turn: [vector(&half_turn), vector(&to_body(&half_turn))],
             angle: angle as f32,
+            longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
             stray: stray as f32,
             turn: [turn.cos() as f32, turn.sin() as f32],
         }
     }
 
-    /// Half the path of a volume of the body, bound, m: what cutting the interval in two would halve.
+    /// Whether a volume of the body moves by more than `length` (m) in half the interval, to first order.
     #[inline]
-    pub(crate) fn half_sweep(&self, body: &Volume) -> f32 {
-        let turned = apply(&self.rotation, &body.center);
-        norm(&sum(
-            &self.half_path[0],
-            &product(&self.half_turn[0], &turned),
-        )) + self.angle * body.radius
+    pub(crate) fn sweeps_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
+        self.longest_half_sweep > length && {
+            let body = tree.volume(child);
+            let arm = apply(&self.rotation, &body.center);
+            let sweep = sum(&self.half_path[0], &product(&self.half_turn[0], &arm));
+            norm(&sweep) + self.angle * body.radius > length
+        }
     }
 
     /// A volume of the body, to be tested against volumes of the obstacle.
@@ -162,7 +166,7 @@ impl FacingVolumes {
         Against {
             center: sum(&arm, &self.offset),
             half: apply(&self.rotation_abs, &v.half),
-            axis: axis.map(|x| -x),
+            axis: [-axis[0], -axis[1], -axis[2]],
             middle: -v.middle,
             slab: v.slab,
             radius: v.radius,
@@ -186,7 +190,7 @@ impl FacingVolumes {
                 &self.offset_back,
             ),
             half: apply_transposed(&self.rotation_abs, &v.half),
-            axis: axis.map(|x| -x),
+            axis: [-axis[0], -axis[1], -axis[2]],
             middle: -v.middle,
             slab: v.slab,
             radius: v.radius,
@@ -214,61 +218,39 @@ impl FacingVolumes {
 
 impl Against {
     /// Which of the eight may come within the margin of this volume, facing it: a bit each. All that NaN is in.
+    ///
+    /// One loop over the lanes, without branches: the compiler makes vectors of it.
     #[inline]
     pub(crate) fn facing(&self, node: &WideNode) -> u32 {
-        let apart = [
-            Lanes::splat(self.center[0]) - node.center[0],
-            Lanes::splat(self.center[1]) - node.center[1],
-            Lanes::splat(self.center[2]) - node.center[2],
-        ];
-        let turned = cross(&self.spin, &node.center);
-        let sweep = [
-            turned[0] + Lanes::splat(self.sweep[0]),
-            turned[1] + Lanes::splat(self.sweep[1]),
-            turned[2] + Lanes::splat(self.sweep[2]),
-        ];
-        let stray = node.radius * self.stray_per_radius + Lanes::splat(self.stray);
-        let mut off = [0_u32; LANES];
-        let mut separate = |above: [u32; LANES]| {
-            for k in 0..LANES {
-                off[k] |= above[k];
-            }
-        };
-        for i in 0..3 {
-            let extent = node.half[i] + Lanes::splat(self.half[i]) + sweep[i].abs() + stray;
-            separate(apart[i].abs().above(extent));
-        }
-        let cosine = dot(&node.axis, &self.axis);
-        let crossed = cross(&self.axis, &node.axis);
-        let sine = dot_lanes(&crossed, &crossed).sqrt();
-        let slant = cosine.abs();
-        // Along the axes of the eight.
-        let height = dot_lanes(&node.axis, &apart) + cosine * self.middle - node.middle;
-        let extent = node.slab
-            + slant * self.slab
-            + sine * self.radius
-            + dot_lanes(&node.axis, &sweep).abs()
-            + stray;
-        separate(height.abs().above(extent));
-        // Along the axis of the one.
-        let height = dot(&apart, &self.axis) + Lanes::splat(self.middle) - cosine * node.middle;
-        let extent = slant * node.slab
-            + sine * node.radius
-            + dot(&sweep, &self.axis).abs()
-            + stray
-            + Lanes::splat(self.slab);
-        separate(height.abs().above(extent));
-        // Cones: the sum of two angles is above pi where its sine is below zero.
-        let sine_of_sum = node.sine * self.cosine + node.cosine * self.sine;
-        let cosine_of_sum = node.cosine * self.cosine - node.sine * self.sine;
-        let away = (cosine_of_sum - Lanes::splat(COSINE_ROUNDING)).above(cosine);
-        let narrow = sine_of_sum.above(Lanes::splat(0.0));
-        for k in 0..LANES {
-            off[k] |= away[k] & narrow[k];
-        }
+        let (n, q) = (node, self);
         let mut mask = 0;
-        for (k, off) in off.iter().enumerate() {
-            mask |= (off ^ 1) << k;
+        for k in 0..LANES {
+            let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
+            let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
+            let (rho, slab, middle) = (n.radius.0[k], n.slab.0[k], n.middle.0[k]);
+            let d = [q.center[0] - c[0], q.center[1] - c[1], q.center[2] - c[2]];
+            let s = sum(&q.sweep, &product(&q.spin, &c));
+            let stray = q.stray + q.stray_per_radius * rho;
+            // Along the sides of the boxes.
+            let off_x = d[0].abs() > n.half[0].0[k] + q.half[0] + s[0].abs() + stray;
+            let off_y = d[1].abs() > n.half[1].0[k] + q.half[1] + s[1].abs() + stray;
+            let off_z = d[2].abs() > n.half[2].0[k] + q.half[2] + s[2].abs() + stray;
+            // Along the axes of the eight, and along that of the one.
+            let cosine = dot(&a, &q.axis);
+            let sine = norm(&product(&q.axis, &a));
+            let slant = cosine.abs();
+            let height = dot(&a, &d) + cosine * q.middle - middle;
+            let extent = slab + slant * q.slab + sine * q.radius + dot(&a, &s).abs() + stray;
+            let off_a = height.abs() > extent;
+            let height = dot(&q.axis, &d) + q.middle - cosine * middle;
+            let extent = q.slab + slant * slab + sine * rho + dot(&q.axis, &s).abs() + stray;
+            let off_b = height.abs() > extent;
+            // Cones: the sum of two angles is above pi where its sine is not above zero.
+            let [cos, sin] = [n.cosine.0[k], n.sine.0[k]];
+            let narrow = sin * q.cosine + cos * q.sine > 0.0;
+            let away = cosine < cos * q.cosine - sin * q.sine - COSINE_ROUNDING;
+            let off = off_x | off_y | off_z | off_a | off_b | (narrow & away);
+            mask |= u32::from(!off) << k;
         }
         mask
     }
@@ -311,13 +293,13 @@ pub(crate) fn open_pair(
         (Below::Node(node), below)
             if matches!(below, Below::Triangle(_)) || body.radius(a) > obstacle.radius(b) =>
         {
-            let against = volumes.of_obstacle(&obstacle.volume(b));
+            let against = volumes.of_obstacle(obstacle.volume(b));
             for_each_child(node, against.facing(body.node(node)), |child| {
                 found((child, b));
             });
         }
         (_, Below::Node(node)) => {
-            let against = volumes.of_body(&body.volume(a));
+            let against = volumes.of_body(body.volume(a));
             for_each_child(node, against.facing(obstacle.node(node)), |child| {
                 found((a, child));
             });
@@ -344,12 +326,16 @@ fn vector(v: &Vector3<f64>) -> [f32; 3] {
 
 #[inline(always)]
 fn apply(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|i| m[i][0] * v[0] + m[i][1] * v[1] + m[i][2] * v[2])
+    [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
 }
 
 #[inline(always)]
 fn apply_transposed(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|i| m[0][i] * v[0] + m[1][i] * v[1] + m[2][i] * v[2])
+    [
+        m[0][0] * v[0] + m[1][0] * v[1] + m[2][0] * v[2],
+        m[0][1] * v[0] + m[1][1] * v[1] + m[2][1] * v[2],
+        m[0][2] * v[0] + m[1][2] * v[1] + m[2][2] * v[2],
+    ]
 }
 
 #[inline(always)]
@@ -364,6 +350,11 @@ fn product(v: &[f32; 3], w: &[f32; 3]) -> [f32; 3] {
         v[2] * w[0] - v[0] * w[2],
         v[0] * w[1] - v[1] * w[0],
     ]
+}
+
+#[inline(always)]
+fn dot(v: &[f32; 3], w: &[f32; 3]) -> f32 {
+    v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
 }
 
 #[inline(always)]

@@ -48,6 +48,12 @@ impl Intervals {
         (self.end, self.margin) = (end, margin);
     }
 
+    /// The time at which interval `number` is cut.
+    #[inline]
+    pub(super) fn middle(&self, number: u32) -> f64 {
+        ends(2 * number, self.end)[1]
+    }
+
     /// Interval `number`, at most `MAX_HALVINGS` deep.
     #[inline]
     pub(super) fn get(
@@ -73,16 +79,24 @@ fn make(
     motion: &RelativeMotion,
     trees: (&WideTree, &WideTree),
 ) -> Interval {
-    let halvings = number.ilog2();
-    let (k, count) = (number - (1 << halvings), f64::from(1_u32 << halvings));
-    // Neighbours share their ends to the bit.
-    let [from, to] = [k, k + 1].map(|k| end * (f64::from(k) / count));
+    let [from, to] = ends(number, end);
     Interval {
         from,
         to,
         start: motion.at(from),
         volumes: FacingVolumes::over(trees, motion, [from, to], margin),
     }
+}
+
+/// Neighbours share their ends to the bit.
+#[inline]
+fn ends(number: u32, end: f64) -> [f64; 2] {
+    let halvings = number.ilog2();
+    let (k, count) = (number - (1 << halvings), f64::from(1_u32 << halvings));
+    [
+        end * (f64::from(k) / count),
+        end * (f64::from(k + 1) / count),
+    ]
 }
 
 /// Cuts of a motion into at most `count` intervals.

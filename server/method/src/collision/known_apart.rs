@@ -15,6 +15,8 @@ const SHARE_OF_GAP: f64 = 0.5;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KnownApart {
     motions: ArrayVec<Known, MAX_MOTIONS>,
+    /// The newest is the one in which a body was found last.
+    newest_serves: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -28,7 +30,8 @@ struct Known {
 }
 
 impl KnownApart {
-    /// Remembers that two meshes stay apart by `gap`, m, up to the time `until`.
+    /// Remembers that two meshes stay apart by `gap`, m, up to the time `until` of a motion; it takes the place of the one
+    /// that [`Self::knows`] found last.
     pub(super) fn remember(
         &mut self,
         key: [u64; 2],
@@ -36,35 +39,89 @@ impl KnownApart {
         until: f64,
         gap: f64,
     ) {
-        let same = self.motions.iter().position(|m| m.key == key);
-        if let Some(index) = same.or(self.motions.is_full().then_some(MAX_MOTIONS - 1)) {
-            self.motions.remove(index);
+        if self.newest_serves || self.motions.is_full() {
+            let last = self.motions.len() - 1;
+            self.motions
+                .remove(if self.newest_serves { 0 } else { last });
         }
-        let motion = *motion;
         self.motions.insert(
             0,
             Known {
                 key,
-                motion,
+                motion: *motion,
                 until,
                 gap,
             },
         );
+        self.newest_serves = false;
     }
 
     /// Whether the meshes are known to be apart with the body there; `radius` bounds the distance of its points from G, m.
-    pub(super) fn knows(&self, key: [u64; 2], body: &Placement, radius: f64) -> bool {
-        self.motions.iter().any(|known| {
-            known.key == key && {
-                let times = [known.until, known.motion.time_nearest(body), 0.0];
-                times.iter().any(|time| {
-                    let off = known
-                        .motion
-                        .at(time.clamp(0.0, known.until))
-                        .distance_to(body, radius);
-                    off < SHARE_OF_GAP * known.gap // false for NaN
-                })
-            }
-        })
+    pub(super) fn knows(&mut self, key: [u64; 2], body: &Placement, radius: f64) -> bool {
+        let found = self
+            .motions
+            .iter()
+            .position(|known| known.key == key && known.holds(body, radius));
+        if let Some(index) = found {
+            self.motions[..=index].rotate_right(1);
+        }
+        self.newest_serves = found.is_some();
+        self.newest_serves
+    }
+}
+
+impl Known {
+    fn holds(&self, body: &Placement, radius: f64) -> bool {
+        [self.until, self.motion.time_nearest(body), 0.0]
+            .iter()
+            .any(|time| {
+                let place = self.motion.at(time.clamp(0.0, self.until));
+                place.distance_to(body, radius) < SHARE_OF_GAP * self.gap // false for NaN
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::motion::Motion;
+    use super::*;
+    use crate::spatial::{Pose, at_reference_point, from_reference_point, six};
+    use nalgebra::{Point3, Vector3};
+
+    const KEY: [u64; 2] = [1, 2];
+
+    #[test]
+    fn where_a_motion_ends_and_on_its_way_bodies_are_known_apart_and_nowhere_else() {
+        let obstacle = Pose::new(Vector3::new(0.3, -2.0, 0.1), Vector3::new(0.4, 0.2, -1.0));
+        let point = Point3::new(0.01, -0.02, 0.005);
+        let mut known = KnownApart::default();
+        let mut start = Pose::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 0.3, 0.2));
+        for k in 0..200 {
+            let u = f64::from(k);
+            let turn = Vector3::new(0.003 * u.sin(), 0.005, 0.002 * u.cos());
+            let path = if k % 5 == 0 {
+                Vector3::zeros()
+            } else {
+                Vector3::new(1e-3 * u.cos(), 2e-3, 1e-4)
+            };
+            let motion = Motion {
+                start,
+                displacement: six(&path, &turn),
+                reference_point: point,
+            };
+            let relative = RelativeMotion::new(&motion, &obstacle);
+            let first = relative.at(0.0);
+            assert_eq!(known.knows(KEY, &first, 0.1), k > 0, "{k}");
+            assert!(!known.knows([1, 3], &first, 0.1));
+            let until = 0.3 + 0.7 * u.sin().abs();
+            assert_eq!(known.knows(KEY, &first, 0.1), k > 0);
+            known.remember(KEY, &relative, until, 1e-6);
+            assert!(!known.knows(KEY, &relative.at(until + 0.01), 0.1));
+            assert_eq!(known.motions.len(), 1);
+            // To the end, or part of the way, as when another obstacle is met first; through the body's own pose.
+            let made = if k % 3 == 0 { 0.6 * until } else { until };
+            let own = from_reference_point(&motion.pose_at(made), &point);
+            start = at_reference_point(&own, &point);
+        }
     }
 }

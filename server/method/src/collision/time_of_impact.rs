@@ -21,7 +21,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
-use super::advancement::{PairOutcome, PairSearch, TrianglePair};
+use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::facing_volumes::{FacingVolumes, for_facing_triangle_pairs, open_pair};
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
@@ -68,10 +68,10 @@ pub struct AdvancementSettings {
     pub gap_tolerance: f64,
     /// Most evaluations of the closest points of one pair of triangles in one interval. Bounds the worst-case time of the loop.
     pub max_iterations: u32,
-    /// A pair of volumes, triangles at last, is looked at in intervals in which it moves by less than this share of its
-    /// larger diameter.
+    /// A pair of volumes, down to single triangles, is looked at in intervals in which it moves by less than this share of
+    /// the larger one's diameter, as far as `max_intervals` allows.
     pub interval_edges: f64,
-    /// Most intervals of a motion; a power of two.
+    /// Most intervals of a motion: the next lower power of two, up to 256.
     pub max_intervals: u32,
 }
 
@@ -82,7 +82,7 @@ impl Default for AdvancementSettings {
             minimum_gap: 1e-6,
             gap_tolerance: 1e-7,
             max_iterations: 200,
-            interval_edges: 0.5,
+            interval_edges: 1.0,
             max_intervals: 64,
         }
     }
@@ -121,6 +121,7 @@ pub fn time_of_impact(
         motion: &relative,
         gaps: Gaps::new(settings.minimum_gap, settings.gap_tolerance, slack),
         max_iterations: settings.max_iterations,
+        cubic: relative.rate.powi(3) * radius / 6.0,
     };
     let problem = Problem {
         body,
@@ -206,16 +207,17 @@ impl Problem<'_> {
         // The nearest pairs of the last search bound the time before the trees are touched.
         let start = self.relative.at(0.0);
         let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
-        workspace
+        for &(a, b) in workspace
             .hints
-            .retain(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles);
-        for &(a, b) in &workspace.hints {
+            .iter()
+            .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
+        {
             let pair = self.pair(a, b);
-            let outcome = match search.begin(&pair, &start, 0.0, first.time) {
-                Some(moving) => search.follow(moving, &pair, &start, 0.0, first.time, work),
-                None => PairOutcome::Free,
-            };
-            first.take(outcome, (a, b), 0.0);
+            let interval = [0.0, first.time];
+            if !search.is_free(&pair, &start, interval, &first.lately) {
+                let outcome = search.follow(&pair, &start, interval, &mut first.lately, work);
+                first.take(outcome, (a, b), 0.0);
+            }
         }
         self.descend(search, &mut first, workspace, work);
         if first.overlapping {
@@ -247,10 +249,14 @@ impl Problem<'_> {
         } = workspace;
         intervals.restart(first.time, search.gaps.stop);
         let cuts = halvings(self.settings.max_intervals);
-        let longest = 2.0 * self.settings.interval_edges as f32;
+        let longest = self.settings.interval_edges as f32;
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
-        while let Some((a, b, index)) = stack.pop() {
+        while let Some((a, b, mut index)) = stack.pop() {
+            // The half in which nothing more is looked for is left out.
+            while index.ilog2() < cuts && intervals.middle(index) >= first.time {
+                index *= 2;
+            }
             let interval = intervals.get(index, self.relative, trees);
             let [from, to] = [interval.from, interval.to.min(first.time)];
             let later = from >= first.time || (first.is_near() && from > 0.0);
@@ -260,18 +266,22 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if let Some(moving) = search.begin(&pair, &interval.start, from, to)
+                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
                     && !hints.contains(&(t, s))
                 {
-                    let outcome = search.follow(moving, &pair, &interval.start, from, to, work);
+                    let outcome =
+                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
                 }
                 continue;
             }
             work.node_pairs += 1;
             let size = trees.0.radius(a).max(trees.1.radius(b));
-            let moving = trees.0.volume(a);
-            if index.ilog2() < cuts && interval.volumes.half_sweep(&moving) > longest * size {
+            if index.ilog2() < cuts
+                && interval
+                    .volumes
+                    .sweeps_more_than(longest * size, trees.0, a)
+            {
                 // Later half below the earlier one.
                 stack.push((a, b, 2 * index + 1));
                 stack.push((a, b, 2 * index));
@@ -303,6 +313,7 @@ struct First {
     near: f64,
     /// Some pair intersects.
     overlapping: bool,
+    lately: Directions,
 }
 
 impl Default for First {
@@ -312,6 +323,7 @@ impl Default for First {
             hit: None,
             near: f64::INFINITY,
             overlapping: false,
+            lately: Directions::default(),
         }
     }
 }

@@ -87,7 +87,12 @@ impl Mesh {
     /// Corner positions of triangle `t`.
     #[inline]
     pub fn corners(&self, t: u32) -> [Point3<f64>; 3] {
-        self.triangles[t as usize].map(|v| self.vertices[v as usize])
+        let [a, b, c] = self.triangles[t as usize];
+        [
+            self.vertices[a as usize],
+            self.vertices[b as usize],
+            self.vertices[c as usize],
+        ]
     }
 
     /// Outward unit normal of triangle `t`.

@@ -46,11 +46,11 @@ pub(crate) struct WideNode {
     pub(crate) radius: Lanes,
     pub(crate) cosine: Lanes,
     pub(crate) sine: Lanes,
-    below: [u32; LANES],
 }
 
-/// What a child holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a child holds, once more by itself: one line of the cache.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
 pub(crate) struct Volume {
     pub(crate) center: [f32; 3],
     pub(crate) half: [f32; 3],
@@ -60,6 +60,7 @@ pub(crate) struct Volume {
     pub(crate) radius: f32,
     pub(crate) cosine: f32,
     pub(crate) sine: f32,
+    below: u32,
 }
 
 /// What lies below a child.
@@ -75,6 +76,8 @@ pub(crate) enum Below {
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree {
     nodes: Vec<WideNode>,
+    /// The children of all nodes, by number.
+    volumes: Vec<Volume>,
     /// Point of the mesh's frame from which all coordinates are taken, m.
     pub(crate) origin: Point3<f64>,
     /// Largest distance of a vertex from `origin`, m.
@@ -135,14 +138,31 @@ impl WideTree {
             .map(|v| (v - source.origin).norm_squared())
             .fold(0.0, f64::max)
             .sqrt();
-        let mut nodes = vec![WideNode::empty()];
-        nodes[0].set(0, &source.volume(0));
-        nodes[0].below[0] = source.grow(0, &mut nodes);
-        Self {
-            nodes,
+        let mut tree = Self {
+            nodes: Vec::new(),
+            volumes: Vec::new(),
             origin: source.origin,
             reach,
-        }
+        };
+        tree.add_node();
+        tree.set(ROOT, source.volume(0));
+        let below = source.grow(0, &mut tree);
+        tree.volumes[ROOT as usize].below = below;
+        tree
+    }
+
+    /// Appends a node without children; its number.
+    fn add_node(&mut self) -> u32 {
+        let index = self.nodes.len() as u32;
+        self.nodes.push(WideNode::empty());
+        self.volumes
+            .resize(self.nodes.len() * LANES, Volume::default());
+        index
+    }
+
+    fn set(&mut self, child: Child, volume: Volume) {
+        self.nodes[child as usize / LANES].set(child as usize % LANES, &volume);
+        self.volumes[child as usize] = volume;
     }
 
     /// Node `index`.
@@ -153,31 +173,20 @@ impl WideTree {
 
     /// What a child holds.
     #[inline]
-    pub(crate) fn volume(&self, child: Child) -> Volume {
-        let (node, k) = (&self.nodes[child as usize / LANES], child as usize % LANES);
-        let three = |lanes: &[Lanes; 3]| [lanes[0].0[k], lanes[1].0[k], lanes[2].0[k]];
-        Volume {
-            center: three(&node.center),
-            half: three(&node.half),
-            axis: three(&node.axis),
-            middle: node.middle.0[k],
-            slab: node.slab.0[k],
-            radius: node.radius.0[k],
-            cosine: node.cosine.0[k],
-            sine: node.sine.0[k],
-        }
+    pub(crate) fn volume(&self, child: Child) -> &Volume {
+        &self.volumes[child as usize]
     }
 
     /// Radius of a child's ball, m.
     #[inline]
     pub(crate) fn radius(&self, child: Child) -> f32 {
-        self.nodes[child as usize / LANES].radius.0[child as usize % LANES]
+        self.volumes[child as usize].radius
     }
 
     /// What lies below a child.
     #[inline]
     pub(crate) fn below(&self, child: Child) -> Below {
-        let below = self.nodes[child as usize / LANES].below[child as usize % LANES];
+        let below = self.volumes[child as usize].below;
         if below & TRIANGLE != 0 {
             Below::Triangle(below & !TRIANGLE)
         } else {
@@ -198,7 +207,6 @@ impl WideNode {
             radius: zero,
             cosine: zero,
             sine: zero,
-            below: [0; LANES],
         }
     }
 
@@ -218,7 +226,7 @@ impl WideNode {
 
 impl Source<'_> {
     /// Appends what lies below node `top` of the binary tree; says what it is.
-    fn grow(&self, top: u32, nodes: &mut Vec<WideNode>) -> u32 {
+    fn grow(&self, top: u32, tree: &mut WideTree) -> u32 {
         let node = &self.binary[top as usize];
         if node.is_leaf() {
             return node.triangle | TRIANGLE;
@@ -238,14 +246,12 @@ impl Source<'_> {
             below[count] = self.binary[opened as usize].second;
             count += 1;
         }
-        let index = nodes.len();
-        nodes.push(WideNode::empty());
-        for (k, child) in below[..count].iter().enumerate() {
-            let volume = self.volume(*child);
-            nodes[index].set(k, &volume);
-            nodes[index].below[k] = self.grow(*child, nodes);
+        let index = tree.add_node();
+        for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
+            tree.set(child, self.volume(*opened));
+            tree.volumes[child as usize].below = self.grow(*opened, tree);
         }
-        index as u32
+        index
     }
 
     /// What node `index` of the binary tree holds, measured triangle by triangle.
@@ -291,6 +297,7 @@ impl Source<'_> {
             radius: outward(radius.sqrt()),
             cosine: angle.cos() as f32,
             sine: angle.sin() as f32,
+            below: 0,
         }
     }
 
@@ -308,5 +315,86 @@ impl Source<'_> {
             return first;
         }
         sum.try_normalize(f64::MIN_POSITIVE).unwrap_or(first)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Mesh;
+
+    /// A bumpy ball at `center`: a grid of parallels and meridians, with needles where `needles` is small.
+    fn ball(center: Vector3<f64>, needles: f64) -> Mesh {
+        let (rings, around) = (17_u32, 23_u32);
+        let mut vertices = vec![Point3::from(center + Vector3::z())];
+        for i in 1..rings {
+            let u = std::f64::consts::PI * f64::from(i) / f64::from(rings);
+            for j in 0..around {
+                let v = std::f64::consts::TAU * f64::from(j) / f64::from(around);
+                let r = 1.0 + 0.2 * (7.0 * u).sin() * (5.0 * v).cos();
+                let p = Vector3::new(u.sin() * v.cos(), needles * u.sin() * v.sin(), u.cos());
+                vertices.push(Point3::from(center + p * r));
+            }
+        }
+        vertices.push(Point3::from(center - Vector3::z()));
+        let at = |i: u32, j: u32| 1 + (i - 1) * around + j % around;
+        let last = vertices.len() as u32 - 1;
+        let mut triangles = Vec::new();
+        for j in 0..around {
+            triangles.push([0, at(1, j), at(1, j + 1)]);
+            triangles.push([last, at(rings - 1, j + 1), at(rings - 1, j)]);
+            for i in 1..rings - 1 {
+                triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        Mesh::new(vertices, triangles).expect("a ball is closed")
+    }
+
+    /// Checks a child against all triangles below it, which it returns.
+    fn below(mesh: &Mesh, child: Child) -> Vec<u32> {
+        let tree = mesh.wide_tree();
+        let triangles = match tree.below(child) {
+            Below::Triangle(t) => vec![t],
+            Below::Node(node) => (0..LANES as u32)
+                .map(|k| node * LANES as u32 + k)
+                .filter(|c| tree.node(node).half[0].0[*c as usize % LANES] >= 0.0)
+                .flat_map(|c| below(mesh, c))
+                .collect(),
+        };
+        let v = tree.volume(child);
+        let wide = |x: [f32; 3]| Vector3::from(x.map(f64::from));
+        let (center, axis) = (tree.origin + wide(v.center), wide(v.axis));
+        let cone = f64::from(v.sine).atan2(f64::from(v.cosine));
+        for t in &triangles {
+            for p in mesh.corners(*t) {
+                let arm = p - center;
+                for i in 0..3 {
+                    assert!(arm[i].abs() <= f64::from(v.half[i]));
+                }
+                assert!(arm.norm() <= f64::from(v.radius));
+                assert!((axis.dot(&arm) - f64::from(v.middle)).abs() <= f64::from(v.slab));
+            }
+            let normal = mesh.face_normal(*t);
+            let off = axis.cross(normal).norm().atan2(axis.dot(normal));
+            // The single-precision cosine holds an angle near zero to 4e-4; the test of facing allows for more.
+            assert!(off <= cone + 5e-4, "{off} {cone}");
+        }
+        triangles
+    }
+
+    #[test]
+    fn every_volume_holds_what_is_below_and_every_triangle_is_there_once() {
+        for (center, needles) in [
+            (Vector3::zeros(), 1.0),
+            (Vector3::new(1000.0, -700.0, 300.0), 1.0),
+            (Vector3::new(0.1, 0.0, 0.0), 1e-5),
+        ] {
+            let mesh = ball(center, needles);
+            let mut found = below(&mesh, ROOT);
+            found.sort_unstable();
+            let all: Vec<u32> = (0..mesh.triangles().len() as u32).collect();
+            assert_eq!(found, all);
+        }
     }
 }
