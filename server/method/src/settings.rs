@@ -75,7 +75,7 @@ pub struct Settings {
     pub activation_distance: f64,
     /// Most that look-ahead adds to the activation distance, m.
     pub look_ahead_limit: f64,
-    /// Triangle pairs that one look-ahead may cost. One that costs more shortens the next: late updates must not make
+    /// Triangle pairs with features to look at that one collection may cost. One that costs more shortens the next: late updates must not make
     /// later ones still later.
     pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less than this is none, m.
