@@ -264,7 +264,7 @@ fn measure(
         known.extend(set.constraints.iter().map(|row| row.features));
         let lag = (pair[0].translation.vector - god_object.pose().translation.vector).norm();
         lengths.push(lag * 1e6);
-        if k % stride == 0 {
+        if k.is_multiple_of(stride) {
             let (expected, count) = every.force(&world, god_object.pose(), &pair[1]);
             let error = felt.wrench - expected;
             errors.push(linear(&error).norm());

@@ -80,13 +80,15 @@ pub(crate) fn collect_bounded(
         }
         looked_at += 1;
         let pair = facing.pair(a, b);
-        for_contacts(&facing, &pair, work, |contact| {
-            if candidates.len() == capacity {
-                keep_nearest(candidates, room);
-                truncated = true;
-            }
-            candidates.push(contact);
-        });
+        if facing.may_face(&pair) {
+            for_contacts(&facing, &pair, work, |contact| {
+                if candidates.len() == capacity {
+                    keep_nearest(candidates, room);
+                    truncated = true;
+                }
+                candidates.push(contact);
+            });
+        }
         let affordable = looked_at <= pairs;
         if !affordable {
             complete_within = 0.0;

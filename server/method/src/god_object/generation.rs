@@ -128,6 +128,27 @@ impl GodObject {
         self.reduction = Some(reduction);
         let reach = self.settings.activation_distance
             + update.all_moved.min(self.settings.look_ahead_limit);
+        self.choose(difference, reach, &mut report.work);
+    }
+
+    /// Chooses the rows of a set that is published: for a device that is `difference` away and may go `reach` (m) from there.
+    pub(super) fn choose(&mut self, difference: &Vector6, reach: f64, work: &mut Work) {
+        let Some(mut reduction) = self.reduction.take() else {
+            return;
+        };
+        let all = self.place().is_some_and(|at| reduction.take_all(&at));
+        self.reduction = Some(reduction);
+        if !all {
+            self.complete_for(&self.probes(difference, reach), work);
+        }
+        if let Some(reduction) = &mut self.reduction {
+            reduction.retire();
+        }
+        self.write_set();
+    }
+
+    /// Where the device may be next: where it is, and as far as it reaches along and about each axis.
+    fn probes(&self, difference: &Vector6, reach: f64) -> [(Vector6, Purpose); 13] {
         let mut probes = [(*difference, Purpose::Force); 13];
         for (k, probe) in probes[1..].iter_mut().enumerate() {
             let size = if k % 2 == 0 { reach } else { -reach };
@@ -139,10 +160,7 @@ impl GodObject {
                 six(&zero, &(axis / self.radius))
             };
         }
-        self.complete_for(&probes, &mut report.work);
-        if let Some(reduction) = &mut self.reduction {
-            reduction.retire();
-        }
+        probes
     }
 
     fn complete_for(&mut self, motions: &[(Vector6, Purpose)], work: &mut Work) {

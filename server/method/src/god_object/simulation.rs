@@ -84,7 +84,9 @@ impl GodObject {
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };
-        god_object.collect(settings.activation_distance, &mut Work::default());
+        let work = &mut Work::default();
+        god_object.collect(settings.activation_distance, work);
+        god_object.choose(&Vector6::zeros(), settings.activation_distance, work);
         Ok(god_object)
     }
 
