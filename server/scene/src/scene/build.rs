@@ -300,6 +300,7 @@ impl Scene {
             motion_tolerance: method.motion_tolerance.unwrap_or(defaults.motion_tolerance),
             max_constraints: method.max_constraints.unwrap_or(defaults.max_constraints),
             max_substeps: method.max_substeps.unwrap_or(defaults.max_substeps),
+            implicit_rounds: method.implicit_rounds.unwrap_or(defaults.implicit_rounds),
             max_advancement_steps: method
                 .max_advancement_steps
                 .unwrap_or(defaults.max_advancement_steps),

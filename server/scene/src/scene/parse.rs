@@ -254,6 +254,7 @@ fn method(section: Section<'_>) -> MethodSpec {
         motion_tolerance: section.number("motion_tolerance", Range::Positive),
         max_constraints: count("max_constraints").map(|n| n as usize),
         max_substeps: count("max_substeps").map(|n| n as u32),
+        implicit_rounds: section.integer("implicit_rounds", 0, 3).map(|n| n as u32),
         max_advancement_steps: count("max_advancement_steps").map(|n| n as u32),
         work_budget: section
             .integer("work_budget", 1, i64::MAX)

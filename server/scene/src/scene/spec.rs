@@ -181,6 +181,8 @@ pub struct MethodSpec {
     pub max_constraints: Option<usize>,
     /// Repetitions within one update.
     pub max_substeps: Option<u32>,
+    /// Rounds of implicit constraints, 0 to 3.
+    pub implicit_rounds: Option<u32>,
     /// Evaluations in one collision search.
     pub max_advancement_steps: Option<u32>,
     /// Nominal microseconds of work of one update.
