@@ -16,14 +16,14 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use crate::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, meshes_intersect,
-    time_of_impact,
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work,
 };
 use crate::constraint::{
-    ConstraintSet, Contact, NonPenetrationConstraint, collect_contacts, contact_jacobian,
+    ConstraintSet, Contact, NonPenetrationConstraint, contact_jacobian,
 };
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, ProjectionStatus, Projector};
 use crate::settings::{Settings, SettingsError};
+use crate::shape::{self, shapes_intersect};
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear,
     pose_difference, pose_is_finite,
@@ -142,7 +142,7 @@ impl GodObject {
             });
         }
         for obstacle in &world.obstacles {
-            if meshes_intersect(&world.body.mesh, start, &obstacle.mesh, &obstacle.pose) {
+            if shapes_intersect(&world.body, start, obstacle, &obstacle.pose) {
                 return Err(StartError::Penetration {
                     obstacle: obstacle.name.clone(),
                 });
@@ -369,10 +369,10 @@ impl GodObject {
         };
         let mut free = 1.0;
         for obstacle in &self.world.obstacles {
-            let found = time_of_impact(
-                &self.world.body.mesh,
+            let found = shape::time_of_impact(
+                &self.world.body,
                 &motion,
-                &obstacle.mesh,
+                obstacle,
                 &obstacle.pose,
                 &settings,
                 &mut self.collision,
@@ -414,10 +414,10 @@ impl GodObject {
         self.set.constraints.clear();
         for (index, obstacle) in self.world.obstacles.iter().enumerate() {
             self.contacts.clear();
-            let collected = collect_contacts(
-                &self.world.body.mesh,
+            let collected = shape::collect(
+                &self.world.body,
                 &self.pose,
-                &obstacle.mesh,
+                obstacle,
                 &obstacle.pose,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 distance,

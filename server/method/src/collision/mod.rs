@@ -16,6 +16,6 @@ pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
-pub(crate) use motion::Placement;
+pub(crate) use motion::{Placement, RelativeMotion};
 pub(crate) use swept_box::{StillBoxes, for_triangle_pairs};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

@@ -10,3 +10,7 @@ pub use collect::collect_contacts;
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
+
+pub(crate) use facing::{
+    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, is_over,
+};
