@@ -255,7 +255,7 @@ fn rows_of_triangle(
     mesh: &Mesh,
     t: u32,
     activation_distance: f64,
-    found: &mut impl FnMut(Row),
+    found: &mut dyn FnMut(Row),
 ) {
     match touching {
         Touching::Cylinder(cylinder) => cylinder.face(mesh, t, activation_distance, &mut *found),
@@ -297,7 +297,7 @@ fn rows_of_triangle(
 }
 
 /// Rows between a primitive and a point; the primitive first.
-fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut impl FnMut(Row)) {
+fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut dyn FnMut(Row)) {
     match touching {
         Touching::Cylinder(cylinder) => {
             cylinder.knob(other).map(found);
@@ -318,7 +318,7 @@ fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut impl FnMut(
 }
 
 /// Rows between a primitive and a segment; the primitive first.
-fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut impl FnMut(Row)) {
+fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut dyn FnMut(Row)) {
     match touching {
         Touching::Cylinder(cylinder) => {
             cylinder.rod_on_side(other).map(&mut *found);
@@ -338,7 +338,7 @@ fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut impl FnMut(Ro
 }
 
 /// Rows between two primitives, `a` first.
-fn primitive_pair(a: &Touching, b: &Touching, found: &mut impl FnMut(Row)) {
+fn primitive_pair(a: &Touching, b: &Touching, found: &mut dyn FnMut(Row)) {
     match (a, b) {
         (Touching::Plane(..), Touching::Plane(..)) => {}
         (Touching::Cylinder(cylinder), Touching::Plane(normal, point)) => {

@@ -113,7 +113,7 @@ pub(crate) fn oracle_pose(pose: &Pose) -> math::Pose {
 
 /// Distance by parry, m; 0 where they overlap.
 pub(crate) fn oracle_distance(a: &dyn Shape, pose_a: &Pose, b: &dyn Shape, pose_b: &Pose) -> f64 {
-    query::distance(&oracle_pose(pose_a), a, &oracle_pose(pose_b), b).expect("supported")
+    query::distance(&oracle_pose(pose_a), a, &oracle_pose(pose_b), b).expect("supported").distance
 }
 
 pub(crate) fn box_mesh(half: Vector3<f64>) -> Mesh {
