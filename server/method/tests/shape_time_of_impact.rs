@@ -78,7 +78,7 @@ proptest! {
         let pose = Pose::new(Vector3::new(0.3, -0.2, 0.1), obstacle_turn);
         let start = pose * Pose::new(offset, turn);
         let (a, b) = (form.oracle(), obstacle.oracle());
-        let distance = |pose_a: &Pose| oracle_distance(&*a, pose_a, &*b, &pose);
+        let distance = |pose_a: &Pose| oracle_distance(&a, pose_a, &b, &pose);
         prop_assume!(distance(&start) > 2e-4);
         // The surface of a mesh has no inside for the oracle.
         prop_assume!(!shape::shapes_intersect(&form.body(), &start, &obstacle.obstacle("o", pose), &pose));
@@ -106,7 +106,10 @@ proptest! {
 fn a_sphere_stops_at_the_closed_form_over_a_plane() {
     let pose = Pose::identity();
     let start = Pose::translation(0.1, -0.3, 0.05);
-    let down = six(&Vector3::new(0.02, 0.01, -0.1), &Vector3::new(1.0, 2.0, 0.3));
+    let down = six(
+        &Vector3::new(0.02, 0.01, -0.1),
+        &Vector3::new(1.0, 2.0, 0.3),
+    );
     let TimeOfImpact::Impact { time } =
         search(Form::Sphere(0.02), &start, &down, Form::Plane, &pose)
     else {
@@ -122,13 +125,62 @@ fn bodies_at_the_minimum_gap_may_slide_roll_yaw_and_leave() {
     let lying = UnitQuaternion::identity();
     let standing = shape_support::turned(Vector3::x(), std::f64::consts::FRAC_PI_2);
     let cases = [
-        ("sphere slides", Form::Sphere(0.01), lying, 0.01, [0.1, 0.05, 0.0], [0.0, 0.0, 0.0]),
-        ("sphere rolls", Form::Sphere(0.01), lying, 0.01, [0.01, 0.0, 0.0], [0.0, 1.0, 0.0]),
-        ("cylinder lies and rolls", Form::Cylinder(0.01, 0.03), lying, 0.01, [0.01, 0.0, 0.0], [0.0, 1.0, 0.0]),
-        ("cylinder lies and yaws", Form::Cylinder(0.01, 0.03), lying, 0.01, [0.01, 0.02, 0.0], [0.0, 0.0, 1.0]),
-        ("cylinder stands and yaws", Form::Cylinder(0.01, 0.03), standing, 0.03, [0.01, 0.02, 0.0], [0.0, 0.0, 2.0]),
-        ("capsule lies and yaws", Form::Capsule(0.01, 0.03), lying, 0.01, [0.01, 0.02, 0.0], [0.0, 0.0, 1.0]),
-        ("cube yaws and leaves", Form::Cube(0.01), lying, 0.01, [0.0, 0.0, 0.01], [0.0, 0.0, 1.0]),
+        (
+            "sphere slides",
+            Form::Sphere(0.01),
+            lying,
+            0.01,
+            [0.1, 0.05, 0.0],
+            [0.0, 0.0, 0.0],
+        ),
+        (
+            "sphere rolls",
+            Form::Sphere(0.01),
+            lying,
+            0.01,
+            [0.01, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ),
+        (
+            "cylinder lies and rolls",
+            Form::Cylinder(0.01, 0.03),
+            lying,
+            0.01,
+            [0.01, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ),
+        (
+            "cylinder lies and yaws",
+            Form::Cylinder(0.01, 0.03),
+            lying,
+            0.01,
+            [0.01, 0.02, 0.0],
+            [0.0, 0.0, 1.0],
+        ),
+        (
+            "cylinder stands and yaws",
+            Form::Cylinder(0.01, 0.03),
+            standing,
+            0.03,
+            [0.01, 0.02, 0.0],
+            [0.0, 0.0, 2.0],
+        ),
+        (
+            "capsule lies and yaws",
+            Form::Capsule(0.01, 0.03),
+            lying,
+            0.01,
+            [0.01, 0.02, 0.0],
+            [0.0, 0.0, 1.0],
+        ),
+        (
+            "cube yaws and leaves",
+            Form::Cube(0.01),
+            lying,
+            0.01,
+            [0.0, 0.0, 0.01],
+            [0.0, 0.0, 1.0],
+        ),
     ];
     for (name, form, rotation, height, path, spin) in cases {
         let start = Pose::from_parts(Vector3::new(0.0, 0.0, height + gap).into(), rotation);
@@ -156,7 +208,10 @@ fn a_body_inside_a_primitive_overlaps_and_nan_stops() {
     ] {
         let found = search(form, &at, &Vector6::zeros(), obstacle, &Pose::identity());
         assert!(
-            matches!(found, TimeOfImpact::Overlapping | TimeOfImpact::Impact { time: 0.0 }),
+            matches!(
+                found,
+                TimeOfImpact::Overlapping | TimeOfImpact::Impact { time: 0.0 }
+            ),
             "{form:?} in {obstacle:?}: {found:?}"
         );
     }

@@ -270,7 +270,12 @@ impl Facing<'_> {
 
 /// Whether the foot of a point lies in the triangle, to tolerance.
 #[inline]
-pub(crate) fn is_over(p: &Point3<f64>, t: &[Point3<f64>; 3], normal: &Vector3<f64>, gap: f64) -> bool {
+pub(crate) fn is_over(
+    p: &Point3<f64>,
+    t: &[Point3<f64>; 3],
+    normal: &Vector3<f64>,
+    gap: f64,
+) -> bool {
     (0..3).all(|k| {
         let side = t[(k + 1) % 3] - t[k];
         let inside = normal.cross(&side).dot(&(p - t[k]));
@@ -292,7 +297,12 @@ fn foot_on_side(p: &Point3<f64>, t: &[Point3<f64>; 3], side: usize) -> Option<(P
 }
 
 /// No edge at the vertex rises in `direction` by more than `tolerance`.
-pub(crate) fn is_in_vertex_cone(mesh: &Mesh, v: u32, direction: &Vector3<f64>, tolerance: f64) -> bool {
+pub(crate) fn is_in_vertex_cone(
+    mesh: &Mesh,
+    v: u32,
+    direction: &Vector3<f64>,
+    tolerance: f64,
+) -> bool {
     let apex = mesh.vertices()[v as usize];
     mesh.neighbours(v).iter().all(|w| {
         let edge = mesh.vertices()[*w as usize] - apex;

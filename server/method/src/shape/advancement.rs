@@ -255,7 +255,9 @@ impl Moving {
         for i in 0..self.piece.count {
             let (height, speed, bend) = self.path(i, direction, sideways, below);
             best.gap = best.gap.min(height);
-            best.step = best.step.min(time_to_fall(height - gap_to_keep, speed, bend));
+            best.step = best
+                .step
+                .min(time_to_fall(height - gap_to_keep, speed, bend));
         }
         if below.is_finite() {
             best
@@ -289,7 +291,14 @@ impl Moving {
             -slope * turn,
             -slope * bend + slope.abs() * self.axis_remainder * sideways,
         );
-        let growths = [standing, if sine > STANDING_SINE { lying } else { standing }];
+        let growths = [
+            standing,
+            if sine > STANDING_SINE {
+                lying
+            } else {
+                standing
+            },
+        ];
         let mut best = SafeStep {
             step: f64::INFINITY,
             gap: f64::INFINITY,

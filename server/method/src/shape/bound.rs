@@ -50,7 +50,9 @@ impl<'a> Bound<'a> {
         let center = if mesh_moves {
             placement.center
         } else {
-            placement.rotation.tr_mul(&(placement.center - placement.origin))
+            placement
+                .rotation
+                .tr_mul(&(placement.center - placement.origin))
         };
         Self {
             center,

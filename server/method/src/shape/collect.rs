@@ -171,7 +171,7 @@ pub(super) fn collect(
             let body = Touching::of(body, Some(&placement), false);
             let obstacle = Touching::of(obstacle, None, false);
             work.feature_pairs += 1;
-            primitive_pair(&body, &obstacle, &mut |row| sink.take(&row, None));
+            primitive_pair(&body, &obstacle, activation_distance, &mut |row| sink.take(&row, None));
             obstacle_pose
         }
         Pairing::BodyPrimitive(primitive, mesh) => {
@@ -337,14 +337,14 @@ fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut dyn FnMut(Row
     }
 }
 
-/// Rows between two primitives, `a` first.
-fn primitive_pair(a: &Touching, b: &Touching, found: &mut dyn FnMut(Row)) {
+/// Rows between two primitives within `reach`, m, `a` first.
+fn primitive_pair(a: &Touching, b: &Touching, reach: f64, found: &mut dyn FnMut(Row)) {
     match (a, b) {
         (Touching::Plane(..), Touching::Plane(..)) => {}
         (Touching::Cylinder(cylinder), Touching::Plane(normal, point)) => {
             cylinder.rims_over(normal, point, false, Feature::Whole, |_, _| true, found);
         }
-        (Touching::Cylinder(a), Touching::Cylinder(b)) => cylinder_cylinder(a, b, found),
+        (Touching::Cylinder(a), Touching::Cylinder(b)) => cylinder_cylinder(a, b, reach, found),
         (_, Touching::Ball(_) | Touching::Capsule(..)) => {
             let (knobs, rod) = match b.round() {
                 Some(round) => round,
@@ -358,7 +358,7 @@ fn primitive_pair(a: &Touching, b: &Touching, found: &mut dyn FnMut(Row)) {
             }
         }
         (_, Touching::Cylinder(_) | Touching::Plane(..)) => {
-            primitive_pair(b, a, &mut |row: Row| found(row.reversed()));
+            primitive_pair(b, a, reach, &mut |row: Row| found(row.reversed()));
         }
     }
 }

@@ -69,7 +69,11 @@ impl Cylinder {
         let sideways = offset - self.axis * along;
         let distance = sideways.norm();
         let end = usize::from(along > 0.5 * self.length);
-        let above = if end == 1 { along - self.length } else { -along };
+        let above = if end == 1 {
+            along - self.length
+        } else {
+            -along
+        };
         let radial = sideways / distance; // NaN on the axis, where it is not used
         let name = end as u8;
         let (on_cylinder, outward, tilt, feature) = if above <= 0.0 {
@@ -112,7 +116,11 @@ impl Cylinder {
         let (x, y) = (self.ends[0] + u * s, b.ends[0] + v * t);
         let cross = u.cross(&v);
         let unit = cross / cross.norm();
-        let normal = if unit.dot(&(x - y)) < 0.0 { -unit } else { unit };
+        let normal = if unit.dot(&(x - y)) < 0.0 {
+            -unit
+        } else {
+            unit
+        };
         b.cone.holds(&normal, NORMAL_CONE_TOLERANCE).then(|| {
             Row::between(
                 [Feature::Side, b.feature],
@@ -222,7 +230,13 @@ impl Cylinder {
     }
 
     /// Rim points over a face of a mesh.
-    pub(super) fn face(&self, mesh: &Mesh, t: u32, activation_distance: f64, found: impl FnMut(Row)) {
+    pub(super) fn face(
+        &self,
+        mesh: &Mesh,
+        t: u32,
+        activation_distance: f64,
+        found: impl FnMut(Row),
+    ) {
         let (corners, normal) = (mesh.corners(t), *mesh.face_normal(t));
         // The plane must come near, and some rim be beside the triangle along the axis.
         let lowest = self.ends.map(|end| normal.dot(&(end - corners[0])));
@@ -254,8 +268,6 @@ fn out_of(
     along: &Vector3<f64>,
     outward: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
-    let unit = tangent
-        .cross(along)
-        .try_normalize(f64::EPSILON.sqrt())?;
+    let unit = tangent.cross(along).try_normalize(f64::EPSILON.sqrt())?;
     Some(if unit.dot(outward) > 0.0 { -unit } else { unit })
 }

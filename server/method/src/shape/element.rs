@@ -132,8 +132,7 @@ pub(super) fn knob_rod(a: &Knob, b: &Rod) -> Option<Row> {
         Cone::End(_) => LOOK_AHEAD_TILT,
         _ => NORMAL_CONE_TOLERANCE,
     };
-    let facing =
-        a.cone.holds(&-normal, tilt) && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
+    let facing = a.cone.holds(&-normal, tilt) && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
     facing.then(|| {
         Row::between(
             [a.feature, b.feature],
@@ -159,18 +158,18 @@ pub(super) fn rod_rod(a: &Rod, b: &Rod) -> Option<Row> {
     let (x, y) = (a.ends[0] + u * s, b.ends[0] + v * t);
     let cross = u.cross(&v);
     let unit = cross / cross.norm();
-    let normal = if unit.dot(&(x - y)) < 0.0 { -unit } else { unit };
+    let normal = if unit.dot(&(x - y)) < 0.0 {
+        -unit
+    } else {
+        unit
+    };
     let facing = a.cone.holds(&-normal, NORMAL_CONE_TOLERANCE)
         && b.cone.holds(&normal, NORMAL_CONE_TOLERANCE);
     facing.then(|| Row::between([a.feature, b.feature], [x, y], [a.round, b.round], normal))
 }
 
 /// Fractions along two lines, `u` and `v` from points `r` apart, where they are nearest; `None` when they are parallel.
-pub(super) fn crossing(
-    u: &Vector3<f64>,
-    v: &Vector3<f64>,
-    r: &Vector3<f64>,
-) -> Option<(f64, f64)> {
+pub(super) fn crossing(u: &Vector3<f64>, v: &Vector3<f64>, r: &Vector3<f64>) -> Option<(f64, f64)> {
     let (a, e, b) = (u.norm_squared(), v.norm_squared(), u.dot(v));
     let denominator = a * e - b * b;
     let crosses = denominator > PARALLEL_SINE * PARALLEL_SINE * a * e; // false for NaN

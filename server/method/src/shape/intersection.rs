@@ -38,9 +38,7 @@ fn primitives_apart(body: &Primitive, obstacle: &Primitive, placement: &Placemen
 /// Lower bound of the distance of a placed piece from a primitive, m; sharp to rounding where they are apart.
 fn gap_to(piece: &Piece, primitive: &Primitive) -> f64 {
     match primitive {
-        Primitive::Plane { normal, point } => {
-            -piece.support(&-normal) - normal.dot(&point.coords)
-        }
+        Primitive::Plane { normal, point } => -piece.support(&-normal) - normal.dot(&point.coords),
         bounded => Piece::of(bounded).map_or(f64::NEG_INFINITY, |still| gap(piece, &still)),
     }
 }
@@ -61,12 +59,7 @@ pub(super) fn gap(mover: &Piece, still: &Piece) -> f64 {
 }
 
 /// Whether every triangle of the mesh is apart from the primitive.
-fn mesh_apart(
-    mesh: &Mesh,
-    primitive: &Primitive,
-    mesh_moves: bool,
-    placement: &Placement,
-) -> bool {
+fn mesh_apart(mesh: &Mesh, primitive: &Primitive, mesh_moves: bool, placement: &Placement) -> bool {
     let bound = Bound::still(primitive, mesh_moves, placement, 0.0);
     let mut apart = true;
     for_triangles(

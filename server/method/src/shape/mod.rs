@@ -23,9 +23,28 @@ pub use primitive::{Nearest, Primitive, PrimitiveError};
 use crate::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
 use crate::constraint::{Collected, Contact, collect_contacts};
 use crate::spatial::Pose;
-use crate::world::{Body, Obstacle};
+use crate::world::{Body, Obstacle, World};
 use collect::Pairing;
 use time_of_impact::Form;
+
+/// Says which primitive of a world cannot be used, by its body's name, and why.
+pub(crate) fn check_primitives(world: &World) -> Result<(), (String, PrimitiveError)> {
+    if let Some(primitive) = &world.body.primitive {
+        let bounded = match primitive {
+            Primitive::Plane { .. } => Err(PrimitiveError::Unbounded),
+            _ => primitive.validate(),
+        };
+        bounded.map_err(|error| ("god-object".to_owned(), error))?;
+    }
+    for obstacle in &world.obstacles {
+        if let Some(primitive) = &obstacle.primitive {
+            primitive
+                .validate()
+                .map_err(|error| (obstacle.name.clone(), error))?;
+        }
+    }
+    Ok(())
+}
 
 /// [`collision::time_of_impact`](crate::collision::time_of_impact) for any shapes: never late, the gap is at least `minimum_gap` all the
 /// way, NaN stops at 0, no allocation. A half-space as the body stops at 0.

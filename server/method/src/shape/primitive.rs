@@ -57,6 +57,9 @@ pub enum PrimitiveError {
     /// The axis has no length, or is not finite.
     #[error("the ends of its axis are not two finite points")]
     Axis,
+    /// A half-space has neither mass nor end: it cannot be held.
+    #[error("a half-space cannot be the body in the hand; give it a bounded plate")]
+    Unbounded,
     /// The normal is not a unit vector.
     #[error("its normal is not a unit vector")]
     Normal,
@@ -187,8 +190,7 @@ impl Primitive {
                 let (tube, ball) = (PI * r2 * length, 4.0 / 3.0 * PI * r2 * radius);
                 // A half sphere's centroid lies 3 r / 8 past the end; about the sphere's centre it has half the sphere's moment.
                 let past = 0.375 * radius;
-                let ball_across =
-                    ball * (0.4 * r2 - past * past + (0.5 * length + past).powi(2));
+                let ball_across = ball * (0.4 * r2 - past * past + (0.5 * length + past).powi(2));
                 let inertia = about_axis(
                     &unit_axis(ends),
                     0.5 * tube * r2 + 0.4 * ball * r2,

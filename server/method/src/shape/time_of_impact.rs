@@ -178,8 +178,7 @@ impl Problem<'_> {
                 first.take(search.advance(&mover, &still, &placement, from, to, work));
             }
             (Form::Primitive(mover), Form::Mesh(mesh)) => {
-                let bound =
-                    Bound::over(mover, false, self.relative, [from, to], search.stop_gap);
+                let bound = Bound::over(mover, false, self.relative, [from, to], search.stop_gap);
                 let Some(mover) = Piece::of(mover) else {
                     return first.take(Outcome::Hit(0.0));
                 };
@@ -190,8 +189,7 @@ impl Problem<'_> {
                 });
             }
             (Form::Mesh(mesh), Form::Primitive(obstacle)) => {
-                let bound =
-                    Bound::over(obstacle, true, self.relative, [from, to], search.stop_gap);
+                let bound = Bound::over(obstacle, true, self.relative, [from, to], search.stop_gap);
                 let Some(still) = still_of(obstacle) else {
                     return first.take(Outcome::Hit(0.0));
                 };

@@ -1,0 +1,59 @@
+//! The constraint set of the present pose: every pair of features that face each other within a distance.
+
+use super::GodObject;
+use crate::collision::Work;
+use crate::constraint::NonPenetrationConstraint;
+use crate::shape;
+
+impl GodObject {
+    /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
+    pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
+        let pairs_before = work.triangle_pairs;
+        self.collected_within = distance;
+        self.set.sequence += 1;
+        self.set.god_object_pose = self.pose;
+        self.set.gap_min = f64::INFINITY;
+        self.set.truncated = false;
+        self.set.constraints.clear();
+        for (index, obstacle) in self.world.obstacles.iter().enumerate() {
+            self.contacts.clear();
+            let collected = shape::collect(
+                &self.world.body,
+                &self.pose,
+                obstacle,
+                &obstacle.pose,
+                u16::try_from(index).unwrap_or(u16::MAX),
+                distance,
+                &mut self.collision,
+                &mut self.contacts,
+                work,
+            );
+            self.set.gap_min = self.set.gap_min.min(collected.gap_min);
+            let room = self.settings.max_constraints - self.set.constraints.len();
+            self.set.truncated |= collected.truncated || self.contacts.len() > room;
+            for contact in self.contacts.iter().take(room) {
+                let shading_normal = self.shading[index].as_ref().and_then(|normals| {
+                    normals.at(
+                        obstacle,
+                        contact.obstacle_triangle,
+                        &contact.barycentric,
+                        &contact.normal,
+                    )
+                });
+                self.set.constraints.push(NonPenetrationConstraint {
+                    features: contact.features,
+                    point: contact.point_on_obstacle,
+                    normal: contact.normal,
+                    gap: contact.gap,
+                    shading_normal,
+                });
+            }
+        }
+        self.afford_look_ahead(distance, work.triangle_pairs - pairs_before);
+        // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
+        self.set
+            .constraints
+            .sort_unstable_by_key(|row| row.features);
+        self.warm_start.clear();
+    }
+}

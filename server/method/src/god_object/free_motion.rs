@@ -1,0 +1,53 @@
+//! How far a motion is free of every obstacle: continuous collision detection, obstacle by obstacle.
+
+use super::{GodObject, StepReport};
+use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
+use crate::shape;
+use crate::spatial::{Pose, Vector6};
+
+impl GodObject {
+    /// The fraction of the motion that is free of every obstacle, in [0, 1].
+    pub(super) fn free_time(
+        &mut self,
+        start: &Pose,
+        displacement: &Vector6,
+        report: &mut StepReport,
+    ) -> f64 {
+        let mut motion = Motion {
+            start: *start,
+            displacement: *displacement,
+            reference_point: self.world.body.reference_point,
+        };
+        let settings = AdvancementSettings {
+            minimum_gap: self.settings.minimum_gap,
+            gap_tolerance: self.settings.gap_tolerance,
+            max_iterations: self.settings.max_advancement_steps,
+            ..AdvancementSettings::default()
+        };
+        let mut free = 1.0;
+        for obstacle in &self.world.obstacles {
+            let found = shape::time_of_impact(
+                &self.world.body,
+                &motion,
+                obstacle,
+                &obstacle.pose,
+                &settings,
+                &mut self.collision,
+                &mut report.work,
+            );
+            let time = match found {
+                TimeOfImpact::Separated => continue,
+                TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => time,
+                TimeOfImpact::Overlapping => 0.0,
+            };
+            // The next obstacle needs to be searched only up to here.
+            let shortened = time.clamp(0.0, 1.0);
+            free *= shortened;
+            motion.displacement *= shortened;
+            if shortened == 0.0 {
+                break;
+            }
+        }
+        free
+    }
+}

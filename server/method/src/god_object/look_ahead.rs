@@ -1,0 +1,33 @@
+//! How far a published set looks ahead, and what that may cost: late updates must not make later ones still later.
+
+use super::GodObject;
+use super::substep::Update;
+
+/// How much shorter a look-ahead becomes that costs too much, and how much longer one that costs little.
+const LOOK_AHEAD_SHRINKS: f64 = 0.5;
+const LOOK_AHEAD_GROWS: f64 = 1.25;
+/// The paper's cone has touching contacts only: gaps up to this many rest distances touch.
+const TOUCHING_REST_DISTANCES: f64 = 2.0;
+
+impl GodObject {
+    /// How far the set that an update publishes collects, m.
+    pub(super) fn published_distance(&self, update: &Update) -> f64 {
+        if self.settings.look_ahead {
+            self.settings.activation_distance + update.look_ahead.min(self.affordable)
+        } else {
+            TOUCHING_REST_DISTANCES * self.settings.rest_distance
+        }
+    }
+
+    /// Takes note of what a collection within `distance` (m) cost, in triangle pairs.
+    pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
+        if pairs > self.settings.look_ahead_pairs {
+            let beyond = (distance - self.settings.activation_distance).max(0.0);
+            self.affordable = beyond.min(self.affordable) * LOOK_AHEAD_SHRINKS;
+        } else if pairs < self.settings.look_ahead_pairs / 4 {
+            self.affordable = (self.affordable * LOOK_AHEAD_GROWS)
+                .max(self.settings.activation_distance)
+                .min(self.settings.look_ahead_limit);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The state of loop 1 and one update as a whole: where to, sub-step by sub-step, and what is published at the end.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::substep::Update;
+use super::{StartError, StepReport};
+use crate::collision::{CollisionWorkspace, Work};
+use crate::constraint::{ConstraintSet, Contact};
+use crate::quasi_statics::{HalfSpace, Projector};
+use crate::settings::Settings;
+use crate::spatial::{
+    Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
+    pose_is_finite,
+};
+use crate::surface::{ShadedAcceleration, ShadingNormals};
+use crate::world::World;
+
+/// Loop 1 of the method.
+#[derive(Debug)]
+pub struct GodObject {
+    pub(super) world: Arc<World>,
+    pub(super) settings: Settings,
+    pub(super) pose: Pose,
+    pub(super) set: ConstraintSet,
+    pub(super) shading: Vec<Option<ShadingNormals>>,
+    pub(super) projector: Projector,
+    pub(super) collision: CollisionWorkspace,
+    pub(super) contacts: Vec<Contact>,
+    pub(super) rows: Vec<HalfSpace>,
+    pub(super) warm_start: Vec<u32>,
+    pub(super) rotation: Vector3<f64>,
+    pub(super) radius: f64,
+    pub(super) trust_length: f64,
+    pub(super) last_device: Option<Pose>,
+    /// Distance within which the present set has every row, m.
+    pub(super) collected_within: f64,
+    /// Longest look-ahead that the last ones' cost allows, m.
+    pub(super) affordable: f64,
+}
+
+impl GodObject {
+    /// Checks the start, sizes every buffer and collects the first constraint set.
+    pub fn new(world: Arc<World>, settings: Settings, start: Pose) -> Result<Self, StartError> {
+        Self::check_start(&world, &settings, &start)?;
+        let capacity = settings.max_constraints;
+        let radius = world.body.mesh.radius_about(&world.body.reference_point);
+        let mut god_object = Self {
+            shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
+            world,
+            settings,
+            pose: start,
+            set: ConstraintSet::with_capacity(capacity),
+            projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
+            collision: CollisionWorkspace::new(),
+            contacts: Vec::with_capacity(capacity),
+            rows: Vec::with_capacity(capacity),
+            warm_start: Vec::with_capacity(6),
+            rotation: Vector3::zeros(),
+            radius,
+            trust_length: f64::INFINITY,
+            last_device: None,
+            collected_within: 0.0,
+            affordable: settings.look_ahead_limit,
+        };
+        god_object.collect(settings.activation_distance, &mut Work::default());
+        Ok(god_object)
+    }
+
+    /// World from body: where the god-object is.
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// The constraints that hold at [`Self::pose`].
+    pub fn constraint_set(&self) -> &ConstraintSet {
+        &self.set
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// One update: moves the body the share k_s of the way to the device, as far as the obstacles let it, and collects the
+    /// constraint set there.
+    ///
+    /// `shaded` is the first pass of force shading; it replaces a_u when it was computed on the present set. The bodies
+    /// never intersect on the way, whatever the input; a pose that is not finite moves nothing.
+    pub fn step(&mut self, device_pose: &Pose, shaded: Option<&ShadedAcceleration>) -> StepReport {
+        let mut report = StepReport::default();
+        if !pose_is_finite(device_pose) {
+            report.rejected = true;
+            self.describe_set(&mut report);
+            return report;
+        }
+
+        // 1. and 2. The share of the way that this update is to cover, as a pose to arrive at.
+        let start = self.pose_at_reference_point();
+        let device = at_reference_point(device_pose, &self.world.body.reference_point);
+        let difference = pose_difference(&device, &start, &self.rotation);
+        self.rotation = angular(&difference);
+        let unconstrained = match shaded {
+            Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
+            _ => difference * self.settings.k_s,
+        };
+        let goal = advance_pose(&start, &unconstrained, 1.0);
+        let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
+            self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
+        });
+
+        // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
+        let mut branch = angular(&unconstrained);
+        let mut update = Update {
+            device_moved,
+            look_ahead: device_moved,
+            last_motion: Vector6::zeros(),
+            damping: 1.0,
+        };
+        report.unfinished = true;
+        while report.substeps < self.settings.max_substeps {
+            let budget_left = self
+                .settings
+                .work_budget
+                .is_none_or(|budget| report.work.nominal_us() < budget);
+            if !budget_left {
+                break;
+            }
+            report.substeps += 1;
+            let left = pose_difference(&goal, &self.pose_at_reference_point(), &branch);
+            branch = angular(&left);
+            if !self.substep(&left, &mut update, &mut report) {
+                report.unfinished = false;
+                break;
+            }
+        }
+        // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
+        let published = self.published_distance(&update);
+        if self.collected_within < published {
+            self.collect(published, &mut report.work);
+        }
+        self.describe_set(&mut report);
+        report
+    }
+
+    pub(super) fn pose_at_reference_point(&self) -> Pose {
+        at_reference_point(&self.pose, &self.world.body.reference_point)
+    }
+
+    /// Bound on the path of the body's fastest point, m.
+    pub(super) fn motion_length(&self, displacement: &Vector6) -> f64 {
+        linear(displacement).norm() + self.radius * angular(displacement).norm()
+    }
+}

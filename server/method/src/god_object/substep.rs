@@ -1,0 +1,98 @@
+//! One repetition of project, move and collect within an update.
+//!
+//! A trust length keeps the linear constraints honest on curved surfaces: it shrinks where a motion was cut short, and grows
+//! where it was free.
+
+use super::{GodObject, StepReport};
+use crate::spatial::{Vector6, advance_pose, angular, from_reference_point, linear};
+
+/// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
+const TRUSTED_SHARE: f64 = 0.5;
+/// How much shorter the motions become when one turns back on the last.
+const TURNING_BACK_DAMPING: f64 = 0.5;
+
+/// What the sub-steps of one update hand on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Update {
+    /// Path of the device since the last update, m: it may move as far again until the next.
+    pub(super) device_moved: f64,
+    /// That, and what the body may still cover, m: so far the published set must look ahead.
+    pub(super) look_ahead: f64,
+    /// Motion of the sub-step before.
+    pub(super) last_motion: Vector6,
+    /// Share of the projected motion that is made; shrinks while motions turn back on each other.
+    pub(super) damping: f64,
+}
+
+impl GodObject {
+    /// Project, move, collect, once. False when there was nothing left to move.
+    pub(super) fn substep(
+        &mut self,
+        left: &Vector6,
+        update: &mut Update,
+        report: &mut StepReport,
+    ) -> bool {
+        let length = self.motion_length(left);
+        let moves = length > self.settings.motion_tolerance; // false for NaN
+        let eases = self.set.gap_min < self.settings.rest_distance - self.settings.motion_tolerance;
+        if !moves && !eases {
+            return false;
+        }
+        // 3. Project, on no more of the way than the linear constraints are trusted for.
+        let trusted = if length > self.trust_length {
+            left * (self.trust_length / length)
+        } else {
+            *left
+        };
+        let Some(mut constrained) = self.project(&trusted, report) else {
+            return false;
+        };
+        // A motion that turns back on the last one says that the minimum lies between: features took turns in holding.
+        if self.turns_back(&constrained, &update.last_motion) {
+            update.damping *= TURNING_BACK_DAMPING;
+        }
+        constrained *= update.damping;
+        update.last_motion = constrained;
+        let covered = self.motion_length(&constrained);
+        if report.substeps == 1 {
+            // This update covers the share k_s of what is free, the next sets must serve the rest.
+            update.look_ahead =
+                update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+        }
+        let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
+        if !worth_moving {
+            return false;
+        }
+
+        // 4. Move as far as continuous collision detection allows.
+        let start = self.pose_at_reference_point();
+        let time = self.free_time(&start, &constrained, report);
+        if time > 0.0 {
+            let reached = advance_pose(&start, &constrained, time);
+            self.pose = from_reference_point(&reached, &self.world.body.reference_point);
+        }
+        if time < TRUSTED_SHARE {
+            self.trust_length = (covered * time).max(self.settings.rest_distance);
+        } else if time >= 1.0 {
+            self.trust_length *= 2.0;
+        }
+
+        // 5. Collect at the pose reached: for the next sub-step what it can reach, or all when it is likely the last.
+        let distance = if covered < self.settings.rest_distance {
+            self.published_distance(update)
+        } else {
+            self.settings
+                .activation_distance
+                .min(2.0 * self.settings.rest_distance + covered)
+        };
+        self.collect(distance, &mut report.work);
+        true
+    }
+
+    /// Whether one motion undoes a part of the other, points of the body weighed alike.
+    fn turns_back(&self, motion: &Vector6, last: &Vector6) -> bool {
+        let along = linear(motion).dot(&linear(last))
+            + self.radius * self.radius * angular(motion).dot(&angular(last));
+        along < 0.0
+    }
+}
