@@ -171,7 +171,9 @@ pub(super) fn collect(
             let body = Touching::of(body, Some(&placement), false);
             let obstacle = Touching::of(obstacle, None, false);
             work.feature_pairs += 1;
-            primitive_pair(&body, &obstacle, activation_distance, &mut |row| sink.take(&row, None));
+            primitive_pair(&body, &obstacle, activation_distance, &mut |row| {
+                sink.take(&row, None)
+            });
             obstacle_pose
         }
         Pairing::BodyPrimitive(primitive, mesh) => {

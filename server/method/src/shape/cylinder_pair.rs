@@ -19,7 +19,12 @@ const NEWTON_STEPS: u32 = 8;
 const SAME_POINT: f64 = 1e-6;
 
 /// Every row between `a` and `b`, a first; of rims on rims those within `reach`, m.
-pub(super) fn cylinder_cylinder(a: &Cylinder, b: &Cylinder, reach: f64, mut found: impl FnMut(Row)) {
+pub(super) fn cylinder_cylinder(
+    a: &Cylinder,
+    b: &Cylinder,
+    reach: f64,
+    mut found: impl FnMut(Row),
+) {
     if let Some(row) = a.rod_on_side(&a_side(b)) {
         found(row);
     }
@@ -117,8 +122,7 @@ fn rim_on_rim(a: &Cylinder, b: &Cylinder, reach: f64, mut found: impl FnMut(Row)
             if centers.norm() > reach + a.radius + b.radius {
                 continue;
             }
-            let normal =
-                nearest.get_or_insert_with(|| closest::direction(&solids[0], &solids[1]));
+            let normal = nearest.get_or_insert_with(|| closest::direction(&solids[0], &solids[1]));
             let starts = [solids[0].farthest(&-*normal), b.ends[j]];
             let mut first: Option<Row> = None;
             for start in starts {
@@ -164,7 +168,10 @@ fn settle([(a, i), (b, j)]: [(&Cylinder, usize); 2], start: &Point3<f64>) -> Opt
         if !minimum {
             break;
         }
-        let (s, t) = ((ab * h - bb * g) / determinant, (ab * g - aa * h) / determinant);
+        let (s, t) = (
+            (ab * h - bb * g) / determinant,
+            (ab * g - aa * h) / determinant,
+        );
         let turned = |c: &Cylinder, r: Vector3<f64>, by: f64| {
             let moved = r + c.axis.cross(&r) * by;
             moved / moved.norm()
