@@ -4,18 +4,22 @@ pub mod distance;
 mod mass;
 mod mesh;
 mod mesh_error;
+mod nearest;
 mod normal_cone;
 mod normals;
 mod report;
+mod self_intersection;
 mod topology;
 mod tree;
 
 pub use mass::{MassProperties, mass_properties};
 pub use mesh::Mesh;
 pub use mesh_error::MeshError;
+pub use nearest::{NearestOnMesh, OneSidedDistance, nearest_on_mesh, one_sided_distance};
 pub use normal_cone::NormalCone;
 pub use normals::corner_normals;
 pub use report::MeshReport;
+pub use self_intersection::self_intersection;
 pub use topology::Edge;
 pub use tree::{Node, Tree};
 
