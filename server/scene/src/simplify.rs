@@ -15,6 +15,8 @@ use crate::mesh_file::RawMesh;
 
 /// Errors that the simplifier is asked for, as shares of the limit: coarsest first.
 const LEVELS: [f32; 8] = [2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.15, 0.05];
+/// Most passes of the simplifier over its own answer.
+const MAX_PASSES: u32 = 8;
 /// Work that takes longer shows a bar.
 const SILENT_TIME: Duration = Duration::from_secs(2);
 
@@ -102,15 +104,17 @@ fn candidate(original: &Mesh, error: f32) -> RawMesh {
         .iter()
         .map(|v| (v - middle).map(|c| c as f32).into())
         .collect();
-    let indices: Vec<u32> = original.triangles().iter().flatten().copied().collect();
-    let kept = meshopt::simplify_decoder(
-        &indices,
-        &places,
-        0,
-        error,
-        SimplifyOptions::ErrorAbsolute,
-        None,
-    );
+    let mut kept: Vec<u32> = original.triangles().iter().flatten().copied().collect();
+    // One pass stops early on flat faces.
+    for _ in 0..MAX_PASSES {
+        let options = SimplifyOptions::ErrorAbsolute;
+        let fewer = meshopt::simplify_decoder(&kept, &places, 0, error, options, None);
+        let done = fewer.len() == kept.len();
+        kept = fewer;
+        if done {
+            break;
+        }
+    }
     let mut place = vec![u32::MAX; original.vertices().len()];
     let mut raw = RawMesh::default();
     for corners in kept.chunks_exact(3) {

@@ -53,39 +53,32 @@ fn sampled(from: &Mesh, to: &Mesh) -> f64 {
 
 #[test]
 fn a_finely_cut_box_becomes_twelve_triangles() {
-    // A sphere's subdivision blown up to a cube: flat faces, thousands of triangles.
-    let mut raw = sphere(1.0, 0);
-    raw = {
-        let n = 12;
-        let mut cut = RawMesh::default();
-        let face = |u: Vector3<f64>, v: Vector3<f64>, cut: &mut RawMesh| {
-            let w = u.cross(&v);
-            let first = cut.vertices.len() as u32;
-            for i in 0..=n {
-                for j in 0..=n {
-                    let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
-                    cut.vertices.push(Point3::from(
-                        (u * (2.0 * s - 1.0) + v * (2.0 * t - 1.0) + w) * 0.05,
-                    ));
-                }
+    let n: u32 = 12;
+    let mut cut = RawMesh::default();
+    let mut face = |u: Vector3<f64>, v: Vector3<f64>| {
+        let w = u.cross(&v);
+        let first = cut.vertices.len() as u32;
+        for i in 0..=n {
+            for j in 0..=n {
+                let [s, t] = [i, j].map(|k| 2.0 * f64::from(k) / f64::from(n) - 1.0);
+                cut.vertices.push(Point3::from((u * s + v * t + w) * 0.05));
             }
-            for i in 0..n as u32 {
-                for j in 0..n as u32 {
-                    let m = n as u32 + 1;
-                    let p = first + i * m + j;
-                    cut.triangles.push([p, p + m, p + m + 1]);
-                    cut.triangles.push([p, p + m + 1, p + 1]);
-                }
-            }
-        };
-        for (u, v) in [(0, 1), (1, 2), (2, 0)] {
-            let (u, v) = (Vector3::ith(u, 1.0), Vector3::ith(v, 1.0));
-            face(u, v, &mut cut);
-            face(v, u, &mut cut);
         }
-        drop(raw);
-        weld(&cut)
+        for i in 0..n {
+            for j in 0..n {
+                let p = first + i * (n + 1) + j;
+                let q = p + n + 1;
+                cut.triangles.push([p, q, q + 1]);
+                cut.triangles.push([p, q + 1, p + 1]);
+            }
+        }
     };
+    for (u, v) in [(0, 1), (1, 2), (2, 0)] {
+        let (u, v) = (Vector3::ith(u, 1.0), Vector3::ith(v, 1.0));
+        face(u, v);
+        face(v, u);
+    }
+    let raw = weld(&cut);
     let scene = built(&raw, 1e-5);
     let report = &scene.simplified[0];
     assert_eq!(report.triangles_before, 6 * 2 * 144);
@@ -118,10 +111,10 @@ fn weld(raw: &RawMesh) -> RawMesh {
 
 #[test]
 fn what_is_said_of_the_distance_holds_and_finer_limits_keep_more() {
-    let raw = capsule(0.02, 0.03, 64, Axis::Y);
+    let raw = capsule(0.02, 0.03, 24, Axis::Y);
     let original = mesh(&raw);
     let mut last = 0;
-    for max_error in [1e-3, 2e-4, 4e-5] {
+    for max_error in [2e-3, 1e-3, 4e-4] {
         let scene = built(&raw, max_error);
         let report = &scene.simplified[0];
         let used = &scene.world.obstacles[0].mesh;
@@ -216,7 +209,7 @@ fn the_bunny_keeps_its_form_with_fewer_triangles() {
         return;
     };
     let raw = taut_scene::read_mesh(&path).unwrap();
-    let scene = built(&raw, 2e-4);
+    let scene = built(&raw, 1e-3);
     let report = &scene.simplified[0];
     println!("{report}");
     assert!(report.unchanged.is_none(), "{report}");
