@@ -293,6 +293,7 @@ mod tests {
             point: Point3::new(gap, 0.0, 0.0),
             normal: Vector3::z(),
             gap,
+            separation: Default::default(),
             shading_normal: None,
         }
     }

@@ -5,7 +5,7 @@
 //! | d_k       | `violation_at_entry`    | m    | `J_k (a_u + c)` when the constraint first appeared       |
 //! | c         | `Coupling::correction`  | m, rad | `a_c - a_u` of the step before: zero without contact   |
 //! | b_k       | `bound`                 | m    | where the constraint belongs                             |
-//! | f_k(t)    | [`AdaptationState::bound`] | m | bound in force at time t, rising from d_k to b_k         |
+//! | f_k(t)    | [`Ramp::bound`]         | m    | bound in force at time t, rising from d_k to b_k         |
 //! | Delta-t   | `Adaptation::duration`  | s    | time of the rise                                         |
 //! | epsilon   | `Adaptation::threshold` | m    | only `d_k - b_k <= epsilon` is smoothed                  |
 //!
@@ -14,25 +14,33 @@
 //! enters from what the force of the step before already upholds.
 //! Source: Ortega et al. 2007, Section 5, Figure 6.
 
-use crate::constraint::{FeaturePair, NonPenetrationConstraint};
+use crate::known_rows::KnownRows;
 use crate::settings::Adaptation;
 
 /// One constraint on its way in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ramp {
-    features: FeaturePair,
+    row: u32,
     violation_at_entry: f64,
     start: f64,
 }
 
-/// Which constraints are known and which are still on their way in. No allocation after `new`.
+impl Ramp {
+    /// The bound in force at `time`, on the way to `bound`; `None` on arrival.
+    fn bound(&self, time: f64, duration: f64, bound: f64) -> Option<f64> {
+        let progress = ((time - self.start) / duration).clamp(0.0, 1.0);
+        let on_its_way = progress < 1.0; // false for NaN: a broken clock lets the constraint in at once
+        let entering = self.violation_at_entry + (bound - self.violation_at_entry) * progress;
+        on_its_way.then(|| entering.min(bound))
+    }
+}
+
+/// Which constraints are still on their way in. No allocation after `new`; no work where there are none.
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptationState {
     adaptation: Adaptation,
-    sequence: Option<u64>,
-    known: Vec<FeaturePair>,
-    arrivals: Vec<FeaturePair>,
-    /// In ascending order of their features.
+    /// Rows of the present set that no step has seen yet.
+    arrivals: Vec<u32>,
     ramps: Vec<Ramp>,
 }
 
@@ -41,82 +49,59 @@ impl AdaptationState {
     pub(crate) fn new(adaptation: Adaptation, capacity: usize) -> Self {
         Self {
             adaptation,
-            sequence: None,
-            known: Vec::with_capacity(capacity),
             arrivals: Vec::with_capacity(capacity),
             ramps: Vec::with_capacity(capacity),
         }
     }
 
-    /// Takes note of a set: rows that were not in the one before become arrivals, rows gone are forgotten.
-    ///
-    /// `rows` are in ascending order of their features. The first set after `new` has no arrivals.
-    pub(crate) fn observe(&mut self, sequence: u64, rows: &[NonPenetrationConstraint]) {
-        if self.sequence == Some(sequence) {
-            self.arrivals.clear();
-            return;
-        }
+    /// Takes note of a new set: constraints on their way in follow their rows, those gone are forgotten.
+    pub(crate) fn observe(&mut self, known: &KnownRows) {
+        self.ramps.retain_mut(|ramp| {
+            let place = known.place_of(ramp.row);
+            ramp.row = place.unwrap_or(ramp.row);
+            place.is_some()
+        });
         self.arrivals.clear();
-        if self.sequence.is_some() {
-            let room = self.arrivals.capacity();
-            let new = rows.iter().map(|row| row.features);
-            let known = &self.known;
-            self.arrivals
-                .extend(new.filter(|f| known.binary_search(f).is_err()).take(room));
-        }
-        self.known.clear();
-        let room = self.known.capacity();
-        self.known
-            .extend(rows.iter().map(|row| row.features).take(room));
-        let known = &self.known;
-        self.ramps
-            .retain(|ramp| known.binary_search(&ramp.features).is_ok());
-        self.sequence = Some(sequence);
+        let room = self.arrivals.capacity();
+        self.arrivals
+            .extend(known.arrivals().iter().copied().take(room));
     }
 
-    /// The bound in force now for one row: `bound` itself, or less while the row is on its way in.
+    /// Whether [`AdaptationState::step`] has nothing to do until the next set.
+    #[inline]
+    pub(crate) fn is_idle(&self) -> bool {
+        self.arrivals.is_empty() && self.ramps.is_empty()
+    }
+
+    /// Tells `set_bound` the bound in force of every row that is on its way in, and that of a row on its arrival.
     ///
-    /// `reached` is `J_k (a_u + c)` at the present device pose, `time` in seconds never runs back.
-    pub(crate) fn bound(
+    /// `bound_of` a row is where it belongs, `reached_by` a row is `J_k (a_u + c)` at the present device pose.
+    /// `time` in seconds never runs back.
+    pub(crate) fn step(
         &mut self,
         time: f64,
-        features: FeaturePair,
-        bound: f64,
-        reached: f64,
-    ) -> f64 {
-        let position = self
-            .ramps
-            .binary_search_by_key(&features, |ramp| ramp.features);
-        let ramp = match position {
-            Ok(known) => self.ramps[known],
-            Err(place) => {
-                let enters = self.arrivals.binary_search(&features).is_ok()
-                    && reached - bound <= self.adaptation.threshold
-                    && self.ramps.len() < self.ramps.capacity();
-                if !enters {
-                    return bound;
-                }
-                let ramp = Ramp {
-                    features,
+        bound_of: impl Fn(usize) -> f64,
+        reached_by: impl Fn(usize) -> f64,
+        mut set_bound: impl FnMut(usize, f64),
+    ) {
+        for row in self.arrivals.drain(..) {
+            let reached = reached_by(row as usize);
+            let enters = reached - bound_of(row as usize) <= self.adaptation.threshold
+                && self.ramps.len() < self.ramps.capacity();
+            if enters {
+                self.ramps.push(Ramp {
+                    row,
                     violation_at_entry: reached,
                     start: time,
-                };
-                self.ramps.insert(place, ramp);
-                ramp
+                });
             }
-        };
-        let progress = ((time - ramp.start) / self.adaptation.duration).clamp(0.0, 1.0);
-        let on_its_way = progress < 1.0; // false for NaN: a broken clock lets the constraint in at once
-        if !on_its_way {
-            return bound;
         }
-        let entering = ramp.violation_at_entry + (bound - ramp.violation_at_entry) * progress;
-        entering.min(bound)
-    }
-
-    /// Forgets ramps that have arrived.
-    pub(crate) fn retire(&mut self, time: f64) {
         let duration = self.adaptation.duration;
-        self.ramps.retain(|ramp| time - ramp.start < duration);
+        self.ramps.retain(|ramp| {
+            let bound = bound_of(ramp.row as usize);
+            let in_force = ramp.bound(time, duration, bound);
+            set_bound(ramp.row as usize, in_force.unwrap_or(bound));
+            in_force.is_some()
+        });
     }
 }

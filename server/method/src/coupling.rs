@@ -7,14 +7,19 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
-//! No collision detection, no allocation, bounded work: the god-object stands still meanwhile.
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//!
+//! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides is prepared once
+//! when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
 //! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
-use crate::quasi_statics::{HalfSpace, Projection, ProjectionStatus, Projector};
+use crate::implicit::{ImplicitRounds, LinearAnswer};
+use crate::known_rows::KnownRows;
+use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
@@ -29,13 +34,40 @@ pub struct Coupling {
     body: CoupledBody,
     /// Empty when no obstacle has a texture.
     surfaces: Vec<TexturedSurface>,
+    prepared: PreparedSet,
     projector: Projector,
+    implicit: ImplicitRounds,
+    known: KnownRows,
+    /// The bounds in force now: those of `rows`, lower where a row is on its way in.
+    bounds: Vec<f64>,
     adaptation: Option<AdaptationState>,
+    /// The rows of the present set, with the bounds where they belong.
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     rotation: Vector3<f64>,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
+}
+
+/// What depends on the constraint set alone: made once when it arrives, used for every device sample until the next one.
+/// The rows themselves are in `Coupling::rows` and, made ready, in its projector.
+#[derive(Debug)]
+struct PreparedSet {
+    /// Sequence and pose of the set; `None` before the first.
+    of: Option<(u64, Pose, usize)>,
+    /// Pose of the reference point.
+    god_object: Pose,
+    /// `None` where it is not positive definite, or the pose is not finite.
+    metric: Option<Metric>,
+    shaded: bool,
+}
+
+impl PreparedSet {
+    #[inline]
+    fn serves(&self, set: &ConstraintSet) -> bool {
+        let of = (set.sequence, set.god_object_pose, set.constraints.len());
+        self.of == Some(of) // false for a pose that is not finite
+    }
 }
 
 /// What the coupling needs to know of the body: no surface.
@@ -84,7 +116,21 @@ impl Coupling {
                 reference_point: world.body.reference_point,
             },
             surfaces,
+            prepared: PreparedSet {
+                of: None,
+                god_object: Pose::identity(),
+                metric: None,
+                shaded: false,
+            },
             projector: Projector::new(settings.solver, capacity),
+            implicit: ImplicitRounds::new(
+                settings,
+                world.body.mesh.radius_about(&world.body.reference_point),
+                Projector::new(settings.solver, capacity),
+                capacity,
+            ),
+            known: KnownRows::new(capacity),
+            bounds: Vec::with_capacity(capacity),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -97,46 +143,81 @@ impl Coupling {
 
     /// The force for one device pose. `time` in seconds never runs back; it drives the constraint adaptation.
     ///
+    /// A set with sequence, pose and number of rows of the one before is taken for the same set.
     /// A pose that is not finite gives a zero wrench and `ProjectionStatus::NotFinite`.
     pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
             return CouplingOutput::without_force(ProjectionStatus::NotFinite);
         }
-        let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
+        if !self.prepared.serves(set) {
+            self.prepare(set);
+        }
         let device = at_reference_point(device_pose, &self.body.reference_point);
-        let difference = pose_difference(&device, &god_object, &self.rotation);
+        let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
-        let Some(metric) = self.body.metric(&self.settings, &god_object) else {
+        let Some(metric) = &self.prepared.metric else {
             return CouplingOutput::without_force(ProjectionStatus::NotFinite);
         };
 
-        let center = Point3::from(god_object.translation.vector);
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
         let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
-        let shaded = self.gather_rows(time, &reached, &center, set);
-        let projection =
-            self.projector
-                .project(&metric, &unconstrained, &self.rows, &self.warm_start);
+        if let Some(adaptation) = self.adaptation.as_mut().filter(|state| !state.is_idle()) {
+            adaptation.step(
+                time,
+                |row| self.rows[row].bound,
+                |row| self.rows[row].jacobian.dot(&reached),
+                |row, bound| {
+                    self.projector.set_bound(row, bound);
+                    self.bounds[row] = bound;
+                },
+            );
+        }
+        let mut projection = self
+            .projector
+            .project_prepared(&unconstrained, &self.warm_start);
+        self.warm_start.clear();
         if projection.status != ProjectionStatus::Solved {
-            self.warm_start.clear();
             return CouplingOutput::without_force(projection.status);
         }
-        self.warm_start.clear();
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
 
         // F_c = k_h M (a_c - a_u)
-        let change = projection.acceleration - unconstrained;
-        self.correction = change;
-        let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
+        let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let given = LinearAnswer {
+            constraints: &set.constraints[..self.rows.len()],
+            start: &self.prepared.god_object,
+            goal: &device,
+            branch: self.rotation,
+            scale: self.settings.k_s,
+            shaded: self.prepared.shaded,
+            projection: &projection,
+        };
+        let implicit = self.implicit.solve(
+            &given,
+            |row| self.bounds[row],
+            |pose| self.body.metric(&self.settings, pose),
+        );
+        if let Some(answer) = implicit {
+            let change = answer.projection.acceleration - answer.unconstrained;
+            held = answer.metric.mass_matrix_times(&change);
+            // What follows counts from x_s.
+            let nearest = angular(&projection.acceleration) / self.settings.k_s;
+            let moved = pose_difference(&answer.reached, &self.prepared.god_object, &nearest);
+            projection = answer.projection;
+            projection.acceleration = moved * self.settings.k_s;
+        }
+        self.correction = projection.acceleration - unconstrained;
+        let mut wrench = held * self.settings.k_h;
         if !self.surfaces.is_empty() {
+            let center = Point3::from(self.prepared.god_object.translation.vector);
             wrench = self.textured(&wrench, &projection, &center, set);
         }
         let (wrench, saturated) = self.limited(&wrench);
         CouplingOutput {
             wrench,
-            shaded: shaded.then_some(ShadedAcceleration {
+            shaded: self.prepared.shaded.then_some(ShadedAcceleration {
                 sequence: set.sequence,
                 acceleration: projection.acceleration,
             }),
@@ -147,33 +228,46 @@ impl Coupling {
         }
     }
 
-    /// Writes the half-spaces of the set into `rows`; says whether any is shaded.
-    fn gather_rows(
-        &mut self,
-        time: f64,
-        reached: &Vector6,
-        center: &Point3<f64>,
-        set: &ConstraintSet,
-    ) -> bool {
-        if let Some(adaptation) = &mut self.adaptation {
-            adaptation.observe(set.sequence, &set.constraints);
-        }
+    /// Everything that the set decides, whatever the device does: rows, metric, and which rows are new.
+    fn prepare(&mut self, set: &ConstraintSet) {
+        let constraints =
+            &set.constraints[..set.constraints.len().min(self.settings.max_constraints)];
+        let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
+        let center = Point3::from(god_object.translation.vector);
         self.rows.clear();
         let mut shaded = false;
-        for constraint in set.constraints.iter().take(self.settings.max_constraints) {
+        for constraint in constraints {
             let normal = constraint.shading_normal.unwrap_or(constraint.normal);
             shaded |= constraint.shading_normal.is_some();
-            let jacobian = contact_jacobian(&normal, &constraint.point, center);
-            let mut bound = self.settings.coupling_bound(constraint.gap);
-            if let Some(adaptation) = &mut self.adaptation {
-                bound = adaptation.bound(time, constraint.features, bound, jacobian.dot(reached));
-            }
-            self.rows.push(HalfSpace { jacobian, bound });
+            self.rows.push(HalfSpace {
+                jacobian: contact_jacobian(&normal, &constraint.point, &center),
+                bound: self.settings.coupling_bound(constraint.gap),
+            });
         }
+        self.bounds.clear();
+        self.bounds.extend(self.rows.iter().map(|row| row.bound));
+        let metric = self.body.metric(&self.settings, &god_object);
+        if let Some(metric) = &metric {
+            self.projector.prepare(metric, &self.rows);
+        }
+
+        // Rows are known by their features: those that held the body last time are looked for where they are now.
+        self.known.replace(constraints);
         if let Some(adaptation) = &mut self.adaptation {
-            adaptation.retire(time);
+            adaptation.observe(&self.known);
         }
-        shaded
+        let known = &self.known;
+        self.warm_start.retain_mut(|row| {
+            let place = known.place_of(*row);
+            *row = place.unwrap_or(*row);
+            place.is_some()
+        });
+        self.prepared = PreparedSet {
+            of: Some((set.sequence, set.god_object_pose, set.constraints.len())),
+            god_object,
+            metric,
+            shaded,
+        };
     }
 
     /// The wrench tilted by the textures under the active contacts, which the motion carries along.
@@ -216,7 +310,7 @@ impl Coupling {
 }
 
 impl CoupledBody {
-    fn metric(&self, settings: &Settings, pose: &Pose) -> Option<crate::quasi_statics::Metric> {
+    fn metric(&self, settings: &Settings, pose: &Pose) -> Option<Metric> {
         crate::world::metric_at(self.mass, &self.inertia, settings.rotation_metric, pose)
     }
 }

@@ -30,6 +30,8 @@ pub mod constraint;
 mod coupling;
 pub mod geometry;
 mod god_object;
+mod implicit;
+mod known_rows;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;

@@ -14,6 +14,12 @@ use proptest::prelude::*;
 /// Error of an answer relative to |a_u|_M: rounding, amplified by nearly parallel rows.
 const TOLERANCE: f64 = 1e-9;
 
+/// Largest KKT residual that is met in practice; answers up to `KKT_TOLERANCE` count as certified.
+const ACCURACY: f64 = 1e-12;
+
+/// Two measurements of one residual differ by some roundings.
+const MEASUREMENT: f64 = 1e-14;
+
 fn solve(metric: &Metric, a_u: &Vector6, rows: &[HalfSpace]) -> Vector6 {
     let projection =
         Projector::new(SolverKind::ActiveSet, rows.len()).project(metric, a_u, rows, &[]);
@@ -29,8 +35,18 @@ fn case() -> impl Strategy<Value = (u64, usize, usize, bool)> {
     (any::<u64>(), 0..FAMILIES.len(), 0..60_usize, any::<bool>())
 }
 
+/// 1500 cases, or as many as `PROPTEST_CASES` asks for beyond that.
+fn config() -> ProptestConfig {
+    let default = ProptestConfig::default();
+    ProptestConfig {
+        cases: default.cases.max(1500),
+        failure_persistence: None,
+        ..default
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn every_answer_is_certified_feasible_dissipative_and_bounded((seed, family, count, gaps) in case()) {
@@ -44,10 +60,10 @@ proptest! {
         prop_assert_eq!(answer.status, ProjectionStatus::Solved, "{}", FAMILIES[family]);
         prop_assert_eq!(answer.producer, SolverKind::ActiveSet);
 
-        // KKT, measured here once more.
+        // KKT, measured here once more, by other means: the same number, up to the roundings of the measurement.
         let residual = kkt_residual(&metric, &a_u, &rows, &a_c, &answer.active);
-        prop_assert_eq!(residual.largest(), answer.kkt_residual);
-        prop_assert!(answer.kkt_residual <= KKT_TOLERANCE, "{:?}", residual);
+        prop_assert!((residual.largest() - answer.kkt_residual).abs() <= MEASUREMENT, "{:?} {:e}", residual, answer.kkt_residual);
+        prop_assert!(residual.largest() <= ACCURACY && ACCURACY < KKT_TOLERANCE, "{} {:?}", FAMILIES[family], residual);
         prop_assert!(answer.active.iter().all(|row| row.multiplier > 0.0));
 
         // Dissipation, and the force is bounded: 0 is feasible.

@@ -212,6 +212,7 @@ mod tests {
                 point: Point3::origin(),
                 normal: Vector3::z(),
                 gap,
+                separation: Default::default(),
                 shading_normal: None,
             });
             let before = self.lines.len();

@@ -2,7 +2,7 @@
 
 use super::GodObject;
 use crate::collision::Work;
-use crate::constraint::NonPenetrationConstraint;
+use crate::constraint::{NonPenetrationConstraint, Separation};
 use crate::shape;
 
 impl GodObject {
@@ -45,6 +45,11 @@ impl GodObject {
                     point: contact.point_on_obstacle,
                     normal: contact.normal,
                     gap: contact.gap,
+                    separation: Separation::of(
+                        &contact.features,
+                        (&self.world.body.mesh, &self.pose),
+                        (&obstacle.mesh, &obstacle.pose),
+                    ),
                     shading_normal,
                 });
             }

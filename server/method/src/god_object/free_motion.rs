@@ -3,21 +3,10 @@
 use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;
-use crate::spatial::{Pose, Vector6};
 
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
-    pub(super) fn free_time(
-        &mut self,
-        start: &Pose,
-        displacement: &Vector6,
-        report: &mut StepReport,
-    ) -> f64 {
-        let mut motion = Motion {
-            start: *start,
-            displacement: *displacement,
-            reference_point: self.world.body.reference_point,
-        };
+    pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
         let settings = AdvancementSettings {
             minimum_gap: self.settings.minimum_gap,
             gap_tolerance: self.settings.gap_tolerance,

@@ -8,6 +8,7 @@ use super::substep::Update;
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
 use crate::constraint::{ConstraintSet, Contact};
+use crate::implicit::ImplicitRounds;
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -28,6 +29,7 @@ pub struct GodObject {
     pub(super) projector: Projector,
     pub(super) collision: CollisionWorkspace,
     pub(super) contacts: Vec<Contact>,
+    pub(super) implicit: ImplicitRounds,
     pub(super) rows: Vec<HalfSpace>,
     pub(super) warm_start: Vec<u32>,
     pub(super) rotation: Vector3<f64>,
@@ -55,6 +57,12 @@ impl GodObject {
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
+            implicit: ImplicitRounds::new(
+                &settings,
+                radius,
+                Projector::new(settings.solver, capacity).with_reference_fallback(true),
+                capacity,
+            ),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
             rotation: Vector3::zeros(),
@@ -115,6 +123,7 @@ impl GodObject {
         let mut update = Update {
             device_moved,
             look_ahead: device_moved,
+            made: 0.0,
             last_motion: Vector6::zeros(),
             damping: 1.0,
         };

@@ -3,11 +3,18 @@
 //! A trust length keeps the linear constraints honest on curved surfaces: it shrinks where a motion was cut short, and grows
 //! where it was free.
 
+use nalgebra::Point3;
+
 use super::{GodObject, StepReport};
-use crate::spatial::{Vector6, advance_pose, angular, from_reference_point, linear};
+use crate::collision::Motion;
+use crate::spatial::{
+    Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
+};
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
+/// A motion that is a smaller share of the way that the update has made is not worth a search.
+const WORTH_SHARE: f64 = 0.05;
 /// How much shorter the motions become when one turns back on the last.
 const TURNING_BACK_DAMPING: f64 = 0.5;
 
@@ -18,6 +25,8 @@ pub(super) struct Update {
     pub(super) device_moved: f64,
     /// That, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
+    /// Way made by the sub-steps so far, m.
+    pub(super) made: f64,
     /// Motion of the sub-step before.
     pub(super) last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
@@ -44,9 +53,10 @@ impl GodObject {
         } else {
             *left
         };
-        let Some(mut constrained) = self.project(&trusted, report) else {
+        let Some(projected) = self.project(&trusted, report) else {
             return false;
         };
+        let mut constrained = projected.acceleration;
         // A motion that turns back on the last one says that the minimum lies between: features took turns in holding.
         if self.turns_back(&constrained, &update.last_motion) {
             update.damping *= TURNING_BACK_DAMPING;
@@ -59,18 +69,21 @@ impl GodObject {
             update.look_ahead =
                 update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
-        let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway.
+        let least = (WORTH_SHARE * update.made).max(self.settings.motion_tolerance);
+        let worth_moving = covered > least; // false for NaN
         if !worth_moving {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
-        let start = self.pose_at_reference_point();
-        let time = self.free_time(&start, &constrained, report);
+        let motion = self.motion(&constrained, &projected.straight);
+        let time = self.free_time(motion, report);
         if time > 0.0 {
-            let reached = advance_pose(&start, &constrained, time);
-            self.pose = from_reference_point(&reached, &self.world.body.reference_point);
+            let reached = motion.pose_at(time);
+            self.pose = from_reference_point(&reached, &motion.reference_point);
         }
+        update.made += covered * time;
         if time < TRUSTED_SHARE {
             self.trust_length = (covered * time).max(self.settings.rest_distance);
         } else if time >= 1.0 {
@@ -87,6 +100,29 @@ impl GodObject {
         };
         self.collect(distance, &mut report.work);
         true
+    }
+
+    /// The motion by `displacement` of the reference point in which the body's point `straight` goes straight.
+    fn motion(&self, displacement: &Vector6, straight: &Point3<f64>) -> Motion {
+        let reference_point = self.world.body.reference_point;
+        if *straight == reference_point {
+            return Motion {
+                start: self.pose_at_reference_point(),
+                displacement: *displacement,
+                reference_point,
+            };
+        }
+        let end = advance_pose(&self.pose_at_reference_point(), displacement, 1.0);
+        let start = at_reference_point(&self.pose, straight);
+        let arrived = end * Point3::from(straight - reference_point);
+        Motion {
+            start,
+            displacement: six(
+                &(arrived.coords - start.translation.vector),
+                &angular(displacement),
+            ),
+            reference_point: *straight,
+        }
     }
 
     /// Whether one motion undoes a part of the other, points of the body weighed alike.

@@ -2,14 +2,16 @@
 //!
 //! Starts at the unconstrained answer and takes in violated rows one by one; a row that would begin to pull leaves on the way.
 //! The distance grows with every step, so that no working set comes twice, and the first point that violates nothing is the optimum.
-//! Storage is fixed: at most six rows are independent. A warm start begins with the rows that carried the last answer.
+//! Storage is fixed: at most six rows are independent. A warm start begins with the rows that carried the last answer: where they
+//! still do, it is one small solution and one pass over the rows, which certifies it.
 //!
 //! Source: Goldfarb, Idnani 1983; Wilhelmsen 1976 for the cone (the solver of Ortega et al. 2007, Section 4.2).
 
-use super::least_distance::LeastDistance;
+use super::certificate::{Certificate, active_rows};
+use super::least_distance::{LeastDistance, Scan};
 use super::projection::SolverKind;
 use super::solve::{Answer, Outcome, Solve};
-use super::working_set::{DEPENDENT_SINE, WorkingSet};
+use super::working_set::{DEPENDENT_SINE, Refinement, WorkingSet};
 use crate::spatial::Vector6;
 
 /// A row violated by less is satisfied, relative to the problem's scale: some hundred roundings.
@@ -18,6 +20,9 @@ const FEASIBILITY_TOLERANCE: f64 = 1e-13;
 /// A dependent row may stay violated by this much, relative to the problem's scale. With bounds <= 0 it never is by more
 /// than `DEPENDENT_SINE`; beyond, the rows contradict each other.
 const CONTRADICTION_TOLERANCE: f64 = 4.0 * DEPENDENT_SINE;
+
+/// An answer with a larger residual is solved anew on its rows: some roundings are usual.
+const POLISH_ABOVE: f64 = 1e-14;
 
 /// Most rows taken in by one attempt. Six unknowns need about ten, thousands of rows some thirty.
 const MAX_ITERATIONS: u32 = 300;
@@ -54,35 +59,27 @@ impl ActiveSet {
 
     /// Begins with those rows of the last answer that push here as well; returns the point they give.
     fn warm_start(&mut self, problem: &LeastDistance, rows: &[u32]) -> Vector6 {
-        self.set.clear();
+        self.set.hold(problem, rows);
         let tolerance = FEASIBILITY_TOLERANCE * problem.scale();
         // Where no old row is violated by a_u there is nothing to keep, and a_u itself may be the answer.
-        let useful = rows.iter().any(|row| {
-            problem.can_bind(*row as usize) && problem.offset(*row as usize) > tolerance
-        });
-        if !useful {
+        if !self.set.has_offset_above(tolerance) {
+            self.set.clear();
             return Vector6::zeros();
         }
-        for row in rows.iter().filter(|row| problem.can_bind(**row as usize)) {
-            let normal = problem.normal(*row as usize);
-            let seen = self.set.decompose(&normal);
-            if !seen.is_dependent() {
-                self.set.push(*row, &normal, &seen, 0.0);
-            }
-        }
-        self.set.settle(problem)
+        self.set.settle(Refinement::None)
     }
 
-    fn pivot(&self, problem: &LeastDistance, y: &Vector6, tolerance: f64) -> (usize, f64) {
+    fn pivot(&self, problem: &LeastDistance, scan: &Scan, tolerance: f64) -> (usize, f64) {
         match self.pivot_rule {
-            PivotRule::MostViolated => problem.most_violated(y),
-            PivotRule::FirstViolated => problem.first_violated(y, tolerance),
+            PivotRule::MostViolated => (scan.row(), scan.violation()),
+            PivotRule::FirstViolated => problem.first_violated(scan, tolerance),
         }
     }
 
     /// Takes `row` in, letting rows go that would pull. False if the rows held contradict it.
     fn take_in(&mut self, problem: &LeastDistance, row: usize, y: &mut Vector6) -> bool {
         let normal = problem.normal(row);
+        let offset = problem.offset(row);
         let mut multiplier = 0.0;
         // Each round but the last lets a row go.
         for _ in 0..=super::projection::MAX_ACTIVE {
@@ -91,21 +88,22 @@ impl ActiveSet {
             let primal_step = if seen.is_dependent() {
                 f64::INFINITY
             } else {
-                problem.violation(row, y) / seen.squared
+                (offset - normal.dot(y)) / seen.squared
             };
             let step = dual_step.min(primal_step);
             if step == f64::INFINITY {
                 return false;
             }
             if !seen.is_dependent() {
-                *y += seen.perpendicular * step;
+                *y += seen.perpendicular() * step;
             }
             self.set.take_dual_step(&seen, step);
             multiplier += step;
             match blocking {
                 Some(position) if dual_step < primal_step => self.set.remove(position),
                 _ => {
-                    self.set.push(row as u32, &normal, &seen, multiplier);
+                    self.set
+                        .push(row as u32, &normal, offset, &seen, multiplier);
                     return true;
                 }
             }
@@ -113,16 +111,17 @@ impl ActiveSet {
         false
     }
 
-    fn answer(&self, y: Vector6, outcome: Outcome, iterations: u32) -> Answer {
+    fn answer(
+        &self,
+        problem: &LeastDistance,
+        scan: &Scan,
+        outcome: Outcome,
+        iterations: u32,
+    ) -> Answer {
+        let active = active_rows(&self.set);
         Answer {
-            correction: y,
-            active: self
-                .set
-                .rows()
-                .iter()
-                .copied()
-                .zip(self.set.multipliers().iter().copied())
-                .collect(),
+            certificate: Certificate::new(problem, scan, &active),
+            active,
             outcome,
             iterations,
         }
@@ -137,36 +136,38 @@ impl Solve for ActiveSet {
     /// No allocation; at most `MAX_ITERATIONS` rows taken in.
     fn solve(&mut self, problem: &LeastDistance, warm_start: &[u32]) -> Answer {
         let mut y = self.warm_start(problem, warm_start);
-        let mut polished = self.set.len() > 0;
+        let mut polished = false;
         for iteration in 0..MAX_ITERATIONS {
+            let scan = problem.scan(&y);
             let scale = problem.scale() + y.norm();
             let tolerance = FEASIBILITY_TOLERANCE * scale;
-            let (row, violation) = self.pivot(problem, &y, tolerance);
+            let (row, violation) = self.pivot(problem, &scan, tolerance);
 
             let violated = violation > tolerance;
-            if !violated && (polished || self.set.len() == 0) {
-                return self.answer(y, Outcome::Optimal, iteration);
-            }
             if !violated {
-                // The polishing step: the same rows, solved anew from the problem.
-                y = self.set.settle(problem);
+                let answer = self.answer(problem, &scan, Outcome::Optimal, iteration);
+                if polished || answer.certificate.residual() <= POLISH_ABOVE {
+                    return answer;
+                }
+                // The same rows, solved anew from the problem.
+                y = self.set.settle(Refinement::Once);
                 polished = true;
                 continue;
             }
 
             polished = false;
             if !self.take_in(problem, row, &mut y) {
-                y = self.set.settle(problem);
-                let remaining = problem.violation(row, &y);
+                let scan = problem.scan(&self.set.settle(Refinement::Once));
+                let remaining = problem.violation_at(row, scan.acceleration());
                 let outcome = if remaining <= CONTRADICTION_TOLERANCE * scale {
                     Outcome::Optimal
                 } else {
                     Outcome::Infeasible
                 };
-                return self.answer(y, outcome, iteration);
+                return self.answer(problem, &scan, outcome, iteration);
             }
         }
-        let y = self.set.settle(problem);
-        self.answer(y, Outcome::IterationLimit, MAX_ITERATIONS)
+        let scan = problem.scan(&self.set.settle(Refinement::Once));
+        self.answer(problem, &scan, Outcome::IterationLimit, MAX_ITERATIONS)
     }
 }

@@ -5,11 +5,12 @@
 //!
 //! Source: Goulart, Chen 2024, "Clarabel: An interior-point solver for conic programs with quadratic objectives".
 
+use super::certificate::{ActiveRows, Certificate, active_rows};
 use super::least_distance::LeastDistance;
 use super::projection::SolverKind;
 use super::reduction::reduce;
 use super::solve::{Answer, Outcome, Solve};
-use super::working_set::WorkingSet;
+use super::working_set::{Refinement, WorkingSet};
 use crate::spatial::Vector6;
 use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{
@@ -39,26 +40,27 @@ impl Solve for Clarabel {
     }
 
     fn solve(&mut self, problem: &LeastDistance, _warm_start: &[u32]) -> Answer {
-        let mut answer = Answer {
-            correction: Vector6::zeros(),
-            active: Default::default(),
-            outcome: Outcome::Optimal,
-            iterations: 0,
+        let answer = |y: &Vector6, active: ActiveRows, outcome, iterations| Answer {
+            certificate: Certificate::new(problem, &problem.scan(y), &active),
+            active,
+            outcome,
+            iterations,
         };
-        let rows: Vec<usize> = (0..problem.rows())
+        let rows: Vec<usize> = (0..problem.rows.len())
             .filter(|row| problem.can_bind(*row))
             .collect();
-        let deepest = problem.most_violated(&Vector6::zeros()).1;
+        let deepest = problem.scan(&Vector6::zeros()).violation();
         let outside = deepest > POLISHED_VIOLATION * problem.scale();
         if !outside {
-            return answer;
+            return answer(&Vector6::zeros(), ActiveRows::new(), Outcome::Optimal, 0);
         }
 
         // Lengths in units of the deepest violation: the answer has at least that length.
         let mut best: Option<InteriorPoint> = None;
+        let mut iterations = 0;
         for tolerance in TOLERANCES {
             best = interior_point(problem, &rows, deepest, tolerance);
-            answer.iterations += best.as_ref().map_or(0, |found| found.iterations);
+            iterations += best.as_ref().map_or(0, |found| found.iterations);
             if best
                 .as_ref()
                 .is_some_and(|found| found.outcome != Outcome::IterationLimit)
@@ -67,11 +69,14 @@ impl Solve for Clarabel {
             }
         }
         let Some(found) = best else {
-            answer.outcome = Outcome::IterationLimit;
-            return answer;
+            let nothing = Vector6::zeros();
+            return answer(
+                &nothing,
+                ActiveRows::new(),
+                Outcome::IterationLimit,
+                iterations,
+            );
         };
-        answer.outcome = found.outcome;
-        answer.correction = found.correction;
         let largest = found.multipliers.iter().copied().fold(0.0, f64::max);
         let mut forces: Vec<(u32, f64)> = rows
             .iter()
@@ -83,17 +88,16 @@ impl Solve for Clarabel {
         forces.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut set = WorkingSet::new();
         reduce(problem, forces.into_iter(), &mut set);
-        let unpolished = collect(&set);
+        let unpolished = active_rows(&set);
 
-        let polished = set.settle(problem);
+        let polished = set.settle(Refinement::Once);
         let tolerance = POLISHED_VIOLATION * (problem.scale() + polished.norm());
-        if found.outcome != Outcome::Infeasible && problem.most_violated(&polished).1 <= tolerance {
-            answer.correction = polished;
-            answer.active = collect(&set);
+        if found.outcome != Outcome::Infeasible && problem.scan(&polished).violation() <= tolerance
+        {
+            answer(&polished, active_rows(&set), found.outcome, iterations)
         } else {
-            answer.active = unpolished;
+            answer(&found.correction, unpolished, found.outcome, iterations)
         }
-        answer
     }
 }
 
@@ -163,12 +167,4 @@ fn interior_point(
         outcome,
         iterations: solution.iterations,
     })
-}
-
-fn collect(set: &WorkingSet) -> arrayvec::ArrayVec<(u32, f64), { super::projection::MAX_ACTIVE }> {
-    set.rows()
-        .iter()
-        .copied()
-        .zip(set.multipliers().iter().copied())
-        .collect()
 }

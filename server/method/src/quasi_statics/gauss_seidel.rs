@@ -5,6 +5,7 @@
 //!
 //! Source: Moreau, Jean 1996; Erleben 2007, for contacts.
 
+use super::certificate::{Certificate, active_rows};
 use super::least_distance::LeastDistance;
 use super::projection::SolverKind;
 use super::reduction::reduce;
@@ -42,7 +43,7 @@ impl Solve for GaussSeidel {
 
     fn solve(&mut self, problem: &LeastDistance, _warm_start: &[u32]) -> Answer {
         self.multipliers.clear();
-        self.multipliers.resize(problem.rows(), 0.0);
+        self.multipliers.resize(problem.rows.len(), 0.0);
         let mut y = Vector6::zeros();
         let mut outcome = Outcome::IterationLimit;
         let mut sweeps = 0;
@@ -70,15 +71,10 @@ impl Solve for GaussSeidel {
             .filter(|(_, m)| **m > 0.0)
             .map(|(row, m)| (row as u32, *m));
         reduce(problem, forces, &mut self.set);
+        let active = active_rows(&self.set);
         Answer {
-            correction: y,
-            active: self
-                .set
-                .rows()
-                .iter()
-                .copied()
-                .zip(self.set.multipliers().iter().copied())
-                .collect(),
+            certificate: Certificate::new(problem, &problem.scan(&y), &active),
+            active,
             outcome,
             iterations: sweeps,
         }

@@ -1,6 +1,6 @@
 //! How optimal an answer is: the Karush-Kuhn-Tucker residuals, from the problem as given.
 //!
-//! Shares nothing with the solvers but the metric, so that a solver's mistake cannot hide itself.
+//! Shares nothing with the projector but the metric: the yardstick for its certificates, and for other solvers.
 //!
 //! | symbol | meaning                                                                                          |
 //! |--------|--------------------------------------------------------------------------------------------------|
@@ -58,23 +58,11 @@ pub fn kkt_residual(
     acceleration: &Vector6,
     active: &[ActiveRow],
 ) -> KktResidual {
-    residual_with_bounds(metric, unconstrained, rows, |b| b, acceleration, active)
-}
-
-/// The same, each bound seen through `bound_of`.
-pub(crate) fn residual_with_bounds(
-    metric: &Metric,
-    unconstrained: &Vector6,
-    rows: &[HalfSpace],
-    bound_of: impl Fn(f64) -> f64,
-    acceleration: &Vector6,
-    active: &[ActiveRow],
-) -> KktResidual {
     let scale = metric.norm(unconstrained).max(metric.norm(acceleration));
 
     let mut primal = 0.0_f64;
     for row in rows {
-        let slack = row.jacobian.dot(acceleration) - bound_of(row.bound);
+        let slack = row.jacobian.dot(acceleration) - row.bound;
         let inside = slack >= 0.0; // false for NaN
         if !inside {
             // Only a violated row needs its length: most rows cost six multiplications.
@@ -92,7 +80,7 @@ pub(crate) fn residual_with_bounds(
             continue;
         };
         let length = length(metric, row);
-        let slack = (row.jacobian.dot(acceleration) - bound_of(row.bound)) / length;
+        let slack = (row.jacobian.dot(acceleration) - row.bound) / length;
         let multiplier = entry.multiplier * length;
         dual = larger(dual, -multiplier);
         complementarity = larger(complementarity, slack.abs().min(multiplier.abs()));

@@ -2,39 +2,19 @@
 //!
 //! | symbol | name in code              | meaning                                                                  |
 //! |--------|---------------------------|--------------------------------------------------------------------------|
-//! | y      | (the unknown)             | `L^T (a - a_u)`, the correction in coordinates where the metric is one    |
+//! | y      | `correction`              | `L^T (a - a_u)`, the correction in coordinates where the metric is one    |
 //! | n_k    | [`LeastDistance::normal`] | `L^-1 j_k / |L^-1 j_k|`, unit                                             |
 //! | h_k    | [`LeastDistance::offset`] | `(b_k - j_k . a_u) / |L^-1 j_k|`, how deep `a_u` violates row k           |
 //!
 //! `min |y|^2 / 2` subject to `n_k . y >= h_k`. All lengths share one unit, that of the metric.
-//! Rows lie in blocks of [`LANES`], one array per component, so that one scan is a few vector instructions per row.
+//! The rows are prepared once; the normals of the few that come to be held are computed when they are.
 
 use super::half_space::HalfSpace;
-use super::metric::{Metric, scaled_norm};
+use super::metric::Metric;
+use super::rows::{Prepared, Rows};
 use crate::spatial::Vector6;
 
-/// Rows per block: one AVX register, or two SSE2 registers, per component.
-const LANES: usize = 4;
-
-/// A row of length below this is a zero row: its direction is noise. Smallest normal double.
-const ZERO_ROW: f64 = f64::MIN_POSITIVE;
-
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    normal: [[f64; LANES]; 6],
-    offset: [f64; LANES],
-    /// Length of the row before normalisation; multipliers are divided by it on the way out.
-    length: [f64; LANES],
-}
-
-/// Rows that can never be violated: padding, and zero rows that hold.
-const NEVER_VIOLATED: Block = Block {
-    normal: [[0.0; LANES]; 6],
-    offset: [f64::NEG_INFINITY; LANES],
-    length: [1.0; LANES],
-};
-
-/// How [`LeastDistance::load`] takes the bounds.
+/// How the bounds are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Bounds {
     AsGiven,
@@ -42,101 +22,99 @@ pub(crate) enum Bounds {
     Clipped,
 }
 
-impl Bounds {
-    #[inline]
-    pub(crate) fn apply(self, bound: f64) -> f64 {
-        match self {
-            Bounds::AsGiven => bound,
-            Bounds::Clipped => bound.min(0.0),
-        }
-    }
-}
-
-/// What [`LeastDistance::load`] found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Loaded {
-    Ready,
-    NotFinite,
-    TooManyRows,
-    /// A zero row demands more than zero.
-    Infeasible,
-}
-
-/// The problem in its own coordinates; storage is reserved once.
+/// The problem; storage is reserved once.
 #[derive(Clone, Debug)]
 pub(crate) struct LeastDistance {
-    blocks: Vec<Block>,
-    rows: usize,
-    max_rows: usize,
+    pub(crate) rows: Rows,
+    prepared: Prepared,
+    metric: Metric,
+    unconstrained: Vector6,
     scale: f64,
-    has_positive_bound: bool,
+    /// Bounds count as no more than this.
+    ceiling: f64,
+}
+
+/// What was measured at a correction. Only [`LeastDistance::scan`] makes one, so that a certificate may rely on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scan {
+    acceleration: Vector6,
+    row: usize,
+    violation: f64,
+}
+
+impl Scan {
+    /// `a_u + L^-T y`; `a_u` itself, bit for bit, without correction: no force in free space.
+    #[inline]
+    pub(crate) fn acceleration(&self) -> &Vector6 {
+        &self.acceleration
+    }
+
+    /// The most violated row.
+    #[inline]
+    pub(crate) fn row(&self) -> usize {
+        self.row
+    }
+
+    /// Its violation; negative where every row holds, -infinity without rows.
+    #[inline]
+    pub(crate) fn violation(&self) -> f64 {
+        self.violation
+    }
 }
 
 impl LeastDistance {
     pub(crate) fn with_capacity(max_rows: usize) -> LeastDistance {
         LeastDistance {
-            blocks: Vec::with_capacity(max_rows.div_ceil(LANES)),
-            rows: 0,
-            max_rows,
+            rows: Rows::with_capacity(max_rows),
+            prepared: Prepared::Ready,
+            metric: Metric::unit(),
+            unconstrained: Vector6::zeros(),
             scale: 0.0,
-            has_positive_bound: false,
+            ceiling: f64::INFINITY,
         }
     }
 
-    /// Takes a problem in. No allocation: more rows than the capacity are refused.
-    pub(crate) fn load(
-        &mut self,
-        metric: &Metric,
-        unconstrained: &Vector6,
-        rows: &[HalfSpace],
-        bounds: Bounds,
-    ) -> Loaded {
-        self.blocks.clear();
-        self.rows = 0;
-        self.has_positive_bound = false;
-        if !unconstrained.iter().all(|x| x.is_finite()) {
-            return Loaded::NotFinite;
-        }
-        if rows.len() > self.max_rows {
-            return Loaded::TooManyRows;
-        }
-        self.scale = metric.norm(unconstrained);
-        self.rows = rows.len();
-
-        let mut feasible = true;
-        for chunk in rows.chunks(LANES) {
-            let mut block = NEVER_VIOLATED;
-            for (lane, row) in chunk.iter().enumerate() {
-                if !row.is_finite() {
-                    return Loaded::NotFinite;
-                }
-                let bound = bounds.apply(row.bound);
-                self.has_positive_bound |= bound > 0.0;
-                let whitened = metric.whiten_row(&row.jacobian);
-                let length = scaled_norm(&whitened);
-                if length < ZERO_ROW {
-                    feasible &= bound <= 0.0;
-                    continue;
-                }
-                for (component, x) in block.normal.iter_mut().zip(whitened.iter()) {
-                    component[lane] = x / length;
-                }
-                block.offset[lane] = (bound - row.jacobian.dot(unconstrained)) / length;
-                block.length[lane] = length;
-            }
-            self.blocks.push(block);
-        }
-        if feasible {
-            Loaded::Ready
-        } else {
-            Loaded::Infeasible
-        }
+    /// Takes metric and rows in; they serve until the next call. No allocation.
+    pub(crate) fn prepare(&mut self, metric: &Metric, rows: &[HalfSpace]) -> Prepared {
+        self.metric = *metric;
+        self.prepared = self.rows.prepare(metric, rows);
+        self.prepared
     }
 
-    /// Number of rows, ignored ones included: row k here is row k of the call.
+    /// Replaces the bound of one row, in the unit that the row was given in.
     #[inline]
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
+    pub(crate) fn set_bound(&mut self, row: usize, bound: f64) {
+        if !bound.is_finite() {
+            self.prepared = Prepared::NotFinite;
+        }
+        self.rows.set_bound(row, bound);
+    }
+
+    /// How the last preparation ended.
+    #[inline]
+    pub(crate) fn prepared(&self) -> Prepared {
+        self.prepared
+    }
+
+    /// Sets what is wished for, and how the bounds are taken.
+    #[inline]
+    pub(crate) fn aim(&mut self, unconstrained: &Vector6, bounds: Bounds) {
+        self.unconstrained = *unconstrained;
+        self.scale = self.metric.norm(unconstrained);
+        self.ceiling = match bounds {
+            Bounds::AsGiven => f64::INFINITY,
+            Bounds::Clipped => 0.0,
+        };
+    }
+
+    #[inline]
+    pub(crate) fn metric(&self) -> &Metric {
+        &self.metric
+    }
+
+    #[inline]
+    pub(crate) fn unconstrained(&self) -> &Vector6 {
+        &self.unconstrained
     }
 
     /// `|a_u|_M`.
@@ -148,29 +126,36 @@ impl LeastDistance {
     /// Whether some row forbids to stay; only then may the problem be infeasible.
     #[inline]
     pub(crate) fn has_positive_bound(&self) -> bool {
-        self.has_positive_bound
+        self.ceiling > 0.0 && self.rows.has_positive_bound()
     }
 
     #[inline]
     pub(crate) fn normal(&self, row: usize) -> Vector6 {
-        let block = &self.blocks[row / LANES];
-        Vector6::from_fn(|i, _| block.normal[i][row % LANES])
+        self.metric.whiten_row(&self.rows.jacobian(row))
     }
 
     #[inline]
     pub(crate) fn offset(&self, row: usize) -> f64 {
-        self.blocks[row / LANES].offset[row % LANES]
-    }
-
-    #[inline]
-    pub(crate) fn length(&self, row: usize) -> f64 {
-        self.blocks[row / LANES].length[row % LANES]
+        self.violation_at(row, &self.unconstrained)
     }
 
     /// Whether row k can bind at all; zero rows cannot.
     #[inline]
     pub(crate) fn can_bind(&self, row: usize) -> bool {
-        row < self.rows && self.offset(row) > f64::NEG_INFINITY
+        self.rows.can_bind(row)
+    }
+
+    /// The length that row k was given with; multipliers are divided by it on the way out.
+    #[inline]
+    pub(crate) fn length(&self, row: usize) -> f64 {
+        self.rows.length(row)
+    }
+
+    /// How deep `acceleration` violates row k.
+    #[inline]
+    pub(crate) fn violation_at(&self, row: usize, acceleration: &Vector6) -> f64 {
+        let bound = self.rows.bound(row).min(self.ceiling);
+        bound - self.rows.jacobian(row).dot(acceleration)
     }
 
     /// `h_k - n_k . y`, how deep `y` violates row k.
@@ -179,53 +164,47 @@ impl LeastDistance {
         self.offset(row) - self.normal(row).dot(y)
     }
 
-    /// The most violated row and its violation; (0, -infinity) without rows.
+    /// `a_u + L^-T y`.
     #[inline]
-    pub(crate) fn most_violated(&self, y: &Vector6) -> (usize, f64) {
-        let mut worst = [f64::NEG_INFINITY; LANES];
-        // The block's index as a double: comparison and selection stay in one kind of register.
-        let mut at = [0.0_f64; LANES];
-        let mut index = 0.0;
-        for block in &self.blocks {
-            let violation = block.violations(y);
-            for lane in 0..LANES {
-                let deeper = violation[lane] > worst[lane];
-                worst[lane] = if deeper { violation[lane] } else { worst[lane] };
-                at[lane] = if deeper { index } else { at[lane] };
-            }
-            index += 1.0;
+    fn acceleration(&self, y: &Vector6) -> Vector6 {
+        if *y == Vector6::zeros() {
+            self.unconstrained
+        } else {
+            self.unconstrained + self.metric.unwhiten(y)
         }
-        let mut best = (0, f64::NEG_INFINITY);
-        for lane in 0..LANES {
-            if worst[lane] > best.1 {
-                best = (at[lane] as usize * LANES + lane, worst[lane]);
-            }
-        }
-        best
     }
 
-    /// The first row violated by more than `tolerance`, and its violation; else (0, -infinity).
-    pub(crate) fn first_violated(&self, y: &Vector6, tolerance: f64) -> (usize, f64) {
-        for (index, block) in self.blocks.iter().enumerate() {
-            let violation = block.violations(y);
-            if let Some(lane) = violation.iter().position(|v| *v > tolerance) {
-                return (index * LANES + lane, violation[lane]);
-            }
+    /// One pass over all rows at `y`: the most violated one.
+    #[inline]
+    pub(crate) fn scan(&self, y: &Vector6) -> Scan {
+        let acceleration = self.acceleration(y);
+        let (row, violation) = self.rows.most_violated(&acceleration, self.ceiling);
+        Scan {
+            acceleration,
+            row,
+            violation,
         }
-        (0, f64::NEG_INFINITY)
+    }
+
+    /// The first row that the scanned correction violates by more than `tolerance`, and its violation; else (0, -infinity).
+    pub(crate) fn first_violated(&self, scan: &Scan, tolerance: f64) -> (usize, f64) {
+        self.rows
+            .first_violated(&scan.acceleration, self.ceiling, tolerance)
     }
 }
 
-impl Block {
-    #[inline]
-    fn violations(&self, y: &Vector6) -> [f64; LANES] {
-        let mut violation = self.offset;
-        for (component, y) in self.normal.iter().zip(y.iter()) {
-            for lane in 0..LANES {
-                violation[lane] -= component[lane] * y;
-            }
-        }
-        violation
+#[cfg(test)]
+impl LeastDistance {
+    /// A problem of its own, for tests.
+    pub(crate) fn of(
+        metric: &Metric,
+        unconstrained: &Vector6,
+        rows: &[HalfSpace],
+    ) -> LeastDistance {
+        let mut problem = LeastDistance::with_capacity(rows.len());
+        assert_eq!(problem.prepare(metric, rows), Prepared::Ready);
+        problem.aim(unconstrained, Bounds::AsGiven);
+        problem
     }
 }
 
@@ -251,32 +230,59 @@ mod tests {
             row(3.0, 4.0, 0.0),
             row(0.0, 1e200, 0.0),
         ];
-        let mut problem = LeastDistance::with_capacity(5);
         let unconstrained = Vector6::new(0.0, 0.0, -1.0, 0.0, 0.0, 0.0);
-        let loaded = problem.load(&metric, &unconstrained, &rows, Bounds::AsGiven);
-        assert_eq!(loaded, Loaded::Ready);
+        let problem = LeastDistance::of(&metric, &unconstrained, &rows);
         assert!(!problem.can_bind(0) && (1..5).all(|k| problem.can_bind(k)));
+        assert!(!problem.can_bind(5), "padding is no row");
         for k in 1..5 {
             assert!((problem.normal(k).norm() - 1.0).abs() < 1e-15, "row {k}");
         }
         // Row 2 asks z >= 1 of a_u = -z: two metres, times the root of the mass.
-        assert_eq!(problem.most_violated(&Vector6::zeros()), (2, 4.0));
-        assert_eq!(problem.first_violated(&Vector6::zeros(), 3.0), (2, 4.0));
-        assert_eq!(problem.first_violated(&Vector6::zeros(), 1.0).0, 2);
+        let scan = problem.scan(&Vector6::zeros());
+        assert_eq!((scan.row(), scan.violation()), (2, 4.0));
+        assert_eq!(scan.acceleration(), &unconstrained);
+        assert_eq!(problem.first_violated(&scan, 3.0), (2, 4.0));
+        assert_eq!(problem.first_violated(&scan, 1.0).0, 2);
         assert!(problem.has_positive_bound());
     }
 
     #[test]
-    fn unusable_problems_are_named() {
+    fn clipped_bounds_let_the_body_stay() {
+        let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
+        let mut problem = LeastDistance::of(&metric, &Vector6::zeros(), &[row(0.0, 1.0, 1.0)]);
+        assert_eq!(problem.scan(&Vector6::zeros()).violation(), 1.0);
+        problem.aim(&Vector6::zeros(), Bounds::Clipped);
+        assert_eq!(problem.scan(&Vector6::zeros()).violation(), 0.0);
+        assert!(!problem.has_positive_bound());
+    }
+
+    #[test]
+    fn a_bound_replaced_is_the_bound_given() {
+        let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
+        let a_u = Vector6::new(0.0, 0.0, -1.0, 0.0, 0.0, 0.0);
+        let given = LeastDistance::of(&metric, &a_u, &[row(0.0, 3.0, -2.0), row(0.0, 0.0, 0.0)]);
+        let mut replaced =
+            LeastDistance::of(&metric, &a_u, &[row(0.0, 3.0, 0.0), row(0.0, 0.0, 0.0)]);
+        for k in 0..5 {
+            replaced.rows.set_bound(k, -2.0);
+        }
+        assert_eq!(given.offset(0), replaced.offset(0));
+        assert!(!replaced.can_bind(1));
+    }
+
+    #[test]
+    fn unusable_rows_are_named() {
         let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
         let mut problem = LeastDistance::with_capacity(1);
-        let mut load = |a: f64, rows: &[HalfSpace]| {
-            problem.load(&metric, &Vector6::repeat(a), rows, Bounds::AsGiven)
-        };
-        assert_eq!(load(f64::NAN, &[]), Loaded::NotFinite);
-        assert_eq!(load(0.0, &[row(f64::NAN, 0.0, 0.0)]), Loaded::NotFinite);
-        assert_eq!(load(0.0, &[row(0.0, 0.0, 1.0)]), Loaded::Infeasible);
-        assert_eq!(load(0.0, &[row(0.0, 0.0, 0.0)]), Loaded::Ready);
-        assert_eq!(load(0.0, &[row(1.0, 0.0, 0.0); 2]), Loaded::TooManyRows);
+        let mut prepare = |rows: &[HalfSpace]| problem.prepare(&metric, rows);
+        assert_eq!(prepare(&[row(f64::NAN, 0.0, 0.0)]), Prepared::NotFinite);
+        assert_eq!(prepare(&[row(1.0, 0.0, 0.0); 2]), Prepared::TooManyRows);
+        assert_eq!(prepare(&[row(0.0, 0.0, 0.0)]), Prepared::Ready);
+        assert!(!problem.rows.has_impossible_row());
+        assert_eq!(
+            problem.prepare(&metric, &[row(0.0, 0.0, 1.0)]),
+            Prepared::Ready
+        );
+        assert!(problem.rows.has_impossible_row());
     }
 }

@@ -10,6 +10,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.2; Gauss' principle of least constraint.
 
+use super::rows::{LANES, Lanes};
 use crate::spatial::{Vector6, angular, linear, six};
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,6 +27,7 @@ pub struct Metric {
     mass: f64,
     inertia: Matrix3<f64>,
     root_mass: f64,
+    inverse_root_mass: f64,
     /// Lower triangular factor of the inertia tensor.
     factor: Matrix3<f64>,
     /// Its inverse, lower triangular as well.
@@ -49,15 +51,28 @@ impl Metric {
         let inertia = (inertia_in_world + inertia_in_world.transpose()) * 0.5;
         let factor = cholesky(&inertia, PIVOT_TOLERANCE * largest)?;
         let inverse_factor = inverse_of_lower(&factor);
-        let usable =
-            mass.sqrt().recip().is_finite() && inverse_factor.iter().all(|x| x.is_finite());
+        let inverse_root_mass = mass.sqrt().recip();
+        let usable = inverse_root_mass.is_finite() && inverse_factor.iter().all(|x| x.is_finite());
         usable.then_some(Metric {
             mass,
             inertia,
             root_mass: mass.sqrt(),
+            inverse_root_mass,
             factor,
             inverse_factor,
         })
+    }
+
+    /// The metric of 1 kg and 1 kg m^2 about every axis: a placeholder before there is a body.
+    pub(crate) fn unit() -> Metric {
+        Metric {
+            mass: 1.0,
+            inertia: Matrix3::identity(),
+            root_mass: 1.0,
+            inverse_root_mass: 1.0,
+            factor: Matrix3::identity(),
+            inverse_factor: Matrix3::identity(),
+        }
     }
 
     /// `M a`: the wrench (N, N m) that gives the acceleration `a`, or the momentum of a twist.
@@ -109,16 +124,34 @@ impl Metric {
     #[inline]
     pub fn unwhiten(&self, y: &Vector6) -> Vector6 {
         six(
-            &(linear(y) / self.root_mass),
+            &(linear(y) * self.inverse_root_mass),
             &transposed_lower_times(&self.inverse_factor, &angular(y)),
         )
+    }
+
+    /// `|L^-1 j|^2` for a block of rows, one array per component.
+    #[inline(always)]
+    pub(crate) fn squared_row_lengths(&self, rows: &[Lanes; 6]) -> Lanes {
+        let l = &self.inverse_factor;
+        let per_mass = self.inverse_root_mass * self.inverse_root_mass;
+        let mut squares = [0.0; LANES];
+        for k in 0..LANES {
+            let (x, y, z) = (rows[3][k], rows[4][k], rows[5][k]);
+            let linear =
+                rows[0][k] * rows[0][k] + rows[1][k] * rows[1][k] + rows[2][k] * rows[2][k];
+            let first = l.m11 * x;
+            let second = l.m21 * x + l.m22 * y;
+            let third = l.m31 * x + l.m32 * y + l.m33 * z;
+            squares[k] = linear * per_mass + first * first + second * second + third * third;
+        }
+        squares
     }
 
     /// `L^-1 j`: a row of J (or a wrench) in the same coordinates, so that `j . a = (L^-1 j) . (L^T a)`.
     #[inline]
     pub fn whiten_row(&self, j: &Vector6) -> Vector6 {
         six(
-            &(linear(j) / self.root_mass),
+            &(linear(j) * self.inverse_root_mass),
             &lower_times(&self.inverse_factor, &angular(j)),
         )
     }

@@ -1,15 +1,18 @@
 //! Quasi-statics: the motion nearest to the wished one that no contact forbids (Gauss' least constraint).
 
 mod active_set;
+mod certificate;
 mod clarabel;
 mod gauss_seidel;
 mod half_space;
 mod kkt;
+mod lanes;
 mod least_distance;
 mod metric;
 mod projection;
 mod projector;
 mod reduction;
+mod rows;
 mod solve;
 mod working_set;
 

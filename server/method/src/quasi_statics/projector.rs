@@ -9,16 +9,16 @@
 //! Source: Ortega et al. 2007, Section 4.2, Eq. (1), which has b = 0. Beyond the paper: bounds, the certificate, the fallback.
 
 use super::active_set::{ActiveSet, PivotRule};
+use super::certificate::Certificate;
 use super::clarabel::Clarabel;
 use super::gauss_seidel::GaussSeidel;
 use super::half_space::HalfSpace;
-use super::kkt::residual_with_bounds;
-use super::least_distance::{Bounds, LeastDistance, Loaded};
+use super::least_distance::{Bounds, LeastDistance};
 use super::metric::Metric;
-use super::projection::{ActiveRow, MAX_ACTIVE, Projection, ProjectionStatus, SolverKind};
+use super::projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
+use super::rows::Prepared;
 use super::solve::{Answer, Outcome, Solve};
 use crate::spatial::Vector6;
-use arrayvec::ArrayVec;
 
 /// Largest relative KKT residual of a certified answer. Usual answers have 1e-15; a row that depends on others up to
 /// rounding may leave 1e-10. For a motion of 10 mm this is 10 pm, far below the rest distance.
@@ -32,15 +32,6 @@ pub struct Projector {
     problem: LeastDistance,
     active_set: ActiveSet,
     gauss_seidel: GaussSeidel,
-}
-
-/// One call's input.
-#[derive(Clone, Copy)]
-struct Given<'a> {
-    metric: &'a Metric,
-    unconstrained: &'a Vector6,
-    rows: &'a [HalfSpace],
-    bounds: Bounds,
 }
 
 impl Projector {
@@ -78,27 +69,44 @@ impl Projector {
         rows: &[HalfSpace],
         warm_start: &[u32],
     ) -> Projection {
-        let given = Given {
-            metric,
-            unconstrained,
-            rows,
-            bounds: Bounds::AsGiven,
+        self.prepare(metric, rows);
+        self.project_prepared(unconstrained, warm_start)
+    }
+
+    /// Takes a metric and rows in, for any number of calls of [`Projector::project_prepared`]. No allocation.
+    ///
+    /// Rows that cannot be used, too many or not finite, are told by the status of those calls.
+    pub fn prepare(&mut self, metric: &Metric, rows: &[HalfSpace]) {
+        self.problem.prepare(metric, rows);
+    }
+
+    /// Replaces the bound of one prepared row, in the unit that the row was given in. A row out of range is ignored.
+    pub fn set_bound(&mut self, row: usize, bound: f64) {
+        self.problem.set_bound(row, bound);
+    }
+
+    /// [`Projector::project`] on the metric and the rows of the last [`Projector::prepare`].
+    pub fn project_prepared(&mut self, unconstrained: &Vector6, warm_start: &[u32]) -> Projection {
+        let usable = match self.problem.prepared() {
+            Prepared::TooManyRows => Err(ProjectionStatus::IterationLimit),
+            Prepared::NotFinite => Err(ProjectionStatus::NotFinite),
+            Prepared::Ready if !unconstrained.iter().all(|x| x.is_finite()) => {
+                Err(ProjectionStatus::NotFinite)
+            }
+            Prepared::Ready => Ok(()),
         };
-        let loaded = self.problem.load(metric, unconstrained, rows, given.bounds);
-        let projection = match loaded {
-            Loaded::NotFinite => Projection::stopped(ProjectionStatus::NotFinite, self.kind),
-            Loaded::TooManyRows => Projection::stopped(ProjectionStatus::IterationLimit, self.kind),
-            Loaded::Infeasible => self.project_clipped(&given, warm_start),
-            Loaded::Ready => {
-                let first = self.attempts(&given, warm_start);
-                if first.status == ProjectionStatus::Infeasible {
-                    let iterations = first.iterations;
-                    let mut clipped = self.project_clipped(&given, warm_start);
-                    clipped.iterations += iterations;
-                    clipped
-                } else {
-                    first
-                }
+        if let Err(status) = usable {
+            return Projection::stopped(status, self.kind);
+        }
+        self.problem.aim(unconstrained, Bounds::AsGiven);
+        let projection = if self.problem.rows.has_impossible_row() {
+            self.project_clipped(unconstrained, warm_start, 0)
+        } else {
+            let first = self.attempts(warm_start);
+            if first.status == ProjectionStatus::Infeasible {
+                self.project_clipped(unconstrained, warm_start, first.iterations)
+            } else {
+                first
             }
         };
         // Numbers near the end of their range may overflow inside: no motion rather than a broken one.
@@ -110,107 +118,109 @@ impl Projector {
     }
 
     /// The safe best answer to contradicting rows: with the bounds `min(b, 0)`, to stay is allowed.
-    fn project_clipped(&mut self, given: &Given, warm_start: &[u32]) -> Projection {
-        let clipped = Given {
-            bounds: Bounds::Clipped,
-            ..*given
-        };
-        let loaded = self.problem.load(
-            clipped.metric,
-            clipped.unconstrained,
-            clipped.rows,
-            clipped.bounds,
-        );
-        debug_assert_eq!(loaded, Loaded::Ready);
-        let mut projection = self.attempts(&clipped, warm_start);
+    #[cold]
+    fn project_clipped(
+        &mut self,
+        unconstrained: &Vector6,
+        warm_start: &[u32],
+        iterations_before: u32,
+    ) -> Projection {
+        self.problem.aim(unconstrained, Bounds::Clipped);
+        let mut projection = self.attempts(warm_start);
         projection.status = ProjectionStatus::Infeasible;
+        projection.iterations += iterations_before;
         projection
     }
 
-    /// Solves the loaded problem, again by other means while the answer is not certified; the best answer of all.
-    fn attempts(&mut self, given: &Given, warm_start: &[u32]) -> Projection {
+    /// Solves the problem, again by other means while the answer is not certified; the best answer of all.
+    #[inline]
+    fn attempts(&mut self, warm_start: &[u32]) -> Projection {
         let problem = &self.problem;
         match self.kind {
-            SolverKind::Clarabel => attempt(&mut Clarabel, problem, given, warm_start),
+            SolverKind::Clarabel => attempt(&mut Clarabel, problem, warm_start),
             SolverKind::ProjectedGaussSeidel => {
-                attempt(&mut self.gauss_seidel, problem, given, warm_start)
+                attempt(&mut self.gauss_seidel, problem, warm_start)
             }
             SolverKind::ActiveSet => {
                 let solver = self.active_set.with_pivot_rule(PivotRule::MostViolated);
-                let mut best = attempt(solver, problem, given, warm_start);
+                let best = attempt(solver, problem, warm_start);
                 if best.status == ProjectionStatus::IterationLimit {
-                    let solver = self.active_set.with_pivot_rule(PivotRule::FirstViolated);
-                    best = better(best, attempt(solver, problem, given, &[]));
+                    self.other_attempts(best)
+                } else {
+                    best
                 }
-                if best.status == ProjectionStatus::IterationLimit && self.reference_fallback {
-                    best = better(best, attempt(&mut Clarabel, problem, given, &[]));
-                }
-                best
             }
         }
+    }
+
+    /// Another order of rows, then the reference.
+    #[cold]
+    fn other_attempts(&mut self, first: Projection) -> Projection {
+        let problem = &self.problem;
+        let solver = self.active_set.with_pivot_rule(PivotRule::FirstViolated);
+        let mut best = better(first, attempt(solver, problem, &[]));
+        if best.status == ProjectionStatus::IterationLimit && self.reference_fallback {
+            best = better(best, attempt(&mut Clarabel, problem, &[]));
+        }
+        best
     }
 }
 
 /// One solver's answer, in accelerations, with the residual it really has.
 ///
 /// An answer that is not certified and pushes harder than the wish, though to stay is allowed, cannot be right; then the body stays.
-fn attempt(
-    solver: &mut impl Solve,
-    problem: &LeastDistance,
-    given: &Given,
-    warm_start: &[u32],
-) -> Projection {
+#[inline]
+fn attempt(solver: &mut impl Solve, problem: &LeastDistance, warm_start: &[u32]) -> Projection {
     let Answer {
-        correction,
+        certificate,
         active,
         outcome,
         iterations,
     } = solver.solve(problem, warm_start);
 
-    let mut acceleration = if active.is_empty() && correction == Vector6::zeros() {
-        *given.unconstrained // bit for bit: no force in free space
-    } else {
-        given.unconstrained + given.metric.unwhiten(&correction)
-    };
-    let mut active = active
-        .iter()
-        .map(|(row, multiplier)| ActiveRow {
-            row: *row,
-            multiplier: multiplier / problem.length(*row as usize),
-        })
-        .collect::<ArrayVec<_, MAX_ACTIVE>>();
-    let residual = |acceleration: &Vector6, active: &[ActiveRow]| {
-        let bound_of = |b| given.bounds.apply(b);
-        let (metric, a_u) = (given.metric, given.unconstrained);
-        residual_with_bounds(metric, a_u, given.rows, bound_of, acceleration, active).largest()
-    };
-    let mut kkt_residual = residual(&acceleration, &active);
-
     // Where to stay is allowed there is an answer: who says otherwise is wrong.
     let infeasible = outcome == Outcome::Infeasible && problem.has_positive_bound();
-    let certified = kkt_residual <= KKT_TOLERANCE; // false for NaN
-    let push = given.metric.norm(&(acceleration - given.unconstrained));
-    let bounded = push <= problem.scale() * (1.0 + KKT_TOLERANCE); // false for NaN
-    if !certified && !bounded && !problem.has_positive_bound() {
-        acceleration = Vector6::zeros();
-        active.clear();
-        kkt_residual = residual(&acceleration, &active);
-    }
-    let status = if infeasible {
-        ProjectionStatus::Infeasible
-    } else if certified {
-        ProjectionStatus::Solved
-    } else {
-        ProjectionStatus::IterationLimit
-    };
-    Projection {
-        acceleration,
-        status,
-        kkt_residual,
-        active,
+    let certified = certificate.residual() <= KKT_TOLERANCE; // false for NaN
+    let mut projection = Projection {
+        acceleration: *certificate.acceleration(),
+        status: if infeasible {
+            ProjectionStatus::Infeasible
+        } else if certified {
+            ProjectionStatus::Solved
+        } else {
+            ProjectionStatus::IterationLimit
+        },
+        kkt_residual: certificate.residual(),
+        active: active
+            .iter()
+            .map(|(row, multiplier)| ActiveRow {
+                row: *row,
+                multiplier: multiplier / problem.length(*row as usize),
+            })
+            .collect(),
         iterations,
         producer: solver.kind(),
         restarts: 0,
+    };
+    if !certified && !problem.has_positive_bound() {
+        stay_if_unbounded(problem, &mut projection);
+    }
+    projection
+}
+
+/// Replaces an answer that pushes harder than the wish by no motion.
+#[cold]
+fn stay_if_unbounded(problem: &LeastDistance, projection: &mut Projection) {
+    let push = problem
+        .metric()
+        .norm(&(projection.acceleration - problem.unconstrained()));
+    let bounded = push <= problem.scale() * (1.0 + KKT_TOLERANCE); // false for NaN
+    if !bounded {
+        let stay = -problem.metric().whiten(problem.unconstrained());
+        let certificate = Certificate::new(problem, &problem.scan(&stay), &[]);
+        projection.acceleration = Vector6::zeros();
+        projection.active.clear();
+        projection.kkt_residual = certificate.residual();
     }
 }
 
@@ -231,6 +241,7 @@ fn better(first: Projection, second: Projection) -> Projection {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quasi_statics::certificate::ActiveRows;
     use nalgebra::Matrix3;
 
     /// A solver that claims an optimum which is none.
@@ -243,10 +254,10 @@ mod tests {
             SolverKind::ActiveSet
         }
 
-        fn solve(&mut self, _problem: &LeastDistance, _warm_start: &[u32]) -> Answer {
+        fn solve(&mut self, problem: &LeastDistance, _warm_start: &[u32]) -> Answer {
             Answer {
-                correction: self.correction,
-                active: ArrayVec::new(),
+                certificate: Certificate::new(problem, &problem.scan(&self.correction), &[]),
+                active: ActiveRows::new(),
                 outcome: Outcome::Optimal,
                 iterations: 1,
             }
@@ -255,30 +266,21 @@ mod tests {
 
     const PUSH: Vector6 = Vector6::new(0.3, 0.0, -1.0, 0.0, 0.0, 0.0);
 
-    fn with_loaded_floor(check: impl Fn(&LeastDistance, &Given)) {
+    fn with_floor(check: impl Fn(&LeastDistance)) {
         let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
         let rows = [HalfSpace {
             jacobian: Vector6::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
             bound: 0.0,
         }];
-        let mut problem = LeastDistance::with_capacity(1);
-        let loaded = problem.load(&metric, &PUSH, &rows, Bounds::AsGiven);
-        assert_eq!(loaded, Loaded::Ready);
-        let given = Given {
-            metric: &metric,
-            unconstrained: &PUSH,
-            rows: &rows,
-            bounds: Bounds::AsGiven,
-        };
-        check(&problem, &given);
+        check(&LeastDistance::of(&metric, &PUSH, &rows));
     }
 
     #[test]
     fn a_wrong_answer_is_never_called_solved() {
-        with_loaded_floor(|problem, given| {
+        with_floor(|problem| {
             let small = Vector6::new(0.0, 0.0, 0.5, 0.0, 0.0, 0.0);
             for correction in [Vector6::zeros(), small, Vector6::repeat(f64::NAN)] {
-                let answer = attempt(&mut Liar { correction }, problem, given, &[]);
+                let answer = attempt(&mut Liar { correction }, problem, &[]);
                 assert_eq!(answer.status, ProjectionStatus::IterationLimit);
                 assert!(answer.kkt_residual > 0.1);
             }
@@ -287,10 +289,10 @@ mod tests {
 
     #[test]
     fn a_wrong_answer_that_pushes_too_hard_becomes_no_motion() {
-        with_loaded_floor(|problem, given| {
+        with_floor(|problem| {
             for size in [1e3, 1e200, f64::NAN, f64::INFINITY] {
                 let correction = Vector6::repeat(size);
-                let answer = attempt(&mut Liar { correction }, problem, given, &[]);
+                let answer = attempt(&mut Liar { correction }, problem, &[]);
                 assert_eq!(answer.status, ProjectionStatus::IterationLimit);
                 assert_eq!(answer.acceleration, Vector6::zeros());
             }
@@ -299,10 +301,10 @@ mod tests {
 
     #[test]
     fn the_reference_replaces_a_wrong_answer_and_says_so() {
-        with_loaded_floor(|problem, given| {
+        with_floor(|problem| {
             let correction = Vector6::zeros();
-            let wrong = attempt(&mut Liar { correction }, problem, given, &[]);
-            let right = attempt(&mut Clarabel, problem, given, &[]);
+            let wrong = attempt(&mut Liar { correction }, problem, &[]);
+            let right = attempt(&mut Clarabel, problem, &[]);
             for (first, second) in [(wrong.clone(), right.clone()), (right, wrong)] {
                 let best = better(first, second);
                 assert_eq!(best.status, ProjectionStatus::Solved);

@@ -23,7 +23,8 @@ pub(crate) fn reduce(
         for _ in 0..=MAX_ACTIVE {
             let seen = set.decompose(&normal);
             if !seen.is_dependent() {
-                set.push(row, &normal, &seen, left);
+                let offset = problem.offset(row as usize);
+                set.push(row, &normal, offset, &seen, left);
                 break;
             }
             // n = N c: the rows held take over, up to the whole force, or until one of them has none left.
@@ -42,7 +43,6 @@ pub(crate) fn reduce(
 mod tests {
     use super::*;
     use crate::quasi_statics::half_space::HalfSpace;
-    use crate::quasi_statics::least_distance::Bounds;
     use crate::quasi_statics::metric::Metric;
     use crate::spatial::Vector6;
     use nalgebra::{Matrix3, Vector3};
@@ -60,8 +60,7 @@ mod tests {
             })
             .collect();
         let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
-        let mut problem = LeastDistance::with_capacity(rows.len());
-        let _ = problem.load(&metric, &Vector6::zeros(), &rows, Bounds::AsGiven);
+        let problem = LeastDistance::of(&metric, &Vector6::zeros(), &rows);
 
         let forces = |i: u32| 0.1 + f64::from(i % 7);
         let whole: Vector6 = (0..40)
@@ -70,7 +69,10 @@ mod tests {
         let mut set = WorkingSet::new();
         reduce(&problem, (0..40).map(|i| (i, forces(i))), &mut set);
 
-        assert!(set.len() <= 3, "normals on a plane span three dimensions");
+        assert!(
+            set.rows().len() <= 3,
+            "normals on a plane span three dimensions"
+        );
         assert!(set.multipliers().iter().all(|m| *m >= 0.0));
         let reduced: Vector6 = set
             .rows()

@@ -1,9 +1,8 @@
 //! What every solver of the projection can do.
 
+use super::certificate::{ActiveRows, Certificate};
 use super::least_distance::LeastDistance;
-use super::projection::{MAX_ACTIVE, SolverKind};
-use crate::spatial::Vector6;
-use arrayvec::ArrayVec;
+use super::projection::SolverKind;
 
 /// How a solver ended, by its own account; the projector checks it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,10 +15,10 @@ pub(crate) enum Outcome {
 /// A solver's answer in the coordinates of the least-distance problem.
 #[derive(Clone, Debug)]
 pub(crate) struct Answer {
-    /// `y = L^T (a - a_u)`.
-    pub(crate) correction: Vector6,
+    /// Where the solver arrived, `y = L^T (a - a_u)`, and how optimal that is with `active`.
+    pub(crate) certificate: Certificate,
     /// Rows with their multipliers, for unit rows; `y = sum lambda_k n_k`.
-    pub(crate) active: ArrayVec<(u32, f64), MAX_ACTIVE>,
+    pub(crate) active: ActiveRows,
     pub(crate) outcome: Outcome,
     pub(crate) iterations: u32,
 }

@@ -3,14 +3,19 @@
 //! | symbol | name in code | meaning                                                                        |
 //! |--------|--------------|--------------------------------------------------------------------------------|
 //! | N      | `normals`    | 6 x k, columns are the unit normals of the rows held                            |
-//! | Q, R   | `q`, `r`     | `N = Q R`, Q has orthonormal columns, R is upper triangular                     |
+//! | h      | `offsets`    | `N^T y = h` holds them                                                          |
+//! | Q      | `q`          | `N = Q R`, orthonormal columns                                                  |
+//! | V      | `v`          | `R^-1`, upper triangular, so that `V Q^T` is the pseudo-inverse of N            |
 //! | lambda | `multiplier` | `y = N lambda`; a row pushes only if lambda > 0                                 |
 //!
-//! Rows are added by Gram-Schmidt done twice and removed by Givens rotations: N is never factorised anew.
+//! Rows are added by Gram-Schmidt and removed by rotations of the columns of V and Q: N is factorised anew only when rounding of many
+//! updates might have piled up. Columns are padded to eight lanes and absent ones are zero, so that every product is a fixed
+//! number of vector instructions.
 //!
 //! Source: Goldfarb, Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs";
 //! Daniel, Gragg, Kaufman, Stewart 1976, for the updates.
 
+use super::lanes::{Lanes8, add_scaled, combine, dot, products, vector6, widened};
 use super::least_distance::LeastDistance;
 use super::projection::MAX_ACTIVE;
 use crate::spatial::Vector6;
@@ -23,14 +28,18 @@ pub(crate) const DEPENDENT_SINE: f64 = 1e-10;
 /// noise made blocking would hand an arbitrary force to the others.
 const COEFFICIENT_TOLERANCE: f64 = 1e-9;
 
+/// A second pass of Gram-Schmidt is needed where the first one leaves less than this of a unit normal, squared: what is lost
+/// of orthogonality is one rounding over the length that is left.
+const SECOND_PASS_BELOW: f64 = 0.1;
+
+/// Rows added and removed before the factorisation is made anew.
+const MAX_UPDATES: u32 = 50;
+
 /// A normal seen from the working set: `normal = N coefficients + perpendicular`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decomposed {
-    /// `Q^T normal`.
-    in_basis: [f64; MAX_ACTIVE],
-    /// `R^-1 Q^T normal`.
-    coefficients: [f64; MAX_ACTIVE],
-    pub(crate) perpendicular: Vector6,
+    coefficients: Lanes8,
+    perpendicular: Lanes8,
     pub(crate) squared: f64,
 }
 
@@ -40,41 +49,48 @@ impl Decomposed {
     pub(crate) fn is_dependent(&self) -> bool {
         self.squared <= DEPENDENT_SINE * DEPENDENT_SINE
     }
+
+    /// The part of the normal that is perpendicular to the rows held.
+    #[inline]
+    pub(crate) fn perpendicular(&self) -> Vector6 {
+        vector6(&self.perpendicular)
+    }
 }
 
 /// The rows held at equality.
 #[derive(Clone, Debug)]
 pub(crate) struct WorkingSet {
     len: usize,
+    updates: u32,
     rows: [u32; MAX_ACTIVE],
-    multiplier: [f64; MAX_ACTIVE],
-    normals: [Vector6; MAX_ACTIVE],
+    multiplier: Lanes8,
+    offsets: Lanes8,
+    normals: [Lanes8; MAX_ACTIVE],
     /// Column k is `q[k]`.
-    q: [Vector6; MAX_ACTIVE],
-    /// Column k is `r[k]`, of which the first k + 1 entries count.
-    r: [[f64; MAX_ACTIVE]; MAX_ACTIVE],
+    q: [Lanes8; MAX_ACTIVE],
+    /// Column k is `v[k]`, of which the first k + 1 entries count.
+    v: [Lanes8; MAX_ACTIVE],
 }
+
+const ZERO: Lanes8 = [0.0; 8];
 
 impl WorkingSet {
     pub(crate) fn new() -> WorkingSet {
         WorkingSet {
             len: 0,
+            updates: 0,
             rows: [0; MAX_ACTIVE],
-            multiplier: [0.0; MAX_ACTIVE],
-            normals: [Vector6::zeros(); MAX_ACTIVE],
-            q: [Vector6::zeros(); MAX_ACTIVE],
-            r: [[0.0; MAX_ACTIVE]; MAX_ACTIVE],
+            multiplier: ZERO,
+            offsets: ZERO,
+            normals: [ZERO; MAX_ACTIVE],
+            q: [ZERO; MAX_ACTIVE],
+            v: [ZERO; MAX_ACTIVE],
         }
     }
 
     #[inline]
     pub(crate) fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    #[inline]
-    pub(crate) fn len(&self) -> usize {
-        self.len
+        *self = WorkingSet::new();
     }
 
     #[inline]
@@ -87,74 +103,121 @@ impl WorkingSet {
         &self.multiplier[..self.len]
     }
 
+    /// Whether some row held is violated by more than `tolerance` without any correction.
+    #[inline]
+    pub(crate) fn has_offset_above(&self, tolerance: f64) -> bool {
+        self.offsets[..self.len].iter().any(|h| *h > tolerance)
+    }
+
+    /// Holds `rows`, in this order, as far as they exist and are independent. What is held already is not factorised anew.
+    #[inline]
+    pub(crate) fn hold(&mut self, problem: &LeastDistance, rows: &[u32]) {
+        let mut same = rows == self.rows() && self.updates < MAX_UPDATES;
+        if same {
+            for k in 0..self.len {
+                let row = self.rows[k] as usize;
+                same &= problem.can_bind(row);
+                if !same {
+                    break;
+                }
+                same &= widened(&problem.normal(row)) == self.normals[k];
+                self.offsets[k] = problem.offset(row);
+            }
+        }
+        if same {
+            return;
+        }
+        self.clear();
+        for row in rows.iter().filter(|row| problem.can_bind(**row as usize)) {
+            let normal = problem.normal(*row as usize);
+            let seen = self.decompose(&normal);
+            if !seen.is_dependent() {
+                self.push(*row, &normal, problem.offset(*row as usize), &seen, 0.0);
+            }
+        }
+        self.updates = 0;
+    }
+
     /// Splits `normal` into a combination of the rows held and a rest perpendicular to them.
     #[inline]
     pub(crate) fn decompose(&self, normal: &Vector6) -> Decomposed {
-        let mut in_basis = [0.0; MAX_ACTIVE];
-        let mut perpendicular = *normal;
-        if self.len > 0 {
+        let mut perpendicular = widened(normal);
+        let mut in_basis = products(&self.q, &perpendicular);
+        perpendicular = add_scaled(&perpendicular, &combine(&self.q, &in_basis), -1.0);
+        let mut squared = dot(&perpendicular, &perpendicular);
+        if squared < SECOND_PASS_BELOW {
             // Twice is enough: the second pass removes what the first left by rounding.
-            for _ in 0..2 {
-                for (k, q) in self.q[..self.len].iter().enumerate() {
-                    let along = q.dot(&perpendicular);
-                    in_basis[k] += along;
-                    perpendicular -= q * along;
-                }
-            }
+            let again = products(&self.q, &perpendicular);
+            perpendicular = add_scaled(&perpendicular, &combine(&self.q, &again), -1.0);
+            in_basis = add_scaled(&in_basis, &again, 1.0);
+            squared = dot(&perpendicular, &perpendicular);
         }
-        let squared = if self.len < MAX_ACTIVE {
-            perpendicular.norm_squared()
-        } else {
-            0.0 // six rows span everything
-        };
         Decomposed {
-            in_basis,
-            coefficients: self.solve_upper(&in_basis),
+            coefficients: combine(&self.v, &in_basis),
             perpendicular,
-            squared,
+            // Six rows span everything.
+            squared: if self.len < MAX_ACTIVE { squared } else { 0.0 },
         }
     }
 
     /// Adds an independent row with its multiplier.
-    pub(crate) fn push(&mut self, row: u32, normal: &Vector6, seen: &Decomposed, multiplier: f64) {
+    #[inline]
+    pub(crate) fn push(
+        &mut self,
+        row: u32,
+        normal: &Vector6,
+        offset: f64,
+        seen: &Decomposed,
+        multiplier: f64,
+    ) {
         debug_assert!(self.len < MAX_ACTIVE && !seen.is_dependent());
         if self.len == MAX_ACTIVE {
             return;
         }
         let k = self.len;
-        let height = seen.squared.sqrt();
+        let inverse_height = 1.0 / seen.squared.sqrt();
         self.rows[k] = row;
         self.multiplier[k] = multiplier;
-        self.normals[k] = *normal;
-        self.q[k] = seen.perpendicular / height;
-        self.r[k] = seen.in_basis;
-        self.r[k][k] = height;
+        self.offsets[k] = offset;
+        self.normals[k] = widened(normal);
+        // The new column of R is (Q^T n, height); that of its inverse is (-V Q^T n, 1) / height.
+        self.q[k] = add_scaled(&ZERO, &seen.perpendicular, inverse_height);
+        self.v[k] = add_scaled(&ZERO, &seen.coefficients, -inverse_height);
+        self.v[k][k] = inverse_height;
         self.len = k + 1;
+        self.updates += 1;
     }
 
     /// Drops the row at `position` of the working set.
     pub(crate) fn remove(&mut self, position: usize) {
-        for k in position + 1..self.len {
-            self.rows[k - 1] = self.rows[k];
-            self.multiplier[k - 1] = self.multiplier[k];
-            self.normals[k - 1] = self.normals[k];
-            self.r[k - 1] = self.r[k];
+        let last = self.len - 1;
+        // Rotate until the dropped row of V is zero but for the last column; then both can go.
+        for k in position..last {
+            let (a, b) = (self.v[k][position], self.v[k + 1][position]);
+            let h = (a * a + b * b).sqrt();
+            let (cosine, sine) = if h > 0.0 { (b / h, a / h) } else { (1.0, 0.0) };
+            rotate(&mut self.v, k, cosine, sine);
+            rotate(&mut self.q, k, cosine, sine);
         }
-        self.len -= 1;
-        // R lost a column and is upper Hessenberg from there on: rotate each subdiagonal entry away.
-        for k in position..self.len {
-            let (a, b) = (self.r[k][k], self.r[k][k + 1]);
-            let h = a.hypot(b);
-            let (cosine, sine) = if h > 0.0 { (a / h, b / h) } else { (1.0, 0.0) };
-            for column in &mut self.r[k..self.len] {
-                let (x, y) = (column[k], column[k + 1]);
-                column[k] = cosine * x + sine * y;
-                column[k + 1] = cosine * y - sine * x;
+        for k in position..last {
+            self.rows[k] = self.rows[k + 1];
+            self.multiplier[k] = self.multiplier[k + 1];
+            self.offsets[k] = self.offsets[k + 1];
+            self.normals[k] = self.normals[k + 1];
+            for column in &mut self.v[..last] {
+                column[k] = column[k + 1];
             }
-            let (x, y) = (self.q[k], self.q[k + 1]);
-            self.q[k] = x * cosine + y * sine;
-            self.q[k + 1] = y * cosine - x * sine;
         }
+        for column in &mut self.v[..last] {
+            column[last] = 0.0;
+        }
+        self.multiplier[last] = 0.0;
+        self.offsets[last] = 0.0;
+        self.normals[last] = ZERO;
+        self.q[last] = ZERO;
+        self.v[last] = ZERO;
+        self.len = last;
+        self.updates += 1;
     }
 
     /// How far the new row's multiplier may grow before one of the rows held stops pushing, and which one that is.
@@ -210,47 +273,32 @@ impl WorkingSet {
 
     /// The shortest y that holds every row of the set at equality; sets the multipliers, of either sign.
     ///
-    /// Computed from the problem, not from the path there, and refined once: rounding of the steps does not pile up.
-    pub(crate) fn solve_equalities(&mut self, problem: &LeastDistance) -> Vector6 {
-        let k = self.len;
-        let mut target = [0.0; MAX_ACTIVE];
-        for (t, row) in target.iter_mut().zip(self.rows()) {
-            *t = problem.offset(*row as usize);
-        }
+    /// Computed from the rows, not from the path there: rounding of the steps does not pile up.
+    #[inline]
+    pub(crate) fn solve_equalities(&mut self, refinement: Refinement) -> Vector6 {
         // R^T w = h, y = Q w, R lambda = w.
-        let mut w = self.solve_transposed(&target);
-        let mut y = self.combine_basis(&w);
-        let mut rest = [0.0; MAX_ACTIVE];
-        for i in 0..k {
-            rest[i] = target[i] - self.normals[i].dot(&y);
+        let mut w = products(&self.v, &self.offsets);
+        let mut y = combine(&self.q, &w);
+        if refinement == Refinement::Once {
+            let rest = add_scaled(&self.offsets, &products(&self.normals, &y), -1.0);
+            w = add_scaled(&w, &products(&self.v, &rest), 1.0);
+            y = combine(&self.q, &w);
         }
-        let correction = self.solve_transposed(&rest);
-        for (w, correction) in w.iter_mut().zip(&correction) {
-            *w += correction;
+        self.multiplier = combine(&self.v, &w);
+        if refinement == Refinement::Once {
+            let unexplained = add_scaled(&y, &combine(&self.normals, &self.multiplier), -1.0);
+            let correction = combine(&self.v, &products(&self.q, &unexplained));
+            self.multiplier = add_scaled(&self.multiplier, &correction, 1.0);
         }
-        y = self.combine_basis(&w);
-
-        self.multiplier = self.solve_upper(&w);
-        let mut unexplained = y;
-        for i in 0..k {
-            unexplained -= self.normals[i] * self.multiplier[i];
-        }
-        let mut in_basis = [0.0; MAX_ACTIVE];
-        for (x, q) in in_basis.iter_mut().zip(&self.q[..k]) {
-            *x = q.dot(&unexplained);
-        }
-        let correction = self.solve_upper(&in_basis);
-        for (multiplier, correction) in self.multiplier.iter_mut().zip(&correction) {
-            *multiplier += correction;
-        }
-        y
+        vector6(&y)
     }
 
     /// [`WorkingSet::solve_equalities`], dropping rows that pull until every one left pushes. Returns y.
-    pub(crate) fn settle(&mut self, problem: &LeastDistance) -> Vector6 {
+    #[inline]
+    pub(crate) fn settle(&mut self, refinement: Refinement) -> Vector6 {
         // Each round drops a row: at most six.
         while self.len > 0 {
-            let y = self.solve_equalities(problem);
+            let y = self.solve_equalities(refinement);
             let mut weakest = (0.0, None);
             for (k, multiplier) in self.multipliers().iter().enumerate() {
                 let pushes = *multiplier > 0.0; // false for NaN
@@ -265,40 +313,24 @@ impl WorkingSet {
         }
         Vector6::zeros()
     }
+}
 
-    /// `R x = b`.
-    #[inline]
-    fn solve_upper(&self, b: &[f64; MAX_ACTIVE]) -> [f64; MAX_ACTIVE] {
-        let mut x = *b;
-        for k in (0..self.len).rev() {
-            x[k] /= self.r[k][k];
-            for i in 0..k {
-                x[i] -= self.r[k][i] * x[k];
-            }
-        }
-        x
-    }
+/// How exactly the rows held are met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refinement {
+    /// To the rounding of the factorisation.
+    None,
+    /// One step of iterative refinement against the normals themselves.
+    Once,
+}
 
-    /// `R^T x = b`.
-    #[inline]
-    fn solve_transposed(&self, b: &[f64; MAX_ACTIVE]) -> [f64; MAX_ACTIVE] {
-        let mut x = *b;
-        for k in 0..self.len {
-            for i in 0..k {
-                x[k] -= self.r[k][i] * x[i];
-            }
-            x[k] /= self.r[k][k];
-        }
-        x
-    }
-
-    #[inline]
-    fn combine_basis(&self, w: &[f64; MAX_ACTIVE]) -> Vector6 {
-        let mut y = Vector6::zeros();
-        for (q, w) in self.q[..self.len].iter().zip(w) {
-            y += q * *w;
-        }
-        y
+/// Turns columns k and k + 1: the first one loses what the second gains.
+#[inline]
+fn rotate(columns: &mut [Lanes8; MAX_ACTIVE], k: usize, cosine: f64, sine: f64) {
+    for lane in 0..8 {
+        let (x, y) = (columns[k][lane], columns[k + 1][lane]);
+        columns[k][lane] = cosine * x - sine * y;
+        columns[k + 1][lane] = cosine * y + sine * x;
     }
 }
 
@@ -306,7 +338,6 @@ impl WorkingSet {
 mod tests {
     use super::*;
     use crate::quasi_statics::half_space::HalfSpace;
-    use crate::quasi_statics::least_distance::{Bounds, Loaded};
     use crate::quasi_statics::metric::Metric;
     use nalgebra::Matrix3;
 
@@ -321,20 +352,13 @@ mod tests {
             })
             .collect();
         let metric = Metric::new(1.0, &Matrix3::identity()).expect("a unit tensor is an inertia");
-        let mut problem = LeastDistance::with_capacity(6);
-        let loaded = problem.load(&metric, &Vector6::zeros(), &rows, Bounds::AsGiven);
-        assert_eq!(loaded, Loaded::Ready);
-        problem
+        LeastDistance::of(&metric, &Vector6::zeros(), &rows)
     }
 
     fn hold(problem: &LeastDistance, rows: &[u32]) -> WorkingSet {
         let mut set = WorkingSet::new();
-        for row in rows {
-            let normal = problem.normal(*row as usize);
-            let seen = set.decompose(&normal);
-            assert!(!seen.is_dependent());
-            set.push(*row, &normal, &seen, 0.0);
-        }
+        set.hold(problem, rows);
+        assert_eq!(set.rows(), rows, "all are independent");
         set
     }
 
@@ -344,8 +368,8 @@ mod tests {
         for removed in 0..6 {
             let mut set = hold(&problem, &[0, 1, 2, 3, 4, 5]);
             set.remove(removed);
-            let y = set.solve_equalities(&problem);
-            assert_eq!(set.len(), 5);
+            let y = set.solve_equalities(Refinement::None);
+            assert_eq!(set.rows().len(), 5);
             let mut force = Vector6::zeros();
             for (row, multiplier) in set.rows().iter().zip(set.multipliers()) {
                 assert!(problem.violation(*row as usize, &y).abs() < 1e-13);
@@ -369,7 +393,7 @@ mod tests {
     fn settling_leaves_only_rows_that_push() {
         let problem = problem();
         let mut set = hold(&problem, &[5, 4, 3, 2, 1, 0]);
-        let y = set.settle(&problem);
+        let y = set.settle(Refinement::Once);
         assert!(set.multipliers().iter().all(|m| *m > 0.0));
         for row in set.rows() {
             assert!(problem.violation(*row as usize, &y).abs() < 1e-13);
