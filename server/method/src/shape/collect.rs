@@ -264,7 +264,7 @@ fn rows_of_triangle(
         Touching::Plane(..) => {}
         Touching::Ball(_) | Touching::Capsule(..) => {
             for knob in touching.round().into_iter().flat_map(|(knobs, _)| knobs) {
-                knob_face(knob, mesh, t).map(&mut *found);
+                hand_on(knob_face(knob, mesh, t), found);
             }
         }
     }
@@ -272,19 +272,19 @@ fn rows_of_triangle(
     if owned == 0 {
         return;
     }
-    let corners = mesh.triangles()[t as usize];
-    for k in 0..3 {
+    let edges = mesh.triangle_edges(t);
+    for (k, v) in mesh.triangles()[t as usize].into_iter().enumerate() {
         if owned & (1 << k) != 0 {
             let knob = Knob {
-                at: mesh.vertices()[corners[k] as usize],
+                at: mesh.vertices()[v as usize],
                 round: 0.0,
-                cone: Cone::Vertex(mesh, corners[k]),
-                feature: Feature::Vertex(corners[k]),
+                cone: Cone::Vertex(mesh, v),
+                feature: Feature::Vertex(v),
             };
             primitive_knob(touching, &knob, found);
         }
         if owned & (8 << k) != 0 {
-            let e = mesh.triangle_edges(t)[k];
+            let e = edges[k];
             let rod = Rod {
                 ends: mesh.edges()[e as usize]
                     .vertices
@@ -298,23 +298,29 @@ fn rows_of_triangle(
     }
 }
 
+fn hand_on(row: Option<Row>, found: &mut dyn FnMut(Row)) {
+    if let Some(row) = row {
+        found(row);
+    }
+}
+
 /// Rows between a primitive and a point; the primitive first.
 fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut dyn FnMut(Row)) {
     match touching {
         Touching::Cylinder(cylinder) => {
-            cylinder.knob(other).map(found);
+            hand_on(cylinder.knob(other), found);
         }
         Touching::Plane(normal, point) => {
-            knob_plane(other, normal, point).map(|row| found(row.reversed()));
+            hand_on(knob_plane(other, normal, point).map(Row::reversed), found);
         }
         Touching::Ball(knob) => {
-            knob_knob(knob, other).map(found);
+            hand_on(knob_knob(knob, other), found);
         }
         Touching::Capsule(ends, side) => {
             for end in ends {
-                knob_knob(end, other).map(&mut *found);
+                hand_on(knob_knob(end, other), found);
             }
-            knob_rod(other, side).map(|row| found(row.reversed()));
+            hand_on(knob_rod(other, side).map(Row::reversed), found);
         }
     }
 }
@@ -323,18 +329,18 @@ fn primitive_knob(touching: &Touching, other: &Knob<'_>, found: &mut dyn FnMut(R
 fn primitive_rod(touching: &Touching, other: &Rod<'_>, found: &mut dyn FnMut(Row)) {
     match touching {
         Touching::Cylinder(cylinder) => {
-            cylinder.rod_on_side(other).map(&mut *found);
+            hand_on(cylinder.rod_on_side(other), found);
             cylinder.rod_on_rims(other, found);
         }
         Touching::Plane(..) => {} // its ends stand for it
         Touching::Ball(knob) => {
-            knob_rod(knob, other).map(found);
+            hand_on(knob_rod(knob, other), found);
         }
         Touching::Capsule(ends, side) => {
             for end in ends {
-                knob_rod(end, other).map(&mut *found);
+                hand_on(knob_rod(end, other), found);
             }
-            rod_rod(side, other).map(found);
+            hand_on(rod_rod(side, other), found);
         }
     }
 }
