@@ -2,7 +2,7 @@
 
 use super::GodObject;
 use crate::collision::Work;
-use crate::constraint::{NonPenetrationConstraint, Separation};
+use crate::constraint::NonPenetrationConstraint;
 use crate::shape;
 
 impl GodObject {
@@ -45,10 +45,10 @@ impl GodObject {
                     point: contact.point_on_obstacle,
                     normal: contact.normal,
                     gap: contact.gap,
-                    separation: Separation::of(
+                    separation: shape::separation(
                         &contact.features,
-                        (&self.world.body.mesh, &self.pose),
-                        (&obstacle.mesh, &obstacle.pose),
+                        (&self.world.body, &self.pose),
+                        (obstacle, &obstacle.pose),
                     ),
                     shading_normal,
                 });

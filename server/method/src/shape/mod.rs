@@ -15,10 +15,12 @@ mod intersection;
 mod piece;
 mod primitive;
 mod rim;
+mod separation;
 mod time_of_impact;
 
 pub use intersection::shapes_intersect;
 pub use primitive::{Nearest, Primitive, PrimitiveError};
+pub(crate) use separation::separation;
 
 use crate::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
 use crate::constraint::{Collected, Contact, collect_contacts};
