@@ -9,6 +9,7 @@ use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Pose, Settings, StartError, World, shape};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use shape_support::{Form, turned};
 use std::f64::consts::FRAC_PI_2;
 
@@ -248,7 +249,7 @@ fn mixed() -> World {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, rng_seed: RngSeed::Fixed(13), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn among_mixed_shapes_the_body_never_enters_and_keeps_its_gap(

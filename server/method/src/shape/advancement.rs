@@ -28,6 +28,8 @@ const KEPT_SHARE_OF_START_GAP: f64 = 0.9;
 const KEPT_SLACKS: f64 = 4.0;
 /// Share of the gap tolerance, above the minimum gap, at which an advance ends.
 const STOP_SHARE_OF_TOLERANCE: f64 = 0.5;
+/// A step along the normals of faces and caps that covers this share of what is left is taken without a look at closest points.
+const GOOD_SHARE: f64 = 0.25;
 /// A cylinder's axis nearer to the direction than this stands, as a sine: the first bound divides by it.
 const STANDING_SINE: f64 = 1e-9;
 
@@ -124,7 +126,14 @@ impl<'a> Search<'a> {
         let mut time = from;
         for iteration in 0..self.max_iterations {
             work.advancement_steps += 1;
-            let best = moving.best_step(still, self.stop_gap);
+            let cheap = moving.cheap_step(still, self.stop_gap);
+            let good = cheap.step >= GOOD_SHARE * (to - time)
+                && cheap.gap - self.stop_gap > self.stop_tolerance; // false for NaN
+            let best = if good {
+                cheap
+            } else {
+                moving.best_step(still, cheap, self.stop_gap)
+            };
             let far = best.gap >= self.stop_gap; // false for NaN
             if iteration == 0 && !far {
                 return Outcome::Near(best.gap);
@@ -230,9 +239,8 @@ impl Moving {
         }
     }
 
-    /// That, and the step along the closest points.
-    fn best_step(&self, still: &Still, gap_to_keep: f64) -> SafeStep {
-        let best = self.cheap_step(still, gap_to_keep);
+    /// The better of a step and that along the closest points.
+    fn best_step(&self, still: &Still, best: SafeStep, gap_to_keep: f64) -> SafeStep {
         let Still::Convex(other) = still else {
             return best;
         };
