@@ -214,12 +214,14 @@ fn measure(
     let solid = mass_properties(&body);
     let world = Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: body,
             mass: 1.0,
             inertia: solid.inertia_per_density / solid.volume,
             reference_point: solid.centroid,
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "hole".into(),
             mesh: obstacle,
             pose: obstacle_pose,

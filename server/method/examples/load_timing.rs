@@ -34,12 +34,14 @@ fn main() {
     let times = [body.1, obstacle.1];
     let world = Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: body.0,
             mass: 0.5,
             inertia: solid.inertia_per_density * (0.5 / solid.volume),
             reference_point: solid.centroid,
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "bunny".into(),
             mesh: obstacle.0,
             pose: Pose::identity(),

@@ -87,12 +87,14 @@ fn world_of(mesh: Mesh) -> Arc<World> {
     let solid = mass_properties(&mesh);
     Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: mesh.clone(),
             mass: 0.5,
             inertia: solid.inertia_per_density * (0.5 / solid.volume),
             reference_point: solid.centroid,
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "bunny".into(),
             mesh,
             pose: Pose::identity(),

@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use crate::geometry::Mesh;
 use crate::quasi_statics::Metric;
 use crate::settings::RotationMetric;
+use crate::shape::Primitive;
 use crate::spatial::Pose;
 
 /// The rigid body in the user's hand.
@@ -15,6 +16,8 @@ use crate::spatial::Pose;
 pub struct Body {
     /// Surface, in the body's own frame.
     pub mesh: Mesh,
+    /// The exact form, if it is one; the mesh, within it, then is for drawing and for independent checks.
+    pub primitive: Option<Primitive>,
     /// Mass, kg.
     pub mass: f64,
     /// Inertia tensor about the reference point, body axes, kg m^2.
@@ -54,6 +57,8 @@ pub struct Obstacle {
     pub name: String,
     /// Surface, in the obstacle's own frame.
     pub mesh: Mesh,
+    /// The exact form, if it is one; the mesh, within it, then is for drawing and for independent checks.
+    pub primitive: Option<Primitive>,
     /// World from obstacle.
     pub pose: Pose,
     /// How the surface feels.

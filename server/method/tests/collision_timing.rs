@@ -186,6 +186,7 @@ fn a_bunny_as_god_object_slides_on_a_bunny() {
     let solid = god_object::geometry::mass_properties(&bunny);
     let body = Body {
         mesh: bunny.clone(),
+        primitive: None,
         mass: 0.5,
         inertia: solid.inertia_per_density * (0.5 / solid.volume),
         reference_point: solid.centroid,
@@ -193,6 +194,7 @@ fn a_bunny_as_god_object_slides_on_a_bunny() {
     let obstacle = Obstacle {
         name: "bunny".into(),
         mesh: bunny.clone(),
+        primitive: None,
         pose: Pose::identity(),
         surface: Surface::default(),
     };

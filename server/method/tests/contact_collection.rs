@@ -242,6 +242,7 @@ fn worst_slope(m: &Mesh, pose: &Pose, feature: Feature, outward: &Vector3<f64>) 
                 .map(|w| m.vertices()[*w as usize] - m.vertices()[v as usize]);
             around.map(slope).fold(f64::NEG_INFINITY, f64::max)
         }
+        other => unreachable!("a mesh has no {other:?}"),
     }
 }
 

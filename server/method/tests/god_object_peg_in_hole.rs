@@ -28,12 +28,14 @@ fn peg_in_hole(clearance: f64, placed: &Pose) -> Arc<World> {
     let inner = (RADIUS + clearance) / (PI / f64::from(SIDES)).cos();
     Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: body,
             mass: 1.0,
             inertia,
             reference_point: Point3::origin(),
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "hole".into(),
             mesh: mesh(hole(inner, 0.03, HALF_LENGTH, SIDES)),
             pose: *placed,

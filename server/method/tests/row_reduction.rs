@@ -24,12 +24,14 @@ fn world(body: Soup, obstacle: Soup, pose: Pose) -> Arc<World> {
     let solid = mass_properties(&body);
     Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: body,
             mass: 1.0,
             inertia: solid.inertia_per_density / solid.volume,
             reference_point: Point3::origin(),
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "obstacle".into(),
             mesh: mesh(obstacle),
             pose,

@@ -12,6 +12,7 @@ mod problem;
 mod rotation;
 mod scene;
 pub mod shapes;
+mod simplify;
 mod trace;
 mod workbench;
 
@@ -29,6 +30,7 @@ pub use scene::{
     ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
     shipped_scene_text,
 };
+pub use simplify::Simplified;
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,
     TraceSample,

@@ -87,12 +87,14 @@ impl Scene {
         Self {
             world: Arc::new(World {
                 body: Body {
+                    primitive: None,
                     mesh: body,
                     mass: 1.0,
                     inertia: solid.inertia_per_density / solid.volume,
                     reference_point: solid.centroid,
                 },
                 obstacles: vec![Obstacle {
+                    primitive: None,
                     name: "obstacle".into(),
                     mesh: obstacle,
                     pose: Pose::identity(),

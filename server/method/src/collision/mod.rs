@@ -23,5 +23,5 @@ pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
 pub(crate) use facing_volumes::{FacingVolumes, for_facing_triangle_pairs};
-pub(crate) use motion::Placement;
-pub(crate) use workspace::MAX_HINTS;
+pub(crate) use motion::{Placement, RelativeMotion};
+pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

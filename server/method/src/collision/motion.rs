@@ -123,6 +123,11 @@ impl RelativeMotion {
             && self.rotation.iter().all(|c| c.is_finite())
     }
 
+    /// Bound on the path of the body's fastest point, given its radius about G, m.
+    pub(crate) fn length(&self, radius: f64) -> f64 {
+        self.velocity.norm() + self.rate * radius
+    }
+
     /// Largest coordinate that the body or the motion reaches, given its radius about G, m. Rounding is relative to it.
     pub(crate) fn reach(&self, radius: f64) -> f64 {
         self.start.amax() + self.velocity.amax() + radius + self.reference_point.coords.amax()

@@ -191,6 +191,7 @@ pub(super) fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
         Feature::Vertex(v) => mesh.vertex_owner(v),
         Feature::Edge(e) => Some(mesh.edges()[e as usize].faces[0]),
         Feature::Face(t) => Some(t),
+        Feature::Whole | Feature::Side | Feature::Cap(_) | Feature::Rim(..) => None,
     }
 }
 

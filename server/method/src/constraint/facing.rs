@@ -21,10 +21,10 @@ use crate::geometry::{Mesh, NormalCone};
 
 /// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
-pub(super) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
+pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
 /// The same for a corner over a face, rad. The normal is the face's whatever the corner does, so the row is true; it is there
 /// before the body tilts onto the corner.
-pub(super) const LOOK_AHEAD_TILT: f64 = 0.02;
+pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
 /// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
 const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
 const FOOT_TOLERANCE_PER_SIDE: f64 = 1e-9;
@@ -297,8 +297,8 @@ impl Facing<'_> {
             (Feature::Vertex(v), Feature::Vertex(w)) => {
                 self.vertex_vertex(&pair, corner(body, a, v)?, corner(obstacle, b, w)?)
             }
-            (Feature::Edge(_), Feature::Face(_))
-            | (Feature::Face(_), Feature::Edge(_) | Feature::Face(_)) => None,
+            // Faces on edges and faces are their corners' contacts; features of primitives are not those of meshes.
+            _ => None,
         }
     }
 
@@ -355,7 +355,12 @@ impl Facing<'_> {
 
 /// Whether the foot of a point lies in the triangle, to tolerance.
 #[inline]
-fn is_over(p: &Point3<f64>, t: &[Point3<f64>; 3], normal: &Vector3<f64>, gap: f64) -> bool {
+pub(crate) fn is_over(
+    p: &Point3<f64>,
+    t: &[Point3<f64>; 3],
+    normal: &Vector3<f64>,
+    gap: f64,
+) -> bool {
     (0..3).all(|k| {
         let side = t[(k + 1) % 3] - t[k];
         let inside = normal.cross(&side).dot(&(p - t[k]));
@@ -377,7 +382,12 @@ fn foot_on_side(p: &Point3<f64>, t: &[Point3<f64>; 3], side: usize) -> Option<(P
 }
 
 /// No edge at the vertex rises in `direction` by more than `tolerance`.
-fn is_in_vertex_cone(mesh: &Mesh, v: u32, direction: &Vector3<f64>, tolerance: f64) -> bool {
+pub(crate) fn is_in_vertex_cone(
+    mesh: &Mesh,
+    v: u32,
+    direction: &Vector3<f64>,
+    tolerance: f64,
+) -> bool {
     let apex = mesh.vertices()[v as usize];
     mesh.neighbours(v).iter().all(|w| {
         let edge = mesh.vertices()[*w as usize] - apex;
@@ -387,7 +397,7 @@ fn is_in_vertex_cone(mesh: &Mesh, v: u32, direction: &Vector3<f64>, tolerance: f
 }
 
 /// Neither face at the edge rises in `direction`.
-fn is_in_edge_cone(mesh: &Mesh, edge: u32, direction: &Vector3<f64>) -> bool {
+pub(crate) fn is_in_edge_cone(mesh: &Mesh, edge: u32, direction: &Vector3<f64>) -> bool {
     let edge = &mesh.edges()[edge as usize];
     let along =
         mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];

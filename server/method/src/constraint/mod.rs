@@ -15,3 +15,7 @@ pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, Purpose, RowReduction};
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
+
+pub(crate) use facing::{
+    LOOK_AHEAD_TILT, NORMAL_CONE_TOLERANCE, is_in_edge_cone, is_in_vertex_cone, is_over,
+};

@@ -39,6 +39,29 @@ pub enum Separation {
         /// Along the edge of the obstacle.
         on_obstacle: Vector3<f64>,
     },
+    /// A ball of the body's over a plane of the obstacle's: its centre counts, however it turns.
+    OfBall {
+        /// m.
+        radius: f64,
+    },
+    /// A rim of the body's over a plane of the obstacle's: its lowest point at any pose. World at x_s.
+    OfRim {
+        /// Centre of the rim, m.
+        center: Point3<f64>,
+        /// Unit, across the rim.
+        axis: Vector3<f64>,
+        /// m.
+        radius: f64,
+    },
+    /// Points or lines with balls around them: spheres, sides of capsules and cylinders, vertices, edges. World at x_s.
+    OfRods {
+        /// Unit, along the body's; zero for a point.
+        on_body: Vector3<f64>,
+        /// Unit, along the obstacle's; zero for a point.
+        on_obstacle: Vector3<f64>,
+        /// Of the balls on body and obstacle, m.
+        radii: [f64; 2],
+    },
 }
 
 impl Separation {
@@ -110,6 +133,37 @@ impl NonPenetrationConstraint {
             } => self
                 .between_lines(&x, &(turn * along), &along, &on_obstacle)
                 .unwrap_or_else(|| self.off_plane(&x)),
+            Separation::OfBall { radius } => {
+                // The centre moves; the lowest point is always below it.
+                let raised = self.normal * radius;
+                let arm = turn * (on_body + raised - start.translation.vector).coords;
+                self.off_plane(&(Point3::from(candidate.translation.vector + arm) - raised))
+            }
+            Separation::OfRim {
+                center,
+                axis,
+                radius,
+            } => {
+                let arm = turn * (center.coords - start.translation.vector);
+                let axis = turn * axis;
+                let down = axis * axis.dot(&self.normal) - self.normal;
+                let sine = down.norm();
+                let lowest = if sine > 0.0 { down / sine } else { down };
+                self.off_plane(&Point3::from(
+                    candidate.translation.vector + arm + lowest * radius,
+                ))
+            }
+            Separation::OfRods {
+                on_body: along,
+                on_obstacle,
+                radii,
+            } => {
+                let core = on_body + self.normal * radii[0];
+                let arm = turn * (core.coords - start.translation.vector);
+                let moved = Point3::from(candidate.translation.vector + arm);
+                self.between_rods(&moved, [&along, &(turn * along), &on_obstacle], radii)
+                    .unwrap_or_else(|| self.off_plane(&x))
+            }
         }
     }
 
@@ -121,6 +175,41 @@ impl NonPenetrationConstraint {
             normal: self.normal,
             gap,
         }
+    }
+
+    /// Distance of two points or lines with balls around them: the body's through `p` along `u`, which was `before`, and the obstacle's along `v`.
+    /// `None` when they meet.
+    fn between_rods(
+        &self,
+        p: &Point3<f64>,
+        [before, u, v]: [&Vector3<f64>; 3],
+        [on_body, on_obstacle]: [f64; 2],
+    ) -> Option<MovedConstraint> {
+        let q = self.point - self.normal * on_obstacle;
+        let difference = p - q;
+        let across = u.cross(v);
+        let squared = across.norm_squared();
+        let crossing = squared > PARALLEL_SINE * PARALLEL_SINE; // false for NaN
+        let (normal, foot) = if crossing {
+            let side = self.normal.dot(&before.cross(v)).signum();
+            let along_obstacle = u.cross(&difference).dot(&across) / squared;
+            (across * (side / squared.sqrt()), q + v * along_obstacle)
+        } else if *v == Vector3::zeros() {
+            let off = difference - u * u.dot(&difference);
+            (off.try_normalize(f64::MIN_POSITIVE)?, q)
+        } else {
+            let along_obstacle = v.dot(&difference);
+            let off = difference - v * along_obstacle;
+            (
+                off.try_normalize(f64::MIN_POSITIVE)?,
+                q + v * along_obstacle,
+            )
+        };
+        Some(MovedConstraint {
+            point: foot + normal * on_obstacle,
+            normal,
+            gap: normal.dot(&difference) - on_body - on_obstacle,
+        })
     }
 
     /// Distance of two lines: that of the body through `x` along `u`, which was `before`, and that of the obstacle along `v`.
@@ -157,6 +246,20 @@ mod tests {
     use crate::constraint::contact_jacobian;
     use crate::spatial::{Vector6, advance_pose};
 
+    fn rods(on_body: Vector3<f64>, on_obstacle: Vector3<f64>) -> Separation {
+        Separation::OfRods {
+            on_body,
+            on_obstacle,
+            radii: [0.02, 0.03],
+        }
+    }
+
+    /// Of a rim whose lowest point lies 5 mm below its centre and 8.7 mm along `u`: half a right angle and more.
+    fn rim_axis(normal: &Vector3<f64>, u: &Vector3<f64>) -> Vector3<f64> {
+        let radial = u * 0.75f64.sqrt() - normal * 0.5;
+        normal.cross(u).cross(&radial)
+    }
+
     fn rows() -> Vec<NonPenetrationConstraint> {
         let normal = Vector3::new(0.2, -0.3, 0.9).normalize();
         let on_body = normal.cross(&Vector3::x()).normalize();
@@ -168,6 +271,17 @@ mod tests {
                 on_body,
                 on_obstacle,
             },
+            Separation::OfBall { radius: 0.02 },
+            Separation::OfRim {
+                center: Point3::new(0.02, -0.01, 0.03) + normal * 1e-3 + normal * 5e-3
+                    - on_body * (0.01f64.powi(2) - 0.005f64.powi(2)).sqrt(),
+                axis: rim_axis(&normal, &on_body),
+                radius: 0.01,
+            },
+            rods(on_body, on_obstacle),
+            rods(on_body, Vector3::zeros()),
+            rods(Vector3::zeros(), on_obstacle),
+            rods(Vector3::zeros(), Vector3::zeros()),
         ]
         .map(|separation| NonPenetrationConstraint {
             features: FeaturePair {

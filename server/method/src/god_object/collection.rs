@@ -2,7 +2,8 @@
 
 use super::GodObject;
 use crate::collision::Work;
-use crate::constraint::{NonPenetrationConstraint, Separation, collect_contacts};
+use crate::constraint::NonPenetrationConstraint;
+use crate::shape;
 
 impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
@@ -20,10 +21,10 @@ impl GodObject {
         let placed = self.world.obstacles.iter().zip(&self.obstacles);
         for (index, (obstacle, placed)) in placed.enumerate() {
             self.contacts.clear();
-            let collected = collect_contacts(
-                &self.world.body.mesh,
+            let collected = shape::collect(
+                &self.world.body,
                 &self.pose,
-                &obstacle.mesh,
+                obstacle,
                 &placed.pose,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 distance,
@@ -52,10 +53,10 @@ impl GodObject {
                     point: contact.point_on_obstacle,
                     normal: contact.normal,
                     gap: contact.gap,
-                    separation: Separation::of(
+                    separation: shape::separation(
                         &contact.features,
-                        (&self.world.body.mesh, &self.pose),
-                        (&obstacle.mesh, &placed.pose),
+                        (&self.world.body, &self.pose),
+                        (obstacle, &placed.pose),
                     ),
                     came: placed.came(&contact.point_on_obstacle, &contact.normal),
                     shading_normal,

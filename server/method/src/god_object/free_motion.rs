@@ -1,7 +1,8 @@
 //! How far a motion is free of every obstacle: continuous collision detection, obstacle by obstacle.
 
 use super::{GodObject, StepReport};
-use crate::collision::{AdvancementSettings, Motion, TimeOfImpact, time_of_impact};
+use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
+use crate::shape;
 
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
@@ -9,10 +10,10 @@ impl GodObject {
         let settings = self.advancement();
         let mut free = 1.0;
         for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
-            let found = time_of_impact(
-                &self.world.body.mesh,
+            let found = shape::time_of_impact(
+                &self.world.body,
                 &motion,
-                &obstacle.mesh,
+                obstacle,
                 &placed.pose,
                 &settings,
                 &mut self.collision,

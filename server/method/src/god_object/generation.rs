@@ -26,11 +26,13 @@ const LOOK_AHEAD_GROWS: f64 = 1.25;
 const MAX_ATTEMPTS: u32 = 8;
 
 impl GodObject {
-    /// Whether this world's rows can be chosen by their geometry: a shaded row is not the one that the surface has, and the
-    /// paper's cone has every touching contact.
+    /// Whether this world's rows can be chosen by their geometry: exact primitives have few, a shaded row is not the one that the
+    /// surface has, and the paper's cone has every touching contact.
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
         let shaded = world.obstacles.iter().any(|o| o.surface.shading.is_some());
-        (settings.look_ahead && !shaded)
+        let exact =
+            world.body.primitive.is_some() || world.obstacles.iter().any(|o| o.primitive.is_some());
+        (settings.look_ahead && !shaded && !exact)
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 

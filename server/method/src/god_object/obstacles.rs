@@ -14,8 +14,9 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::{GodObject, StepReport};
-use crate::collision::{Motion, TimeOfImpact, time_of_impact};
+use crate::collision::{Motion, TimeOfImpact};
 use crate::constraint::NonPenetrationConstraint;
+use crate::shape;
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
 };
@@ -190,10 +191,10 @@ impl GodObject {
                 displacement: placed.left() * share,
                 reference_point: Point3::origin(),
             };
-            let found = time_of_impact(
-                &obstacle.mesh,
+            let found = shape::time_of_impact_of_obstacle(
+                obstacle,
                 &motion,
-                &self.world.body.mesh,
+                &self.world.body,
                 &self.pose,
                 &settings,
                 &mut self.collision,

@@ -1,8 +1,8 @@
 //! Whether a god-object can start where it is, and why not.
 
 use super::GodObject;
-use crate::collision::meshes_intersect;
 use crate::settings::{Settings, SettingsError};
+use crate::shape::{PrimitiveError, check_primitives, shapes_intersect};
 use crate::spatial::{Pose, pose_is_finite};
 use crate::world::World;
 
@@ -28,6 +28,14 @@ pub enum StartError {
         /// The mass given, kg.
         mass: f64,
     },
+    /// A primitive's numbers make none, or it cannot be held.
+    #[error("the primitive of \"{name}\" cannot be used: {error}")]
+    Primitive {
+        /// The obstacle's name, or `god-object`.
+        name: String,
+        /// What is wrong.
+        error: PrimitiveError,
+    },
     /// A setting is out of range.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -45,8 +53,9 @@ impl GodObject {
                 mass: world.body.mass,
             });
         }
+        check_primitives(world).map_err(|(name, error)| StartError::Primitive { name, error })?;
         for obstacle in &world.obstacles {
-            if meshes_intersect(&world.body.mesh, start, &obstacle.mesh, &obstacle.pose) {
+            if shapes_intersect(&world.body, start, obstacle, &obstacle.pose) {
                 return Err(StartError::Penetration {
                     obstacle: obstacle.name.clone(),
                 });

@@ -35,6 +35,7 @@ pub(crate) fn box_body(half: Vector3<f64>) -> Body {
     let square = half.component_mul(&half) * (4.0 / 12.0);
     Body {
         mesh: box_mesh(half),
+        primitive: None,
         mass: 1.0,
         inertia: Matrix3::from_diagonal(&Vector3::new(
             square.y + square.z,
@@ -50,6 +51,7 @@ pub(crate) fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>)
     Obstacle {
         name: name.into(),
         mesh: box_mesh(half),
+        primitive: None,
         pose: Pose::from_parts(
             center.into(),
             god_object::nalgebra::UnitQuaternion::identity(),

@@ -9,7 +9,7 @@ use crate::document::{Document, Value};
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::mesh_file::{is_mesh_path, read_mesh};
 use crate::problem::{FileError, Problem};
-use crate::scene::{Scene, shipped_scene_text};
+use crate::scene::{GOD_OBJECT_NAME, Scene, shipped_scene_text};
 use crate::trace::DeviceTrace;
 use crate::workbench::Workbench;
 
@@ -156,9 +156,25 @@ fn summarise_scene(scene: &Scene) -> Result<String, FileError> {
         .map(|b| format!("{} {}", b.name, b.mesh.triangles.len()))
         .collect();
     let (mass, stiffness) = (built.world.body.mass, built.stiffness());
-    Ok(format!(
+    let mut exact: Vec<&str> = Vec::new();
+    exact.extend(built.world.body.primitive.map(|_| GOD_OBJECT_NAME));
+    let obstacles = &built.world.obstacles;
+    exact.extend(
+        obstacles
+            .iter()
+            .filter(|o| o.primitive.is_some())
+            .map(|o| o.name.as_str()),
+    );
+    let mut summary = format!(
         "scene \"{}\", triangles: {}, mass {mass} kg, stiffness {stiffness} N/m",
         built.name,
         triangles.join(", ")
-    ))
+    );
+    if !exact.is_empty() {
+        summary += &format!(", exact: {}", exact.join(", "));
+    }
+    for simplified in &built.simplified {
+        summary += &format!("; {simplified}");
+    }
+    Ok(summary)
 }

@@ -2,7 +2,7 @@
 
 use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
-use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::load::Scene;
@@ -11,7 +11,13 @@ use crate::document::At;
 use crate::mesh_file::RawMesh;
 use crate::problem::{FileError, Problem};
 use crate::shapes;
+use crate::simplify::{Simplified, simplify};
 use crate::trace::DeviceTrace;
+
+/// How finely an exact primitive is drawn: 5,120 triangles, 2,304, 288.
+const DRAWN_SUBDIVISIONS: u32 = 4;
+const DRAWN_MERIDIANS: usize = 48;
+const DRAWN_SIDES: usize = 72;
 
 /// The god-object's name among the bodies.
 pub const GOD_OBJECT_NAME: &str = "god-object";
@@ -89,6 +95,8 @@ pub struct BuiltScene {
     pub motions: Vec<BuiltMotion>,
     /// What is drawn: the god-object first, then the obstacles in order.
     pub bodies: Vec<BuiltBody>,
+    /// How meshes were simplified, for each shape that asks for it.
+    pub simplified: Vec<Simplified>,
     /// How the scene stands on the workbench.
     pub view: View,
     /// Longest side of the box around the god-object, m.
@@ -100,12 +108,12 @@ impl Scene {
     pub fn build(&self) -> Result<BuiltScene, FileError> {
         let mut problems = Vec::new();
         let spec = &self.spec;
-        let body_mesh = self.mesh(
+        let mut body_mesh = self.mesh(
             &spec.god_object.shape,
             &spec.god_object.shape_at,
             &mut problems,
         );
-        let obstacle_meshes: Vec<Option<Mesh>> = spec
+        let mut obstacle_meshes: Vec<Option<Mesh>> = spec
             .obstacles
             .iter()
             .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
@@ -116,6 +124,16 @@ impl Scene {
         });
         let motions = self.motions(&mut problems);
         FileError::unless_empty(problems)?;
+        let named = std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, &mut body_mesh))
+            .chain(
+                spec.obstacles
+                    .iter()
+                    .zip(&mut obstacle_meshes)
+                    .map(|(o, mesh)| (&o.shape, o.name.as_str(), mesh)),
+            );
+        let simplified = named
+            .filter_map(|(shape, name, mesh)| simplify_as_asked(shape, name, mesh))
+            .collect();
 
         let Some(mesh) = body_mesh else {
             return Err(self
@@ -142,6 +160,7 @@ impl Scene {
                 Some(Obstacle {
                     name: o.name.clone(),
                     mesh: mesh?,
+                    primitive: o.shape.primitive(),
                     pose: o.pose,
                     surface: o.surface,
                 })
@@ -168,6 +187,7 @@ impl Scene {
             }),
             motions,
             bodies,
+            simplified,
             view: spec.view,
             size,
         })
@@ -211,41 +231,49 @@ impl Scene {
     /// The surface of a shape of this scene, not yet checked for being closed.
     pub(crate) fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<RawMesh, FileError> {
         Ok(match *shape {
-            Shape::Mesh { ref path, scale } => self.mesh_file(path, at)?.scaled(scale),
+            Shape::Mesh {
+                ref path, scale, ..
+            } => self.mesh_file(path, at)?.scaled(scale),
             Shape::Sphere {
                 radius,
                 subdivisions,
-            } => shapes::sphere(radius, subdivisions),
+            } => shapes::sphere(radius, subdivisions.unwrap_or(DRAWN_SUBDIVISIONS)),
             Shape::Box { half_extents } => shapes::cuboid(half_extents),
             Shape::Capsule {
                 radius,
                 half_length,
                 facets,
                 axis,
-            } => shapes::capsule(radius, half_length, facets, axis),
+            } => shapes::capsule(radius, half_length, facets.unwrap_or(DRAWN_MERIDIANS), axis),
             Shape::Cylinder {
                 radius,
                 half_length,
                 facets,
                 axis,
-            } => shapes::cylinder(radius, half_length, facets, axis),
+            } => shapes::cylinder(radius, half_length, facets.unwrap_or(DRAWN_SIDES), axis),
             Shape::BoxWithHole {
                 half_extents,
                 radius,
                 facets,
                 axis,
             } => shapes::box_with_hole(half_extents, radius, facets, axis),
-            Shape::Plane {
-                size,
-                thickness,
-                axis,
-            } => shapes::plane(size, thickness, axis),
+            Shape::Plane { plate, axis } => {
+                let [size, thickness] = plate.unwrap_or(shapes::PLATE);
+                shapes::plane(size, thickness, axis)
+            }
         })
     }
 
     fn body(&self, mesh: Mesh) -> Result<Body, FileError> {
         let spec = &self.spec.god_object;
-        let properties = mass_properties(&mesh);
+        // A half-space cannot be held: a plane in the hand is its plate.
+        let primitive = spec
+            .shape
+            .primitive()
+            .filter(|p| !matches!(p, Primitive::Plane { .. }));
+        let properties = primitive
+            .and_then(|p| p.mass_properties())
+            .unwrap_or_else(|| mass_properties(&mesh));
         let mass = match spec.mass {
             MassSpec::Mass(mass) => mass,
             MassSpec::Density(density) => density * properties.volume,
@@ -268,6 +296,7 @@ impl Scene {
             about_centroid + displaced_inertia(mass, &(properties.centroid - reference_point));
         Ok(Body {
             mesh,
+            primitive,
             mass,
             inertia,
             reference_point,
@@ -314,6 +343,20 @@ impl Scene {
         })?;
         Ok(settings)
     }
+}
+
+/// Puts a simplified mesh in the place of the file's, if the shape asks for it.
+fn simplify_as_asked(shape: &Shape, name: &str, mesh: &mut Option<Mesh>) -> Option<Simplified> {
+    let Shape::Mesh {
+        simplify: Some(max_error),
+        ..
+    } = shape
+    else {
+        return None;
+    };
+    let (coarser, report) = simplify(mesh.take()?, *max_error, name);
+    *mesh = Some(coarser);
+    Some(report)
 }
 
 fn drawn(name: &str, mesh: &Mesh, pose: Pose) -> BuiltBody {

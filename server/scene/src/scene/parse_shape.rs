@@ -6,7 +6,7 @@ use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use super::spec::Shape;
 use crate::document::{Range, Section, Value};
 use crate::rotation::unit_quaternion;
-use crate::shapes::{Axis, hole_circumradius};
+use crate::shapes::{Axis, PLATE, hole_circumradius};
 
 /// Sides of a prism: fewer make no prism, more make slivers that no hand feels.
 const FACETS: (i64, i64) = (3, 4096);
@@ -14,8 +14,8 @@ const FACETS: (i64, i64) = (3, 4096);
 const ROUND_FACETS: (i64, i64) = (8, 4096);
 /// Most subdivisions of a sphere: 1.3 million triangles.
 const MAX_SUBDIVISIONS: i64 = 8;
-/// Default sphere: 5,120 triangles.
-const SUBDIVISIONS: i64 = 4;
+/// Sides of a hole that names none, as in the paper.
+const HOLE_FACETS: usize = 66;
 /// Largest angle between faces, rad.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
@@ -41,6 +41,7 @@ pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
         found.push(Some(Shape::Mesh {
             path: path.to_owned(),
             scale,
+            simplify: simplify(&shape),
         }));
     }
     let primitives: [(&'static str, ReadPrimitive); 6] = [
@@ -77,15 +78,22 @@ pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     }
 }
 
+/// `simplify = { max_error }`: the most distance, m.
+fn simplify(shape: &Section<'_>) -> Option<f64> {
+    let section = shape.section("simplify")?;
+    let max_error = section.required_number("max_error", Range::Positive, "max_error = 1e-4");
+    section.finish();
+    max_error
+}
+
 fn axis(section: &Section<'_>, default: Axis) -> Axis {
     section.choice("axis", &AXES).unwrap_or(default)
 }
 
-fn facets(section: &Section<'_>, (low, high): (i64, i64), default: usize) -> usize {
+fn facets(section: &Section<'_>, (low, high): (i64, i64)) -> Option<usize> {
     section
         .integer("facets", low, high)
         .and_then(|n| usize::try_from(n).ok())
-        .unwrap_or(default)
 }
 
 fn radius(section: &Section<'_>) -> Option<f64> {
@@ -106,7 +114,7 @@ fn half_extents(section: &Section<'_>) -> Option<[f64; 3]> {
 fn sphere(section: &Section<'_>) -> Option<Shape> {
     let subdivisions = section
         .integer("subdivisions", 0, MAX_SUBDIVISIONS)
-        .unwrap_or(SUBDIVISIONS) as u32;
+        .map(|n| n as u32);
     Some(Shape::Sphere {
         radius: radius(section)?,
         subdivisions,
@@ -120,7 +128,7 @@ fn cuboid(section: &Section<'_>) -> Option<Shape> {
 }
 
 fn capsule(section: &Section<'_>) -> Option<Shape> {
-    let (facets, axis) = (facets(section, ROUND_FACETS, 48), axis(section, Axis::Y));
+    let (facets, axis) = (facets(section, ROUND_FACETS), axis(section, Axis::Y));
     let (radius, half_length) = (radius(section), half_length(section));
     Some(Shape::Capsule {
         radius: radius?,
@@ -131,7 +139,7 @@ fn capsule(section: &Section<'_>) -> Option<Shape> {
 }
 
 fn cylinder(section: &Section<'_>) -> Option<Shape> {
-    let (facets, axis) = (facets(section, FACETS, 72), axis(section, Axis::Y));
+    let (facets, axis) = (facets(section, FACETS), axis(section, Axis::Y));
     let (radius, half_length) = (radius(section), half_length(section));
     Some(Shape::Cylinder {
         radius: radius?,
@@ -142,7 +150,8 @@ fn cylinder(section: &Section<'_>) -> Option<Shape> {
 }
 
 fn box_with_hole(section: &Section<'_>) -> Option<Shape> {
-    let (facets, axis) = (facets(section, ROUND_FACETS, 66), axis(section, Axis::Y));
+    let facets = facets(section, ROUND_FACETS).unwrap_or(HOLE_FACETS);
+    let axis = axis(section, Axis::Y);
     let (radius, half_extents) = (radius(section), half_extents(section));
     let (radius, half_extents) = (radius?, half_extents?);
     let [u, v, _] = axis.split(half_extents);
@@ -166,11 +175,11 @@ fn box_with_hole(section: &Section<'_>) -> Option<Shape> {
 
 fn plane(section: &Section<'_>) -> Option<Shape> {
     let axis = axis(section, Axis::Z);
-    let size = section.number_or("size", Range::Positive, 1.0);
-    let thickness = section.number_or("thickness", Range::Positive, 0.1);
+    let size = section.number_or("size", Range::Positive, PLATE[0]);
+    let thickness = section.number_or("thickness", Range::Positive, PLATE[1]);
+    let bounded = section.has("size") || section.has("thickness");
     Some(Shape::Plane {
-        size,
-        thickness,
+        plate: bounded.then_some([size, thickness]),
         axis,
     })
 }

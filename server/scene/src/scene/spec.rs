@@ -1,12 +1,15 @@
 //! A scene as it was written, checked value by value but without its meshes. SI units.
 
-use god_object::{Pose, RotationMetric, SolverKind, Surface};
+use god_object::{Pose, Primitive, RotationMetric, SolverKind, Surface};
 use nalgebra::{Point3, UnitQuaternion};
 
 use crate::document::At;
-use crate::shapes::Axis;
+use crate::shapes::{Axis, exact_capsule, exact_cylinder, exact_plane, exact_sphere};
 
 /// The form of a body.
+///
+/// A primitive is exact unless its tessellation is named: what names `facets` or `subdivisions` is that mesh, and what names none is round. A plane that
+/// names neither `size` nor `thickness` is a half-space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A mesh file, relative to the scene file, else to the data directory.
@@ -15,13 +18,15 @@ pub enum Shape {
         path: String,
         /// Factor on all coordinates.
         scale: f64,
+        /// Most distance to the mesh in the file, either way, m; the mesh gets as few triangles as that allows.
+        simplify: Option<f64>,
     },
-    /// An icosphere.
+    /// A sphere, or an icosphere within it.
     Sphere {
         /// m.
         radius: f64,
-        /// 20 · 4^subdivisions triangles.
-        subdivisions: u32,
+        /// 20 · 4^subdivisions triangles; `None` is exact.
+        subdivisions: Option<u32>,
     },
     /// A box.
     Box {
@@ -34,19 +39,19 @@ pub enum Shape {
         radius: f64,
         /// Origin to the centre of either half sphere, m.
         half_length: f64,
-        /// Meridians.
-        facets: usize,
+        /// Meridians; `None` is exact.
+        facets: Option<usize>,
         /// Its axis.
         axis: Axis,
     },
-    /// A prism.
+    /// A cylinder, or a prism within it.
     Cylinder {
-        /// Of the vertices, m.
+        /// Of a prism's vertices, m.
         radius: f64,
         /// m.
         half_length: f64,
-        /// Sides.
-        facets: usize,
+        /// Sides; `None` is exact.
+        facets: Option<usize>,
         /// Its axis.
         axis: Axis,
     },
@@ -61,15 +66,39 @@ pub enum Shape {
         /// The hole's axis.
         axis: Axis,
     },
-    /// A bounded plane: a big box of this thickness whose upper face holds the origin.
+    /// A plane through the origin: a half-space, or a big box of this thickness whose upper face holds the origin.
     Plane {
-        /// Length of either side, m.
-        size: f64,
-        /// m.
-        thickness: f64,
+        /// Length of either side and thickness, m; `None` has no end. In the hand it has: a half-space cannot be held.
+        plate: Option<[f64; 2]>,
         /// The normal.
         axis: Axis,
     },
+}
+
+impl Shape {
+    /// The exact form, if the shape is one: a primitive that does not name its tessellation.
+    pub fn primitive(&self) -> Option<Primitive> {
+        match *self {
+            Self::Sphere {
+                radius,
+                subdivisions: None,
+            } => Some(exact_sphere(radius)),
+            Self::Capsule {
+                radius,
+                half_length,
+                facets: None,
+                axis,
+            } => Some(exact_capsule(radius, half_length, axis)),
+            Self::Cylinder {
+                radius,
+                half_length,
+                facets: None,
+                axis,
+            } => Some(exact_cylinder(radius, half_length, axis)),
+            Self::Plane { plate: None, axis } => Some(exact_plane(axis)),
+            _ => None,
+        }
+    }
 }
 
 /// How heavy the god-object is.

@@ -1,4 +1,6 @@
-//! Primitives as triangle meshes. In this version every primitive of a scene is tessellated.
+//! Primitives: exact, and as triangle meshes within them.
+//!
+//! A scene's primitive is exact unless it names its tessellation ([`Shape`](crate::Shape)). The mesh is drawn either way.
 //!
 //! All meshes are closed and seen anticlockwise from outside. The frame of each is centred and, where the shape has an
 //! axis, along y unless another is asked for, as in the paper's peg-in-a-hole.
@@ -8,6 +10,7 @@ mod box_with_hole;
 mod capsule;
 mod cuboid;
 mod cylinder;
+mod exact;
 mod plane;
 mod sphere;
 
@@ -17,5 +20,7 @@ pub(crate) use box_with_hole::hole_circumradius;
 pub use capsule::capsule;
 pub use cuboid::cuboid;
 pub use cylinder::cylinder;
+pub(crate) use exact::{exact_capsule, exact_cylinder, exact_plane, exact_sphere};
+pub(crate) use plane::PLATE;
 pub use plane::plane;
 pub use sphere::sphere;

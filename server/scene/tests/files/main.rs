@@ -1,7 +1,9 @@
 //! Scenes, workbenches, shapes and checks from outside the crate.
 
 mod checks;
+mod exact_shapes;
 mod generated_shapes;
 mod scene_faults;
 mod shipped;
+mod simplification;
 mod workbench_faults;

@@ -1,0 +1,76 @@
+//! Whether a closed surface runs through itself. For set-up and checks.
+
+use nalgebra::Point3;
+
+use super::distance::triangles_intersect;
+use super::mesh::Mesh;
+
+/// Faces at an edge whose normals are opposite to this cosine lie on each other.
+const FOLDED: f64 = -1.0 + 1e-12;
+
+/// Two triangles of the mesh that meet elsewhere than at corners and edges that they share; `None` when there are none.
+pub fn self_intersection(mesh: &Mesh) -> Option<[u32; 2]> {
+    let count = mesh.triangles().len() as u32;
+    let mut stack = Vec::new();
+    (0..count).find_map(|a| partner(mesh, a, &mut stack).map(|b| [a, b]))
+}
+
+/// A triangle after `a` that meets it elsewhere.
+fn partner(mesh: &Mesh, a: u32, stack: &mut Vec<u32>) -> Option<u32> {
+    let nodes = mesh.tree().nodes();
+    let corners = mesh.corners(a);
+    let (low, high) = (
+        corners[0].inf(&corners[1]).inf(&corners[2]),
+        corners[0].sup(&corners[1]).sup(&corners[2]),
+    );
+    stack.clear();
+    stack.push(0);
+    while let Some(i) = stack.pop() {
+        let node = &nodes[i as usize];
+        let (from, to) = (node.center - node.half, node.center + node.half);
+        if (0..3).any(|k| from[k] > high[k] || to[k] < low[k]) {
+            continue;
+        }
+        if !node.is_leaf() {
+            stack.extend([node.second, i + 1]);
+        } else if node.triangle > a && meet_elsewhere(mesh, a, node.triangle) {
+            return Some(node.triangle);
+        }
+    }
+    None
+}
+
+fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {
+    let (on_a, on_b) = (mesh.triangles()[a as usize], mesh.triangles()[b as usize]);
+    let own = |t: [u32; 3], other: [u32; 3]| t.into_iter().filter(move |v| !other.contains(v));
+    match own(on_a, on_b).count() {
+        3 => triangles_intersect(&mesh.corners(a), &mesh.corners(b)),
+        // One corner in common: the opposite side of either may run through the other.
+        2 => {
+            let side = |t, other| {
+                let mut ends = own(t, other).map(|v| mesh.vertices()[v as usize]);
+                ends.next().zip(ends.next())
+            };
+            let hits = |ends: Option<(Point3<f64>, Point3<f64>)>, t: u32| {
+                ends.is_some_and(|(p, q)| segment_meets(&p, &q, &mesh.corners(t)))
+            };
+            hits(side(on_a, on_b), b) || hits(side(on_b, on_a), a)
+        }
+        // An edge in common: one on the other.
+        1 => mesh.face_normal(a).dot(mesh.face_normal(b)) < FOLDED,
+        _ => true, // the same three corners
+    }
+}
+
+/// Whether a segment meets a triangle, by the signs of volumes; one in its plane does not.
+fn segment_meets(p: &Point3<f64>, q: &Point3<f64>, t: &[Point3<f64>; 3]) -> bool {
+    let volume = |a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>, d: &Point3<f64>| {
+        (b - a).cross(&(c - a)).dot(&(d - a))
+    };
+    let sides = [p, q].map(|x| volume(&t[0], &t[1], &t[2], x));
+    if sides[0] * sides[1] > 0.0 || sides == [0.0, 0.0] {
+        return false;
+    }
+    let turns = [0, 1, 2].map(|k| volume(p, q, &t[k], &t[(k + 1) % 3]));
+    turns.iter().all(|v| *v >= 0.0) || turns.iter().all(|v| *v <= 0.0)
+}

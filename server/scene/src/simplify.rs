@@ -1,0 +1,204 @@
+//! A mesh with no more triangles than a scene needs, and how far it is from the one in the file.
+//!
+//! The simplifier's own error is an estimate. What is stated here is measured afterwards, as a rigorous upper bound, both ways; a candidate beyond the
+//! limit, open, inside out or running through itself is not taken, and the next finer one is tried.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use god_object::Mesh;
+use god_object::geometry::{one_sided_distance, self_intersection};
+use indicatif::ProgressBar;
+use meshopt::SimplifyOptions;
+
+use crate::mesh_file::RawMesh;
+
+/// Errors that the simplifier is asked for, as shares of the limit: coarsest first.
+const LEVELS: [f32; 8] = [2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.15, 0.05];
+/// Most passes of the simplifier over its own answer.
+const MAX_PASSES: u32 = 8;
+/// Work that takes longer shows a bar.
+const SILENT_TIME: Duration = Duration::from_secs(2);
+
+/// How a mesh was simplified.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simplified {
+    /// `god-object`, or the obstacle's name.
+    pub body: String,
+    /// Triangles in the file.
+    pub triangles_before: usize,
+    /// Triangles that are used.
+    pub triangles_after: usize,
+    /// The limit in the scene, m.
+    pub max_error: f64,
+    /// No point of the mesh that is used is farther from the mesh in the file, m: an upper bound.
+    pub to_original: f64,
+    /// No point of the mesh in the file is farther from the mesh that is used, m: an upper bound.
+    pub from_original: f64,
+    /// Why the mesh in the file is used as it is; `None` when it was simplified.
+    pub unchanged: Option<String>,
+}
+
+impl std::fmt::Display for Simplified {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (before, after) = (self.triangles_before, self.triangles_after);
+        match &self.unchanged {
+            Some(why) => write!(
+                f,
+                "{}: not simplified within {:.3e} m, {before} triangles as in the file: {why}",
+                self.body, self.max_error
+            ),
+            None => write!(
+                f,
+                "{}: simplified from {before} to {after} triangles, at most {:.3e} m from the file's surface and the file's at most {:.3e} m from it (limit {:.3e} m)",
+                self.body, self.to_original, self.from_original, self.max_error
+            ),
+        }
+    }
+}
+
+/// The coarsest candidate within `max_error` (m) of `original`, both ways, that is closed, outward and does not run through itself; else the original.
+pub(crate) fn simplify(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
+    let before = original.triangles().len();
+    let mut bar = Bar::new(body);
+    let mut reason = "no candidate has fewer triangles".to_owned();
+    for level in LEVELS {
+        let raw = candidate(&original, max_error as f32 * level);
+        if raw.triangles.len() >= before {
+            break; // finer levels have no fewer
+        }
+        match measured(raw, &original, max_error, &mut bar) {
+            Ok((mesh, [to_original, from_original])) => {
+                let report = Simplified {
+                    body: body.to_owned(),
+                    triangles_before: before,
+                    triangles_after: mesh.triangles().len(),
+                    max_error,
+                    to_original,
+                    from_original,
+                    unchanged: None,
+                };
+                return (mesh, report);
+            }
+            Err(why) => reason = why,
+        }
+    }
+    let report = Simplified {
+        body: body.to_owned(),
+        triangles_before: before,
+        triangles_after: before,
+        max_error,
+        to_original: 0.0,
+        from_original: 0.0,
+        unchanged: Some(reason),
+    };
+    (original, report)
+}
+
+/// The simplifier's answer for an estimated error, m. Its vertices are vertices of the original, to the last digit.
+fn candidate(original: &Mesh, error: f32) -> RawMesh {
+    let [low, high] = original.bounding_box();
+    let middle = nalgebra::center(&low, &high);
+    let places: Vec<[f32; 3]> = original
+        .vertices()
+        .iter()
+        .map(|v| (v - middle).map(|c| c as f32).into())
+        .collect();
+    let mut kept: Vec<u32> = original.triangles().iter().flatten().copied().collect();
+    // One pass stops early on flat faces.
+    for _ in 0..MAX_PASSES {
+        let options = SimplifyOptions::ErrorAbsolute;
+        let fewer = meshopt::simplify_decoder(&kept, &places, 0, error, options, None);
+        let done = fewer.len() == kept.len();
+        kept = fewer;
+        if done {
+            break;
+        }
+    }
+    let mut place = vec![u32::MAX; original.vertices().len()];
+    let mut raw = RawMesh::default();
+    for corners in kept.chunks_exact(3) {
+        let mut triangle = [0; 3];
+        for (corner, v) in triangle.iter_mut().zip(corners) {
+            let at = &mut place[*v as usize];
+            if *at == u32::MAX {
+                *at = raw.vertices.len() as u32;
+                raw.vertices.push(original.vertices()[*v as usize]);
+            }
+            *corner = *at;
+        }
+        raw.triangles.push(triangle);
+    }
+    raw
+}
+
+/// The candidate as a mesh, and its distances to and from the original, m; or why it is not taken.
+fn measured(
+    raw: RawMesh,
+    original: &Mesh,
+    max_error: f64,
+    bar: &mut Bar,
+) -> Result<(Mesh, [f64; 2]), String> {
+    let mesh = Mesh::new(raw.vertices, raw.triangles)
+        .map_err(|error| format!("the candidates are not closed surfaces: {error}"))?;
+    if let Some([a, b]) = self_intersection(&mesh) {
+        return Err(format!(
+            "the candidates run through themselves, as at triangles {a} and {b}"
+        ));
+    }
+    let total = mesh.triangles().len() + original.triangles().len();
+    let mut bound = |from: &Mesh, to: &Mesh, offset: usize| {
+        let found = one_sided_distance(from, to, max_error, |done| bar.show(offset + done, total));
+        if found.at_most <= max_error {
+            Ok(found.at_most)
+        } else {
+            Err(format!(
+                "the candidates are up to {:.3e} m away",
+                found.at_least
+            ))
+        }
+    };
+    let to_original = bound(&mesh, original, 0)?;
+    let from_original = bound(original, &mesh, mesh.triangles().len())?;
+    Ok((mesh, [to_original, from_original]))
+}
+
+/// A progress bar that appears on a terminal when the work takes long.
+struct Bar {
+    started: Instant,
+    body: String,
+    shown: Option<ProgressBar>,
+}
+
+impl Bar {
+    fn new(body: &str) -> Self {
+        Self {
+            started: Instant::now(),
+            body: body.to_owned(),
+            shown: None,
+        }
+    }
+
+    fn show(&mut self, done: usize, total: usize) {
+        if self.shown.is_none()
+            && self.started.elapsed() > SILENT_TIME
+            && std::io::stderr().is_terminal()
+        {
+            let bar = ProgressBar::new(total as u64);
+            bar.println(format!("{}: measuring the simplified mesh", self.body));
+            self.shown = Some(bar);
+        }
+        if let Some(bar) = &self.shown {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Some(bar) = self.shown.take() {
+            bar.finish_and_clear();
+        }
+    }
+}

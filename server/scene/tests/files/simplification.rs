@@ -1,0 +1,220 @@
+//! Meshes with no more triangles than a scene needs: closed, not through themselves, and as near as is said.
+
+use std::path::PathBuf;
+
+use god_object::Mesh;
+use god_object::geometry::{nearest_on_mesh, one_sided_distance, self_intersection};
+use nalgebra::{Point3, Vector3};
+use taut_scene::shapes::{Axis, capsule, cuboid, sphere};
+use taut_scene::{BuiltScene, RawMesh, Scene, check, data_file, write_ply};
+
+fn built(mesh: &RawMesh, max_error: f64) -> BuiltScene {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.ply"), write_ply(mesh)).unwrap();
+    Scene::parse("s.toml", &text(max_error), folder.path())
+        .and_then(|scene| scene.build())
+        .unwrap()
+}
+
+fn text(max_error: f64) -> String {
+    format!(
+        "name = \"s\"\n[god_object]\nshape = {{ sphere = {{ radius = 0.01 }} }}\nmass = 1.0\npose = {{ position = [0.0, 0.0, 1.0] }}\n\
+         [[obstacle]]\nname = \"a\"\nshape = {{ mesh = \"a.ply\", simplify = {{ max_error = {max_error} }} }}\n"
+    )
+}
+
+fn mesh(raw: &RawMesh) -> Mesh {
+    Mesh::new(raw.vertices.clone(), raw.triangles.clone()).unwrap()
+}
+
+/// Largest distance of a dense set of points of `from` to `to`: below any true bound.
+fn sampled(from: &Mesh, to: &Mesh) -> f64 {
+    let mut farthest: f64 = 0.0;
+    for t in 0..from.triangles().len() as u32 {
+        let [a, b, c] = from.corners(t);
+        for i in 0..=6 {
+            for j in 0..=6 - i {
+                let (u, v) = (f64::from(i) / 6.0, f64::from(j) / 6.0);
+                let p = a + (b - a) * u + (c - a) * v;
+                // Every triangle, without the tree.
+                let nearest = (0..to.triangles().len() as u32)
+                    .map(|k| {
+                        let q =
+                            god_object::geometry::distance::closest_on_triangle(&p, &to.corners(k));
+                        (q.point - p).norm()
+                    })
+                    .fold(f64::INFINITY, f64::min);
+                farthest = farthest.max(nearest);
+            }
+        }
+    }
+    farthest
+}
+
+#[test]
+fn a_finely_cut_box_becomes_twelve_triangles() {
+    let n: u32 = 12;
+    let mut cut = RawMesh::default();
+    let mut face = |u: Vector3<f64>, v: Vector3<f64>| {
+        let w = u.cross(&v);
+        let first = cut.vertices.len() as u32;
+        for i in 0..=n {
+            for j in 0..=n {
+                let [s, t] = [i, j].map(|k| 2.0 * f64::from(k) / f64::from(n) - 1.0);
+                cut.vertices.push(Point3::from((u * s + v * t + w) * 0.05));
+            }
+        }
+        for i in 0..n {
+            for j in 0..n {
+                let p = first + i * (n + 1) + j;
+                let q = p + n + 1;
+                cut.triangles.push([p, q, q + 1]);
+                cut.triangles.push([p, q + 1, p + 1]);
+            }
+        }
+    };
+    for (u, v) in [(0, 1), (1, 2), (2, 0)] {
+        let (u, v) = (Vector3::ith(u, 1.0), Vector3::ith(v, 1.0));
+        face(u, v);
+        face(v, u);
+    }
+    let raw = weld(&cut);
+    let scene = built(&raw, 1e-5);
+    let report = &scene.simplified[0];
+    assert_eq!(report.triangles_before, 6 * 2 * 144);
+    assert_eq!(report.triangles_after, 12, "{report}");
+    assert!(
+        report.to_original <= 1e-5 && report.from_original <= 1e-5,
+        "{report}"
+    );
+}
+
+fn weld(raw: &RawMesh) -> RawMesh {
+    let mut vertices: Vec<Point3<f64>> = Vec::new();
+    let place = |p: &Point3<f64>, vertices: &mut Vec<Point3<f64>>| {
+        let known = vertices.iter().position(|v| (v - p).norm() < 1e-9);
+        known.unwrap_or_else(|| {
+            vertices.push(*p);
+            vertices.len() - 1
+        }) as u32
+    };
+    let triangles = raw
+        .triangles
+        .iter()
+        .map(|t| t.map(|i| place(&raw.vertices[i as usize], &mut vertices)))
+        .collect();
+    RawMesh {
+        vertices,
+        triangles,
+    }
+}
+
+#[test]
+fn what_is_said_of_the_distance_holds_and_finer_limits_keep_more() {
+    let raw = capsule(0.02, 0.03, 24, Axis::Y);
+    let original = mesh(&raw);
+    let mut last = 0;
+    for max_error in [2e-3, 1e-3, 4e-4] {
+        let scene = built(&raw, max_error);
+        let report = &scene.simplified[0];
+        let used = &scene.world.obstacles[0].mesh;
+        assert_eq!(report.triangles_after, used.triangles().len());
+        assert!(report.unchanged.is_none(), "{report}");
+        assert!(report.triangles_after > last && report.triangles_after < report.triangles_before);
+        last = report.triangles_after;
+        assert!(
+            report.to_original <= max_error && report.from_original <= max_error,
+            "{report}"
+        );
+        let (there, back) = (sampled(used, &original), sampled(&original, used));
+        assert!(
+            there <= report.to_original && back <= report.from_original,
+            "{there} {back}: {report}"
+        );
+        // The bound is worth something: not much above what is seen.
+        assert!(
+            report.from_original <= (1.1 * back).max(0.3 * max_error),
+            "{back}: {report}"
+        );
+        assert_eq!(self_intersection(used), None);
+    }
+}
+
+#[test]
+fn distances_between_surfaces_have_their_closed_form() {
+    let (small, large) = (mesh(&cuboid([0.1; 3])), mesh(&cuboid([0.11; 3])));
+    let there = one_sided_distance(&small, &large, 1.0, |_| {});
+    assert!(there.at_least <= 0.01 + 1e-12 && there.at_most >= 0.01 && there.at_most < 0.3);
+    let there = one_sided_distance(&small, &large, 0.02, |_| {});
+    assert!((0.01..0.0106).contains(&there.at_most), "{there:?}");
+    let back = one_sided_distance(&large, &small, 0.02, |_| {});
+    let corner = 0.01 * 3f64.sqrt();
+    assert!(
+        back.at_most >= corner && back.at_most < 1.06 * corner,
+        "{back:?}"
+    );
+    // Beyond the limit it gives up and says so.
+    let beyond = one_sided_distance(&large, &small, 0.015, |_| {});
+    assert!(beyond.at_most.is_infinite() && beyond.at_least > 0.015);
+    let nearest = nearest_on_mesh(&small, &Point3::new(0.15, 0.02, 0.01), 3);
+    assert!((nearest.distance - 0.05).abs() < 1e-15);
+}
+
+#[test]
+fn surfaces_that_run_through_themselves_are_found() {
+    let mut two = cuboid([0.1; 3]);
+    assert_eq!(self_intersection(&mesh(&two)), None);
+    let other = cuboid([0.1; 3]);
+    let offset = two.vertices.len() as u32;
+    two.vertices.extend(
+        other
+            .vertices
+            .iter()
+            .map(|v| v + Vector3::new(0.15, 0.03, 0.02)),
+    );
+    two.triangles
+        .extend(other.triangles.iter().map(|t| t.map(|i| i + offset)));
+    assert!(self_intersection(&mesh(&two)).is_some());
+    assert_eq!(self_intersection(&mesh(&sphere(0.1, 3))), None);
+}
+
+#[test]
+fn what_cannot_be_simplified_is_used_as_it_is_and_said() {
+    let scene = built(&cuboid([0.1; 3]), 1e-6);
+    let report = &scene.simplified[0];
+    assert_eq!((report.triangles_after, report.to_original), (12, 0.0));
+    assert!(report.to_string().contains("not simplified"), "{report}");
+}
+
+#[test]
+fn the_check_prints_triangles_and_distance() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.ply"), write_ply(&sphere(0.05, 4))).unwrap();
+    let path: PathBuf = folder.path().join("s.toml");
+    std::fs::write(&path, text(2e-4)).unwrap();
+    let report = check(&[path]).remove(0);
+    assert!(report.is_good(), "{report}");
+    assert!(
+        report.summary.contains("a: simplified from 5120 to ")
+            && report.summary.contains("(limit 2.000e-4 m)")
+            && report.summary.contains("exact: god-object"),
+        "{report}"
+    );
+}
+
+#[test]
+fn the_bunny_keeps_its_form_with_fewer_triangles() {
+    let Some(path) = data_file("bunny_27k.ply") else {
+        println!("skipped: bunny_27k.ply is not in the data directory");
+        return;
+    };
+    let raw = taut_scene::read_mesh(&path).unwrap();
+    let scene = built(&raw, 1e-3);
+    let report = &scene.simplified[0];
+    println!("{report}");
+    assert!(report.unchanged.is_none(), "{report}");
+    assert!(
+        report.triangles_after * 2 < report.triangles_before,
+        "{report}"
+    );
+}
