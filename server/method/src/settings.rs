@@ -119,7 +119,7 @@ impl Settings {
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,
-            implicit_rounds: 1,
+            implicit_rounds: 0,
             max_advancement_steps: 200,
             work_budget: None,
             solver: SolverKind::ActiveSet,

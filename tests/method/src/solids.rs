@@ -16,6 +16,7 @@ pub fn mesh(raw: RawMesh) -> Mesh {
 pub fn body(mesh: Mesh) -> Body {
     let solid = mass_properties(&mesh);
     Body {
+        primitive: None,
         mass: 1.0,
         inertia: solid.inertia_per_density / solid.volume,
         reference_point: solid.centroid,
@@ -27,6 +28,7 @@ pub fn body(mesh: Mesh) -> Body {
 #[must_use]
 pub fn obstacle(name: &str, mesh: Mesh, pose: Pose) -> Obstacle {
     Obstacle {
+        primitive: None,
         name: name.into(),
         mesh,
         pose,

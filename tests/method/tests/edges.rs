@@ -3,6 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use god_object::collision::{CollisionWorkspace, Work};
+use god_object::constraint::collect_contacts;
 use god_object::{Coupling, GodObject, Pose, Settings, World};
 use nalgebra::Vector3;
 use taut_method_tests::solids::{body, cells, mesh, obstacle};
@@ -124,7 +126,6 @@ fn the_force_on_a_cylinder_lags_by_no_more_than_its_staleness() {
 }
 
 #[test]
-#[ignore = "fails: the body stays behind, moving by short sub-steps at the minimum gap; 1.08 rad where 0.43 are allowed"]
 fn a_fast_hand_on_a_cylinder_lags_by_no_more_than_its_staleness_at_71_hertz() {
     for (radius, facets) in [(0.05, 256), (0.02, 64), (0.02, 256)] {
         lags_by_its_staleness(radius, 0.2, facets, 14);
@@ -192,13 +193,27 @@ fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
                 "c {clearance}: {}",
                 felt.wrench
             );
-            let touching = god_object
-                .constraint_set()
-                .constraints
-                .iter()
-                .filter(|row| row.gap < 2.0 * settings.rest_distance)
-                .count();
+            // The set holds the rows that are needed; the teeth touch wherever they lie on each other.
+            let touching = contacts_within(&world, god_object.pose(), 2.0 * settings.rest_distance);
             assert!(touching >= 20, "c {clearance}: {touching} contacts");
         }
     }
+}
+
+/// How many pairs of features face each other within `distance`, m.
+fn contacts_within(world: &World, pose: &Pose, distance: f64) -> usize {
+    let mut contacts = Vec::with_capacity(4096);
+    let obstacle = &world.obstacles[0];
+    let _ = collect_contacts(
+        &world.body.mesh,
+        pose,
+        &obstacle.mesh,
+        &obstacle.pose,
+        0,
+        distance,
+        &mut CollisionWorkspace::new(),
+        &mut contacts,
+        &mut Work::default(),
+    );
+    contacts.len()
 }
