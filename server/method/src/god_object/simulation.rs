@@ -141,6 +141,7 @@ impl GodObject {
         let mut update = Update {
             all_moved: device_moved + obstacles_moved,
             look_ahead: device_moved + obstacles_moved,
+            made: 0.0,
             last_motion: Vector6::zeros(),
             damping: 1.0,
         };

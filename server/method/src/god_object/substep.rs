@@ -14,6 +14,8 @@ use crate::spatial::{
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
+/// A motion that is a smaller share of the way that the update has made is not worth a search.
+const WORTH_SHARE: f64 = 0.05;
 /// How much shorter the motions become when one turns back on the last.
 const TURNING_BACK_DAMPING: f64 = 0.5;
 
@@ -24,6 +26,8 @@ pub(super) struct Update {
     pub(super) all_moved: f64,
     /// That, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
+    /// Way made by the sub-steps so far, m.
+    pub(super) made: f64,
     /// Motion of the sub-step before.
     pub(super) last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
@@ -67,13 +71,21 @@ impl GodObject {
             update.look_ahead =
                 update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
-        let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
+        // but for easing out, which is little always: a body left below the rest distance stops at every motion.
+        let little = if eases {
+            0.0
+        } else {
+            WORTH_SHARE * update.made
+        };
+        let worth_moving = covered > self.settings.motion_tolerance.max(little); // false for NaN
         if !worth_moving {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
         let time = self.go(&projected, &constrained, report);
+        update.made += covered * time;
         if time < TRUSTED_SHARE {
             self.trust_length = (covered * time).max(self.settings.rest_distance);
         } else if time >= 1.0 {
