@@ -19,7 +19,9 @@ use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
 };
-use crate::surface::{ShadedAcceleration, TexturedSurface, perturb_force};
+use crate::surface::{
+    Friction, FrictionProblem, ShadedAcceleration, StickAnchor, TexturedSurface, perturb_force,
+};
 use crate::world::World;
 
 /// Loop 2 of the method. `step` allocates nothing.
@@ -30,6 +32,9 @@ pub struct Coupling {
     /// Empty when no obstacle has a texture.
     surfaces: Vec<TexturedSurface>,
     projector: Projector,
+    /// `None` when every obstacle is frictionless.
+    friction: Option<Friction>,
+    anchor: StickAnchor,
     adaptation: Option<AdaptationState>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -85,6 +90,8 @@ impl Coupling {
             },
             surfaces,
             projector: Projector::new(settings.solver, capacity),
+            friction: Friction::of(world, settings),
+            anchor: StickAnchor::default(),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -115,11 +122,27 @@ impl Coupling {
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
         let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
         let shaded = self.gather_rows(time, &reached, &center, set);
-        let projection =
+        let mut projection =
             self.projector
                 .project(&metric, &unconstrained, &self.rows, &self.warm_start);
+        if let Some(friction) = &mut self.friction {
+            let k_s = self.settings.k_s;
+            let problem = FrictionProblem {
+                metric: &metric,
+                unconstrained: &unconstrained,
+                stuck_at: &self.anchor.acceleration(&god_object, &unconstrained, k_s),
+                reference_point: &center,
+                rows: &self.rows,
+                constraints: &set.constraints,
+            };
+            projection = friction.hold(&problem, &mut self.projector, projection);
+            let reached = &projection.acceleration;
+            self.anchor
+                .follow(&god_object, reached, k_s, friction.slid());
+        }
         if projection.status != ProjectionStatus::Solved {
             self.warm_start.clear();
+            self.anchor.forget();
             return CouplingOutput::without_force(projection.status);
         }
         self.warm_start.clear();

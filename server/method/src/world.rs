@@ -60,13 +60,15 @@ pub struct Obstacle {
     pub surface: Surface,
 }
 
-/// How a surface feels. What is `None` costs nothing.
+/// How a surface feels. What is `None` or 0 costs nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Contact normals interpolated from vertex normals, Section 6.1.
     pub shading: Option<ForceShading>,
     /// A sine that tilts the force, Section 6.2.
     pub texture: Option<SineTexture>,
+    /// Coefficient of Coulomb friction, beyond the paper; 0 is frictionless.
+    pub friction: f64,
 }
 
 /// Force shading, Section 6.1.

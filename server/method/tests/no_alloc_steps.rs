@@ -20,6 +20,7 @@ fn god_object_and_coupling_steps_allocate_nothing() {
             wavelength: 2e-3,
             amplitude: 0.2,
         }),
+        friction: 0.4,
     };
     let world = Arc::new(world);
     let settings = Settings::for_size(0.04);

@@ -6,6 +6,7 @@ use super::{GodObject, StepReport};
 use crate::constraint::contact_jacobian;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, ProjectionStatus};
 use crate::spatial::Vector6;
+use crate::surface::FrictionProblem;
 
 impl GodObject {
     /// Eq. (1) on the present constraint set; `None` when there is no certified answer.
@@ -27,9 +28,20 @@ impl GodObject {
             });
         }
         report.work.projections += 1;
-        let projection =
+        let mut projection =
             self.projector
                 .project(&metric, unconstrained, &self.rows, &self.warm_start);
+        if let Some(friction) = &mut self.friction {
+            let problem = FrictionProblem {
+                metric: &metric,
+                unconstrained,
+                stuck_at: &Vector6::zeros(),
+                reference_point: &center,
+                rows: &self.rows,
+                constraints: &self.set.constraints,
+            };
+            projection = friction.hold(&problem, &mut self.projector, projection);
+        }
         report.kkt = report.kkt.max(projection.kkt_residual);
         report.active = projection.active.len();
         report.solver_fallbacks += u32::from(projection.producer != self.settings.solver);

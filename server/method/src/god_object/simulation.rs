@@ -14,7 +14,7 @@ use crate::spatial::{
     Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
     pose_is_finite,
 };
-use crate::surface::{ShadedAcceleration, ShadingNormals};
+use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
 use crate::world::World;
 
 /// Loop 1 of the method.
@@ -26,6 +26,7 @@ pub struct GodObject {
     pub(super) set: ConstraintSet,
     pub(super) shading: Vec<Option<ShadingNormals>>,
     pub(super) projector: Projector,
+    pub(super) friction: Option<Friction>,
     pub(super) collision: CollisionWorkspace,
     pub(super) contacts: Vec<Contact>,
     pub(super) rows: Vec<HalfSpace>,
@@ -47,6 +48,7 @@ impl GodObject {
         let capacity = settings.max_constraints;
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {
+            friction: Friction::of(&world, &settings),
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
             world,
             settings,

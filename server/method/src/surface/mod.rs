@@ -1,7 +1,10 @@
 //! Surface properties: force shading and texture. Source: Ortega et al. 2007, Section 6.
 
+mod friction;
 mod shading;
 mod texture;
 
+pub(crate) use friction::StickAnchor;
+pub use friction::{Friction, FrictionProblem};
 pub use shading::{ShadedAcceleration, ShadingNormals};
 pub use texture::{TexturedSurface, perturb_force};
