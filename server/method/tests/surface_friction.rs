@@ -150,7 +150,13 @@ fn no_direction_is_preferred() {
 
 #[test]
 fn on_an_incline_the_body_sticks_below_the_angle_of_friction_and_slides_above() {
-    for (degrees, sticks) in [(5.0, true), (15.0, true), (19.5, true), (20.5, false), (30.0, false)] {
+    for (degrees, sticks) in [
+        (5.0, true),
+        (15.0, true),
+        (19.5, true),
+        (20.5, false),
+        (30.0, false),
+    ] {
         let tilt: f64 = f64::to_radians(degrees);
         let turned = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), tilt);
         let mut slope = box_obstacle("slope", Vector3::new(0.5, 0.5, 0.05), Vector3::zeros());

@@ -28,7 +28,13 @@ impl StickAnchor {
     }
 
     /// Takes the answer: the felt body goes to the constrained acceleration when a contact `slid`, else it stays.
-    pub(crate) fn follow(&mut self, god_object: &Pose, constrained: &Vector6, k_s: f64, slid: bool) {
+    pub(crate) fn follow(
+        &mut self,
+        god_object: &Pose,
+        constrained: &Vector6,
+        k_s: f64,
+        slid: bool,
+    ) {
         if slid || self.felt.is_none() {
             self.felt = Some(advance_pose(god_object, &(constrained / k_s), 1.0));
         }

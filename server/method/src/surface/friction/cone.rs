@@ -1,4 +1,5 @@
-//! The cone problem of all touching contacts, solved by block Gauss-Seidel from the answer of full stick.
+//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method, checked by block
+//! Gauss-Seidel sweeps.
 //!
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
@@ -16,8 +17,8 @@ use crate::spatial::Vector6;
 
 /// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else.
 pub(super) const MAX_CONE_CONTACTS: usize = 24;
-/// Most single contacts solved in one call: some 25 microseconds.
-const MAX_RELAXATIONS: usize = 1024;
+/// Most sweeps over the single contacts after the Newton iteration. They measure its residual and mend what little it left.
+const MAX_SWEEPS: usize = 8;
 /// A sweep that changes the correction by less than this share of its length is the last.
 const SWEEP_TOLERANCE: f64 = 1e-8;
 /// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
@@ -51,9 +52,10 @@ impl ConeProblem {
                 residual: 0.0,
             };
         }
+        self.improve(scale);
+        y = self.wrench();
         let mut residual = f64::INFINITY;
-        let sweeps = MAX_RELAXATIONS / self.contacts.len().max(1);
-        for sweep in 0..sweeps {
+        for sweep in 0..MAX_SWEEPS {
             // Forwards and backwards in turn, so that the order of the rows shows as little as it can.
             let mut change: f64 = 0.0;
             if sweep % 2 == 0 {

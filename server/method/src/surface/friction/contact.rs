@@ -24,8 +24,9 @@ pub(super) struct ConeContact {
     pub(super) slip: [f64; 2],
     pub(super) load: f64,
     pub(super) grip: [f64; 2],
-    normal_step: f64,
-    tangent_step: f64,
+    /// Multiplier that a unit of penetration or slip costs, the others held, kg.
+    pub(super) normal_step: f64,
+    pub(super) tangent_step: f64,
 }
 
 impl ConeContact {

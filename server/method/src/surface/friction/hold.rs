@@ -116,8 +116,7 @@ impl Friction {
                 self.residual = f64::INFINITY;
                 return frictionless;
             };
-            self.residual =
-                answer.residual + (correction - answer.correction).norm() / scale;
+            self.residual = answer.residual + (correction - answer.correction).norm() / scale;
             let complete = projection
                 .active
                 .iter()
@@ -206,8 +205,7 @@ impl Friction {
         projector: &mut Projector,
     ) -> Option<(Projection, Vector6)> {
         for _ in 0..=MAX_HALVINGS {
-            let pulled =
-                problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
+            let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
             let projection = projector.project(problem.metric, &pulled, problem.rows, &self.rows);
             if projection.status != ProjectionStatus::Solved {
                 return None;

@@ -4,6 +4,7 @@ mod anchor;
 mod cone;
 mod contact;
 mod hold;
+mod newton;
 
 pub(crate) use anchor::StickAnchor;
 pub use hold::{Friction, FrictionProblem};
