@@ -20,7 +20,8 @@ use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
 };
 use crate::surface::{
-    Friction, FrictionProblem, ShadedAcceleration, StickAnchor, TexturedSurface, perturb_force,
+    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, TexturedSurface,
+    perturb_force,
 };
 use crate::world::World;
 
@@ -35,6 +36,8 @@ pub struct Coupling {
     /// `None` when every obstacle is frictionless.
     friction: Option<Friction>,
     anchor: StickAnchor,
+    /// `None` unless passivity is enforced.
+    energy: Option<EnergyObserver>,
     adaptation: Option<AdaptationState>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -92,6 +95,7 @@ impl Coupling {
             projector: Projector::new(settings.solver, capacity),
             friction: Friction::of(world, settings),
             anchor: StickAnchor::default(),
+            energy: settings.passive.then(EnergyObserver::new),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -107,7 +111,7 @@ impl Coupling {
     /// A pose that is not finite gives a zero wrench and `ProjectionStatus::NotFinite`.
     pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
-            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+            return self.without_force(ProjectionStatus::NotFinite);
         }
         let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
         let device = at_reference_point(device_pose, &self.body.reference_point);
@@ -115,7 +119,7 @@ impl Coupling {
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = self.body.metric(&self.settings, &god_object) else {
-            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+            return self.without_force(ProjectionStatus::NotFinite);
         };
 
         let center = Point3::from(god_object.translation.vector);
@@ -142,8 +146,7 @@ impl Coupling {
         }
         if projection.status != ProjectionStatus::Solved {
             self.warm_start.clear();
-            self.anchor.forget();
-            return CouplingOutput::without_force(projection.status);
+            return self.without_force(projection.status);
         }
         self.warm_start.clear();
         self.warm_start
@@ -156,7 +159,14 @@ impl Coupling {
         if !self.surfaces.is_empty() {
             wrench = self.textured(&wrench, &projection, &center, set);
         }
-        let (wrench, saturated) = self.limited(&wrench);
+        let (mut wrench, mut saturated) = self.limited(&wrench);
+        if let Some(mut energy) = self.energy {
+            energy.arrive(&device);
+            let (bounded, clamped) = self.limited(&energy.within_reserve(&metric, &wrench));
+            energy.hold(&device, &bounded);
+            (wrench, saturated) = (bounded, saturated || clamped);
+            self.energy = Some(energy);
+        }
         CouplingOutput {
             wrench,
             shaded: shaded.then_some(ShadedAcceleration {
@@ -168,6 +178,20 @@ impl Coupling {
             status: projection.status,
             saturated,
         }
+    }
+
+    /// The energy at the device's port since the start; `None` unless passivity is enforced.
+    pub fn energy(&self) -> Option<&EnergyObserver> {
+        self.energy.as_ref()
+    }
+
+    /// No force, and nothing to remember of the body that it held.
+    fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
+        self.anchor.forget();
+        if let Some(energy) = &mut self.energy {
+            energy.release();
+        }
+        CouplingOutput::without_force(status)
     }
 
     /// Writes the half-spaces of the set into `rows`; says whether any is shaded.
