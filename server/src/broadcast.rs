@@ -293,6 +293,8 @@ mod tests {
             point: Point3::new(gap, 0.0, 0.0),
             normal: Vector3::z(),
             gap,
+            separation: Default::default(),
+            came: 0.0,
             shading_normal: None,
         }
     }

@@ -7,6 +7,8 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//!
 //! No collision detection, no allocation, bounded work: the god-object stands still meanwhile.
 //! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
 
@@ -14,7 +16,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
-use crate::quasi_statics::{HalfSpace, Projection, ProjectionStatus, Projector};
+use crate::implicit::{ImplicitRounds, LinearAnswer};
+use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
@@ -38,6 +41,8 @@ pub struct Coupling {
     anchor: StickAnchor,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
+    implicit: ImplicitRounds,
+    arrival: Arrival,
     adaptation: Option<AdaptationState>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -54,6 +59,32 @@ struct CoupledBody {
     reference_point: Point3<f64>,
 }
 
+/// When sets arrive: rows of obstacles that move go on with them until the next.
+#[derive(Clone, Copy, Debug, Default)]
+struct Arrival {
+    sequence: u64,
+    /// When the present set was first seen, s.
+    time: f64,
+    /// Time between the present set and the one before, s.
+    period: f64,
+}
+
+impl Arrival {
+    /// How much of an update's time has passed since the set of `sequence` came, in [0, 1]: 0 where it cannot be known.
+    fn share_of_an_update(&mut self, time: f64, sequence: u64) -> f64 {
+        if sequence != self.sequence {
+            *self = Self {
+                sequence,
+                time,
+                period: time - self.time,
+            };
+        }
+        let share = (time - self.time) / self.period;
+        let known = self.period > 0.0 && share > 0.0; // false for NaN
+        if known { share.min(1.0) } else { 0.0 }
+    }
+}
+
 /// The answer of one coupling step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingOutput {
@@ -65,7 +96,8 @@ pub struct CouplingOutput {
     pub active: usize,
     /// Relative KKT residual of the force's projection.
     pub kkt: f64,
-    /// How the projection ended. Anything but `Solved` comes with a zero wrench.
+    /// How the projection ended. Anything but `Solved` comes with a zero wrench, but for `Infeasible` between obstacles that
+    /// move: there it is the force as if they stood.
     pub status: ProjectionStatus,
     /// The norm clamp of force or torque was at work.
     pub saturated: bool,
@@ -96,6 +128,12 @@ impl Coupling {
             friction: Friction::of(world, settings),
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
+            arrival: Arrival::default(),
+            implicit: ImplicitRounds::new(
+                settings,
+                world.body.mesh.radius_about(&world.body.reference_point),
+                capacity,
+            ),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
@@ -144,7 +182,11 @@ impl Coupling {
             self.anchor
                 .follow(&god_object, reached, k_s, friction.slid());
         }
-        if projection.status != ProjectionStatus::Solved {
+        // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
+        let squeezed = projection.status == ProjectionStatus::Infeasible
+            && projection.kkt_residual <= KKT_TOLERANCE
+            && set.constraints.iter().any(|row| row.came != 0.0);
+        if projection.status != ProjectionStatus::Solved && !squeezed {
             self.warm_start.clear();
             return self.without_force(projection.status);
         }
@@ -153,9 +195,37 @@ impl Coupling {
             .extend(projection.active.iter().map(|row| row.row));
 
         // F_c = k_h M (a_c - a_u)
-        let change = projection.acceleration - unconstrained;
-        self.correction = change;
-        let mut wrench = metric.mass_matrix_times(&change) * self.settings.k_h;
+        let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let given = LinearAnswer {
+            constraints: &set.constraints,
+            rows: &self.rows,
+            start: &god_object,
+            goal: &device,
+            branch: self.rotation,
+            scale: self.settings.k_s,
+            shaded,
+            projection: &projection,
+        };
+        // Friction is on the linear rows.
+        let rough = self.friction.as_ref().is_some_and(Friction::acts);
+        let implicit = if rough {
+            None
+        } else {
+            self.implicit.solve(&mut self.projector, &given, |pose| {
+                self.body.metric(&self.settings, pose)
+            })
+        };
+        if let Some(answer) = implicit {
+            let change = answer.projection.acceleration - answer.unconstrained;
+            held = answer.metric.mass_matrix_times(&change);
+            // What follows counts from x_s.
+            let nearest = angular(&projection.acceleration) / self.settings.k_s;
+            let moved = pose_difference(&answer.reached, &god_object, &nearest);
+            projection = answer.projection;
+            projection.acceleration = moved * self.settings.k_s;
+        }
+        self.correction = projection.acceleration - unconstrained;
+        let mut wrench = held * self.settings.k_h;
         if !self.surfaces.is_empty() {
             wrench = self.textured(&wrench, &projection, &center, set);
         }
@@ -205,6 +275,7 @@ impl Coupling {
         if let Some(adaptation) = &mut self.adaptation {
             adaptation.observe(set.sequence, &set.constraints);
         }
+        let arrival = self.arrival.share_of_an_update(time, set.sequence);
         self.rows.clear();
         let mut shaded = false;
         for constraint in set.constraints.iter().take(self.settings.max_constraints) {
@@ -212,6 +283,9 @@ impl Coupling {
             shaded |= constraint.shading_normal.is_some();
             let jacobian = contact_jacobian(&normal, &constraint.point, center);
             let mut bound = self.settings.coupling_bound(constraint.gap);
+            if constraint.came != 0.0 {
+                bound += self.settings.k_s * constraint.came * arrival;
+            }
             if let Some(adaptation) = &mut self.adaptation {
                 bound = adaptation.bound(time, constraint.features, bound, jacobian.dot(reached));
             }

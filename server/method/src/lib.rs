@@ -30,6 +30,7 @@ pub mod constraint;
 mod coupling;
 pub mod geometry;
 mod god_object;
+mod implicit;
 pub mod quasi_statics;
 mod settings;
 pub mod spatial;

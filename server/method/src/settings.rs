@@ -26,6 +26,8 @@ const ACTIVATION_DISTANCE_PER_SIZE: f64 = 4e-3;
 const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.25;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
 const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
+/// Most rounds of implicit constraints: what three do not mend, the next update does.
+const MAX_IMPLICIT_ROUNDS: u32 = 3;
 
 /// What stands in the metric for the inertia tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +87,9 @@ pub struct Settings {
     pub max_constraints: usize,
     /// Most repetitions of project, move, collect within one update.
     pub max_substeps: u32,
+    /// How often a projection is repeated with its rows re-linearised where it led to, in both loops; 0 leaves them linear.
+    /// A motion that does not turn the body needs none.
+    pub implicit_rounds: u32,
     /// Most evaluations of one feature pair's gap in one collision search.
     pub max_advancement_steps: u32,
     /// Nominal microseconds of work ([`Work::nominal_us`](crate::collision::Work::nominal_us)) after which an update starts
@@ -118,6 +123,7 @@ impl Settings {
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,
+            implicit_rounds: 1,
             max_advancement_steps: 200,
             work_budget: None,
             solver: SolverKind::ActiveSet,
@@ -129,6 +135,7 @@ impl Settings {
         Self {
             look_ahead: false,
             max_substeps: 1,
+            implicit_rounds: 0,
             ..Self::for_size(size)
         }
     }
@@ -236,6 +243,13 @@ impl Settings {
             return Err(SettingsError::NotPositive {
                 key: "look_ahead_limit",
                 value: self.look_ahead_limit,
+            });
+        }
+        if self.implicit_rounds > MAX_IMPLICIT_ROUNDS {
+            return Err(SettingsError::Above {
+                key: "implicit_rounds",
+                value: f64::from(self.implicit_rounds),
+                limit: f64::from(MAX_IMPLICIT_ROUNDS),
             });
         }
         if self.max_constraints == 0 || self.max_substeps == 0 || self.max_advancement_steps == 0 {

@@ -3,7 +3,7 @@
 
 mod support;
 
-use god_object::constraint::{Feature, FeaturePair};
+use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::{ConstraintSet, Coupling, NonPenetrationConstraint, Pose, Settings};
 
@@ -37,6 +37,8 @@ fn touching(sequence: u64, face: u32) -> ConstraintSet {
         point: Point3::new(0.0, 0.0, -0.01),
         normal: Vector3::z(),
         gap: 0.0,
+        separation: Separation::default(),
+        came: 0.0,
         shading_normal: None,
     });
     set

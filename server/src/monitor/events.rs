@@ -212,6 +212,8 @@ mod tests {
                 point: Point3::origin(),
                 normal: Vector3::z(),
                 gap,
+                separation: Default::default(),
+                came: 0.0,
                 shading_normal: None,
             });
             let before = self.lines.len();

@@ -12,7 +12,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::FeaturePair;
+use super::{FeaturePair, Separation};
 use crate::spatial::{Pose, Vector6, six};
 
 /// A half-space of accelerations that one pair of facing features allows.
@@ -26,6 +26,10 @@ pub struct NonPenetrationConstraint {
     pub normal: Vector3<f64>,
     /// Distance between the features, m.
     pub gap: f64,
+    /// How the distance changes when the body turns.
+    pub separation: Separation,
+    /// How far the obstacle's point came along the normal in the update that made the set, m: 0 for what stands still.
+    pub came: f64,
     /// Interpolated normal where the surface is shaded, Section 6.1.
     pub shading_normal: Option<Vector3<f64>>,
 }

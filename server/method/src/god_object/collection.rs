@@ -2,7 +2,7 @@
 
 use super::GodObject;
 use crate::collision::Work;
-use crate::constraint::{NonPenetrationConstraint, collect_contacts};
+use crate::constraint::{NonPenetrationConstraint, Separation, collect_contacts};
 
 impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
@@ -14,13 +14,14 @@ impl GodObject {
         self.set.gap_min = f64::INFINITY;
         self.set.truncated = false;
         self.set.constraints.clear();
-        for (index, obstacle) in self.world.obstacles.iter().enumerate() {
+        let placed = self.world.obstacles.iter().zip(&self.obstacles);
+        for (index, (obstacle, placed)) in placed.enumerate() {
             self.contacts.clear();
             let collected = collect_contacts(
                 &self.world.body.mesh,
                 &self.pose,
                 &obstacle.mesh,
-                &obstacle.pose,
+                &placed.pose,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 distance,
                 &mut self.collision,
@@ -32,18 +33,28 @@ impl GodObject {
             self.set.truncated |= collected.truncated || self.contacts.len() > room;
             for contact in self.contacts.iter().take(room) {
                 let shading_normal = self.shading[index].as_ref().and_then(|normals| {
-                    normals.at(
-                        obstacle,
-                        contact.obstacle_triangle,
-                        &contact.barycentric,
-                        &contact.normal,
-                    )
+                    // Shading knows the obstacle where the world has it.
+                    let turn = placed.turned_from(obstacle);
+                    normals
+                        .at(
+                            obstacle,
+                            contact.obstacle_triangle,
+                            &contact.barycentric,
+                            &(turn.inverse() * contact.normal),
+                        )
+                        .map(|normal| turn * normal)
                 });
                 self.set.constraints.push(NonPenetrationConstraint {
                     features: contact.features,
                     point: contact.point_on_obstacle,
                     normal: contact.normal,
                     gap: contact.gap,
+                    separation: Separation::of(
+                        &contact.features,
+                        (&self.world.body.mesh, &self.pose),
+                        (&obstacle.mesh, &placed.pose),
+                    ),
+                    came: placed.came(&contact.point_on_obstacle, &contact.normal),
                     shading_normal,
                 });
             }

@@ -2,34 +2,18 @@
 
 use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact, time_of_impact};
-use crate::spatial::{Pose, Vector6};
 
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
-    pub(super) fn free_time(
-        &mut self,
-        start: &Pose,
-        displacement: &Vector6,
-        report: &mut StepReport,
-    ) -> f64 {
-        let mut motion = Motion {
-            start: *start,
-            displacement: *displacement,
-            reference_point: self.world.body.reference_point,
-        };
-        let settings = AdvancementSettings {
-            minimum_gap: self.settings.minimum_gap,
-            gap_tolerance: self.settings.gap_tolerance,
-            max_iterations: self.settings.max_advancement_steps,
-            ..AdvancementSettings::default()
-        };
+    pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
+        let settings = self.advancement();
         let mut free = 1.0;
-        for obstacle in &self.world.obstacles {
+        for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
             let found = time_of_impact(
                 &self.world.body.mesh,
                 &motion,
                 &obstacle.mesh,
-                &obstacle.pose,
+                &placed.pose,
                 &settings,
                 &mut self.collision,
                 &mut report.work,
@@ -48,5 +32,15 @@ impl GodObject {
             }
         }
         free
+    }
+
+    /// Tolerances and limits of the collision searches.
+    pub(super) fn advancement(&self) -> AdvancementSettings {
+        AdvancementSettings {
+            minimum_gap: self.settings.minimum_gap,
+            gap_tolerance: self.settings.gap_tolerance,
+            max_iterations: self.settings.max_advancement_steps,
+            ..AdvancementSettings::default()
+        }
     }
 }

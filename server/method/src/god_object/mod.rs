@@ -20,11 +20,13 @@
 //! | `free_motion.rs`| how far a motion is free of every obstacle                                        |
 //! | `collection.rs` | the constraint set of a pose                                                      |
 //! | `look_ahead.rs` | how far a published set looks ahead, and what that may cost                       |
+//! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
 //! | `report.rs`     | what one update did                                                               |
 
 mod collection;
 mod free_motion;
 mod look_ahead;
+mod obstacles;
 mod projection;
 mod report;
 mod simulation;

@@ -20,6 +20,8 @@ pub struct StepReport {
     pub solver_failures: u32,
     /// Repetitions of project, move, collect.
     pub substeps: u32,
+    /// Obstacles that did not get to their targets: the body is squeezed, or the budget ran out.
+    pub obstacles_blocked: u32,
     /// The input was not finite: nothing moved.
     pub rejected: bool,
     /// The budget or the sub-steps ran out before the motion left was below tolerance: safe, only not yet closest.

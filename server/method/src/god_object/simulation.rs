@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::obstacles::PlacedObstacle;
 use super::substep::Update;
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
 use crate::constraint::{ConstraintSet, Contact};
+use crate::implicit::ImplicitRounds;
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -22,6 +24,7 @@ use crate::world::World;
 pub struct GodObject {
     pub(super) world: Arc<World>,
     pub(super) settings: Settings,
+    pub(super) obstacles: Vec<PlacedObstacle>,
     pub(super) pose: Pose,
     pub(super) set: ConstraintSet,
     pub(super) shading: Vec<Option<ShadingNormals>>,
@@ -29,6 +32,7 @@ pub struct GodObject {
     pub(super) friction: Option<Friction>,
     pub(super) collision: CollisionWorkspace,
     pub(super) contacts: Vec<Contact>,
+    pub(super) implicit: ImplicitRounds,
     pub(super) rows: Vec<HalfSpace>,
     pub(super) warm_start: Vec<u32>,
     pub(super) rotation: Vector3<f64>,
@@ -50,6 +54,11 @@ impl GodObject {
         let mut god_object = Self {
             friction: Friction::of(&world, &settings),
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
+            obstacles: world
+                .obstacles
+                .iter()
+                .map(PlacedObstacle::at_rest)
+                .collect(),
             world,
             settings,
             pose: start,
@@ -57,6 +66,7 @@ impl GodObject {
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
+            implicit: ImplicitRounds::new(&settings, radius, capacity),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
             rotation: Vector3::zeros(),
@@ -89,7 +99,8 @@ impl GodObject {
     /// constraint set there.
     ///
     /// `shaded` is the first pass of force shading; it replaces a_u when it was computed on the present set. The bodies
-    /// never intersect on the way, whatever the input; a pose that is not finite moves nothing.
+    /// never intersect on the way, whatever the input; a pose that is not finite moves nothing. Obstacles that
+    /// [`Self::move_obstacle`] sent somewhere go there first.
     pub fn step(&mut self, device_pose: &Pose, shaded: Option<&ShadedAcceleration>) -> StepReport {
         let mut report = StepReport::default();
         if !pose_is_finite(device_pose) {
@@ -112,11 +123,15 @@ impl GodObject {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
         });
 
+        // What moves by itself comes first: the body is out of its way before it follows the hand.
+        let obstacles_moved = self.carry_obstacles(&mut report);
+
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
         let mut update = Update {
-            device_moved,
-            look_ahead: device_moved,
+            all_moved: device_moved + obstacles_moved,
+            look_ahead: device_moved + obstacles_moved,
+            made: 0.0,
             last_motion: Vector6::zeros(),
             damping: 1.0,
         };

@@ -3,21 +3,31 @@
 //! A trust length keeps the linear constraints honest on curved surfaces: it shrinks where a motion was cut short, and grows
 //! where it was free.
 
+use nalgebra::Point3;
+
+use super::projection::Projected;
 use super::{GodObject, StepReport};
-use crate::spatial::{Vector6, advance_pose, angular, from_reference_point, linear};
+use crate::collision::Motion;
+use crate::spatial::{
+    Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
+};
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
+/// A motion that is a smaller share of the way that the update has made is not worth a search.
+const WORTH_SHARE: f64 = 0.05;
 /// How much shorter the motions become when one turns back on the last.
 const TURNING_BACK_DAMPING: f64 = 0.5;
 
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Update {
-    /// Path of the device since the last update, m: it may move as far again until the next.
-    pub(super) device_moved: f64,
+    /// Path of the device and of the fastest obstacle since the last update, m: they may move as far again until the next.
+    pub(super) all_moved: f64,
     /// That, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
+    /// Way made by the sub-steps so far, m.
+    pub(super) made: f64,
     /// Motion of the sub-step before.
     pub(super) last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
@@ -44,9 +54,10 @@ impl GodObject {
         } else {
             *left
         };
-        let Some(mut constrained) = self.project(&trusted, report) else {
+        let Some(projected) = self.project(&trusted, None, report) else {
             return false;
         };
+        let mut constrained = projected.acceleration;
         // A motion that turns back on the last one says that the minimum lies between: features took turns in holding.
         if self.turns_back(&constrained, &update.last_motion) {
             update.damping *= TURNING_BACK_DAMPING;
@@ -57,20 +68,18 @@ impl GodObject {
         if report.substeps == 1 {
             // This update covers the share k_s of what is free, the next sets must serve the rest.
             update.look_ahead =
-                update.device_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
+                update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
-        let worth_moving = covered > self.settings.motion_tolerance; // false for NaN
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway.
+        let least = (WORTH_SHARE * update.made).max(self.settings.motion_tolerance);
+        let worth_moving = covered > least; // false for NaN
         if !worth_moving {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
-        let start = self.pose_at_reference_point();
-        let time = self.free_time(&start, &constrained, report);
-        if time > 0.0 {
-            let reached = advance_pose(&start, &constrained, time);
-            self.pose = from_reference_point(&reached, &self.world.body.reference_point);
-        }
+        let time = self.go(&projected, &constrained, report);
+        update.made += covered * time;
         if time < TRUSTED_SHARE {
             self.trust_length = (covered * time).max(self.settings.rest_distance);
         } else if time >= 1.0 {
@@ -87,6 +96,45 @@ impl GodObject {
         };
         self.collect(distance, &mut report.work);
         true
+    }
+
+    /// Moves the body by `displacement`, as far as it is free; the share of it that was.
+    pub(super) fn go(
+        &mut self,
+        projected: &Projected,
+        displacement: &Vector6,
+        report: &mut StepReport,
+    ) -> f64 {
+        let motion = self.motion(displacement, &projected.straight);
+        let time = self.free_time(motion, report);
+        if time > 0.0 {
+            let reached = motion.pose_at(time);
+            self.pose = from_reference_point(&reached, &motion.reference_point);
+        }
+        time
+    }
+
+    /// The motion by `displacement` of the reference point in which the body's point `straight` goes straight.
+    fn motion(&self, displacement: &Vector6, straight: &Point3<f64>) -> Motion {
+        let reference_point = self.world.body.reference_point;
+        if *straight == reference_point {
+            return Motion {
+                start: self.pose_at_reference_point(),
+                displacement: *displacement,
+                reference_point,
+            };
+        }
+        let end = advance_pose(&self.pose_at_reference_point(), displacement, 1.0);
+        let start = at_reference_point(&self.pose, straight);
+        let arrived = end * Point3::from(straight - reference_point);
+        Motion {
+            start,
+            displacement: six(
+                &(arrived.coords - start.translation.vector),
+                &angular(displacement),
+            ),
+            reference_point: *straight,
+        }
     }
 
     /// Whether one motion undoes a part of the other, points of the body weighed alike.

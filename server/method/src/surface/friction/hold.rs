@@ -35,6 +35,7 @@ pub struct Friction {
     rows: arrayvec::ArrayVec<u32, MAX_CONE_CONTACTS>,
     residual: f64,
     slid: bool,
+    acts: bool,
 }
 
 /// One projection to which friction is to be added.
@@ -70,6 +71,7 @@ impl Friction {
             rows: arrayvec::ArrayVec::new(),
             residual: 0.0,
             slid: true,
+            acts: false,
         })
     }
 
@@ -84,6 +86,11 @@ impl Friction {
         self.slid
     }
 
+    /// Whether the last answer is other than the frictionless one.
+    pub fn acts(&self) -> bool {
+        self.acts
+    }
+
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
     /// load it is returned unchanged, bit for bit.
     pub fn hold(
@@ -94,6 +101,7 @@ impl Friction {
     ) -> Projection {
         self.residual = 0.0;
         self.slid = true;
+        self.acts = false;
         if frictionless.status != ProjectionStatus::Solved || frictionless.active.is_empty() {
             return frictionless;
         }
@@ -126,6 +134,7 @@ impl Friction {
                 break;
             }
         }
+        self.acts = held.is_some();
         held.unwrap_or(frictionless)
     }
 

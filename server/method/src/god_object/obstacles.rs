@@ -1,0 +1,258 @@
+//! Obstacles that move: each has a pose to be at, and the god-object is pushed out of their way, never passed through.
+//!
+//! | symbol | name in code   | unit   | meaning                                                                      |
+//! |--------|----------------|--------|------------------------------------------------------------------------------|
+//! | u_k    | `ahead`        | m      | what the obstacle's point at contact k has still to go, times `share`        |
+//! | b_k    | `bound`        | m      | bound of the row while the obstacle stands                                   |
+//!
+//! One update alternates: every obstacle goes on towards its target as far as it is free of the body, by the same collision search with
+//! the roles exchanged; then the body is moved ahead of them by Eq. (1) with a_u = 0 and `J_k a >= b_k + n_k u_k`, as far as
+//! *it* is free of the obstacles where they are. Only one side moves at a time, so that what holds for obstacles at rest
+//! holds here: the surfaces stay apart all the way. Where the body is squeezed, the obstacle stops, lags its target, and is
+//! counted as blocked. Beyond the paper, whose obstacles stand still.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+use super::{GodObject, StepReport};
+use crate::collision::{Motion, TimeOfImpact, time_of_impact};
+use crate::constraint::NonPenetrationConstraint;
+use crate::spatial::{
+    Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
+};
+use crate::world::Obstacle;
+
+/// Most alternations of one update: a corner in the way costs one, a squeeze ends after some.
+const MAX_ALTERNATIONS: u32 = 12;
+/// How much less of its way an obstacle is to go at once when the body cannot be moved ahead of it.
+const SQUEEZED_SHARE: f64 = 0.5;
+/// Smallest such share: below it the body is held.
+const LEAST_SHARE: f64 = 1e-2;
+
+/// Where an obstacle is, and where it is to be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlacedObstacle {
+    /// World from obstacle, now.
+    pub(super) pose: Pose,
+    /// World from obstacle when the update began.
+    before: Pose,
+    target: Pose,
+    /// Radius of the mesh about its origin, m.
+    radius: f64,
+}
+
+impl PlacedObstacle {
+    pub(super) fn at_rest(obstacle: &Obstacle) -> Self {
+        Self {
+            pose: obstacle.pose,
+            before: obstacle.pose,
+            target: obstacle.pose,
+            radius: obstacle.mesh.radius_about(&Point3::origin()),
+        }
+    }
+
+    fn is_moving(&self) -> bool {
+        self.pose != self.target
+    }
+
+    fn came_here(&self) -> bool {
+        self.pose != self.before
+    }
+
+    /// Rotation since the world was made; exactly none for what never moved.
+    pub(super) fn turned_from(&self, obstacle: &Obstacle) -> UnitQuaternion<f64> {
+        if self.pose == obstacle.pose {
+            UnitQuaternion::identity()
+        } else {
+            self.pose.rotation * obstacle.pose.rotation.inverse()
+        }
+    }
+
+    /// What is left of its way.
+    fn left(&self) -> Vector6 {
+        pose_difference(&self.target, &self.pose, &Vector3::zeros())
+    }
+
+    /// Bound on the path of its fastest point over a displacement, m.
+    fn length(&self, displacement: &Vector6) -> f64 {
+        linear(displacement).norm() + self.radius * angular(displacement).norm()
+    }
+
+    /// How far its point that is now at `point` has come along `normal` in this update, m.
+    pub(super) fn came(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        if !self.came_here() {
+            return 0.0;
+        }
+        let before = self.before * self.pose.inverse_transform_point(point);
+        normal.dot(&(point - before))
+    }
+
+    /// How far its point at `point` has still to go along `normal`, m.
+    fn ahead(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        let then = self.target * self.pose.inverse_transform_point(point);
+        normal.dot(&(then - point))
+    }
+}
+
+/// What the body must make room for when it is projected.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ahead {
+    /// Share of what the obstacles have still to go.
+    share: f64,
+    /// Whether rows nearer than the rest distance are eased out at the same time.
+    eases: bool,
+}
+
+impl GodObject {
+    /// World from obstacle, for each obstacle of the world in its order: where they are now.
+    pub fn obstacle_poses(&self) -> impl ExactSizeIterator<Item = &Pose> {
+        self.obstacles.iter().map(|obstacle| &obstacle.pose)
+    }
+
+    /// Tells an obstacle where to be after the next [`Self::step`], world from obstacle. It goes there in a straight line of its frame's
+    /// origin with a constant axis of rotation, by the shorter arc.
+    ///
+    /// False, and nothing changes, for a pose that is not finite and for an index that the world does not have.
+    pub fn move_obstacle(&mut self, index: usize, target: &Pose) -> bool {
+        let Some(obstacle) = self.obstacles.get_mut(index) else {
+            return false;
+        };
+        let usable = pose_is_finite(target);
+        if usable {
+            obstacle.target = *target;
+        }
+        usable
+    }
+
+    /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, m.
+    pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> f64 {
+        let came = self.obstacles.iter().any(PlacedObstacle::came_here);
+        for obstacle in &mut self.obstacles {
+            obstacle.before = obstacle.pose;
+        }
+        let asked = self.longest_way_left();
+        if asked == 0.0 {
+            if came {
+                self.forget_arrivals();
+            }
+            return 0.0;
+        }
+        let mut share = 1.0;
+        for _ in 0..MAX_ALTERNATIONS {
+            let gone = self.advance_obstacles(share, report);
+            let budget_left = self
+                .settings
+                .work_budget
+                .is_none_or(|budget| report.work.nominal_us() < budget);
+            if self.longest_way_left() == 0.0 || share < LEAST_SHARE || !budget_left {
+                break;
+            }
+            match self.make_room(share, report) {
+                Some(made) if made + gone <= self.settings.motion_tolerance => break,
+                Some(_) => share = (share / SQUEEZED_SHARE).min(1.0),
+                None => share *= SQUEEZED_SHARE,
+            }
+        }
+        let blocked = self.obstacles.iter().filter(|o| o.is_moving()).count();
+        report.obstacles_blocked = u32::try_from(blocked).unwrap_or(u32::MAX);
+        let distance = self.settings.activation_distance;
+        self.collect(distance, &mut report.work);
+        asked
+    }
+
+    /// The obstacles stand: no row comes nearer by itself any more.
+    fn forget_arrivals(&mut self) {
+        self.set.sequence += 1;
+        for row in &mut self.set.constraints {
+            row.came = 0.0;
+        }
+    }
+
+    fn longest_way_left(&self) -> f64 {
+        self.obstacles
+            .iter()
+            .filter(|obstacle| obstacle.is_moving())
+            .map(|obstacle| obstacle.length(&obstacle.left()))
+            .fold(0.0, f64::max)
+    }
+
+    /// Every obstacle goes `share` of its way, as far as it is free of the body. The longest path made, m.
+    fn advance_obstacles(&mut self, share: f64, report: &mut StepReport) -> f64 {
+        let settings = self.advancement();
+        let mut longest: f64 = 0.0;
+        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+            if !placed.is_moving() {
+                continue;
+            }
+            let motion = Motion {
+                start: placed.pose,
+                displacement: placed.left() * share,
+                reference_point: Point3::origin(),
+            };
+            let found = time_of_impact(
+                &obstacle.mesh,
+                &motion,
+                &self.world.body.mesh,
+                &self.pose,
+                &settings,
+                &mut self.collision,
+                &mut report.work,
+            );
+            let time = match found {
+                TimeOfImpact::Separated => 1.0,
+                TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => {
+                    time.clamp(0.0, 1.0)
+                }
+                TimeOfImpact::Overlapping => 0.0,
+            };
+            if time > 0.0 {
+                longest = longest.max(placed.length(&motion.displacement) * time);
+                placed.pose = if time >= 1.0 && share >= 1.0 {
+                    placed.target
+                } else {
+                    advance_pose(&motion.start, &motion.displacement, time)
+                };
+            }
+        }
+        longest
+    }
+
+    /// Moves the body ahead of the obstacles for `share` of what they have left. The path made, m; `None` when the rows leave no room.
+    fn make_room(&mut self, share: f64, report: &mut StepReport) -> Option<f64> {
+        let way = self.longest_way_left() * share;
+        let distance = (2.0 * (self.settings.rest_distance + way))
+            .min(self.settings.activation_distance + self.affordable);
+        self.collect(distance, &mut report.work);
+        for eases in [true, false] {
+            let ahead = Ahead { share, eases };
+            let Some(projected) = self.project(&Vector6::zeros(), Some(&ahead), report) else {
+                continue;
+            };
+            if !projected.feasible {
+                continue;
+            }
+            let made = self.motion_length(&projected.acceleration);
+            let worth_moving = made > self.settings.motion_tolerance; // false for NaN
+            if !worth_moving {
+                return Some(0.0);
+            }
+            return Some(made * self.go(&projected, &projected.acceleration, report));
+        }
+        None
+    }
+
+    /// Bound of a row for which the body is to make room, m.
+    pub(super) fn bound_ahead(&self, row: &NonPenetrationConstraint, ahead: &Ahead) -> f64 {
+        let standing = self.settings.motion_bound(row.gap);
+        let standing = if ahead.eases {
+            standing
+        } else {
+            standing.min(0.0)
+        };
+        let to_go = self
+            .obstacles
+            .get(usize::from(row.features.obstacle))
+            .filter(|obstacle| obstacle.is_moving())
+            .map_or(0.0, |obstacle| obstacle.ahead(&row.point, &row.normal));
+        standing + to_go * ahead.share
+    }
+}

@@ -1,0 +1,159 @@
+//! Implicit constraints: rows re-linearised at the candidate pose, and projected again.
+//!
+//! | symbol | name in code    | unit   | meaning                                                                     |
+//! |--------|-----------------|--------|-----------------------------------------------------------------------------|
+//! | x_s    | `start`         | m, –   | pose of the reference point where the rows were collected                   |
+//! | x_g    | `goal`          | m, –   | where the body would go without rows                                        |
+//! | x_k    | `candidate`     | m, –   | where round k - 1 ended; x_1 is the answer of the linear rows               |
+//! | s      | `scale`         | –      | share of the motion that an acceleration is: 1 or k_s                       |
+//! | g, g'  | `gap`           | m      | true distance of a row's features at x_s and at x_k                         |
+//! | b      | `bound`         | m      | bound of the row at x_s                                                     |
+//!
+//! Round k solves Eq. (1) from x_k: a_u is `s (x_g - x_k)`, M is that of x_k, a row is the gradient of its true distance there and its bound
+//! `b + s (g - g')`. Where the rounds converge, the answer is the pose at which the god-object itself would come to rest, and
+//! the force is the one that is felt there. It is Gauss-Newton's scheme on poses, so that no derivative of the rotation vector
+//! appears: each round starts from zero.
+//!
+//! A motion without rotation is exact in one projection, so it costs none of this.
+//! Source: beyond Ortega et al. 2007, Section 7.3.2, which names linear constraints as a limitation.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
+use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
+use crate::settings::Settings;
+use crate::spatial::{Pose, Vector6, advance_pose, angular, pose_difference};
+
+/// The rounds after the first projection, and their memory.
+#[derive(Clone, Debug)]
+pub(crate) struct ImplicitRounds {
+    rounds: u32,
+    /// Radius of the body about the reference point, m.
+    radius: f64,
+    /// Bending of a path below which a straight row is true, m.
+    tolerance: f64,
+    rows: Vec<HalfSpace>,
+    warm_start: Vec<u32>,
+}
+
+/// What was solved first, and between which poses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinearAnswer<'a> {
+    pub(crate) constraints: &'a [NonPenetrationConstraint],
+    /// Rows at x_s in the order of the constraints.
+    pub(crate) rows: &'a [HalfSpace],
+    pub(crate) start: &'a Pose,
+    pub(crate) goal: &'a Pose,
+    /// The branch of the rotation from `start` to `goal`.
+    pub(crate) branch: Vector3<f64>,
+    pub(crate) scale: f64,
+    /// Whether rows have their shading normals.
+    pub(crate) shaded: bool,
+    pub(crate) projection: &'a Projection,
+}
+
+/// The answer of the last round.
+#[derive(Clone, Debug)]
+pub(crate) struct ImplicitAnswer {
+    /// Pose of the reference point at which the last round linearised.
+    pub(crate) linearised_at: Pose,
+    /// Pose of the reference point that it arrived at.
+    pub(crate) reached: Pose,
+    /// M at the last linearisation.
+    pub(crate) metric: Metric,
+    /// a_u of the last round.
+    pub(crate) unconstrained: Vector6,
+    pub(crate) projection: Projection,
+    pub(crate) rounds: u32,
+}
+
+impl ImplicitRounds {
+    /// Rounds for sets of at most `capacity` rows and a body of `radius` about its reference point, m.
+    pub(crate) fn new(settings: &Settings, radius: f64, capacity: usize) -> Self {
+        let capacity = if settings.implicit_rounds > 0 {
+            capacity
+        } else {
+            0
+        };
+        Self {
+            rounds: settings.implicit_rounds,
+            radius,
+            tolerance: settings.motion_tolerance,
+            rows: Vec::with_capacity(capacity),
+            warm_start: Vec::with_capacity(capacity.min(6)),
+        }
+    }
+
+    /// Projects again from where the linear rows led to. `None` when they were true, or when no round had a certified answer.
+    ///
+    /// At most `implicit_rounds` projections; no allocation unless the projector allocates.
+    pub(crate) fn solve(
+        &mut self,
+        projector: &mut Projector,
+        given: &LinearAnswer,
+        metric_at: impl Fn(&Pose) -> Option<Metric>,
+    ) -> Option<ImplicitAnswer> {
+        let nothing_held = given.projection.active.is_empty();
+        if self.rounds == 0 || nothing_held {
+            return None;
+        }
+        let full = given.projection.acceleration / given.scale;
+        let mut candidate = advance_pose(given.start, &full, 1.0);
+        let mut turned = angular(&full).norm();
+        let mut branch = given.branch - angular(&full);
+        let mut answer: Option<ImplicitAnswer> = None;
+        self.remember_active(given.projection);
+        for round in 1..=self.rounds {
+            // A point of the body leaves its tangent by at most r theta^2 / 2.
+            let bends = 0.5 * self.radius * turned * turned > self.tolerance; // false for NaN
+            if !bends {
+                break;
+            }
+            let difference = pose_difference(given.goal, &candidate, &branch);
+            let unconstrained = difference * given.scale;
+            let Some(metric) = metric_at(&candidate) else {
+                break;
+            };
+            self.relinearise(given, &candidate);
+            let projection =
+                projector.project(&metric, &unconstrained, &self.rows, &self.warm_start);
+            if projection.status != ProjectionStatus::Solved {
+                break;
+            }
+            self.remember_active(&projection);
+            let step = projection.acceleration / given.scale;
+            let reached = advance_pose(&candidate, &step, 1.0);
+            turned = angular(&step).norm();
+            branch = angular(&difference) - angular(&step);
+            answer = Some(ImplicitAnswer {
+                linearised_at: candidate,
+                reached,
+                metric,
+                unconstrained,
+                projection,
+                rounds: round,
+            });
+            candidate = reached;
+        }
+        answer
+    }
+
+    /// Every row as it is at `candidate`.
+    fn relinearise(&mut self, given: &LinearAnswer, candidate: &Pose) {
+        let center = Point3::from(candidate.translation.vector);
+        self.rows.clear();
+        for (constraint, row) in given.constraints.iter().zip(given.rows) {
+            let moved = constraint.moved(given.start, candidate, given.shaded);
+            self.rows.push(HalfSpace {
+                jacobian: contact_jacobian(&moved.normal, &moved.point, &center),
+                bound: row.bound + given.scale * (constraint.gap - moved.gap),
+            });
+        }
+    }
+
+    fn remember_active(&mut self, projection: &Projection) {
+        self.warm_start.clear();
+        self.warm_start
+            .extend(projection.active.iter().map(|active| active.row));
+    }
+}
