@@ -17,14 +17,13 @@ use nalgebra::{Point3, Vector3};
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
 use crate::implicit::{ImplicitRounds, LinearAnswer};
-use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus, Projector};
+use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
 };
 use crate::surface::{
-    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, TexturedSurface,
-    perturb_force,
+    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
 };
 use crate::world::World;
 
@@ -33,8 +32,8 @@ use crate::world::World;
 pub struct Coupling {
     settings: Settings,
     body: CoupledBody,
-    /// Empty when no obstacle has a texture.
-    surfaces: Vec<TexturedSurface>,
+    /// `None` when no obstacle has a texture.
+    textures: Option<Textures>,
     projector: Projector,
     /// `None` when every obstacle is frictionless.
     friction: Option<Friction>,
@@ -106,15 +105,6 @@ pub struct CouplingOutput {
 impl Coupling {
     /// Prepares the loop; every buffer gets its final size.
     pub fn new(world: &World, settings: &Settings) -> Self {
-        let textured = world
-            .obstacles
-            .iter()
-            .any(|obstacle| obstacle.surface.texture.is_some());
-        let surfaces = if textured {
-            world.obstacles.iter().map(Into::into).collect()
-        } else {
-            Vec::new()
-        };
         let capacity = settings.max_constraints;
         Self {
             settings: *settings,
@@ -123,7 +113,7 @@ impl Coupling {
                 inertia: world.body.inertia,
                 reference_point: world.body.reference_point,
             },
-            surfaces,
+            textures: Textures::of(world),
             projector: Projector::new(settings.solver, capacity),
             friction: Friction::of(world, settings),
             anchor: StickAnchor::default(),
@@ -177,7 +167,11 @@ impl Coupling {
                 rows: &self.rows,
                 constraints: &set.constraints,
             };
-            projection = friction.hold(&problem, &mut self.projector, projection);
+            projection = friction.hold(
+                &problem,
+                |a_u, warm| self.projector.project(&metric, a_u, &self.rows, warm),
+                projection,
+            );
             let reached = &projection.acceleration;
             self.anchor
                 .follow(&god_object, reached, k_s, friction.slid());
@@ -226,8 +220,14 @@ impl Coupling {
         }
         self.correction = projection.acceleration - unconstrained;
         let mut wrench = held * self.settings.k_h;
-        if !self.surfaces.is_empty() {
-            wrench = self.textured(&wrench, &projection, &center, set);
+        if let Some(textures) = &mut self.textures {
+            let moved = projection.acceleration / self.settings.k_s;
+            let active = projection.active.iter();
+            let touched = active.filter_map(|row| {
+                let contact = set.constraints.get(row.row as usize)?;
+                Some((contact.features.obstacle, contact.point, contact.normal))
+            });
+            wrench = textures.tilt(&wrench, &god_object, &moved, touched);
         }
         let (mut wrench, mut saturated) = self.limited(&wrench);
         if let Some(mut energy) = self.energy {
@@ -295,29 +295,6 @@ impl Coupling {
             adaptation.retire(time);
         }
         shaded
-    }
-
-    /// The wrench tilted by the textures under the active contacts, which the motion carries along.
-    fn textured(
-        &self,
-        wrench: &Vector6,
-        projection: &Projection,
-        center: &Point3<f64>,
-        set: &ConstraintSet,
-    ) -> Vector6 {
-        let moved = |point: &Point3<f64>| {
-            let arm = point - center;
-            point + linear(&projection.acceleration) + angular(&projection.acceleration).cross(&arm)
-        };
-        let contacts = projection.active.iter().filter_map(|active| {
-            let constraint = set.constraints.get(active.row as usize)?;
-            Some((
-                constraint.features.obstacle,
-                moved(&constraint.point),
-                constraint.normal,
-            ))
-        });
-        perturb_force(wrench, center, &self.surfaces, contacts)
     }
 
     /// Force and torque clamped by norm, each with its direction kept.

@@ -7,6 +7,7 @@
 mod check;
 mod document;
 mod files;
+mod height_map_file;
 mod mesh_file;
 mod problem;
 mod rotation;
@@ -25,8 +26,8 @@ pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltScene, CouplingSpec, GOD_OBJECT_NAME,
-    HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, ObstacleSpec, ReferencePoint,
-    SHIPPED_SCENES, Scene, Shape, ShippedScene, View, shipped_scene_text,
+    HandPathSpec, HandPreset, HeightMapSpec, LimitSpec, MassSpec, MethodSpec, ObstacleSpec,
+    ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,

@@ -58,7 +58,11 @@ impl GodObject {
                 rows: &self.rows,
                 constraints: &self.set.constraints,
             };
-            projection = friction.hold(&problem, &mut self.projector, projection);
+            projection = friction.hold(
+                &problem,
+                |a_u, warm| self.projector.project(&metric, a_u, &self.rows, warm),
+                projection,
+            );
         }
         report.kkt = report.kkt.max(projection.kkt_residual);
         report.active = projection.active.len();

@@ -131,9 +131,8 @@ impl Level {
         let (v0, v1, t) = place(v, self.height);
         let slope = |u: usize, v: usize| self.slopes[v * self.width + u].map(f64::from);
         let (a, b, c, d) = (slope(u0, v0), slope(u1, v0), slope(u0, v1), slope(u1, v1));
-        [0, 1].map(|i| {
-            (a[i] * (1.0 - s) + b[i] * s) * (1.0 - t) + (c[i] * (1.0 - s) + d[i] * s) * t
-        })
+        [0, 1]
+            .map(|i| (a[i] * (1.0 - s) + b[i] * s) * (1.0 - t) + (c[i] * (1.0 - s) + d[i] * s) * t)
     }
 
     /// Half the resolution; `None` when a side is odd or would fall below two texels.
@@ -223,7 +222,10 @@ mod tests {
         for u in [0.0, 5.3, 17.0, 40.75] {
             let expected = 0.5 * TAU / 64.0 * (TAU * u / 64.0).cos();
             let [du, dv] = map.slope(u, 11.2, 0.0);
-            assert!((du - expected).abs() < 0.002 * 0.5 * TAU / 64.0 + 2e-4, "{u}: {du} {expected}");
+            assert!(
+                (du - expected).abs() < 0.002 * 0.5 * TAU / 64.0 + 2e-4,
+                "{u}: {du} {expected}"
+            );
             assert!(dv.abs() < 1e-7);
             let [again, _] = map.slope(u - 640.0, 11.2 + 128.0, 0.0);
             assert!((again - du).abs() < 1e-7);

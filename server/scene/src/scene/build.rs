@@ -1,7 +1,7 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
 use god_object::geometry::mass_properties;
-use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::load::Scene;
@@ -77,6 +77,16 @@ impl Scene {
             problems.extend(error.into_problems());
             None
         });
+        let textures: Vec<Option<Texture>> = spec
+            .obstacles
+            .iter()
+            .map(|o| {
+                let map = o.height_map.as_ref()?;
+                self.height_map(map)
+                    .map_err(|error| problems.extend(error.into_problems()))
+                    .ok()
+            })
+            .collect();
         FileError::unless_empty(problems)?;
 
         let Some(mesh) = body_mesh else {
@@ -100,12 +110,15 @@ impl Scene {
             .obstacles
             .iter()
             .zip(obstacle_meshes)
-            .filter_map(|(o, mesh)| {
+            .zip(textures)
+            .filter_map(|((o, mesh), texture)| {
+                let mut surface = o.surface.clone();
+                surface.texture = surface.texture.or(texture);
                 Some(Obstacle {
                     name: o.name.clone(),
                     mesh: mesh?,
                     pose: o.pose,
-                    surface: o.surface,
+                    surface,
                 })
             })
             .collect();
@@ -229,6 +242,7 @@ impl Scene {
                 Some(AdaptationSpec::On(adaptation)) => Some(adaptation),
             },
             look_ahead: coupling.look_ahead.unwrap_or(defaults.look_ahead),
+            passive: coupling.passive.unwrap_or(defaults.passive),
             force_limit: limits.force.unwrap_or(defaults.force_limit),
             torque_limit: limits.torque.unwrap_or(defaults.torque_limit),
             rest_distance: method.rest_distance.unwrap_or(defaults.rest_distance),

@@ -155,7 +155,8 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 format!("there are two obstacles of the name \"{name}\"; rename one"),
             );
         }
-        let (shape, pose, surface) = (shape(&section), pose(&section), surface(&section));
+        let (shape, pose) = (shape(&section), pose(&section));
+        let (surface, height_map) = surface(&section);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
             section.complain(
@@ -171,6 +172,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 shape,
                 pose,
                 surface,
+                height_map,
                 shape_at,
             });
         }
@@ -206,6 +208,7 @@ fn coupling(section: Section<'_>) -> CouplingSpec {
         rotation_metric,
         adaptation,
         look_ahead: section.boolean("look_ahead"),
+        passive: section.boolean("passive"),
     };
     section.finish();
     spec

@@ -120,9 +120,8 @@ impl ConeProblem {
                 [0.0; 2]
             };
             contact.grip = in_disc(wished, contact.limit());
-            for i in 0..2 {
-                cut += contact.tangents[i] * (contact.grip[i] - wished[i]);
-            }
+            let [u, v] = [0, 1].map(|i| contact.grip[i] - wished[i]);
+            cut += contact.tangents[0] * u + contact.tangents[1] * v;
         }
         // What no contact can hold (contacts that contradict each other) counts as cut, too.
         let missed = self.contacts.iter().fold(0.0, |worst: f64, contact| {

@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
-use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
+use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, linear};
 use crate::world::World;
@@ -92,11 +92,12 @@ impl Friction {
     }
 
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
-    /// load it is returned unchanged, bit for bit.
+    /// load it is returned unchanged, bit for bit. `project` is Eq. (1) on the same rows for another a_u, from the rows given to
+    /// start with.
     pub fn hold(
         &mut self,
         problem: &FrictionProblem<'_>,
-        projector: &mut Projector,
+        mut project: impl FnMut(&Vector6, &[u32]) -> Projection,
         frictionless: Projection,
     ) -> Projection {
         self.residual = 0.0;
@@ -120,7 +121,8 @@ impl Friction {
                 break;
             }
             let answer = self.cone.solve(scale);
-            let Some((projection, correction)) = self.project_with_grip(problem, projector) else {
+            let Some((projection, correction)) = self.project_with_grip(problem, &mut project)
+            else {
                 self.residual = f64::INFINITY;
                 return frictionless;
             };
@@ -211,11 +213,11 @@ impl Friction {
     fn project_with_grip(
         &mut self,
         problem: &FrictionProblem<'_>,
-        projector: &mut Projector,
+        project: &mut impl FnMut(&Vector6, &[u32]) -> Projection,
     ) -> Option<(Projection, Vector6)> {
         for _ in 0..=MAX_HALVINGS {
             let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
-            let projection = projector.project(problem.metric, &pulled, problem.rows, &self.rows);
+            let projection = project(&pulled, &self.rows);
             if projection.status != ProjectionStatus::Solved {
                 return None;
             }
