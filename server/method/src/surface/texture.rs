@@ -58,8 +58,9 @@ impl Textures {
     /// Tilts `wrench` (N, N m, at the reference point) by the textures of the obstacles touched.
     ///
     /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
-    /// there (m, rad); `touched` yields obstacle index, point (m, world) and unit normal (world) of every active contact. Call it for every sample: from one to the next the speed is taken. Obstacles without a texture count
-    /// as contacts of tilt zero. Without any textured contact the wrench is returned unchanged.
+    /// there (m, rad); `touched` yields obstacle index, point (m, world) and unit normal (world) of every active contact.
+    /// Call it for every sample: from one to the next the speed is taken. Obstacles without a texture count as contacts of
+    /// tilt zero. Without any textured contact the wrench is returned unchanged.
     pub fn tilt(
         &mut self,
         wrench: &Vector6,
