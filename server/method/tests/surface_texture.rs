@@ -118,7 +118,7 @@ fn slide(texture: Texture, speed: f64, period: usize) -> Vec<f64> {
     for i in 0..800 {
         let t = f64::from(i) * 1e-3;
         let device = at(-0.1 + speed * t, (-1e-3 + 0.04 * t).min(3e-3));
-        if i as usize % period == 0 {
+        if (i as usize).is_multiple_of(period) {
             god_object.step(&device, None);
         }
         let felt = coupling.step(t, &device, god_object.constraint_set());
