@@ -1,7 +1,11 @@
 //! What each surface property costs in the coupling loop: time of one step, as a ratio to a plain surface, in one run.
 //!
 //! `cargo run --release -p god-object --example surface_cost`
-#![allow(clippy::disallowed_methods, reason = "an example may read the clock")]
+#![allow(
+    clippy::disallowed_types,
+    clippy::disallowed_methods,
+    reason = "an example may read the clock"
+)]
 
 use std::sync::Arc;
 use std::time::Instant;
