@@ -19,14 +19,14 @@ use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
-use crate::quasi_statics::{
-    HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus, Projector,
-};
+use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
 };
-use crate::surface::{ShadedAcceleration, TexturedSurface, perturb_force};
+use crate::surface::{
+    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
+};
 use crate::world::World;
 
 /// Loop 2 of the method. `step` allocates nothing.
@@ -34,10 +34,17 @@ use crate::world::World;
 pub struct Coupling {
     settings: Settings,
     body: CoupledBody,
-    /// Empty when no obstacle has a texture.
-    surfaces: Vec<TexturedSurface>,
+    /// `None` when no obstacle has a texture.
+    textures: Option<Textures>,
     prepared: PreparedSet,
     projector: Projector,
+    /// `None` when every obstacle is frictionless.
+    friction: Option<Friction>,
+    anchor: StickAnchor,
+    /// The rows with the bounds in force, where there is friction.
+    rows_in_force: Vec<HalfSpace>,
+    /// `None` unless passivity is enforced.
+    energy: Option<EnergyObserver>,
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
@@ -129,16 +136,8 @@ pub struct CouplingOutput {
 impl Coupling {
     /// Prepares the loop; every buffer gets its final size.
     pub fn new(world: &World, settings: &Settings) -> Self {
-        let textured = world
-            .obstacles
-            .iter()
-            .any(|obstacle| obstacle.surface.texture.is_some());
-        let surfaces = if textured {
-            world.obstacles.iter().map(Into::into).collect()
-        } else {
-            Vec::new()
-        };
         let capacity = settings.max_constraints;
+        let friction = Friction::of(world, settings);
         Self {
             settings: *settings,
             body: CoupledBody {
@@ -146,7 +145,7 @@ impl Coupling {
                 inertia: world.body.inertia,
                 reference_point: world.body.reference_point,
             },
-            surfaces,
+            textures: Textures::of(world),
             prepared: PreparedSet {
                 of: None,
                 god_object: Pose::identity(),
@@ -155,6 +154,10 @@ impl Coupling {
                 moving: false,
             },
             projector: Projector::new(settings.solver, capacity),
+            rows_in_force: Vec::with_capacity(if friction.is_some() { capacity } else { 0 }),
+            friction,
+            anchor: StickAnchor::default(),
+            energy: settings.passive.then(EnergyObserver::new),
             arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
@@ -181,7 +184,7 @@ impl Coupling {
     /// A pose that is not finite gives a zero wrench and `ProjectionStatus::NotFinite`.
     pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
-            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+            return self.without_force(ProjectionStatus::NotFinite);
         }
         if !self.prepared.serves(set) {
             self.prepare(set);
@@ -195,7 +198,7 @@ impl Coupling {
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = &self.prepared.metric else {
-            return CouplingOutput::without_force(ProjectionStatus::NotFinite);
+            return self.without_force(ProjectionStatus::NotFinite);
         };
 
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
@@ -215,12 +218,39 @@ impl Coupling {
             .projector
             .project_prepared(&unconstrained, &self.warm_start);
         self.warm_start.clear();
+        if let Some(friction) = &mut self.friction {
+            let k_s = self.settings.k_s;
+            let god_object = &self.prepared.god_object;
+            self.rows_in_force.clear();
+            let in_force = self.rows.iter().zip(&self.bounds);
+            self.rows_in_force
+                .extend(in_force.map(|(row, bound)| HalfSpace {
+                    bound: *bound,
+                    ..*row
+                }));
+            let problem = FrictionProblem {
+                metric,
+                unconstrained: &unconstrained,
+                stuck_at: &self.anchor.acceleration(god_object, &unconstrained, k_s),
+                reference_point: &Point3::from(god_object.translation.vector),
+                rows: &self.rows_in_force,
+                constraints: &set.constraints,
+            };
+            projection = friction.hold(
+                &problem,
+                |a_u, warm| self.projector.project_prepared(a_u, warm),
+                projection,
+            );
+            let reached = &projection.acceleration;
+            self.anchor
+                .follow(god_object, reached, k_s, friction.slid());
+        }
         // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
         let squeezed = self.prepared.moving
             && projection.status == ProjectionStatus::Infeasible
             && projection.kkt_residual <= KKT_TOLERANCE;
         if projection.status != ProjectionStatus::Solved && !squeezed {
-            return CouplingOutput::without_force(projection.status);
+            return self.without_force(projection.status);
         }
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
@@ -236,11 +266,17 @@ impl Coupling {
             shaded: self.prepared.shaded,
             projection: &projection,
         };
-        let implicit = self.implicit.solve(
-            &given,
-            |row| self.bounds[row],
-            |pose| self.body.metric(&self.settings, pose),
-        );
+        // Friction is on the linear rows.
+        let rough = self.friction.as_ref().is_some_and(Friction::acts);
+        let implicit = if rough {
+            None
+        } else {
+            self.implicit.solve(
+                &given,
+                |row| self.bounds[row],
+                |pose| self.body.metric(&self.settings, pose),
+            )
+        };
         if let Some(answer) = implicit {
             let change = answer.projection.acceleration - answer.unconstrained;
             held = answer.metric.mass_matrix_times(&change);
@@ -252,11 +288,23 @@ impl Coupling {
         }
         self.correction = projection.acceleration - unconstrained;
         let mut wrench = held * self.settings.k_h;
-        if !self.surfaces.is_empty() {
-            let center = Point3::from(self.prepared.god_object.translation.vector);
-            wrench = self.textured(&wrench, &projection, &center, set);
+        if let Some(textures) = &mut self.textures {
+            let moved = projection.acceleration / self.settings.k_s;
+            let active = projection.active.iter();
+            let touched = active.filter_map(|row| {
+                let contact = set.constraints.get(row.row as usize)?;
+                Some((contact.features.obstacle, contact.point, contact.normal))
+            });
+            wrench = textures.tilt(&wrench, &self.prepared.god_object, &moved, touched);
         }
-        let (wrench, saturated) = self.limited(&wrench);
+        let (mut wrench, mut saturated) = self.limited(&wrench);
+        if let Some(mut energy) = self.energy {
+            energy.arrive(&device);
+            let (bounded, clamped) = self.limited(&energy.within_reserve(metric, &wrench));
+            energy.hold(&device, &bounded);
+            (wrench, saturated) = (bounded, saturated || clamped);
+            self.energy = Some(energy);
+        }
         CouplingOutput {
             wrench,
             shaded: self.prepared.shaded.then_some(ShadedAcceleration {
@@ -268,6 +316,20 @@ impl Coupling {
             status: projection.status,
             saturated,
         }
+    }
+
+    /// The energy at the device's port since the start; `None` unless passivity is enforced.
+    pub fn energy(&self) -> Option<&EnergyObserver> {
+        self.energy.as_ref()
+    }
+
+    /// No force, and nothing to remember of the body that it held.
+    fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
+        self.anchor.forget();
+        if let Some(energy) = &mut self.energy {
+            energy.release();
+        }
+        CouplingOutput::without_force(status)
     }
 
     /// Everything that the set decides, whatever the device does: rows, metric, and which rows are new.
@@ -325,29 +387,6 @@ impl Coupling {
                 self.projector.set_bound(row, bound);
             }
         }
-    }
-
-    /// The wrench tilted by the textures under the active contacts, which the motion carries along.
-    fn textured(
-        &self,
-        wrench: &Vector6,
-        projection: &Projection,
-        center: &Point3<f64>,
-        set: &ConstraintSet,
-    ) -> Vector6 {
-        let moved = |point: &Point3<f64>| {
-            let arm = point - center;
-            point + linear(&projection.acceleration) + angular(&projection.acceleration).cross(&arm)
-        };
-        let contacts = projection.active.iter().filter_map(|active| {
-            let constraint = set.constraints.get(active.row as usize)?;
-            Some((
-                constraint.features.obstacle,
-                moved(&constraint.point),
-                constraint.normal,
-            ))
-        });
-        perturb_force(wrench, center, &self.surfaces, contacts)
     }
 
     /// Force and torque clamped by norm, each with its direction kept.

@@ -48,5 +48,5 @@ pub use quasi_statics::{ProjectionStatus, SolverKind};
 pub use settings::{Adaptation, RotationMetric, Settings, SettingsError};
 pub use shape::Primitive;
 pub use spatial::{Pose, Vector6};
-pub use surface::ShadedAcceleration;
-pub use world::{Body, ForceShading, Obstacle, SineTexture, Surface, World};
+pub use surface::{HeightMap, HeightMapTexture, ShadedAcceleration};
+pub use world::{Body, ForceShading, Obstacle, SineTexture, Surface, Texture, World};

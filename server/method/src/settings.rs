@@ -60,6 +60,9 @@ pub struct Settings {
     pub adaptation: Option<Adaptation>,
     /// Publish contacts before they touch, with their gaps. Off: the paper's cone of touching contacts.
     pub look_ahead: bool,
+    /// Bound the energy that the hand takes out over a run by what it has put in, see
+    /// [`EnergyObserver`](crate::surface::EnergyObserver).
+    pub passive: bool,
     /// Largest force on the hand, N; clamped by norm.
     pub force_limit: f64,
     /// Largest torque on the hand, N m; clamped by norm.
@@ -108,6 +111,7 @@ impl Settings {
                 threshold: -1e-3,
             }),
             look_ahead: true,
+            passive: false,
             force_limit: 20.0,
             torque_limit: 0.5,
             rest_distance: REST_DISTANCE_PER_SIZE * size,

@@ -10,6 +10,7 @@ use crate::quasi_statics::Metric;
 use crate::settings::RotationMetric;
 use crate::shape::Primitive;
 use crate::spatial::Pose;
+use crate::surface::HeightMapTexture;
 
 /// The rigid body in the user's hand.
 #[derive(Clone, Debug)]
@@ -65,13 +66,15 @@ pub struct Obstacle {
     pub surface: Surface,
 }
 
-/// How a surface feels. What is `None` costs nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// How a surface feels. What is `None` or 0 costs nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Contact normals interpolated from vertex normals, Section 6.1.
     pub shading: Option<ForceShading>,
-    /// A sine that tilts the force, Section 6.2.
-    pub texture: Option<SineTexture>,
+    /// What tilts the force, Section 6.2.
+    pub texture: Option<Texture>,
+    /// Coefficient of Coulomb friction, beyond the paper; 0 is frictionless.
+    pub friction: f64,
 }
 
 /// Force shading, Section 6.1.
@@ -79,6 +82,15 @@ pub struct Surface {
 pub struct ForceShading {
     /// Faces that meet at more than this angle keep their edge, rad.
     pub crease_angle: f64,
+}
+
+/// What tilts the force with the place that is touched, Section 6.2.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Texture {
+    /// A sine.
+    Sine(SineTexture),
+    /// The gradient of a height map.
+    HeightMap(HeightMapTexture),
 }
 
 /// A sine along one axis that tilts the force, Section 6.2.

@@ -4,7 +4,9 @@ mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use god_object::nalgebra::Vector3;
-use god_object::{Coupling, ForceShading, GodObject, Pose, Settings, SineTexture, Surface, World};
+use god_object::{
+    Coupling, ForceShading, GodObject, Pose, Settings, SineTexture, Surface, Texture, World,
+};
 use std::sync::Arc;
 
 #[global_allocator]
@@ -15,11 +17,12 @@ fn god_object_and_coupling_steps_allocate_nothing() {
     let mut world = World::clone(&support::box_on_table());
     world.obstacles[0].surface = Surface {
         shading: Some(ForceShading { crease_angle: 0.6 }),
-        texture: Some(SineTexture {
+        texture: Some(Texture::Sine(SineTexture {
             axis: Vector3::x(),
             wavelength: 2e-3,
             amplitude: 0.2,
-        }),
+        })),
+        friction: 0.4,
     };
     let world = Arc::new(world);
     let settings = Settings::for_size(0.04);

@@ -7,6 +7,7 @@
 mod check;
 mod document;
 mod files;
+mod height_map_file;
 mod mesh_file;
 mod problem;
 mod rotation;
@@ -26,8 +27,8 @@ pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
-    GOD_OBJECT_NAME, HandPathSpec, HandPreset, LimitSpec, MassSpec, MethodSpec, MotionSpec,
-    ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
+    GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapSpec, LimitSpec, MassSpec, MethodSpec,
+    MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, Shape, ShippedScene, View,
     shipped_scene_text,
 };
 pub use simplify::Simplified;

@@ -188,8 +188,10 @@ fn combs_lock_after_their_clearance_whatever_the_number_of_contacts() {
                 "c {clearance}: {} not {expected}",
                 felt.wrench
             );
+            // A row that was left out may be violated by the set's stated error.
+            let left_out = 1000.0 * god_object.constraint_set().reduction_error;
             assert!(
-                felt.wrench.fixed_rows::<5>(1).norm() <= 1e-6,
+                felt.wrench.fixed_rows::<5>(1).norm() <= 1e-6 + left_out,
                 "c {clearance}: {}",
                 felt.wrench
             );

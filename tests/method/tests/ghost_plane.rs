@@ -41,12 +41,14 @@ fn world(body: &Mesh, plate: Soup) -> Arc<World> {
     let solid = mass_properties(body);
     Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: body.clone(),
             mass: 1.0,
             inertia: solid.inertia_per_density / solid.volume,
             reference_point: solid.centroid,
         },
         obstacles: vec![Obstacle {
+            primitive: None,
             name: "plate".into(),
             mesh: mesh(plate),
             pose: world_from_plate() * Pose::translation(0.0, 0.0, -HALF_THICKNESS),

@@ -63,6 +63,7 @@ fn swing_a_bunny(every: usize) {
     let obstacles = [1, 2, 3].map(|quarter| {
         let there = rows[quarter * rows.len() / 4].1;
         Obstacle {
+            primitive: None,
             name: format!("bunny {quarter}"),
             mesh: large.clone(),
             pose: Pose::new(there.translation.vector, Vector3::y() * quarter as f64),
@@ -75,6 +76,7 @@ fn swing_a_bunny(every: usize) {
     assert!(!obstacles.is_empty(), "the hand never leaves its start");
     let world = Arc::new(World {
         body: Body {
+            primitive: None,
             mesh: small,
             mass: 0.5,
             inertia: solid.inertia_per_density * (0.5 / solid.volume),

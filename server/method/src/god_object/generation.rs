@@ -26,14 +26,15 @@ const LOOK_AHEAD_GROWS: f64 = 1.25;
 const MAX_ATTEMPTS: u32 = 8;
 
 impl GodObject {
-    /// Whether this world's rows can be chosen by their geometry: exact primitives have few, a shaded row is not the one that the
-    /// surface has, one that is re-linearised is needed elsewhere, and the paper's cone has every touching contact.
+    /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
+    /// touch, a shaded row is not the one that the surface has, one that is re-linearised is needed elsewhere, and the paper's cone has every touching contact.
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
         let shaded = world.obstacles.iter().any(|o| o.surface.shading.is_some());
+        let rough = world.obstacles.iter().any(|o| o.surface.friction > 0.0);
         let linear = settings.implicit_rounds == 0;
         let exact =
             world.body.primitive.is_some() || world.obstacles.iter().any(|o| o.primitive.is_some());
-        (settings.look_ahead && linear && !shaded && !exact)
+        (settings.look_ahead && linear && !shaded && !rough && !exact)
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 

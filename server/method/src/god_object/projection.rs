@@ -8,6 +8,7 @@ use crate::constraint::contact_jacobian;
 use crate::implicit::{ImplicitAnswer, LinearAnswer};
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus};
 use crate::spatial::{Vector6, advance_pose, angular, pose_difference};
+use crate::surface::{Friction, FrictionProblem};
 
 /// A motion that the rows allow.
 #[derive(Clone, Copy, Debug)]
@@ -45,9 +46,24 @@ impl GodObject {
             });
         }
         report.work.projections += 1;
-        let projection =
+        let mut projection =
             self.projector
                 .project(&metric, unconstrained, &self.rows, &self.warm_start);
+        if let Some(friction) = &mut self.friction {
+            let problem = FrictionProblem {
+                metric: &metric,
+                unconstrained,
+                stuck_at: &Vector6::zeros(),
+                reference_point: &center,
+                rows: &self.rows,
+                constraints: &self.set.constraints,
+            };
+            projection = friction.hold(
+                &problem,
+                |a_u, warm| self.projector.project(&metric, a_u, &self.rows, warm),
+                projection,
+            );
+        }
         report.kkt = report.kkt.max(projection.kkt_residual);
         report.active = projection.active.len();
         report.solver_fallbacks += u32::from(projection.producer != self.settings.solver);
@@ -55,6 +71,10 @@ impl GodObject {
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
         match projection.status {
+            // Friction is on the linear rows.
+            ProjectionStatus::Solved if self.friction.as_ref().is_some_and(Friction::acts) => {
+                Some(Projected::about(projection.acceleration, reference_point))
+            }
             ProjectionStatus::Solved => Some(self.implicit(unconstrained, projection, report)),
             // Two walls nearer to each other than twice the rest distance: the answer without easing out.
             ProjectionStatus::Infeasible if projection.kkt_residual <= KKT_TOLERANCE => {

@@ -16,7 +16,7 @@ use crate::spatial::{
     Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
     pose_is_finite,
 };
-use crate::surface::{ShadedAcceleration, ShadingNormals};
+use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
 use crate::world::World;
 
 /// Loop 1 of the method.
@@ -29,6 +29,7 @@ pub struct GodObject {
     pub(super) set: ConstraintSet,
     pub(super) shading: Vec<Option<ShadingNormals>>,
     pub(super) projector: Projector,
+    pub(super) friction: Option<Friction>,
     pub(super) collision: CollisionWorkspace,
     pub(super) contacts: Vec<Contact>,
     pub(super) implicit: ImplicitRounds,
@@ -53,6 +54,7 @@ impl GodObject {
         let capacity = settings.max_constraints;
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {
+            friction: Friction::of(&world, &settings),
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
             obstacles: world
                 .obstacles

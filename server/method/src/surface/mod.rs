@@ -1,7 +1,15 @@
-//! Surface properties: force shading and texture. Source: Ortega et al. 2007, Section 6.
+//! Surface properties: force shading, texture, friction; and the energy at the device's port.
+//! Source: Ortega et al. 2007, Section 6; friction and passivity beyond the paper.
 
+mod friction;
+mod height_map;
+mod passivity;
 mod shading;
 mod texture;
 
+pub(crate) use friction::StickAnchor;
+pub use friction::{Friction, FrictionProblem};
+pub use height_map::{HeightMap, HeightMapError, HeightMapTexture};
+pub use passivity::EnergyObserver;
 pub use shading::{ShadedAcceleration, ShadingNormals};
-pub use texture::{TexturedSurface, perturb_force};
+pub use texture::Textures;

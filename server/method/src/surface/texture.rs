@@ -1,148 +1,145 @@
-//! Texture: the direction of the force tilts with a sine of the contact point.
+//! Texture: the direction of the force tilts with the place that is touched.
+//!
+//! | symbol | name in code | unit   | meaning                                                                    |
+//! |--------|--------------|--------|----------------------------------------------------------------------------|
+//! | p      | `point`      | m      | contact point where the felt body is, `a_c / k_s` from the god-object      |
+//! | s      | `covered`    | m      | what the felt body covers there, in the contact plane, in one update       |
 //!
 //! With several contacts the tilts are averaged. The magnitude of the force is kept. Exploration speed over update rate
-//! bounds the spatial frequency that can be felt (Section 6.2); here contact points are carried along by the constrained
-//! acceleration, so the rate is that of the coupling loop.
-//! Source: Ortega et al. 2007, Section 6.2.
+//! bounds the spatial frequency that can be felt (Section 6.2). Contact points go with the felt body, so the rate is that of
+//! the coupling loop, however seldom sets come; and what that rate cannot carry is muted rather than felt as another tone.
+//! Source: Ortega et al. 2007, Section 6.2; the muting is beyond the paper.
 
 use nalgebra::{Point3, Vector3};
 
-use crate::spatial::{Pose, Vector6, linear, six};
-use crate::world::{Obstacle, SineTexture};
+use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference, six};
+use crate::world::{SineTexture, Texture, World};
 
 /// A force smaller than this has no direction to tilt, N.
 const SMALLEST_FORCE: f64 = 1e-9;
+/// Wavelengths per update up to which a sine is whole, and from which it is muted: half the update rate.
+const WHOLE_BELOW: f64 = 0.4;
+const MUTED_ABOVE: f64 = 0.5;
 
-/// What the texture needs to know of an obstacle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TexturedSurface {
+/// What the textures need to know of an obstacle.
+#[derive(Clone, Debug)]
+struct TexturedSurface {
     /// World from obstacle.
-    pub pose: Pose,
-    /// The texture; `None` is smooth.
-    pub texture: Option<SineTexture>,
+    pose: Pose,
+    /// `None` is smooth.
+    texture: Option<Texture>,
 }
 
-impl From<&Obstacle> for TexturedSurface {
-    fn from(obstacle: &Obstacle) -> Self {
-        Self {
-            pose: obstacle.pose,
-            texture: obstacle.surface.texture,
+/// The textures of a world and where the felt body was last. No allocation after `of`.
+#[derive(Clone, Debug)]
+pub struct Textures {
+    surfaces: Vec<TexturedSurface>,
+    felt: Option<Pose>,
+}
+
+impl Textures {
+    /// The textures of a world; `None` when no obstacle has one.
+    pub fn of(world: &World) -> Option<Self> {
+        let surfaces: Vec<_> = world
+            .obstacles
+            .iter()
+            .map(|obstacle| TexturedSurface {
+                pose: obstacle.pose,
+                texture: obstacle.surface.texture.clone(),
+            })
+            .collect();
+        let any = surfaces.iter().any(|surface| surface.texture.is_some());
+        any.then_some(Self {
+            surfaces,
+            felt: None,
+        })
+    }
+
+    /// Tilts `wrench` (N, N m, at the reference point) by the textures of the obstacles touched.
+    ///
+    /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
+    /// there (m, rad); `touched` yields obstacle index, point (m, world) and unit normal (world) of every active contact.
+    /// Call it for every sample: from one to the next the speed is taken. Obstacles without a texture count as contacts of
+    /// tilt zero. Without any textured contact the wrench is returned unchanged.
+    pub fn tilt(
+        &mut self,
+        wrench: &Vector6,
+        god_object: &Pose,
+        moved: &Vector6,
+        touched: impl Iterator<Item = (u16, Point3<f64>, Vector3<f64>)>,
+    ) -> Vector6 {
+        let felt = advance_pose(god_object, moved, 1.0);
+        let step = self.felt.map_or(Vector6::zeros(), |last| {
+            pose_difference(&felt, &last, &Vector3::zeros())
+        });
+        self.felt = Some(felt);
+        let force = linear(wrench);
+        let magnitude = force.norm();
+        let enough = magnitude > SMALLEST_FORCE; // false for NaN
+        if !enough {
+            return *wrench;
         }
-    }
-}
 
-/// Tilts `wrench` (at `reference_point`) by the textures of the obstacles touched.
-///
-/// `contacts` yields obstacle index, point (world) and unit normal (world) of every active contact. Obstacles
-/// without a texture count as contacts of tilt zero. Without any textured contact the wrench is returned unchanged.
-pub fn perturb_force(
-    wrench: &Vector6,
-    reference_point: &Point3<f64>,
-    surfaces: &[TexturedSurface],
-    contacts: impl Iterator<Item = (u16, Point3<f64>, Vector3<f64>)>,
-) -> Vector6 {
-    let force = linear(wrench);
-    let magnitude = force.norm();
-    let enough = magnitude > SMALLEST_FORCE; // false for NaN
-    if !enough {
-        return *wrench;
-    }
-
-    let mut tilt = Vector3::zeros();
-    let mut arm = Vector3::zeros();
-    let (mut count, mut textured) = (0.0, false);
-    for (obstacle, point, normal) in contacts {
-        count += 1.0;
-        arm += point - reference_point;
-        let Some(surface) = surfaces.get(usize::from(obstacle)) else {
-            continue;
-        };
-        let Some(texture) = &surface.texture else {
-            continue;
-        };
-        textured = true;
-        let along = surface
-            .pose
-            .inverse_transform_point(&point)
-            .coords
-            .dot(&texture.axis);
-        let axis = surface.pose.rotation * texture.axis;
-        let tangent = axis - normal * axis.dot(&normal);
-        let phase = std::f64::consts::TAU * along / texture.wavelength;
-        tilt += tangent * (texture.amplitude * phase.sin());
-    }
-    if !textured {
-        return *wrench;
-    }
-
-    let tilted = force / magnitude + tilt / count;
-    let Some(direction) = tilted.try_normalize(SMALLEST_FORCE) else {
-        return *wrench;
-    };
-    let change = direction * magnitude - force;
-    wrench + six(&change, &(arm / count).cross(&change))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::spatial::angular;
-
-    fn plate(texture: Option<SineTexture>) -> TexturedSurface {
-        TexturedSurface {
-            pose: Pose::identity(),
-            texture,
+        let center = Point3::from(god_object.translation.vector);
+        let mut tilt = Vector3::zeros();
+        let mut arms = Vector3::zeros();
+        let (mut count, mut textured) = (0.0, false);
+        for (obstacle, at, normal) in touched {
+            let arm = at - center;
+            let point = at + linear(moved) + angular(moved).cross(&arm);
+            count += 1.0;
+            arms += point - center;
+            let Some(surface) = self.surfaces.get(usize::from(obstacle)) else {
+                continue;
+            };
+            let covered = linear(&step) + angular(&step).cross(&arm);
+            if let Some(tilted) = surface.tilt_at(&point, &normal, &covered) {
+                textured = true;
+                tilt += tilted;
+            }
         }
+        if !textured {
+            return *wrench;
+        }
+
+        let tilted = force / magnitude + tilt / count;
+        let Some(direction) = tilted.try_normalize(SMALLEST_FORCE) else {
+            return *wrench;
+        };
+        let change = direction * magnitude - force;
+        wrench + six(&change, &(arms / count).cross(&change))
     }
+}
 
-    const TEXTURE: SineTexture = SineTexture {
-        axis: Vector3::new(1.0, 0.0, 0.0),
-        wavelength: 2e-3,
-        amplitude: 0.2,
-    };
-
-    #[test]
-    fn the_force_tilts_by_the_sine_and_keeps_its_magnitude() {
-        let wrench = Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0);
-        let crest = Point3::new(0.5e-3, 0.0, 0.0);
-        let contacts = [(0, crest, Vector3::z())];
-        let surfaces = [plate(Some(TEXTURE))];
-        let felt = perturb_force(&wrench, &Point3::origin(), &surfaces, contacts.into_iter());
-        assert!((linear(&felt).norm() - 5.0).abs() < 1e-12);
-        assert!((felt[0] / felt[2] - 0.2).abs() < 1e-12);
-        assert!(
-            (angular(&felt) - crest.coords.cross(&(linear(&felt) - Vector3::z() * 5.0))).norm()
-                < 1e-12
-        );
+impl TexturedSurface {
+    /// The tilt at a point, in the contact plane, as the tangent of the angle; all in world axes. `None` when smooth.
+    fn tilt_at(
+        &self,
+        point: &Point3<f64>,
+        normal: &Vector3<f64>,
+        covered: &Vector3<f64>,
+    ) -> Option<Vector3<f64>> {
+        let point = self.pose.inverse_transform_point(point);
+        let in_surface = |v: &Vector3<f64>| self.pose.rotation.inverse_transform_vector(v);
+        let tangential = covered - normal * covered.dot(normal);
+        let tilt = match self.texture.as_ref()? {
+            Texture::Sine(sine) => sine.tilt(&point, &in_surface(&tangential)),
+            // The normal of a height field leans against its gradient.
+            Texture::HeightMap(map) => {
+                -map.gradient(&point, &in_surface(normal), tangential.norm())
+            }
+        };
+        let tilt = self.pose.rotation * tilt;
+        Some(tilt - normal * tilt.dot(normal))
     }
+}
 
-    #[test]
-    fn tilts_of_several_contacts_are_averaged() {
-        let wrench = Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0);
-        let crest = (0, Point3::new(0.5e-3, 0.0, 0.0), Vector3::z());
-        let trough = (0, Point3::new(1.5e-3, 0.0, 0.0), Vector3::z());
-        let surfaces = [plate(Some(TEXTURE))];
-        let felt = perturb_force(
-            &wrench,
-            &Point3::origin(),
-            &surfaces,
-            [crest, trough].into_iter(),
-        );
-        assert!((felt - wrench).norm() < 1e-12);
-    }
-
-    #[test]
-    fn a_plain_surface_changes_nothing() {
-        let wrench = Vector6::new(1.0, 2.0, 5.0, 0.1, 0.2, 0.3);
-        let contacts = [(0, Point3::new(0.5e-3, 0.0, 0.0), Vector3::z())];
-        assert_eq!(
-            perturb_force(
-                &wrench,
-                &Point3::origin(),
-                &[plate(None)],
-                contacts.into_iter()
-            ),
-            wrench
-        );
+impl SineTexture {
+    /// The tilt at a point for a tip that covers `covered` in one update, obstacle frame.
+    fn tilt(&self, point: &Point3<f64>, covered: &Vector3<f64>) -> Vector3<f64> {
+        let waves = covered.dot(&self.axis).abs() / self.wavelength;
+        let kept = ((MUTED_ABOVE - waves) / (MUTED_ABOVE - WHOLE_BELOW)).clamp(0.0, 1.0);
+        let phase = std::f64::consts::TAU * point.coords.dot(&self.axis) / self.wavelength;
+        self.axis * (self.amplitude * kept * phase.sin())
     }
 }

@@ -2,7 +2,7 @@
 
 use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
-use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, World};
+use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::load::Scene;
@@ -123,6 +123,16 @@ impl Scene {
             None
         });
         let motions = self.motions(&mut problems);
+        let textures: Vec<Option<Texture>> = spec
+            .obstacles
+            .iter()
+            .map(|o| {
+                let map = o.height_map.as_ref()?;
+                self.height_map(map)
+                    .map_err(|error| problems.extend(error.into_problems()))
+                    .ok()
+            })
+            .collect();
         FileError::unless_empty(problems)?;
         let named = std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, &mut body_mesh))
             .chain(
@@ -156,13 +166,16 @@ impl Scene {
             .obstacles
             .iter()
             .zip(obstacle_meshes)
-            .filter_map(|(o, mesh)| {
+            .zip(textures)
+            .filter_map(|((o, mesh), texture)| {
+                let mut surface = o.surface.clone();
+                surface.texture = surface.texture.or(texture);
                 Some(Obstacle {
                     name: o.name.clone(),
                     mesh: mesh?,
                     primitive: o.shape.primitive(),
                     pose: o.pose,
-                    surface: o.surface,
+                    surface,
                 })
             })
             .collect();
@@ -318,6 +331,7 @@ impl Scene {
                 Some(AdaptationSpec::On(adaptation)) => Some(adaptation),
             },
             look_ahead: coupling.look_ahead.unwrap_or(defaults.look_ahead),
+            passive: coupling.passive.unwrap_or(defaults.passive),
             force_limit: limits.force.unwrap_or(defaults.force_limit),
             torque_limit: limits.torque.unwrap_or(defaults.torque_limit),
             rest_distance: method.rest_distance.unwrap_or(defaults.rest_distance),

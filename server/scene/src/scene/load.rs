@@ -1,14 +1,18 @@
 //! Loading a scene by file or by name.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use god_object::{HeightMapTexture, Texture};
 
 use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
-    BodySpec, CouplingSpec, HandPathSpec, LimitSpec, MethodSpec, ObstacleSpec, View,
+    BodySpec, CouplingSpec, HandPathSpec, HeightMapSpec, LimitSpec, MethodSpec, ObstacleSpec, View,
 };
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dirs, read_text};
+use crate::height_map_file::read_height_map;
 use crate::mesh_file::{RawMesh, read_mesh};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
@@ -161,6 +165,16 @@ impl Scene {
     /// The mesh file of this name, as written in the scene.
     pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<RawMesh, FileError> {
         read_mesh(&self.locate(name, at)?)
+    }
+
+    /// The texture of a height map, its picture read.
+    pub(super) fn height_map(&self, spec: &HeightMapSpec) -> Result<Texture, FileError> {
+        let map = read_height_map(&self.locate(&spec.path, &spec.at)?)?;
+        Ok(Texture::HeightMap(HeightMapTexture {
+            map: Arc::new(map),
+            tile: spec.tile,
+            amplitude: spec.amplitude,
+        }))
     }
 
     /// Beside the scene, else in a data directory.

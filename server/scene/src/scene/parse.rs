@@ -155,7 +155,8 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 format!("there are two obstacles of the name \"{name}\"; rename one"),
             );
         }
-        let (shape, pose, surface) = (shape(&section), pose(&section), surface(&section));
+        let (shape, pose) = (shape(&section), pose(&section));
+        let (surface, height_map) = surface(&section);
         let motion = section.section("motion").and_then(motion);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
@@ -173,6 +174,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 pose,
                 surface,
                 motion,
+                height_map,
                 shape_at,
             });
         }
@@ -225,6 +227,7 @@ fn coupling(section: Section<'_>) -> CouplingSpec {
         rotation_metric,
         adaptation,
         look_ahead: section.boolean("look_ahead"),
+        passive: section.boolean("passive"),
     };
     section.finish();
     spec

@@ -1,9 +1,9 @@
 //! Shapes, poses and surfaces out of a scene file.
 
-use god_object::{ForceShading, Pose, SineTexture, Surface};
+use god_object::{ForceShading, Pose, SineTexture, Surface, Texture};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::spec::Shape;
+use super::spec::{HeightMapSpec, Shape};
 use crate::document::{Range, Section, Value};
 use crate::rotation::unit_quaternion;
 use crate::shapes::{Axis, PLATE, hole_circumradius};
@@ -230,10 +230,11 @@ fn position_or_zero(section: &Section<'_>, key: &'static str) -> Option<Point3<f
 }
 
 /// `surface = { shading, texture, friction }`, all optional.
-pub(super) fn surface(body: &Section<'_>) -> Surface {
+pub(super) fn surface(body: &Section<'_>) -> (Surface, Option<HeightMapSpec>) {
     let mut surface = Surface::default();
+    let mut map = None;
     let Some(section) = body.section("surface") else {
-        return surface;
+        return (surface, map);
     };
     if let Some(shading) = section.section("shading") {
         let angle =
@@ -242,26 +243,48 @@ pub(super) fn surface(body: &Section<'_>) -> Surface {
         shading.finish();
     }
     if let Some(texture) = section.section("texture") {
-        if let Some(sine) = texture.section("sine") {
-            surface.texture = sine_texture(&sine);
-            sine.finish();
-        } else if !texture.has("sine") {
-            texture.complain_missing(
+        match (texture.has("sine"), texture.has("height_map")) {
+            (true, true) => texture.complain(
+                texture.at(),
+                format!(
+                    "{} has both `sine` and `height_map`; leave one out",
+                    texture.name()
+                ),
+            ),
+            (false, false) => texture.complain_missing(
                 "sine",
-                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
-            );
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 } or height_map = { file = \"leather.png\", tile = 0.05, amplitude = 2e-4 }",
+            ),
+            _ => {}
+        }
+        if let Some(sine) = texture.section("sine") {
+            surface.texture = sine_texture(&sine).map(Texture::Sine);
+            sine.finish();
+        }
+        if let Some(section) = texture.section("height_map") {
+            map = height_map(&section);
+            section.finish();
         }
         texture.finish();
     }
-    let friction = section.number_or("friction", Range::NotNegative, 0.0);
-    if friction > 0.0 {
-        let at = section
-            .get("friction")
-            .map_or(section.at(), |node| &node.at);
-        section.complain(at, format!("`friction` in {} is {friction}, but surfaces are frictionless in this version; write 0.0 or leave it out", section.name()));
-    }
+    surface.friction = section.number_or("friction", Range::NotNegative, 0.0);
     section.finish();
-    surface
+    (surface, map)
+}
+
+fn height_map(section: &Section<'_>) -> Option<HeightMapSpec> {
+    let path = section.required_text("file", "file = \"leather.png\"");
+    let tile = section.required_number("tile", Range::Positive, "tile = 0.05");
+    let amplitude = section.required_number("amplitude", Range::NotNegative, "amplitude = 2e-4");
+    // Meshes carry no texture coordinates, so that there is one way to lay a picture on them.
+    section.choice("mapping", &[("triplanar", ())]);
+    let at = section.get("file").map_or(section.at(), |node| &node.at);
+    Some(HeightMapSpec {
+        path: path?.to_owned(),
+        tile: tile?,
+        amplitude: amplitude?,
+        at: at.clone(),
+    })
 }
 
 fn sine_texture(sine: &Section<'_>) -> Option<SineTexture> {

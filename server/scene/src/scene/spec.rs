@@ -143,8 +143,10 @@ pub struct ObstacleSpec {
     pub shape: Shape,
     /// World from obstacle.
     pub pose: Pose,
-    /// How it feels.
+    /// How it feels; a height map is loaded by [`Scene::build`](super::Scene::build).
     pub surface: Surface,
+    /// The height map of its texture, if it has one.
+    pub height_map: Option<HeightMapSpec>,
     /// How it moves; `None` stands still at its pose.
     pub motion: Option<MotionSpec>,
     pub(crate) shape_at: At,
@@ -157,6 +159,18 @@ pub struct MotionSpec {
     pub trace: String,
     /// Begin again at the end; otherwise it stays there.
     pub repeat: bool,
+    pub(crate) at: At,
+}
+
+/// A height map as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightMapSpec {
+    /// A grey PNG, relative to the scene file, else to the data directory.
+    pub path: String,
+    /// Length of one row of the picture, m.
+    pub tile: f64,
+    /// Height of white over black, m.
+    pub amplitude: f64,
     pub(crate) at: At,
 }
 
@@ -182,6 +196,8 @@ pub struct CouplingSpec {
     pub adaptation: Option<AdaptationSpec>,
     /// Contacts before they touch.
     pub look_ahead: Option<bool>,
+    /// Bound the energy that the hand takes out.
+    pub passive: Option<bool>,
 }
 
 /// `[limits]`; what is `None` keeps the method's default.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use god_object::{RotationMetric, SolverKind};
+use god_object::{RotationMetric, SolverKind, Texture};
 use nalgebra::Point3;
 use proptest::prelude::*;
 use taut_scene::{MassSpec, Scene, Workbench};
@@ -57,7 +57,10 @@ fn the_example_of_the_interface_is_read() {
     assert_eq!(built.start.translation.z, 0.1);
     let surface = &built.world.obstacles[0].surface;
     assert_eq!(surface.shading.unwrap().crease_angle, 0.6);
-    assert_eq!(surface.texture.unwrap().axis, nalgebra::Vector3::x());
+    let Some(Texture::Sine(sine)) = &surface.texture else {
+        panic!("{:?}", surface.texture);
+    };
+    assert_eq!(sine.axis, nalgebra::Vector3::x());
     assert_eq!(
         built
             .bodies
@@ -142,8 +145,22 @@ fn every_fault_names_file_line_and_key() {
             "s.toml:16: `look_ahead` in [coupling] is an integer, but must be true or false",
         ),
         (
-            changed("friction = 0.0", "friction = 0.3"),
-            "s.toml:10: `friction` in [[obstacle]] surface is 0.3, but surfaces are frictionless in this version; write 0.0 or leave it out",
+            changed("friction = 0.0", "friction = -0.3"),
+            "s.toml:10: `friction` in [[obstacle]] surface is -0.3, but must be a finite number not below zero",
+        ),
+        (
+            changed(
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+                "height_map = { file = \"a.png\", tile = 0.05, amplitude = 2e-4, mapping = \"uv\" }",
+            ),
+            "s.toml:10: `mapping` in [[obstacle]] surface texture height_map is \"uv\", but must be \"triplanar\"",
+        ),
+        (
+            changed(
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+                "height_map = { file = \"a.png\", tile = 0.05, amplitude = 2e-4 }",
+            ),
+            "s.toml:10: the file \"a.png\" does not exist",
         ),
         (
             changed(
@@ -353,4 +370,28 @@ proptest! {
     fn arbitrary_values_never_panic(key in "(coupling|god_object|obstacle|view|hand|method)\\.[a-z_]{1,12}", value in "(-?[0-9]{1,20}|[\\[{\"a-z0-9=., }\\]]{0,20}|nan|inf)") {
         let _ = parse(GOOD).unwrap().with_override(&format!("{key}={value}")).map(|scene| scene.name().len());
     }
+}
+
+#[test]
+fn friction_passivity_and_a_height_map_reach_the_method() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let grey = image::DynamicImage::new_luma16(16, 8);
+    grey.save(directory.path().join("flat.png"))
+        .expect("written");
+    let text = changed("friction = 0.0", "friction = 0.3")
+        .replace("look_ahead = true", "look_ahead = true\npassive = true")
+        .replace(
+            "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+            "height_map = { file = \"flat.png\", tile = 0.05, amplitude = 2e-4, mapping = \"triplanar\" }",
+        );
+    let scene = Scene::parse("s.toml", &text, directory.path()).expect("a scene");
+    let built = scene.build().expect("a built scene");
+    assert!(built.settings.passive);
+    let surface = &built.world.obstacles[0].surface;
+    assert_eq!(surface.friction, 0.3);
+    let Some(Texture::HeightMap(texture)) = &surface.texture else {
+        panic!("{:?}", surface.texture);
+    };
+    assert_eq!((texture.tile, texture.amplitude), (0.05, 2e-4));
+    assert_eq!(texture.map.width(), 16);
 }

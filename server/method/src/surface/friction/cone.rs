@@ -1,0 +1,147 @@
+//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method, checked by block
+//! Gauss-Seidel sweeps.
+//!
+//! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
+//! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
+//! more than the six unknowns, and the share of each contact is not unique: the start is the least-norm distribution, as of
+//! an elastic foundation, which neither order nor duplication of the rows changes, and the relaxation moves from there only
+//! where a cone forbids it.
+//!
+//! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
+
+use arrayvec::ArrayVec;
+use nalgebra::Matrix6;
+
+use super::contact::{ConeContact, in_disc};
+use crate::spatial::Vector6;
+
+/// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else.
+pub(super) const MAX_CONE_CONTACTS: usize = 24;
+/// Most sweeps over the single contacts after the Newton iteration. They measure its residual and mend what little it left.
+const MAX_SWEEPS: usize = 8;
+/// A sweep that changes the correction by less than this share of its length is the last.
+const SWEEP_TOLERANCE: f64 = 1e-8;
+/// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
+const LEAST_NORM_REGULARISATION: f64 = 1e-11;
+/// Share of full stick's correction that the cones may cut before it is relaxed: rounding.
+const STICK_TOLERANCE: f64 = 1e-9;
+
+/// The contacts of one cone problem; emptied and filled by each call.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ConeProblem {
+    pub(super) contacts: ArrayVec<ConeContact, MAX_CONE_CONTACTS>,
+}
+
+/// How a cone problem ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ConeAnswer {
+    /// `L^T (a - a_u)`.
+    pub(super) correction: Vector6,
+    /// Length of the last sweep's change, relative to `scale`; 0 where full stick was the answer.
+    pub(super) residual: f64,
+}
+
+impl ConeProblem {
+    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0.
+    pub(super) fn solve(&mut self, scale: f64) -> ConeAnswer {
+        let cut = self.start_from_stick();
+        let mut y = self.wrench();
+        if cut <= STICK_TOLERANCE * scale {
+            return ConeAnswer {
+                correction: y,
+                residual: 0.0,
+            };
+        }
+        self.improve(scale);
+        y = self.wrench();
+        let mut residual = f64::INFINITY;
+        for sweep in 0..MAX_SWEEPS {
+            // Forwards and backwards in turn, so that the order of the rows shows as little as it can.
+            let mut change: f64 = 0.0;
+            if sweep % 2 == 0 {
+                for contact in &mut self.contacts {
+                    change = change.max(contact.relax(&mut y));
+                }
+            } else {
+                for contact in self.contacts.iter_mut().rev() {
+                    change = change.max(contact.relax(&mut y));
+                }
+            }
+            residual = change / scale;
+            if residual <= SWEEP_TOLERANCE {
+                break;
+            }
+        }
+        ConeAnswer {
+            correction: y,
+            residual,
+        }
+    }
+
+    /// Gives every contact its share of what full stick needs, cut to its cone. Returns the length of what was cut.
+    fn start_from_stick(&mut self) -> f64 {
+        // y = A d with A = sum j j^T, and j . y = -c for each row: A A d = -sum j c; the multipliers are j . d.
+        let mut gram = Matrix6::zeros();
+        let mut wanted = Vector6::zeros();
+        for contact in &self.contacts {
+            let mut row = |j: &Vector6, c: f64| {
+                gram.ger(1.0, j, j, 1.0);
+                wanted -= j * c;
+            };
+            row(&contact.normal, contact.slack);
+            if contact.coefficient > 0.0 {
+                row(&contact.tangents[0], contact.slip[0]);
+                row(&contact.tangents[1], contact.slip[1]);
+            }
+        }
+        let mut regular = gram;
+        let small = LEAST_NORM_REGULARISATION * gram.trace();
+        for i in 0..6 {
+            regular[(i, i)] += small;
+        }
+        let Some(factor) = regular.cholesky() else {
+            return f64::INFINITY; // the contacts keep zero
+        };
+        // One step of refinement takes the regularisation out again where contacts hold.
+        let solve = |right: &Vector6| {
+            let first = factor.solve(right);
+            first + factor.solve(&(right - gram * first))
+        };
+        let shares = solve(&solve(&wanted));
+        let mut cut = Vector6::zeros();
+        for contact in &mut self.contacts {
+            let wished_load = contact.normal.dot(&shares);
+            contact.load = wished_load.max(0.0);
+            cut += contact.normal * (contact.load - wished_load);
+            let frictional = contact.coefficient > 0.0;
+            let wished = if frictional {
+                contact.tangents.map(|j| j.dot(&shares))
+            } else {
+                [0.0; 2]
+            };
+            contact.grip = in_disc(wished, contact.limit());
+            let [u, v] = [0, 1].map(|i| contact.grip[i] - wished[i]);
+            cut += contact.tangents[0] * u + contact.tangents[1] * v;
+        }
+        // What no contact can hold (contacts that contradict each other) counts as cut, too.
+        let missed = self.contacts.iter().fold(0.0, |worst: f64, contact| {
+            let y = self.wrench();
+            worst.max((contact.slack + contact.normal.dot(&y)).abs())
+        });
+        cut.norm() + missed
+    }
+
+    /// The whitened wrench of all contacts.
+    pub(super) fn wrench(&self) -> Vector6 {
+        self.contacts
+            .iter()
+            .fold(Vector6::zeros(), |sum, contact| sum + contact.wrench())
+    }
+
+    /// The whitened wrench of friction alone.
+    pub(super) fn grip_wrench(&self) -> Vector6 {
+        self.contacts
+            .iter()
+            .fold(Vector6::zeros(), |sum, contact| sum + contact.grip_wrench())
+    }
+}

@@ -1,0 +1,250 @@
+//! Friction after the normal projection: the same function in both loops.
+//!
+//! The constrained acceleration of Eq. (1) tells which contacts touch. On these the cone problem is solved; its tangential
+//! multipliers are then a known wrench, and Eq. (1) is projected once more with that wrench in a_u. So the answer keeps its certificate
+//! (the normal rows hold exactly, whatever the cone problem left), and the multipliers of both parts balance `M (a_c - a_u)`.
+//!
+//! No energy is made: the tangential multipliers oppose the slip since the contact stuck last, or friction is taken back.
+//! Source: beyond the paper, which is frictionless. Coulomb's law in displacements, as the motion is quasi-static (Section 4.2).
+
+use nalgebra::Point3;
+
+use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
+use super::contact::{ConeContact, tangents_of};
+use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
+use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus};
+use crate::settings::Settings;
+use crate::spatial::{Vector6, linear};
+use crate::world::World;
+
+/// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
+const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
+/// Friction may bring other contacts to touch: so often the cone problem is set up again with them.
+const MAX_ROUNDS: usize = 3;
+/// A friction that would make energy is halved so often, then dropped.
+const MAX_HALVINGS: usize = 3;
+
+/// Coulomb friction of one loop. No allocation after `new`.
+#[derive(Clone, Debug)]
+pub struct Friction {
+    /// Coefficient of each obstacle.
+    coefficients: Vec<f64>,
+    touching: f64,
+    cone: ConeProblem,
+    /// The rows of the cone problem's contacts, in their order.
+    rows: arrayvec::ArrayVec<u32, MAX_CONE_CONTACTS>,
+    residual: f64,
+    slid: bool,
+    acts: bool,
+}
+
+/// One projection to which friction is to be added.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionProblem<'a> {
+    /// M.
+    pub metric: &'a Metric,
+    /// a_u, m and rad.
+    pub unconstrained: &'a Vector6,
+    /// a_0: the acceleration at which the contacts stuck last; zero in the god-object loop, where the body's pose remembers.
+    pub stuck_at: &'a Vector6,
+    /// G, world, m.
+    pub reference_point: &'a Point3<f64>,
+    /// The rows that were projected on.
+    pub rows: &'a [HalfSpace],
+    /// The constraint of each row.
+    pub constraints: &'a [NonPenetrationConstraint],
+}
+
+impl Friction {
+    /// The friction of a world; `None` where every obstacle is frictionless: then there is nothing to pay.
+    pub fn of(world: &World, settings: &Settings) -> Option<Self> {
+        let coefficients: Vec<f64> = world
+            .obstacles
+            .iter()
+            .map(|obstacle| obstacle.surface.friction)
+            .collect();
+        let any = coefficients.iter().any(|&coefficient| coefficient > 0.0); // false for NaN
+        any.then(|| Self {
+            coefficients,
+            touching: TOUCHING_MOTION_TOLERANCES * settings.motion_tolerance,
+            cone: ConeProblem::default(),
+            rows: arrayvec::ArrayVec::new(),
+            residual: 0.0,
+            slid: true,
+            acts: false,
+        })
+    }
+
+    /// Residual of the last cone problem, relative to a_u: the last sweep's change and what the second projection
+    /// changed. Zero without frictional contact.
+    pub fn residual(&self) -> f64 {
+        self.residual
+    }
+
+    /// Whether a loaded contact has slipped in the last answer, or none was loaded: then sticking starts anew there.
+    pub fn slid(&self) -> bool {
+        self.slid
+    }
+
+    /// Whether the last answer is other than the frictionless one.
+    pub fn acts(&self) -> bool {
+        self.acts
+    }
+
+    /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
+    /// load it is returned unchanged, bit for bit. `project` is Eq. (1) on the same rows for another a_u, from the rows given to
+    /// start with.
+    pub fn hold(
+        &mut self,
+        problem: &FrictionProblem<'_>,
+        mut project: impl FnMut(&Vector6, &[u32]) -> Projection,
+        frictionless: Projection,
+    ) -> Projection {
+        self.residual = 0.0;
+        self.slid = true;
+        self.acts = false;
+        if frictionless.status != ProjectionStatus::Solved || frictionless.active.is_empty() {
+            return frictionless;
+        }
+        let metric = problem.metric;
+        let scale = metric
+            .norm(problem.unconstrained)
+            .max(metric.norm(problem.stuck_at));
+        let usable = scale.is_finite() && scale > 0.0;
+        if !usable {
+            return frictionless;
+        }
+        let mut held: Option<Projection> = None;
+        for _ in 0..MAX_ROUNDS {
+            let now = held.as_ref().unwrap_or(&frictionless);
+            if !self.gather(problem, now) {
+                break;
+            }
+            let answer = self.cone.solve(scale);
+            let Some((projection, correction)) = self.project_with_grip(problem, &mut project)
+            else {
+                self.residual = f64::INFINITY;
+                return frictionless;
+            };
+            self.residual = answer.residual + (correction - answer.correction).norm() / scale;
+            let complete = projection
+                .active
+                .iter()
+                .all(|active| self.rows.contains(&active.row));
+            held = Some(projection);
+            if complete {
+                break;
+            }
+        }
+        self.acts = held.is_some();
+        held.unwrap_or(frictionless)
+    }
+
+    /// Fills the cone problem with the contacts that touch at `now`. False when none of them is frictional.
+    fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
+        self.cone.contacts.clear();
+        self.rows.clear();
+        let rows = || problem.rows.iter().zip(problem.constraints).enumerate();
+        let touches = |row: &HalfSpace| row.slack(&now.acceleration) <= self.touching;
+        let coefficient_of = |constraint: &NonPenetrationConstraint| {
+            let obstacle = usize::from(constraint.features.obstacle);
+            self.coefficients.get(obstacle).copied().unwrap_or(0.0)
+        };
+        let touching = || rows().filter(|(_, (row, _))| touches(row));
+        let (mut count, mut frictional) = (0, false);
+        for (_, (_, constraint)) in touching() {
+            count += 1;
+            frictional |= coefficient_of(constraint) > 0.0;
+        }
+        if !frictional {
+            return false;
+        }
+
+        let metric = problem.metric;
+        let (at_now, wished) = (
+            metric.whiten(&(now.acceleration - problem.unconstrained)),
+            problem.unconstrained - problem.stuck_at,
+        );
+        let contact = |row: &HalfSpace, constraint: &NonPenetrationConstraint| {
+            let point_row = |direction| {
+                contact_jacobian(&direction, &constraint.point, problem.reference_point)
+            };
+            let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
+            let normal = metric.whiten_row(&row.jacobian);
+            // Touching is touching: the contact's own slack at `now` is taken as none.
+            let slack = -normal.dot(&at_now);
+            ConeContact::new(
+                coefficient_of(constraint),
+                normal,
+                tangents.map(|j| metric.whiten_row(&j)),
+                slack,
+                tangents.map(|j| j.dot(&wished)),
+            )
+        };
+        let mut add = |index: usize, row: &HalfSpace, constraint: &NonPenetrationConstraint| {
+            if !self.rows.contains(&(index as u32))
+                && let Some(contact) = contact(row, constraint)
+                && self.cone.contacts.try_push(contact).is_ok()
+            {
+                self.rows.push(index as u32);
+            }
+        };
+        // More contacts than the cone problem takes: those that carry the load, then every n-th of the others.
+        let stride = if count <= MAX_CONE_CONTACTS {
+            1
+        } else {
+            for active in &now.active {
+                let index = active.row as usize;
+                if let (Some(row), Some(constraint)) =
+                    (problem.rows.get(index), problem.constraints.get(index))
+                {
+                    add(index, row, constraint);
+                }
+            }
+            count.div_ceil(MAX_CONE_CONTACTS - now.active.len())
+        };
+        for (index, (row, constraint)) in touching().step_by(stride) {
+            add(index, row, constraint);
+        }
+        !self.rows.is_empty()
+    }
+
+    /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`.
+    fn project_with_grip(
+        &mut self,
+        problem: &FrictionProblem<'_>,
+        project: &mut impl FnMut(&Vector6, &[u32]) -> Projection,
+    ) -> Option<(Projection, Vector6)> {
+        for _ in 0..=MAX_HALVINGS {
+            let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
+            let projection = project(&pulled, &self.rows);
+            if projection.status != ProjectionStatus::Solved {
+                return None;
+            }
+            let change = projection.acceleration - problem.unconstrained;
+            let correction = problem.metric.whiten(&change);
+            if self.dissipates(&correction) {
+                return Some((projection, correction));
+            }
+            for contact in &mut self.cone.contacts {
+                contact.grip = contact.grip.map(|grip| 0.5 * grip);
+            }
+        }
+        None
+    }
+
+    /// Whether friction takes energy at this correction; notes whether a loaded contact slips.
+    fn dissipates(&mut self, correction: &Vector6) -> bool {
+        let (mut power, mut grip, mut loaded) = (0.0, 0.0, false);
+        self.slid = false;
+        for contact in self.cone.contacts.iter().filter(|c| c.coefficient > 0.0) {
+            let slip = contact.slip_at(correction);
+            power += contact.grip[0] * slip[0] + contact.grip[1] * slip[1];
+            grip += contact.grip[0].hypot(contact.grip[1]);
+            loaded |= contact.load > 0.0;
+            self.slid |= contact.load > 0.0 && slip[0].hypot(slip[1]) > self.touching;
+        }
+        self.slid |= !loaded;
+        power <= grip * self.touching // false for NaN
+    }
+}

@@ -1,0 +1,10 @@
+//! Coulomb friction: a cone of forces at each contact, beyond the paper.
+
+mod anchor;
+mod cone;
+mod contact;
+mod hold;
+mod newton;
+
+pub(crate) use anchor::StickAnchor;
+pub use hold::{Friction, FrictionProblem};

@@ -1,0 +1,191 @@
+//! Textures: tilts in closed form, averaged over contacts, and a clean tone at any rate of the god-object loop.
+
+mod geometry_shapes;
+mod support;
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
+use god_object::spatial::{angular, linear};
+use god_object::surface::Textures;
+use god_object::{
+    Body, Coupling, GodObject, HeightMap, HeightMapTexture, Pose, Settings, SineTexture, Texture,
+    Vector6, World,
+};
+use support::{box_obstacle, box_on_table};
+
+const SINE: SineTexture = SineTexture {
+    axis: Vector3::new(1.0, 0.0, 0.0),
+    wavelength: 2e-3,
+    amplitude: 0.2,
+};
+
+fn table_with(texture: Option<Texture>) -> World {
+    let mut world = World::clone(&box_on_table());
+    world.obstacles[0].pose = Pose::identity();
+    world.obstacles[0].surface.texture = texture;
+    world
+}
+
+type Touched = (u16, Point3<f64>, Vector3<f64>);
+
+fn contact_at(x: f64) -> Touched {
+    (0, Point3::new(x, 0.0, 0.0), Vector3::z())
+}
+
+fn tilted(texture: Texture, contacts: &[Touched]) -> Vector6 {
+    let wrench = Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0);
+    Textures::of(&table_with(Some(texture)))
+        .expect("a texture")
+        .tilt(
+            &wrench,
+            &Pose::identity(),
+            &Vector6::zeros(),
+            contacts.iter().copied(),
+        )
+}
+
+#[test]
+fn the_force_tilts_by_the_sine_and_keeps_its_magnitude() {
+    let felt = tilted(Texture::Sine(SINE), &[contact_at(0.5e-3)]);
+    assert!((linear(&felt).norm() - 5.0).abs() < 1e-12);
+    assert!((felt[0] / felt[2] - 0.2).abs() < 1e-12);
+    let arm = Vector3::new(0.5e-3, 0.0, 0.0);
+    let torque = arm.cross(&(linear(&felt) - Vector3::z() * 5.0));
+    assert!((angular(&felt) - torque).norm() < 1e-12);
+}
+
+#[test]
+fn tilts_of_several_contacts_are_averaged() {
+    let crest_and_trough = [contact_at(0.5e-3), contact_at(1.5e-3)];
+    let felt = tilted(Texture::Sine(SINE), &crest_and_trough);
+    assert!((felt - Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0)).norm() < 1e-12);
+    let crest_and_zero = [contact_at(0.5e-3), contact_at(1.0e-3)];
+    let felt = tilted(Texture::Sine(SINE), &crest_and_zero);
+    assert!((felt[0] / felt[2] - 0.1).abs() < 1e-12);
+}
+
+#[test]
+fn a_world_without_texture_has_no_textures() {
+    assert!(Textures::of(&table_with(None)).is_none());
+}
+
+#[test]
+fn on_a_height_map_the_force_leans_down_the_slope() {
+    // Waves of 1 mm along x, 0.1 mm high: the gradient is pi A / wavelength at a flank.
+    let (width, waves) = (128, 4.0);
+    let heights: Vec<f64> = (0..width * width)
+        .map(|i| 0.5 - 0.5 * (TAU * waves * (i % width) as f64 / width as f64).cos())
+        .collect();
+    let texture = Texture::HeightMap(HeightMapTexture {
+        map: Arc::new(HeightMap::new(width, &heights).expect("a map")),
+        tile: 4e-3,
+        amplitude: 1e-4,
+    });
+    let felt = tilted(texture, &[contact_at(0.25e-3)]);
+    let gradient = std::f64::consts::PI * 1e-4 / 1e-3;
+    assert!((linear(&felt).norm() - 5.0).abs() < 1e-12);
+    assert!(
+        (felt[0] / felt[2] + gradient).abs() < 0.01 * gradient,
+        "{felt}"
+    );
+}
+
+/// Sideways force per ms of a tip that slides at `speed` on `texture`, the god-object updated every `period` ms.
+fn slide(texture: Texture, speed: f64, period: usize) -> Vec<f64> {
+    let mut plate = box_obstacle("plate", Vector3::new(0.3, 0.05, 0.01), Vector3::zeros());
+    plate.surface.texture = Some(texture);
+    let world = Arc::new(World {
+        body: Body {
+            primitive: None,
+            mesh: geometry_shapes::mesh(geometry_shapes::icosphere(2e-3, 2)),
+            mass: 1.0,
+            inertia: Matrix3::identity() * 1.6e-6,
+            reference_point: Point3::origin(),
+        },
+        obstacles: vec![plate],
+    });
+    let settings = Settings::for_size(4e-3);
+    let at = |x: f64, depth: f64| {
+        Pose::from_parts(
+            Vector3::new(x, 0.0, 0.012 - depth).into(),
+            UnitQuaternion::identity(),
+        )
+    };
+    let mut coupling = Coupling::new(&world, &settings);
+    let mut god_object = GodObject::new(world, settings, at(-0.1, -1e-3)).expect("free");
+    let mut forces = Vec::new();
+    for i in 0..800 {
+        let t = f64::from(i) * 1e-3;
+        let device = at(-0.1 + speed * t, (-1e-3 + 0.04 * t).min(3e-3));
+        if (i as usize).is_multiple_of(period) {
+            god_object.step(&device, None);
+        }
+        let felt = coupling.step(t, &device, god_object.constraint_set());
+        if i >= 300 {
+            forces.push(felt.wrench[0]);
+        }
+    }
+    forces
+}
+
+/// Amplitude at each whole multiple of 2 Hz up to 500 Hz, of 500 samples at 1 kHz.
+fn spectrum(samples: &[f64]) -> Vec<f64> {
+    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+    (0..=samples.len() / 2)
+        .map(|k| {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (i, sample) in samples.iter().enumerate() {
+                let phase = TAU * k as f64 * i as f64 / samples.len() as f64;
+                re += (sample - mean) * phase.cos();
+                im += (sample - mean) * phase.sin();
+            }
+            2.0 * re.hypot(im) / samples.len() as f64
+        })
+        .collect()
+}
+
+#[test]
+fn the_tone_of_a_sine_is_clean_at_any_rate_of_the_god_object() {
+    // R29: 1 mm at 0.2 m/s is 200 Hz.
+    let texture = Texture::Sine(SineTexture {
+        wavelength: 1e-3,
+        ..SINE
+    });
+    for period in [1, 3, 14] {
+        let amplitudes = spectrum(&slide(texture.clone(), 0.2, period));
+        let tone = amplitudes[100];
+        let (place, loudest) = amplitudes
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| k.abs_diff(100) > 1)
+            .fold(
+                (0, 0.0),
+                |best, (k, a)| if *a > best.1 { (k, *a) } else { best },
+            );
+        let decibels = 20.0 * (tone / loudest).log10();
+        println!(
+            "sets every {period} ms: {tone:.3} N at 200 Hz, next {loudest:.2e} N at {} Hz: {decibels:.1} dB",
+            2 * place
+        );
+        assert!(tone > 0.4, "{tone}");
+        assert!(decibels > 20.0, "{period} ms: {decibels} dB");
+    }
+}
+
+#[test]
+fn a_sine_above_half_the_rate_is_muted() {
+    // 0.3 mm at 0.2 m/s is 667 Hz: sampled at 1 kHz it would be felt as 333 Hz.
+    let fine = Texture::Sine(SineTexture {
+        wavelength: 0.3e-3,
+        ..SINE
+    });
+    let loudest = spectrum(&slide(fine.clone(), 0.2, 1))
+        .into_iter()
+        .fold(0.0, f64::max);
+    assert!(loudest < 1e-3, "{loudest} N");
+    // Slowly it is all there.
+    let slow = spectrum(&slide(fine, 0.03, 1));
+    assert!(slow[50] > 0.4, "{} N at 100 Hz", slow[50]);
+}
