@@ -15,8 +15,9 @@ const SETTINGS: AdvancementSettings = AdvancementSettings {
     max_intervals: 64,
 };
 
-/// How far above the minimum gap an advance may end: the tolerance, and the rounding of coordinates up to 2.
-const NEAR: f64 = SETTINGS.gap_tolerance + 1e-12;
+/// How far above the minimum gap an advance may end: the tolerance, and the rounding of coordinates up to 2 by 4e-16 m. Over a gap
+/// of 1e-7 m that tilts the direction by 4e-9, and features as long as 3.5 m stop earlier by that share of their length.
+const NEAR: f64 = SETTINGS.gap_tolerance + 1.5e-8;
 /// A kilometre away coordinates are rounded by 1e-13 m: over a gap of 1e-7 m that tilts the direction by some 1e-6, and features
 /// as long as 3 m stop earlier by that share of their length.
 const FAR: f64 = 1e-5;

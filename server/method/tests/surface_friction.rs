@@ -7,7 +7,9 @@ use std::sync::Arc;
 
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
-use god_object::{Coupling, CouplingOutput, GodObject, Pose, Settings, Vector6, World};
+use god_object::{
+    Coupling, CouplingOutput, ForceShading, GodObject, Pose, Settings, Vector6, World,
+};
 use proptest::prelude::*;
 use support::{box_body, box_obstacle, box_on_table};
 
@@ -259,6 +261,8 @@ fn obstacles_without_friction_give_the_same_bits_beside_rough_ones() {
         Vector3::new(0.1, 0.1, 0.1),
         Vector3::new(3.0, 0.0, 0.0),
     ));
+    // A shaded obstacle: in both worlds every pair that faces becomes a row, friction or not.
+    rough.obstacles[1].surface.shading = Some(ForceShading { crease_angle: 0.5 });
     let smooth = rough.clone();
     rough.obstacles[1].surface.friction = 0.7;
     let start = at(0.0, 0.0, HALF_HEIGHT + 1e-4);
