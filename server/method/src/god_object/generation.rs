@@ -52,7 +52,7 @@ impl GodObject {
             let reaches = moved + wanted <= within
                 || (self.affordable <= distance && moved <= LONGER_WAY * self.affordable);
             self.set.gap_min = reduction.gap_min();
-            if !reaches {
+            if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
             }
         }
@@ -108,7 +108,23 @@ impl GodObject {
 
     /// Finds the rows that the projection of `unconstrained` needs.
     pub(super) fn complete(&mut self, unconstrained: &Vector6, report: &mut StepReport) {
-        self.complete_for(&[(*unconstrained, Purpose::Motion)], &mut report.work);
+        let motion = [(*unconstrained, Purpose::Motion)];
+        self.complete_for(&motion, &mut report.work);
+        if self.reduction.as_ref().is_some_and(|r| r.is_outdated()) {
+            self.collect_again(&mut report.work);
+            self.complete_for(&motion, &mut report.work);
+        }
+    }
+
+    /// The candidates of the present pose, within the distance of the last collection.
+    fn collect_again(&mut self, work: &mut Work) {
+        let Some(mut reduction) = self.reduction.take() else {
+            return;
+        };
+        if let Some(at) = self.place() {
+            self.collect_candidates(&mut reduction, &at, self.collected_within, work);
+        }
+        self.reduction = Some(reduction);
     }
 
     /// Finds the rows that the force needs: for the device's present pose, and for those that it may take until the next set.

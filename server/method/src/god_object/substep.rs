@@ -72,8 +72,9 @@ impl GodObject {
                 update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
-        // but for easing out, which is little always: a body left below the rest distance stops at every motion.
-        let little = if eases {
+        // but for easing out, which is little always: a body left below the rest distance stops at every motion. Nor is a motion
+        // little that was cut to what is trusted.
+        let little = if eases || length > self.trust_length {
             0.0
         } else {
             WORTH_SHARE * update.made

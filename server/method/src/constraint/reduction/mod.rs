@@ -57,6 +57,9 @@ struct Known {
     idle: u32,
 }
 
+/// A row of a gap up to so many rest distances holds the body, or will soon.
+const NEAR_REST_DISTANCES: f64 = 4.0;
+
 /// Where the rows are to hold.
 #[derive(Clone, Debug)]
 pub(crate) struct At {
@@ -96,6 +99,8 @@ pub(crate) struct RowReduction {
     error: f64,
     /// A search or a row did not find room.
     truncated: bool,
+    /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
+    outdated: bool,
 }
 
 impl RowReduction {
@@ -109,6 +114,7 @@ impl RowReduction {
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
+            outdated: false,
         }
     }
 
@@ -132,8 +138,11 @@ impl RowReduction {
     /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
     pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
         self.error = 0.0;
+        let near = NEAR_REST_DISTANCES * at.rest_distance;
+        let outdated = &mut self.outdated;
         self.known.retain_mut(|row| {
             let contact = face(at, &row.contact.features, work);
+            *outdated |= contact.is_none() && row.contact.gap <= near;
             if let Some(contact) = contact {
                 row.contact = contact;
                 row.jacobian = jacobian(&contact, &at.center());
@@ -144,6 +153,11 @@ impl RowReduction {
         for &hint in hints.iter().take(HINTS_TAKEN) {
             self.take_hint(at, hint, work);
         }
+    }
+
+    /// Whether a pair that mattered has left the features that it was of, so that the candidates are to be collected anew.
+    pub(crate) fn is_outdated(&self) -> bool {
+        self.outdated
     }
 
     /// How far the body may have gone since the candidates were collected, m: `radius` bounds its points' arms about G.
@@ -167,6 +181,7 @@ impl RowReduction {
     /// Forgets the candidates; those of the present pose are to be offered.
     pub(crate) fn begin(&mut self, at: &At) {
         self.truncated = false;
+        self.outdated = false;
         self.candidates.clear(&at.reference);
     }
 
@@ -257,6 +272,7 @@ impl RowReduction {
             } else {
                 face(at, &features, work)
             };
+            self.outdated |= contact.is_none();
             if let Some(contact) = contact {
                 let row = jacobian(&contact, &at.center());
                 let violation = at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
