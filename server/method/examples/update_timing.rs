@@ -1,4 +1,4 @@
-//! Times god-object updates of two bunnies that slide: `cargo run --release --example update_timing -- [subdivisions] [steps]`.
+//! Times god-object updates of two bunnies that slide: `cargo run --release --example update_timing -- [subdivisions] [steps] [work budget, nominal us]`.
 //!
 //! The device presses one bunny 1 to 3 mm into the other and slides it around it, 0.5 to 3 mm and up to half a degree in
 //! a step, on a path of fixed seed. Times are CPU time of the thread. Each subdivision makes four triangles of one: 27,000,
@@ -41,7 +41,8 @@ struct Update {
 fn main() {
     let argument = |k: usize, default: usize| {
         std::env::args().nth(k).map_or(default, |a| {
-            a.parse().expect("arguments: [subdivisions] [steps]")
+            a.parse()
+                .expect("arguments: [subdivisions] [steps] [work budget]")
         })
     };
     let (levels, steps) = (argument(1, 0), argument(2, STEPS));
@@ -57,7 +58,8 @@ fn main() {
         (thread_cpu_us() - before) * 1e-6
     );
     let world = world_of(mesh);
-    let updates = run(&world, steps);
+    let budget = std::env::args().nth(3).map(|_| argument(3, 0) as u64);
+    let updates = run(&world, steps, budget);
     let body = &world.body;
     let around = |pose: &Pose| at_reference_point(pose, &body.reference_point);
     let way = |from: &Pose, to: &Pose, share: f64| Motion {
@@ -104,10 +106,14 @@ fn world_of(mesh: Mesh) -> Arc<World> {
 }
 
 /// The whole update, along the hand's path.
-fn run(world: &Arc<World>, steps: usize) -> Vec<Update> {
+fn run(world: &Arc<World>, steps: usize, work_budget: Option<u64>) -> Vec<Update> {
     let start = Pose::new(Vector3::new(0.16, 0.02, 0.0), Vector3::new(0.0, 2.0, 0.0));
-    let mut god_object = GodObject::new(Arc::clone(world), Settings::for_size(SIZE), start)
-        .expect("apart at the start");
+    let settings = Settings {
+        work_budget,
+        ..Settings::for_size(SIZE)
+    };
+    let mut god_object =
+        GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
     let mut hand = Hand::new(start, 1);
     let (mut times, mut updates) = (Vec::new(), Vec::new());
     let mut work = Work::default();
