@@ -1,6 +1,6 @@
 //! The insertion scenes of the test data: pegs, a gear, a nut, each with the trace of a hand from start to goal.
 //!
-//! A hand does not push on blindly. Where the body stays behind by more than [`PATIENCE`], as a peg does that an offset holds
+//! A hand does not push on blindly. Where the body stays behind by more than `PATIENCE`, as a peg does that an offset holds
 //! on the face beside its hole, the hand goes back a little on its way, corrects offset and tilt meanwhile, and tries again;
 //! as it goes on it falls back into its error, slowly. At the goal it corrects itself and waits. Its tremor never ends.
 //!

@@ -19,7 +19,7 @@ const NORMAL_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Vertices with more edges, tips of fans, are taken as corners without looking: the look costs the cube of their number.
 const MAX_RING: usize = 32;
 
-/// A cone that holds the normal cones of every feature below a node of the tree.
+/// A cone that holds the normal of a triangle and the normal cones of the features that it owns.
 #[derive(Clone, Copy, Debug)]
 pub struct NormalCone {
     /// Unit axis.
@@ -36,24 +36,6 @@ impl NormalCone {
             axis,
             angle,
             cos_sin: [angle.cos(), angle.sin()],
-        }
-    }
-
-    /// A cone that holds both.
-    pub(crate) fn merge(&self, other: &Self) -> Self {
-        let sum = self.axis + other.axis;
-        let length = sum.norm();
-        let everything = Self::new(self.axis, std::f64::consts::PI);
-        if length < f64::EPSILON.sqrt() {
-            return everything;
-        }
-        let axis = sum / length;
-        let reach = |c: &Self| axis.dot(&c.axis).clamp(-1.0, 1.0).acos() + c.angle;
-        let angle = reach(self).max(reach(other));
-        if angle < std::f64::consts::PI {
-            Self::new(axis, angle)
-        } else {
-            everything
         }
     }
 }

@@ -1,10 +1,8 @@
-//! Bounding-volume tree over the triangles of a mesh: boxes in the mesh's frame, and cones of normals.
+//! Bounding-volume tree over the triangles of a mesh: boxes in the mesh's frame.
 //!
 //! Built once by the surface-area heuristic on binned centroids; flat arrays, first child next to its parent.
 
 use nalgebra::{Point3, Vector3};
-
-use super::normal_cone::NormalCone;
 
 /// Bins of the surface-area heuristic along the longest axis.
 const BINS: usize = 16;
@@ -42,7 +40,6 @@ impl Node {
 #[derive(Clone, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
-    cones: Vec<NormalCone>,
 }
 
 /// What the build knows of a triangle.
@@ -55,11 +52,7 @@ struct Item {
 }
 
 impl Tree {
-    pub(crate) fn build(
-        vertices: &[Point3<f64>],
-        triangles: &[[u32; 3]],
-        leaf_cones: &[NormalCone],
-    ) -> Self {
+    pub(crate) fn build(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         let mut items: Vec<Item> = triangles
             .iter()
             .enumerate()
@@ -67,29 +60,13 @@ impl Tree {
             .collect();
         let mut nodes = Vec::with_capacity(2 * triangles.len() - 1);
         grow(&mut items, 0, &mut nodes);
-        let mut cones = vec![NormalCone::new(Vector3::z(), 0.0); nodes.len()];
-        // Children follow their parent: from the back, every child is done before its parent.
-        for index in (0..nodes.len()).rev() {
-            let node: &Node = &nodes[index];
-            cones[index] = if node.is_leaf() {
-                leaf_cones[node.triangle as usize]
-            } else {
-                cones[index + 1].merge(&cones[node.second as usize])
-            };
-        }
-        Self { nodes, cones }
+        Self { nodes }
     }
 
     /// All nodes, the root first.
     #[inline]
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
-    }
-
-    /// Cone of normals of node `index`.
-    #[inline]
-    pub fn cone(&self, index: u32) -> &NormalCone {
-        &self.cones[index as usize]
     }
 }
 
