@@ -256,12 +256,13 @@ impl Against {
 }
 
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
-/// down; stops when it returns false.
+/// down; stops when it returns false. Pairs of volumes that own features `wanted` refuses, (body, obstacle), are not opened.
 pub(crate) fn for_facing_triangle_pairs(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     stack: &mut Vec<(Child, Child)>,
     work: &mut Work,
+    wanted: impl Fn(u8, u8) -> bool,
     mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
     stack.clear();
@@ -275,7 +276,11 @@ pub(crate) fn for_facing_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair((body, obstacle), volumes, (a, b), |pair| stack.push(pair));
+        open_pair((body, obstacle), volumes, (a, b), |(a, b)| {
+            if wanted(body.owned(a), obstacle.owned(b)) {
+                stack.push((a, b));
+            }
+        });
     }
 }
 

@@ -183,11 +183,19 @@ impl Problem<'_> {
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
         let volumes = FacingVolumes::still(trees, &start, 0.0, std::f64::consts::PI);
         let mut crosses = false;
-        for_facing_triangle_pairs(trees, &volumes, &mut workspace.pairs, work, |a, b, _| {
-            let on_body = self.body.corners(a).map(|p| start.point(&p));
-            crosses = triangles_intersect(&on_body, &self.obstacle.corners(b));
-            !crosses
-        });
+        let any = |_, _| true;
+        for_facing_triangle_pairs(
+            trees,
+            &volumes,
+            &mut workspace.pairs,
+            work,
+            any,
+            |a, b, _| {
+                let on_body = self.body.corners(a).map(|p| start.point(&p));
+                crosses = triangles_intersect(&on_body, &self.obstacle.corners(b));
+                !crosses
+            },
+        );
         crosses
     }
 

@@ -74,10 +74,8 @@ pub(crate) fn collect_bounded(
     let mut truncated = false;
     let mut complete_within = activation_distance;
     let mut looked_at = 0;
-    for_facing_triangle_pairs(trees, &volumes, &mut workspace.pairs, work, |a, b, work| {
-        if !can_touch(body.owned_features(a), obstacle.owned_features(b)) {
-            return true;
-        }
+    let stack = &mut workspace.pairs;
+    for_facing_triangle_pairs(trees, &volumes, stack, work, can_touch, |a, b, work| {
         looked_at += 1;
         let pair = facing.pair(a, b);
         if facing.may_face(&pair) {
@@ -120,7 +118,8 @@ pub(crate) fn collect_bounded(
     }
 }
 
-/// Whether two triangles own features that can meet: a corner of either meets the other's face, sides meet sides.
+/// Whether triangles that own these kinds of features, two or those below two volumes, own some that can meet: a corner of either
+/// meets the other's face, sides meet sides.
 #[inline]
 fn can_touch(on_a: u8, on_b: u8) -> bool {
     const CORNERS: u8 = 7;

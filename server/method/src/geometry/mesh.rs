@@ -47,7 +47,13 @@ impl Mesh {
 
         let cones = triangle_cones(&vertices, &triangles, &face_normals, &mut topology);
         let tree = Tree::build(&vertices, &triangles);
-        let wide_tree = WideTree::build(&vertices, &triangles, &face_normals, &cones, &tree);
+        let wide_tree = WideTree::build(
+            &vertices,
+            &triangles,
+            &face_normals,
+            (&cones, &topology.owned),
+            &tree,
+        );
         let identity = identity(&vertices, &triangles);
         let mut bounding_box = [vertices[0]; 2];
         for v in &vertices {

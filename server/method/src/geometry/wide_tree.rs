@@ -61,6 +61,8 @@ pub(crate) struct Volume {
     pub(crate) cosine: f32,
     pub(crate) sine: f32,
     below: u32,
+    /// Which kinds of features the triangles inside own, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
+    owned: u32,
 }
 
 /// What lies below a child.
@@ -90,6 +92,7 @@ struct Source<'a> {
     triangles: &'a [[u32; 3]],
     face_normals: &'a [Vector3<f64>],
     cones: &'a [NormalCone],
+    owned: &'a [u8],
     binary: &'a [Node],
     /// Triangles in the order of the binary tree's leaves, and the range of them below each of its nodes.
     order: Vec<u32>,
@@ -103,7 +106,7 @@ impl WideTree {
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
         face_normals: &[Vector3<f64>],
-        cones: &[NormalCone],
+        (cones, owned): (&[NormalCone], &[u8]),
         tree: &Tree,
     ) -> Self {
         let binary = tree.nodes();
@@ -128,6 +131,7 @@ impl WideTree {
             triangles,
             face_normals,
             cones,
+            owned,
             binary,
             order,
             ranges,
@@ -181,6 +185,12 @@ impl WideTree {
     #[inline]
     pub(crate) fn radius(&self, child: Child) -> f32 {
         self.volumes[child as usize].radius
+    }
+
+    /// Which kinds of features the triangles below a child own.
+    #[inline]
+    pub(crate) fn owned(&self, child: Child) -> u8 {
+        self.volumes[child as usize].owned as u8
     }
 
     /// What lies below a child.
@@ -298,6 +308,9 @@ impl Source<'_> {
             cosine: angle.cos() as f32,
             sine: angle.sin() as f32,
             below: 0,
+            owned: inside
+                .iter()
+                .fold(0, |kinds, t| kinds | u32::from(self.owned[*t as usize])),
         }
     }
 
