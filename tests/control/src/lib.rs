@@ -1,0 +1,1 @@
+//! Control recipes under a virtual clock.
