@@ -32,6 +32,7 @@ pub mod geometry;
 mod god_object;
 mod implicit;
 mod known_rows;
+mod prepared_rows;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;

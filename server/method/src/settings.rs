@@ -157,17 +157,6 @@ impl Settings {
         }
     }
 
-    /// Bound of a row in the coupling loop, m: the same, but a_u is only the fraction k_s of the difference, and a body
-    /// nearer than the rest distance is not pushed: there is no force at a distance.
-    #[inline]
-    pub(crate) fn coupling_bound(&self, gap: f64) -> f64 {
-        if self.look_ahead {
-            (self.k_s * (self.rest_distance - gap)).min(0.0)
-        } else {
-            0.0
-        }
-    }
-
     /// Says what is out of range, by the key's name.
     pub fn validate(&self) -> Result<(), SettingsError> {
         let positive = [

@@ -13,6 +13,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{FeaturePair, Separation};
+use crate::prepared_rows::PreparedRows;
 use crate::spatial::{Pose, Vector6, six};
 
 /// A half-space of accelerations that one pair of facing features allows.
@@ -49,6 +50,8 @@ pub struct ConstraintSet {
     pub truncated: bool,
     /// Most by which a row that was left out is violated by a motion that the rows were chosen for, m; zero for a full set.
     pub reduction_error: f64,
+    /// The rows made ready for the coupling, see [`ConstraintSet::prepare`].
+    pub(crate) prepared: PreparedRows,
 }
 
 impl ConstraintSet {
@@ -57,6 +60,7 @@ impl ConstraintSet {
         Self {
             constraints: Vec::with_capacity(capacity),
             gap_min: f64::INFINITY,
+            prepared: PreparedRows::with_capacity(capacity),
             ..Self::default()
         }
     }
@@ -77,6 +81,7 @@ impl Clone for ConstraintSet {
         self.gap_min = source.gap_min;
         self.truncated = source.truncated;
         self.reduction_error = source.reduction_error;
+        self.prepared.copy_from(&source.prepared);
     }
 }
 
