@@ -30,7 +30,8 @@ pub trait Parse: Line {
 
 impl Line for HapticsRecord {
     const FILE: &'static str = "haptics.csv";
-    const HEADER: &'static str = "sample,t_ns,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,buttons,faulty,fx,fy,fz,tx,ty,tz";
+    const HEADER: &'static str =
+        "sample,t_ns,x,y,z,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz,buttons,faulty,fx,fy,fz,tx,ty,tz";
 
     fn write(&self, line: &mut String) {
         first(line, self.sequence);
@@ -207,7 +208,12 @@ impl<'a> Fields<'a> {
     /// Bit by bit as it was: not normalised.
     fn pose(&mut self) -> Result<Pose, String> {
         let translation = Translation3::new(self.number()?, self.number()?, self.number()?);
-        let rotation = Quaternion::new(self.number()?, self.number()?, self.number()?, self.number()?);
+        let rotation = Quaternion::new(
+            self.number()?,
+            self.number()?,
+            self.number()?,
+            self.number()?,
+        );
         Ok(Pose::from_parts(
             translation,
             UnitQuaternion::new_unchecked(rotation),

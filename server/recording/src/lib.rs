@@ -29,7 +29,7 @@ mod tap;
 pub use error::RecordingError;
 pub use identity::identity_of;
 pub use manifest::{FORMAT, Lost, Manifest, SceneOrigin};
-pub use reader::{Recording, RecordReader};
+pub use reader::{RecordReader, Recording};
 pub use recorder::{EventSender, Recorder, Summary};
 pub use records::{ConstraintRecord, EventRecord, ForceRecord, HapticsRecord, UpdateRecord};
 pub use tap::{Tap, Taps};

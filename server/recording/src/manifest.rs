@@ -18,6 +18,8 @@ pub struct Manifest {
     pub scene: String,
     /// Where the scene's meshes and traces are.
     pub origin: SceneOrigin,
+    /// What was set beside the scene's text, in order, as by `--set`.
+    pub overrides: Vec<String>,
     /// [`identity_of`](crate::identity_of) the bodies, settings and start that the scene gave.
     pub identity: String,
     /// The session came to its end and nothing was lost. False while it runs.

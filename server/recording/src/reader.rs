@@ -104,7 +104,9 @@ impl<T: Line> RecordReader<T> {
             error,
         })?;
         let mut reader = csv::Reader::from_reader(file);
-        let found = reader.headers().map(|header| header.iter().collect::<Vec<_>>().join(","));
+        let found = reader
+            .headers()
+            .map(|header| header.iter().collect::<Vec<_>>().join(","));
         match found {
             Ok(header) if header == T::HEADER => Ok(Self {
                 path,

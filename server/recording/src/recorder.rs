@@ -139,10 +139,11 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
 
 fn write_manifest(directory: &Path, manifest: &Manifest) -> Result<(), RecordingError> {
     let path = directory.join("recording.json");
-    let mut text = serde_json::to_string_pretty(manifest).map_err(|error| RecordingError::Write {
-        path: path.clone(),
-        error: error.into(),
-    })?;
+    let mut text =
+        serde_json::to_string_pretty(manifest).map_err(|error| RecordingError::Write {
+            path: path.clone(),
+            error: error.into(),
+        })?;
     text.push('\n');
     // Under another name first: a manifest is never half there.
     let partial = directory.join(".recording.json.partial");
@@ -246,8 +247,13 @@ impl Files {
     fn event(&mut self, event: &EventRecord) -> Result<(), RecordingError> {
         // A sentence may hold commas: quoted, and one line.
         let text = event.text.replace('"', "\"\"").replace(['\n', '\r'], " ");
-        self.events
-            .put(|line| line.push_str(&format!("{},{},\"{text}\"", event.time.as_nanos(), event.kind)))
+        self.events.put(|line| {
+            line.push_str(&format!(
+                "{},{},\"{text}\"",
+                event.time.as_nanos(),
+                event.kind
+            ))
+        })
     }
 }
 

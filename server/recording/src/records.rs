@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
+use god_object::ShadedAcceleration;
 use god_object::constraint::NonPenetrationConstraint;
 use god_object::spatial::{Pose, Vector6};
-use god_object::ShadedAcceleration;
 
 /// One tick of the haptics loop.
 #[derive(Clone, Copy, Debug, PartialEq)]

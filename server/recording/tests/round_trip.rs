@@ -21,6 +21,7 @@ fn manifest() -> Manifest {
         program: "taut test".to_owned(),
         scene: "none".to_owned(),
         origin: SceneOrigin::Shipped,
+        overrides: Vec::new(),
         identity: "0".to_owned(),
         complete: false,
         reason: None,
@@ -33,7 +34,12 @@ fn pose(seed: u32) -> Pose {
     let x = f64::from(seed) * std::f64::consts::PI;
     Pose::from_parts(
         Translation3::new(x.sin() * 1e-7, x.cos() / 3.0, -0.0),
-        UnitQuaternion::new_unchecked(Quaternion::new(x.cos(), x.sin() * (1.0 + 3e-16), 1e-300, 0.0)),
+        UnitQuaternion::new_unchecked(Quaternion::new(
+            x.cos(),
+            x.sin() * (1.0 + 3e-16),
+            1e-300,
+            0.0,
+        )),
     )
 }
 
