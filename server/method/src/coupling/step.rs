@@ -294,9 +294,6 @@ impl Coupling {
         if let Some(adaptation) = &mut self.adaptation {
             adaptation.observe(&self.known);
         }
-        if let Some(friction) = &mut self.friction {
-            friction.carry(|row| self.known.place_of(row));
-        }
         if prepared.likely.is_empty() {
             let known = &self.known;
             self.warm_start.retain_mut(|row| {

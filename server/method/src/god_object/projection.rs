@@ -56,8 +56,6 @@ impl GodObject {
             self.projector
                 .project(&metric, unconstrained, &self.rows, &self.warm_start);
         if let Some(friction) = &mut self.friction {
-            // The rows were collected anew.
-            friction.carry(|_| None);
             let problem = FrictionProblem {
                 metric: &metric,
                 unconstrained,

@@ -13,7 +13,6 @@ use arrayvec::ArrayVec;
 use nalgebra::Matrix6;
 
 use super::contact::{ConeContact, in_disc};
-use super::newton::{SOFTEST, WARM_STIFFNESS};
 use crate::spatial::Vector6;
 
 /// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else.
@@ -40,44 +39,20 @@ pub(super) struct ConeAnswer {
     pub(super) correction: Vector6,
     /// Length of the last sweep's change, relative to `scale`; 0 where full stick was the answer.
     pub(super) residual: f64,
-    /// Full stick was the answer.
-    pub(super) sticks: bool,
-}
-
-/// The multipliers of one contact, N s^2.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Multipliers {
-    pub(super) load: f64,
-    pub(super) grip: [f64; 2],
 }
 
 impl ConeProblem {
     /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0.
-    ///
-    /// `known` gives a contact, by its place, the multipliers that it had a moment ago. A wrong one costs time and nothing else.
-    pub(super) fn solve(
-        &mut self,
-        scale: f64,
-        known: impl Fn(usize) -> Option<Multipliers>,
-    ) -> ConeAnswer {
+    pub(super) fn solve(&mut self, scale: f64) -> ConeAnswer {
         let cut = self.start_from_stick();
         let mut y = self.wrench();
         if cut <= STICK_TOLERANCE * scale {
             return ConeAnswer {
                 correction: y,
                 residual: 0.0,
-                sticks: true,
             };
         }
-        let mut stiffness = SOFTEST;
-        for place in 0..self.contacts.len() {
-            if let Some(multipliers) = known(place) {
-                self.contacts[place].load = multipliers.load;
-                self.contacts[place].grip = multipliers.grip;
-                stiffness = WARM_STIFFNESS;
-            }
-        }
-        self.improve(scale, stiffness);
+        self.improve(scale);
         y = self.wrench();
         let mut residual = f64::INFINITY;
         for sweep in 0..MAX_SWEEPS {
@@ -100,7 +75,6 @@ impl ConeProblem {
         ConeAnswer {
             correction: y,
             residual,
-            sticks: false,
         }
     }
 

@@ -104,16 +104,10 @@ impl ConeContact {
     }
 }
 
-/// `|v|`.
-#[inline]
-pub(super) fn length(v: [f64; 2]) -> f64 {
-    (v[0] * v[0] + v[1] * v[1]).sqrt()
-}
-
 /// The point of the disc of this radius nearest to `v`.
 #[inline]
 pub(super) fn in_disc(v: [f64; 2], radius: f64) -> [f64; 2] {
-    let norm = length(v);
+    let norm = (v[0] * v[0] + v[1] * v[1]).sqrt();
     let inside = norm <= radius; // false for NaN
     if inside {
         v

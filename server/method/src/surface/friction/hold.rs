@@ -9,8 +9,8 @@
 
 use nalgebra::Point3;
 
-use super::cone::{ConeProblem, MAX_CONE_CONTACTS, Multipliers};
-use super::contact::{ConeContact, length, tangents_of};
+use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
+use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
@@ -33,8 +33,6 @@ pub struct Friction {
     cone: ConeProblem,
     /// The rows of the cone problem's contacts, in their order.
     rows: arrayvec::ArrayVec<u32, MAX_CONE_CONTACTS>,
-    /// Multipliers of the last answer in which contacts slipped, by row: where the next one begins.
-    known: arrayvec::ArrayVec<(u32, Multipliers), MAX_CONE_CONTACTS>,
     residual: f64,
     slid: bool,
     acts: bool,
@@ -71,7 +69,6 @@ impl Friction {
             touching: TOUCHING_MOTION_TOLERANCES * settings.motion_tolerance,
             cone: ConeProblem::default(),
             rows: arrayvec::ArrayVec::new(),
-            known: arrayvec::ArrayVec::new(),
             residual: 0.0,
             slid: true,
             acts: false,
@@ -92,32 +89,6 @@ impl Friction {
     /// Whether the last answer is other than the frictionless one.
     pub fn acts(&self) -> bool {
         self.acts
-    }
-
-    /// The rows have changed their places: `place_of` an old row is the new one, where it still exists. Without a call the next problem is
-    /// taken to have the rows of the last.
-    pub fn carry(&mut self, place_of: impl Fn(u32) -> Option<u32>) {
-        self.known.retain(|(row, _)| {
-            let place = place_of(*row);
-            *row = place.unwrap_or(*row);
-            place.is_some()
-        });
-    }
-
-    /// Keeps the multipliers for the next problem, unless every contact sticks: full stick needs no start.
-    fn remember(&mut self, sticks: bool) {
-        self.known.clear();
-        if sticks {
-            return;
-        }
-        let contacts = self.rows.iter().zip(&self.cone.contacts);
-        self.known.extend(contacts.map(|(row, contact)| {
-            let multipliers = Multipliers {
-                load: contact.load,
-                grip: contact.grip,
-            };
-            (*row, multipliers)
-        }));
     }
 
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
@@ -149,12 +120,7 @@ impl Friction {
             if !self.gather(problem, now) {
                 break;
             }
-            let (rows, known) = (&self.rows, &self.known);
-            let answer = self.cone.solve(scale, |place| {
-                let same = known.iter().find(|(row, _)| *row == rows[place]);
-                same.map(|(_, multipliers)| *multipliers)
-            });
-            self.remember(answer.sticks);
+            let answer = self.cone.solve(scale);
             let Some((projection, correction)) = self.project_with_grip(problem, &mut project)
             else {
                 self.residual = f64::INFINITY;
@@ -274,9 +240,9 @@ impl Friction {
         for contact in self.cone.contacts.iter().filter(|c| c.coefficient > 0.0) {
             let slip = contact.slip_at(correction);
             power += contact.grip[0] * slip[0] + contact.grip[1] * slip[1];
-            grip += length(contact.grip);
+            grip += contact.grip[0].hypot(contact.grip[1]);
             loaded |= contact.load > 0.0;
-            self.slid |= contact.load > 0.0 && length(slip) > self.touching;
+            self.slid |= contact.load > 0.0 && slip[0].hypot(slip[1]) > self.touching;
         }
         self.slid |= !loaded;
         power <= grip * self.touching // false for NaN

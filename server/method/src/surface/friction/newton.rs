@@ -14,23 +14,21 @@
 use nalgebra::Matrix6;
 
 use super::cone::ConeProblem;
-use super::contact::{ConeContact, in_disc, length};
+use super::contact::{ConeContact, in_disc};
 use crate::spatial::Vector6;
 
 /// Stiffness of the multipliers against slip and penetration, in units of the contact's own: at first, at most, and by how much
 /// it grows after a round that balanced and shrinks after one that did not.
-pub(super) const SOFTEST: f64 = 10.0;
+const SOFTEST: f64 = 10.0;
 const STIFFEST: f64 = 1e5;
 const STIFFER: f64 = 10.0;
 const SOFTER: f64 = 4.0;
-/// Stiffness to begin with where the multipliers are nearly known: one or two rounds are left.
-pub(super) const WARM_STIFFNESS: f64 = 1e3;
 /// Most Newton steps of one call and of one round, most halvings of one step: some 15 microseconds.
 const MAX_STEPS: usize = 40;
 const MAX_STEPS_PER_ROUND: usize = 10;
 const MAX_HALVINGS: usize = 5;
-/// Forces balance when this share of the scale is left, for each unit of stiffness: it multiplies the rounding of slip and penetration.
-const BALANCE_TOLERANCE: f64 = 1e-14;
+/// Forces balance when this share of the scale is left.
+const BALANCE_TOLERANCE: f64 = 1e-13;
 /// Slip and penetration are none below this share of the scale.
 const ROUND_TOLERANCE: f64 = 1e-10;
 
@@ -73,7 +71,10 @@ impl ConeContact {
             return;
         }
         let rate = stiffness * self.tangent_step;
-        let (limit, norm) = (self.coefficient * reaction.load, length(reaction.wished));
+        let (limit, norm) = (
+            self.coefficient * reaction.load,
+            reaction.wished[0].hypot(reaction.wished[1]),
+        );
         if norm <= limit {
             for tangent in &self.tangents {
                 slope.ger(rate, tangent, tangent, 1.0);
@@ -90,9 +91,9 @@ impl ConeContact {
 }
 
 impl ConeProblem {
-    /// Improves the multipliers in the contacts, from the `stiffness` given; `scale` is a length in whitened coordinates, > 0.
-    pub(super) fn improve(&mut self, scale: f64, mut stiffness: f64) {
-        let (mut y, mut steps) = (self.wrench(), 0);
+    /// Improves the multipliers in the contacts; `scale` is a length in whitened coordinates, > 0.
+    pub(super) fn improve(&mut self, scale: f64) {
+        let (mut y, mut stiffness, mut steps) = (self.wrench(), SOFTEST, 0);
         while steps < MAX_STEPS {
             let mut found = y;
             if !self.balance(&mut found, stiffness, scale, &mut steps) {
@@ -128,7 +129,7 @@ impl ConeProblem {
         let mut rest = self.rest(y, stiffness);
         for _ in 0..MAX_STEPS_PER_ROUND {
             let left = rest.norm();
-            if left <= stiffness * BALANCE_TOLERANCE * scale {
+            if left <= BALANCE_TOLERANCE * scale {
                 return true;
             }
             *steps += 1;
