@@ -19,8 +19,6 @@ use support::{box_body, box_obstacle, penetrates};
 const UPDATES: u32 = 3000;
 /// Updates without motion that are rest.
 const AT_REST: u32 = 20;
-/// Presses without `PROPTEST_CASES`.
-const CASES: u32 = 150;
 
 fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
     Obstacle {
@@ -32,14 +30,8 @@ fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
     }
 }
 
-/// Presses of one run.
-fn cases() -> u32 {
-    let wanted = std::env::var("PROPTEST_CASES").ok();
-    wanted.and_then(|n| n.parse().ok()).unwrap_or(CASES)
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_pressing_hand_at_rest_leads_to_the_minimiser_and_no_further(
