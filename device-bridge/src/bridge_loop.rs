@@ -6,11 +6,13 @@
 use std::time::Duration;
 
 use nalgebra::{Point3, Vector6};
-use taut_link::proto::input::INPUT_FAULT;
+use taut_link::proto::constraints::ConstraintSet;
+use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
 use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
 
 use crate::device::{Device, DeviceFault, Pose};
+use crate::edge::EdgeCoupler;
 use crate::energy::EnergyObserver;
 use crate::report::Durations;
 use crate::safety::{Safety, SafetyEvent};
@@ -45,6 +47,11 @@ pub(crate) struct TickOutput {
 pub(crate) struct TickStats {
     pub(crate) ticks: u64,
     pub(crate) wrenches: u64,
+    /// Constraint sets taken, and those that were none.
+    pub(crate) sets: u64,
+    pub(crate) broken_sets: u64,
+    /// Session time now minus that of the set's making, at its first use.
+    pub(crate) set_age: Durations,
     pub(crate) safety_events: u64,
     pub(crate) faulty_ticks: u64,
     /// Session time now minus session time of the command, at arrival.
@@ -66,6 +73,8 @@ pub(crate) struct BridgeLoop {
     /// When reading i was taken, at i modulo the length.
     sent: [Duration; REMEMBERED_TICKS],
     newest: Option<Arrival>,
+    /// The coupling, where it is here and not at the server.
+    edge: Option<Box<EdgeCoupler>>,
     last_pose: Pose,
     fault: Option<DeviceFault>,
 }
@@ -83,6 +92,9 @@ impl BridgeLoop {
             stats: TickStats {
                 ticks: 0,
                 wrenches: 0,
+                sets: 0,
+                broken_sets: 0,
+                set_age: Durations::new(),
                 safety_events: 0,
                 faulty_ticks: 0,
                 wrench_age: Durations::new(),
@@ -93,6 +105,7 @@ impl BridgeLoop {
             next_index: 1,
             sent: [Duration::ZERO; REMEMBERED_TICKS],
             newest: None,
+            edge: None,
             last_pose: Pose::identity(),
             fault: None,
         }
@@ -115,9 +128,11 @@ impl BridgeLoop {
         self.fault
     }
 
-    /// Forgets the last session: no force until a command of the new one, which ramps in.
-    pub(crate) fn begin_session(&mut self) {
+    /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
+    /// is computed here.
+    pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
         self.newest = None;
+        self.edge = edge.map(Box::new);
         self.safety.reset();
     }
 
@@ -125,6 +140,31 @@ impl BridgeLoop {
     pub(crate) fn stop(&mut self, now: Duration) {
         self.safety.reset();
         self.device.write(now, &Vector6::zeros());
+    }
+
+    /// Whether constraint sets are wanted.
+    pub(crate) fn couples(&self) -> bool {
+        self.edge.is_some()
+    }
+
+    /// Takes the newest constraint set, that was completed or confirmed at `received`; once or again. `session_ns` is
+    /// session time, 0 while unknown.
+    pub(crate) fn take_set(&mut self, set: &ConstraintSet, received: Duration, session_ns: u64) {
+        let Some(edge) = &mut self.edge else {
+            return;
+        };
+        let new = edge.sequence() != Some(set.head.sequence);
+        match edge.take(set, received) {
+            Ok(()) if new => {
+                self.stats.sets += 1;
+                if session_ns > 0 {
+                    let age = session_ns.saturating_sub(set.head.made_ns);
+                    self.stats.set_age.record(Duration::from_nanos(age));
+                }
+            }
+            Ok(()) => {}
+            Err(_) => self.stats.broken_sets += 1,
+        }
     }
 
     /// One tick at `now`. `session_ns` is session time, 0 while unknown; `arrival` is the newest command,
@@ -143,7 +183,7 @@ impl BridgeLoop {
         self.sent[index as usize % REMEMBERED_TICKS] = now;
         let reading = self.device.read(now);
         let (wrench, event) = match reading {
-            Ok(_) => self.safe_wrench(now),
+            Ok(sample) => self.safe_wrench(now, &sample.pose),
             // Where the hand is, nobody knows: no force, and a ramp when it is back.
             Err(_) => {
                 self.safety.reset();
@@ -162,6 +202,12 @@ impl BridgeLoop {
             velocity: [0.0; 6],
             buttons: 0,
             flags: INPUT_FAULT,
+            rendered: wrench.into(),
+            set_sequence: self
+                .edge
+                .as_ref()
+                .and_then(|edge| edge.sequence())
+                .unwrap_or(0),
         };
         let mut notice = event.map(Notice::Safety);
         match reading {
@@ -182,6 +228,9 @@ impl BridgeLoop {
                     notice = Some(Notice::Fault(fault));
                 }
             }
+        }
+        if self.edge.is_some() {
+            input.flags |= INPUT_AT_EDGE;
         }
         TickOutput { input, notice }
     }
@@ -208,8 +257,15 @@ impl BridgeLoop {
         }
     }
 
-    /// The newest command as the device may render it.
-    fn safe_wrench(&mut self, now: Duration) -> (Vector6<f64>, Option<SafetyEvent>) {
+    /// What the device may render: the coupling's answer to its pose, or the newest command.
+    fn safe_wrench(&mut self, now: Duration, pose: &Pose) -> (Vector6<f64>, Option<SafetyEvent>) {
+        if let Some(edge) = &mut self.edge {
+            let Some(felt) = edge.step(now, pose) else {
+                return (Vector6::zeros(), None);
+            };
+            let safe = self.safety.step(now, &felt.wrench, felt.received);
+            return (safe.wrench, safe.event);
+        }
         let Some(Arrival { command, received }) = self.newest else {
             return (Vector6::zeros(), None);
         };
@@ -285,7 +341,7 @@ mod tests {
         for tick in 1001..=1300 {
             let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
             told.extend(output.notice);
-            let felt = bridge.safe_wrench(ms(tick)).0.norm();
+            let felt = bridge.safe_wrench(ms(tick), &Pose::identity()).0.norm();
             assert_eq!(felt == 0.0, tick >= 1120, "{felt} N at {tick} ms");
         }
         assert_eq!(told, [Notice::Safety(SafetyEvent::Stale { age: ms(21) })]);
@@ -304,7 +360,10 @@ mod tests {
             };
             let _ = bridge.tick(ms(tick), 0, Some(repeated));
         }
-        assert_eq!(bridge.safe_wrench(ms(1200)).0, Vector6::zeros());
+        assert_eq!(
+            bridge.safe_wrench(ms(1200), &Pose::identity()).0,
+            Vector6::zeros()
+        );
         assert_eq!(bridge.stats().wrenches, 1000);
     }
 
@@ -350,14 +409,17 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
         }
-        bridge.begin_session();
+        bridge.begin_session(None);
         // The new server's clock starts at zero: its commands count although their time is smaller.
         let first = Arrival {
             received: ms(1001),
             ..push(1, 5.0, 0)
         };
         let _ = bridge.tick(ms(1001), 0, Some(first));
-        assert_eq!(bridge.safe_wrench(ms(1001)).0, Vector6::zeros());
+        assert_eq!(
+            bridge.safe_wrench(ms(1001), &Pose::identity()).0,
+            Vector6::zeros()
+        );
         assert_eq!(bridge.stats().wrenches, 1001);
     }
 }

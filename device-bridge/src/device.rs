@@ -30,6 +30,12 @@ pub trait Device: Send {
     ///
     /// The caller has made the wrench safe ([`crate::Safety`]); a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
+
+    /// What the hand feels, where the device's own end computes it (N, N m; as of the last reading); `None` where that is what
+    /// [`Device::write`] says.
+    fn felt(&self) -> Option<Vector6<f64>> {
+        None
+    }
 }
 
 /// What a device is: its name and its limits.

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
+use taut_link::proto::ConstraintSet;
 use taut_link::{ClientCounters, ClientLink};
 
 use crate::bridge_loop::{Arrival, BridgeLoop, Notice};
@@ -32,6 +33,7 @@ impl DeviceLoop {
         self.request_realtime();
         let mut ticker = Ticker::new(self.period);
         let mut last = None;
+        let mut set = ConstraintSet::new();
         while !self.end.load(Ordering::Relaxed) {
             self.totals.missed += ticker.wait();
             let now = monotonic_now();
@@ -46,6 +48,12 @@ impl DeviceLoop {
                 command: wrench.command,
                 received: now.saturating_sub(wrench.received.elapsed()),
             });
+            if bridge.couples()
+                && let Some(confirmed) = self.link.newest_set(&mut set)
+            {
+                let received = now.saturating_sub(confirmed.elapsed());
+                bridge.take_set(&set, received, session_ns);
+            }
             let output = bridge.tick(now, session_ns, arrival);
             self.link.send_input(&output.input);
             if let Some(notice) = output.notice {

@@ -4,6 +4,7 @@
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`Safety`]: what every wrench passes before a motor.
+//! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
@@ -14,6 +15,7 @@ mod cli;
 mod device;
 mod device_loop;
 mod devices;
+pub mod edge;
 mod energy;
 pub mod realtime;
 mod report;
@@ -21,7 +23,7 @@ mod safety;
 mod trace_file;
 
 pub use bridge::{BridgeError, run};
-pub use cli::{BridgeArgs, DeviceChoice, UnknownDevice, execute};
+pub use cli::{BridgeArgs, CouplingChoice, DeviceChoice, UnknownDevice, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,

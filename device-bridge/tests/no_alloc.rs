@@ -74,6 +74,8 @@ fn a_remote_device_does_not_allocate() {
                 velocity: [0.0; 6],
                 buttons: 0,
                 flags: 0,
+                rendered: [0.0; 6],
+                set_sequence: 0,
             },
             received_ns: tick * 1_000_000,
             session: 1,

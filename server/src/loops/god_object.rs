@@ -9,11 +9,15 @@ use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
 use god_object::{GodObject, ShadedAcceleration};
+use taut_bridge::edge::device_ahead;
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::timing::Histogram;
+
+/// Sets reach a bridge that couples by itself at least this often.
+const SET_PERIOD: Duration = Duration::from_millis(1);
 
 /// Loop 1 with its ends of the shared data.
 #[derive(Debug)]
@@ -69,6 +73,12 @@ impl GodObjectLoop {
         self.device.refresh();
         let device = self.device.held();
         let shaded = self.shaded.newest();
+        // A hand behind the network is farther on than its pose says, by the time at which the set is there.
+        let ahead = device.felt.map_or(0.0, |_| {
+            let age = clock().saturating_sub(device.time);
+            device_ahead(&device.velocity, self.god_object.radius(), age, SET_PERIOD)
+        });
+        self.god_object.set_device_ahead(ahead);
 
         let before = thread_cpu_time();
         let report = self.god_object.step(&device.pose, shaded.as_ref());

@@ -94,6 +94,7 @@ impl HapticsLoop {
             self.statistics.period.record_time(now.saturating_sub(last));
         }
         let trusted = self.read(now);
+        self.state.felt = self.device.felt();
         self.states.publish(&self.state);
         self.coupling.wake();
 
@@ -103,7 +104,8 @@ impl HapticsLoop {
             Vector6::zeros()
         };
         self.device.write(now, &wrench);
-        self.energy.step(&self.state.pose, &wrench);
+        let felt = self.state.felt.unwrap_or(wrench);
+        self.energy.step(&self.state.pose, &felt);
         self.statistics
             .energy_injected_bits
             .store(self.energy.injected().to_bits(), Ordering::Relaxed);

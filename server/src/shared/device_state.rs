@@ -26,6 +26,9 @@ pub struct DeviceState {
     pub buttons: u16,
     /// The device does not answer; the pose is the last good one.
     pub faulty: bool,
+    /// What the hand felt at `time` where a bridge couples by itself (N, N m at the reference point, world axes); `None` where
+    /// it is the haptics loop's wrench.
+    pub felt: Option<Vector6>,
 }
 
 impl DeviceState {
@@ -38,6 +41,7 @@ impl DeviceState {
             velocity: Vector6::zeros(),
             buttons: 0,
             faulty: false,
+            felt: None,
         }
     }
 }

@@ -10,6 +10,20 @@ const LOOK_AHEAD_GROWS: f64 = 1.25;
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
 impl GodObject {
+    /// The body's fastest point at the device may be up to `distance` (m) from where the device pose of the next updates puts it, by the
+    /// time at which their sets are used: the pose came late, or the sets travel. They look ahead that much farther, within the limit.
+    ///
+    /// What is not a positive finite number counts as zero.
+    pub fn set_device_ahead(&mut self, distance: f64) {
+        let ahead = distance.is_finite() && distance > 0.0;
+        self.device_ahead = if ahead { distance } else { 0.0 };
+    }
+
+    /// Distance of the body's farthest point from the reference point, m.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// How far the set that an update publishes collects, m.
     pub(super) fn published_distance(&self, update: &Update) -> f64 {
         if self.settings.look_ahead {
