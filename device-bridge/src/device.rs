@@ -31,11 +31,20 @@ pub trait Device: Send {
     /// The caller has made the wrench safe ([`crate::Safety`]); a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
 
-    /// What the hand feels, where the device's own end computes it (N, N m; as of the last reading); `None` where that is what
+    /// What the hand feels as of the last reading, where the device is far away and tells; `None` where that is what
     /// [`Device::write`] says.
-    fn felt(&self) -> Option<Vector6<f64>> {
+    fn felt(&self) -> Option<Felt> {
         None
     }
+}
+
+/// What a device at the far end of a network renders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Force then torque on the hand at the reference point, N and N m, world axes.
+    pub wrench: Vector6<f64>,
+    /// It is computed there, from constraint sets.
+    pub at_edge: bool,
 }
 
 /// What a device is: its name and its limits.

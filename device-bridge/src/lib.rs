@@ -24,10 +24,10 @@ mod trace_file;
 
 pub use bridge::{BridgeError, run};
 pub use cli::{BridgeArgs, CouplingChoice, DeviceChoice, UnknownDevice, execute};
-pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,
-    RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
+    AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, PathError,
+    Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
     TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use energy::EnergyObserver;

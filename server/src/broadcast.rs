@@ -168,7 +168,7 @@ fn tool_state(
     };
     let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
     // What a bridge says that it renders is the truth; what was computed here answers a pose that is older.
-    let felt = device.felt.unwrap_or(wrench.wrench);
+    let felt = device.felt.map_or(wrench.wrench, |felt| felt.wrench);
     ToolState {
         god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
         device: PoseF32::from_isometry(&device.pose),

@@ -68,6 +68,7 @@ pub fn session_setup(
         udp: overrides
             .udp
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        announced_udp_port: None,
         key,
         max_clients: network.max_clients,
     };

@@ -98,6 +98,7 @@ impl Session {
             coupling,
             quic: setup.link.quic,
             udp: setup.link.udp,
+            announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)

@@ -12,6 +12,6 @@ pub use grip::Grip;
 pub use hand::{Hand, HandPreset, UnknownHand};
 pub use min_jerk::{MinJerkPath, PathError, Progress, ViaPoint, min_jerk};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};
-pub use remote::{DEFAULT_MAX_AGE, RemoteDevice};
+pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
 pub use simulated::SimulatedDevice;
 pub use tremor::{Tremor, TremorMotion};

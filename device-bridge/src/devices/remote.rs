@@ -14,7 +14,7 @@ use taut_link::proto::WrenchCommand;
 use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_AT_EDGE;
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt};
 
 /// Age of the newest reading from which on the device counts as lost.
 pub const DEFAULT_MAX_AGE: Duration = Duration::from_millis(20);
@@ -42,8 +42,8 @@ pub struct RemoteDevice {
     /// Index of the newest reading: what a command answers.
     index: u64,
     faulty: bool,
-    /// What the bridge says that it renders, if it couples by itself.
-    felt: Option<Vector6<f64>>,
+    /// What the bridge says that it renders.
+    felt: Option<Felt>,
 }
 
 impl RemoteDevice {
@@ -89,9 +89,9 @@ impl RemoteDevice {
         }
 
         let at_edge = input.sample.flags & INPUT_AT_EDGE != 0;
-        let felt = Vector6::from(input.sample.rendered);
-        let told = at_edge && felt.iter().all(|x| x.is_finite());
-        self.felt = told.then_some(felt);
+        let wrench = Vector6::from(input.sample.rendered);
+        let finite = wrench.iter().all(|x| x.is_finite());
+        self.felt = finite.then_some(Felt { wrench, at_edge });
 
         let received = Duration::from_nanos(input.received_ns);
         // The bridge's own stamp is the better one, once its clock is locked.
@@ -157,7 +157,7 @@ impl Device for RemoteDevice {
             input_index: self.index,
             wrench,
             // A bridge that is faulty gets no sets: their silence lets its force fade.
-            flags: if self.felt.is_some() && !self.faulty {
+            flags: if self.felt.is_some_and(|felt| felt.at_edge) {
                 WRENCH_AT_EDGE
             } else {
                 0
@@ -165,7 +165,7 @@ impl Device for RemoteDevice {
         });
     }
 
-    fn felt(&self) -> Option<Vector6<f64>> {
+    fn felt(&self) -> Option<Felt> {
         self.felt
     }
 }
@@ -258,7 +258,14 @@ mod tests {
         edge.sample.rendered = [0.0, 0.0, 3.0, 0.0, 0.1, 0.0];
         inputs.write(Some(edge));
         assert!(device.read(ms(1000)).is_ok(), "100 ms on the way");
-        assert_eq!(device.felt(), Some(Vector6::from(edge.sample.rendered)));
+        let wrench = Vector6::from(edge.sample.rendered);
+        assert_eq!(
+            device.felt(),
+            Some(Felt {
+                wrench,
+                at_edge: true
+            })
+        );
         device.write(ms(1000), &Vector6::repeat(1.0));
         assert_eq!(commands.read().flags, WRENCH_AT_EDGE);
         assert!(device.read(ms(1021)).is_err(), "21 ms of silence");

@@ -74,10 +74,12 @@ impl GodObjectLoop {
         let device = self.device.held();
         let shaded = self.shaded.newest();
         // A hand behind the network is farther on than its pose says, by the time at which the set is there.
-        let ahead = device.felt.map_or(0.0, |_| {
+        let ahead = if device.felt.is_some_and(|felt| felt.at_edge) {
             let age = clock().saturating_sub(device.time);
             device_ahead(&device.velocity, self.god_object.radius(), age, SET_PERIOD)
-        });
+        } else {
+            0.0
+        };
         self.god_object.set_device_ahead(ahead);
 
         let before = thread_cpu_time();

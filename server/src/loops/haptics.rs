@@ -104,7 +104,7 @@ impl HapticsLoop {
             Vector6::zeros()
         };
         self.device.write(now, &wrench);
-        let felt = self.state.felt.unwrap_or(wrench);
+        let felt = self.state.felt.map_or(wrench, |felt| felt.wrench);
         self.energy.step(&self.state.pose, &felt);
         self.statistics
             .energy_injected_bits

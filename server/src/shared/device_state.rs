@@ -9,6 +9,8 @@ use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6};
 
+use taut_bridge::Felt;
+
 use super::fanout::{Publisher, Subscriber, fanout};
 
 /// One sample of the device.
@@ -26,9 +28,8 @@ pub struct DeviceState {
     pub buttons: u16,
     /// The device does not answer; the pose is the last good one.
     pub faulty: bool,
-    /// What the hand felt at `time` where a bridge couples by itself (N, N m at the reference point, world axes); `None` where
-    /// it is the haptics loop's wrench.
-    pub felt: Option<Vector6>,
+    /// What the hand feels from `time` on, where a bridge tells it; `None` where it is the haptics loop's wrench.
+    pub felt: Option<Felt>,
 }
 
 impl DeviceState {

@@ -138,14 +138,14 @@ fn csv(rows: &[Row]) -> Result<String, std::fmt::Error> {
 
 /// A panel per task: error (99th percentile) over delay, one line per coupling and loss; what is unstable has crosses.
 fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
-    let root = SVGBackend::new(path, (1200, 460)).into_drawing_area();
+    let root = SVGBackend::new(path, (1480, 440)).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(
-        "Force error against the ideal without delay, hand at 1000 N/m; crosses: unstable",
+        "Force error against the ideal without delay, at 1000 N/m. Crosses: unstable. What is below 0.001 stands there",
         ("sans-serif", 20),
     )?;
-    let panels = root.split_evenly((1, 3));
-    let tasks = ["wall", "corner", "peg"];
+    let panels = root.split_evenly((1, 4));
+    let tasks = ["wall", "corner", "dome", "peg"];
     for (k, (panel, task)) in panels.iter().zip(tasks).enumerate() {
         let mut chart = ChartBuilder::on(panel)
             .caption(task, ("sans-serif", 18))
@@ -220,7 +220,7 @@ fn draw(path: &Path, rows: &[Row]) -> Result<(), Box<dyn Error>> {
         if k == 0 {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperLeft)
+                .position(SeriesLabelPosition::MiddleLeft)
                 .label_font(("sans-serif", 13))
                 .background_style(WHITE.mix(0.8))
                 .draw()?;

@@ -1,4 +1,4 @@
-//! What the hand does in the study of coupling at the edge: a wall, a corner, a peg in its hole.
+//! What the hand does in the study of coupling at the edge: a wall, a corner, a dome, a peg in its hole.
 //!
 //! All with 1 kg and k_h = 2000/s², so that the hand feels 1000 N/m. The hand is light: what a firm one would damp shows. It
 //! intends to go some centimetres through the surface, which leaves some millimetres and newtons.
@@ -44,6 +44,20 @@ shape = { plane = { axis = "x" } }
 [[obstacle]]
 name = "front"
 shape = { plane = { axis = "y" } }
+[coupling]
+k_s = 0.5
+k_h = 2000.0
+"#;
+
+const DOME: &str = r#"
+name = "dome"
+[god_object]
+shape = { sphere = { radius = 0.020 } }
+mass = 1.0
+pose = { position = [-0.05, 0.0, 0.080] }
+[[obstacle]]
+name = "dome"
+shape = { sphere = { radius = 0.030 } }
 [coupling]
 k_s = 0.5
 k_h = 2000.0
@@ -107,6 +121,27 @@ impl Task {
         }
     }
 
+    /// Slides a ball over another one, from one side of it to the other: the centres stay 50 mm apart, so that half-spaces are
+    /// wrong by a radian every 50 mm.
+    #[must_use]
+    pub fn dome() -> Self {
+        let at = |x, z| Pose::translation(x, 0.0, z);
+        Self {
+            name: "dome",
+            scene: build(parse(DOME)),
+            intention: intention(&[
+                (0.0, at(-0.05, 0.08)),
+                (0.6, at(-DEPTH / 2.0, DEPTH / 2.0)),
+                (0.9, at(-DEPTH / 2.0, DEPTH / 2.0)),
+                (1.6, at(DEPTH / 2.0, DEPTH / 2.0)),
+                (2.6, at(DEPTH / 2.0, DEPTH / 2.0)),
+                (3.1, at(0.05, 0.08)),
+            ]),
+            rest: 2.1..2.6,
+            duration: 3.4,
+        }
+    }
+
     /// Puts a peg (288 triangles) into a hole (280 triangles) with 0.5 mm of clearance, presses it to the side and tilts it there, and takes it out.
     #[must_use]
     pub fn peg() -> Self {
@@ -134,10 +169,10 @@ impl Task {
         }
     }
 
-    /// All three.
+    /// All of them.
     #[must_use]
-    pub fn all() -> [Self; 3] {
-        [Self::wall(), Self::corner(), Self::peg()]
+    pub fn all() -> [Self; 4] {
+        [Self::wall(), Self::corner(), Self::dome(), Self::peg()]
     }
 }
 

@@ -138,7 +138,7 @@ fn run(
                 |datagram| going_up.push(datagram),
             );
         }
-        if let (Ok((length, _)), Some(client)) = (server_side.recv_from(&mut buffer), client) {
+        if let Ok((length, _)) = server_side.recv_from(&mut buffer) {
             idle = false;
             let copies = impair(
                 &buffer[..length],
