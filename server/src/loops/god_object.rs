@@ -10,6 +10,7 @@ use std::time::Duration;
 use crate::realtime::thread_cpu_time;
 use god_object::{GodObject, ShadedAcceleration};
 use taut_bridge::edge::device_ahead;
+use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
@@ -27,7 +28,17 @@ pub struct GodObjectLoop {
     shaded: Subscriber<Option<ShadedAcceleration>>,
     contacts: Publisher<ContactSnapshot>,
     snapshot: ContactSnapshot,
+    recording: Option<UpdateTaps>,
     statistics: Arc<GodObjectStatistics>,
+}
+
+/// Where the updates are recorded.
+#[derive(Debug)]
+pub struct UpdateTaps {
+    /// What each update was computed from, and its answer.
+    pub updates: Tap<UpdateRecord>,
+    /// The rows of its set.
+    pub constraints: Tap<ConstraintRecord>,
 }
 
 /// What loop 1 says about itself.
@@ -48,6 +59,7 @@ impl GodObjectLoop {
         device: Subscriber<DeviceState>,
         shaded: Subscriber<Option<ShadedAcceleration>>,
         mut contacts: Publisher<ContactSnapshot>,
+        recording: Option<UpdateTaps>,
     ) -> Self {
         let capacity = god_object.settings().max_constraints;
         let mut snapshot = ContactSnapshot::at_start(god_object.pose(), capacity);
@@ -59,6 +71,7 @@ impl GodObjectLoop {
             shaded,
             contacts,
             snapshot,
+            recording,
             statistics: Arc::default(),
         }
     }
@@ -72,14 +85,8 @@ impl GodObjectLoop {
     pub fn tick(&mut self, clock: impl Fn() -> Duration) {
         self.device.refresh();
         let device = self.device.held();
-        let shaded = self.shaded.newest();
-        // A hand behind the network is farther on than its pose says, by the time at which the set is there.
-        let ahead = if device.felt.is_some_and(|felt| felt.at_edge) {
-            let age = clock().saturating_sub(device.time);
-            device_ahead(&device.velocity, self.god_object.radius(), age, SET_PERIOD)
-        } else {
-            0.0
-        };
+        let shaded = *self.shaded.newest();
+        let ahead = ahead(device, clock(), self.god_object.radius());
         self.god_object.set_device_ahead(ahead);
 
         let before = thread_cpu_time();
@@ -101,5 +108,30 @@ impl GodObjectLoop {
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;
         self.contacts.publish(&self.snapshot);
+        if let Some(taps) = &mut self.recording {
+            let set = &self.snapshot.set;
+            taps.updates.push(UpdateRecord {
+                sequence: set.sequence,
+                published: self.snapshot.published,
+                device_sequence: device.sequence,
+                device_pose: device.pose,
+                obstacle_time: Duration::ZERO,
+                device_ahead: ahead,
+                shaded,
+                pose: set.god_object_pose,
+                contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
+                gap_min: set.gap_min,
+            });
+            taps.constraints.push_set(set);
+        }
     }
+}
+
+/// How much farther on than its pose a hand behind the network is by the time at which the set is there, m; zero for any other.
+fn ahead(device: &DeviceState, now: Duration, radius: f64) -> f64 {
+    if !device.felt.is_some_and(|felt| felt.at_edge) {
+        return 0.0;
+    }
+    let age = now.saturating_sub(device.time);
+    device_ahead(&device.velocity, radius, age, SET_PERIOD)
 }
