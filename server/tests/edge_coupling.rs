@@ -5,6 +5,9 @@
 mod relay;
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
@@ -33,6 +36,8 @@ k_h = 2000.0
 "#;
 const STIFFNESS: f64 = 1000.0;
 const RADIUS: f64 = 0.02;
+/// The force starts this far above the floor: 1e-4 of the ball's size, m.
+const REST_DISTANCE: f64 = 4e-6;
 
 /// The hand presses for a second, slides, and goes on up and down.
 const PATH: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.04,1,0,0,0\n0.8,0,0,0.012,1,0,0,0\n1.3,0.05,0,0.012,1,0,0,0\n1.6,0.05,0,0.016,1,0,0,0\n1.9,0.05,0,0.01,1,0,0,0\n2.2,0,0,0.016,1,0,0,0\n2.6,0,0,0.012,1,0,0,0\n3.5,0,0,0.012,1,0,0,0\n";
@@ -40,9 +45,9 @@ const DURATION_S: f64 = 3.5;
 /// The force ramps in during this time after the start, s of session time after the first sample.
 const RAMPED_IN: Duration = Duration::from_millis(900);
 
-/// A pause of either loop that a watchdog of 20 ms may take for silence: the machine's doing, not the network's.
-const STALL_US: u64 = 12_000;
-/// Runs until one without such a pause.
+/// A pause of any thread that, with others', a watchdog of 20 ms may take for silence: the machine's doing, not the network's.
+const STALL_US: u64 = 8_000;
+/// Runs until one without a safety event.
 const ATTEMPTS: u32 = 4;
 
 /// Much longer than anything here takes; the machine may be busy.
@@ -106,6 +111,7 @@ fn run(coupling: &str) -> Run {
     };
     let relay = waiting.start(udp, impairment, 7);
 
+    let (canary, awake) = canary();
     let server = quic.to_string();
     let words = [
         "bridge",
@@ -138,13 +144,33 @@ fn run(coupling: &str) -> Run {
     session.follow_network(&Terminal::standard_error());
     let (of_session, failure) = session.stop(&Terminal::standard_error());
     assert!(failure.is_none());
+    awake.store(false, Ordering::Relaxed);
     let slowest = report.period_us.map_or(u64::MAX, |period| period.max);
+    let slowest = slowest.max(canary.join().expect("no panic"));
     Run {
         errors,
         stalled: slowest > STALL_US || of_session.haptics_period_us.max > STALL_US as f64,
         report,
         lost_down,
     }
+}
+
+/// A thread that only sleeps: how late it wakes at worst (us) says what the machine does to any thread.
+fn canary() -> (JoinHandle<u64>, Arc<AtomicBool>) {
+    let awake = Arc::new(AtomicBool::new(true));
+    let of_thread = awake.clone();
+    let thread = std::thread::Builder::new()
+        .name("canary".to_owned())
+        .spawn(move || {
+            let mut worst = Duration::ZERO;
+            while of_thread.load(Ordering::Relaxed) {
+                let before = Instant::now();
+                std::thread::sleep(Duration::from_millis(1));
+                worst = worst.max(before.elapsed());
+            }
+            worst.as_micros() as u64
+        });
+    (thread.expect("a thread"), awake)
 }
 
 /// Force and device pose as the server tells them, until the bridge has ended. Over QUIC, past the relay: what is seen is what the bridge sent.
@@ -177,7 +203,8 @@ fn observe(server: &str, key: &Path, ended: impl Fn() -> bool) -> Vec<(f64, f64)
             let since = *first.get_or_insert(state.sample_time_ns);
             let elapsed = Duration::from_nanos(state.sample_time_ns.saturating_sub(since));
             let ramped = elapsed > RAMPED_IN;
-            let right = STIFFNESS * (RADIUS - f64::from(tool.device.position[2])).max(0.0);
+            let right =
+                STIFFNESS * (RADIUS + REST_DISTANCE - f64::from(tool.device.position[2])).max(0.0);
             if ramped && elapsed.as_secs_f64() < DURATION_S - 0.1 {
                 let felt = nalgebra::Vector3::from(tool.force.map(f64::from));
                 errors.push(((felt - nalgebra::Vector3::z() * right).norm(), right));
@@ -199,10 +226,10 @@ fn quantile(run: &Run, share: f64) -> f64 {
 fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_does_not() {
     let mut edge = run("edge");
     for attempt in 1..ATTEMPTS {
-        if !edge.stalled {
+        if edge.report.safety_events == 0 || !edge.stalled {
             break;
         }
-        println!("attempt {attempt}: this machine paused; once more");
+        println!("attempt {attempt}: this machine paused its threads; once more");
         edge = run("edge");
     }
     assert_eq!(edge.report.coupling, "edge");
@@ -221,11 +248,11 @@ fn the_edge_keeps_the_force_right_over_20_ms_and_5_percent_loss_where_shipping_d
         edge.report.safety_events
     );
     assert!(quantile(&edge, 0.5) < 1e-3);
-    if edge.stalled {
-        println!("this machine pauses its threads too long to tell silence from stalls");
-    } else {
-        assert_eq!(edge.report.safety_events, 0, "{}", edge.report);
+    if edge.report.safety_events == 0 {
         assert!(quantile(&edge, 0.99) < 0.05, "{}", quantile(&edge, 0.99));
+    } else {
+        assert!(edge.stalled, "{}", edge.report);
+        println!("not told: this machine pauses its threads for longer than a watchdog waits");
     }
 
     let shipped = run("server");
