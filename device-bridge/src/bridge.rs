@@ -21,16 +21,16 @@ use taut_link::proto::SceneDescription;
 use taut_link::proto::control::LogLevel;
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
-use crate::bridge_loop::{BridgeLoop, Notice};
+use crate::bridge_loop::BridgeLoop;
 use crate::cli::{BridgeArgs, DeviceChoice};
 use crate::device::{Device, DeviceFault};
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::devices::{
     AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
 };
+use crate::port::{DevicePort, SafetyEvent, SafetySettings};
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
-use crate::safety::{Safety, SafetySettings};
 use crate::trace_file::{TraceFileError, read_trace, via_points};
 
 /// How often the watching thread looks.
@@ -151,6 +151,7 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let first = runtime.block_on(connect(options.clone()))?;
     let bridge = build_loop(args, &motion, first.description())?;
     let mut run = Run {
+        safety: *bridge.port().settings(),
         args,
         options,
         runtime,
@@ -248,13 +249,16 @@ fn build_loop(
             })?)
         }
     };
-    let limits = device.info().limits;
-    let safety = Safety::new(SafetySettings {
-        max_force: limits.max_force,
-        max_torque: limits.max_torque,
+    let safety = SafetySettings {
+        period: Duration::from_secs_f64(1.0 / args.rate),
         ..SafetySettings::default()
-    });
-    Ok(BridgeLoop::new(device, safety, reference_point))
+    };
+    Ok(BridgeLoop::new(DevicePort::new(
+        device,
+        safety,
+        reference_point,
+        &start,
+    )))
 }
 
 async fn stop_on_signal(stop: Arc<AtomicBool>) {
@@ -293,6 +297,7 @@ struct Run<'a> {
     stop: Arc<AtomicBool>,
     /// On the monotonic clock.
     deadline: Option<Duration>,
+    safety: SafetySettings,
     totals: Totals,
 }
 
@@ -404,7 +409,7 @@ impl Run<'_> {
             Some(SessionEnd::ServerStopped | SessionEnd::ServerLost(_))
         ) {
             // Let the force fade as on any silence, rather than cut it.
-            let settings = SafetySettings::default();
+            let settings = self.safety;
             thread::sleep(settings.hold + settings.ramp_out);
         }
         end_loop.store(true, Ordering::Relaxed);
@@ -426,7 +431,11 @@ impl Run<'_> {
         Ok((bridge, end))
     }
 
-    fn session_end(&self, link: &ClientLink, notices: &Receiver<Notice>) -> Option<SessionEnd> {
+    fn session_end(
+        &self,
+        link: &ClientLink,
+        notices: &Receiver<SafetyEvent>,
+    ) -> Option<SessionEnd> {
         tell(link, notices);
         if self.stop.load(Ordering::Relaxed) {
             Some(SessionEnd::Signal)
@@ -447,7 +456,7 @@ impl Run<'_> {
         let (totals, stats) = (&self.totals, bridge.stats());
         let start = totals.first_tick.unwrap_or(totals.last_tick);
         BridgeReport {
-            device: bridge.device().info().name.clone(),
+            device: bridge.port().info().name.clone(),
             server: self.args.server.clone(),
             ended: ended.to_owned(),
             duration_s: totals.last_tick.saturating_sub(start).as_secs_f64(),
@@ -460,8 +469,8 @@ impl Run<'_> {
             packets_sent: totals.packets.packets_sent,
             packets_received: totals.packets.packets_received,
             packets_lost: totals.packets.lost,
-            energy_injected_j: bridge.energy().injected(),
-            energy_delivered_j: bridge.energy().delivered(),
+            energy_injected_j: bridge.port().energy().injected(),
+            energy_delivered_j: bridge.port().energy().delivered(),
             max_force_n: stats.max_force,
             max_torque_n_m: stats.max_torque,
             safety_events: stats.safety_events,
@@ -473,13 +482,15 @@ impl Run<'_> {
 }
 
 /// Logs what the device loop noticed, here and at the server.
-fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
-    for notice in notices.try_iter() {
-        let text = match notice {
-            Notice::Safety(event) => format!("safety of the device: {event:?}"),
-            Notice::Fault(fault) => fault.to_string(),
+fn tell(link: &ClientLink, notices: &Receiver<SafetyEvent>) {
+    for event in notices.try_iter() {
+        let level = if event.kind.is_good_news() {
+            tracing::info!("{event}");
+            LogLevel::Info
+        } else {
+            tracing::warn!("{event}");
+            LogLevel::Warning
         };
-        tracing::warn!("{text}");
-        link.post_log(LogLevel::Warning, text);
+        link.post_log(level, event.to_string());
     }
 }

@@ -3,7 +3,7 @@
 //! Used by the server's haptics loop and by `taut bridge` (here the thin binary `taut-bridge`).
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
-//! - [`Safety`]: what every wrench passes before a motor.
+//! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
@@ -14,10 +14,9 @@ mod cli;
 mod device;
 mod device_loop;
 mod devices;
-mod energy;
+mod port;
 pub mod realtime;
 mod report;
-mod safety;
 mod trace_file;
 
 pub use bridge::{BridgeError, run};
@@ -28,7 +27,10 @@ pub use devices::{
     RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
     TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
-pub use energy::EnergyObserver;
+pub use port::{
+    ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,
+    Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings, TickReport,
+    UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
+};
 pub use report::{BridgeReport, Quantiles};
-pub use safety::{SafeWrench, Safety, SafetyEvent, SafetySettings};
 pub use trace_file::{TraceFileError, read_trace, via_points};

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose};
-use taut_bridge::realtime::{lock_memory, pin_to_core};
+use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
 use taut_bridge::{Device, RemoteDevice};
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use tokio::runtime::Runtime;
@@ -283,9 +283,13 @@ impl Session {
                         |now| haptics.tick(now),
                     );
                 }));
-                // Whatever ended the loop: no force is left on the hand.
-                haptics.release(clock.now());
-                if let Err(cause) = ticked {
+                // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
+                let released = catch_unwind(AssertUnwindSafe(|| {
+                    while !haptics.release_step(clock.now()) {
+                        sleep_until(clock.monotonic(clock.now() + period));
+                    }
+                }));
+                if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
             },

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
-use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+use taut_bridge::{Device, DevicePort, SafetySettings};
 
+use super::arm_switch::ArmSwitch;
 use super::coupling::CouplingLoop;
 use super::god_object::GodObjectLoop;
 use super::haptics::HapticsLoop;
@@ -26,6 +27,8 @@ pub struct WiredLoops {
     pub haptics: HapticsLoop,
     /// Wakes loop 2: loop 3 does after each sample, loop 1's thread after each constraint set.
     pub coupling_waker: Waker,
+    /// Asks loop 3 for force or for none.
+    pub arm_switch: ArmSwitch,
     /// For those who look on.
     pub observers: Observers,
     /// What all of them count.
@@ -72,6 +75,7 @@ impl WiredLoops {
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
+        let arm_switch = ArmSwitch::default();
 
         let god_object = GodObjectLoop::new(
             god_object,
@@ -87,13 +91,12 @@ impl WiredLoops {
             shaded,
         );
         let haptics = HapticsLoop::new(
-            device,
-            Safety::new(safety),
-            EnergyObserver::new(world.body.reference_point),
+            DevicePort::new(device, safety, world.body.reference_point, &start),
             &start,
             wrench_readers.haptics,
             states,
             coupling_waker.clone(),
+            arm_switch.clone(),
         );
         let statistics = Statistics {
             haptics: haptics.statistics(),
@@ -120,6 +123,7 @@ impl WiredLoops {
             coupling,
             haptics,
             coupling_waker,
+            arm_switch,
             observers,
             statistics,
         }
