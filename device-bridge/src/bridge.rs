@@ -5,6 +5,7 @@
 //! | caller's | watches: link, signals, duration; tells what happens |
 //! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines |
 //! | `taut-bridge-net` | the link's sockets (tokio) |
+//! | `console` | what is typed, where standard input is a terminal: `arm`, `off` |
 //!
 //! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
 //! has the force at zero 120 ms later, whatever else goes on.
@@ -21,6 +22,7 @@ use taut_link::proto::SceneDescription;
 use taut_link::proto::control::LogLevel;
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
+use crate::arm_switch::{self, ArmSwitch};
 use crate::bridge_loop::BridgeLoop;
 use crate::cli::{BridgeArgs, DeviceChoice};
 use crate::device::{Device, DeviceFault};
@@ -152,6 +154,7 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let bridge = build_loop(args, &motion, first.description())?;
     let mut run = Run {
         safety: *bridge.port().settings(),
+        wishes: Arc::default(),
         args,
         options,
         runtime,
@@ -161,6 +164,7 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
             .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds)),
         totals: Totals::new(),
     };
+    arm_switch::listen_at_console(&run.wishes);
     run.sessions(first, bridge)
 }
 
@@ -189,6 +193,19 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         RATES_HZ.contains(&args.rate),
         "1 to 10000 Hz",
     )?;
+    for (option, value) in [
+        ("--max-force", args.safety.max_force),
+        ("--max-torque", args.safety.max_torque),
+        ("--force-slew", args.safety.force_slew),
+        ("--torque-slew", args.safety.torque_slew),
+    ] {
+        in_range(
+            option,
+            value,
+            value > 0.0 && value <= 1e3,
+            "a number above 0, at most 1000",
+        )?;
+    }
     if let Some(seconds) = args.duration {
         let valid = (0.0..=1e9).contains(&seconds);
         in_range("--duration", seconds, valid, "0 to 1e9 s")?;
@@ -249,10 +266,11 @@ fn build_loop(
             })?)
         }
     };
-    let safety = SafetySettings {
-        period: Duration::from_secs_f64(1.0 / args.rate),
-        ..SafetySettings::default()
-    };
+    let nobody_is_hurt = matches!(
+        args.device,
+        DeviceChoice::Simulated | DeviceChoice::Trace(_)
+    );
+    let safety = args.safety.settings(args.rate, nobody_is_hurt);
     Ok(BridgeLoop::new(DevicePort::new(
         device,
         safety,
@@ -298,6 +316,7 @@ struct Run<'a> {
     /// On the monotonic clock.
     deadline: Option<Duration>,
     safety: SafetySettings,
+    wishes: Arc<ArmSwitch>,
     totals: Totals,
 }
 
@@ -381,6 +400,7 @@ impl Run<'_> {
         let mut device_loop = DeviceLoop {
             link: Arc::clone(&link),
             end: Arc::clone(&end_loop),
+            wishes: Arc::clone(&self.wishes),
             notices: sender,
             period: Duration::from_secs_f64(1.0 / self.args.rate),
             priority: self.args.priority,

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use taut_link::{ClientCounters, ClientLink};
 
+use crate::arm_switch::{ArmSwitch, ArmWish};
 use crate::bridge_loop::{Arrival, BridgeLoop};
 use crate::device::DeviceFault;
 use crate::port::SafetyEvent;
@@ -21,6 +22,7 @@ use crate::report::Durations;
 pub(crate) struct DeviceLoop {
     pub(crate) link: Arc<ClientLink>,
     pub(crate) end: Arc<AtomicBool>,
+    pub(crate) wishes: Arc<ArmSwitch>,
     pub(crate) notices: SyncSender<SafetyEvent>,
     pub(crate) period: Duration,
     pub(crate) priority: u8,
@@ -47,6 +49,11 @@ impl DeviceLoop {
                 command: wrench.command,
                 received: now.saturating_sub(wrench.received.elapsed()),
             });
+            match self.wishes.take() {
+                Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
+                Some(ArmWish::Disarm) => bridge.port_mut().ask_to_disarm(),
+                None => {}
+            }
             let output = bridge.tick(now, session_ns, arrival);
             self.link.send_input(&output.input);
             for event in output.events.iter() {

@@ -8,6 +8,7 @@
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
 
+mod arm_switch;
 mod bridge;
 mod bridge_loop;
 mod cli;
@@ -19,8 +20,9 @@ pub mod realtime;
 mod report;
 mod trace_file;
 
+pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run};
-pub use cli::{BridgeArgs, DeviceChoice, UnknownDevice, execute};
+pub use cli::{BridgeArgs, DeviceChoice, SafetyArgs, UnknownDevice, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,

@@ -5,9 +5,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_bridge::SafetySettings;
+use taut_bridge::{
+    DEFAULT_MAX_AGE, Passivity, PassivitySettings, Rearm, SafetySettings, ValidationSettings,
+};
 use taut_link::ClusterKey;
-use taut_scene::{HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
+use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
+use taut_scene::{BuiltScene, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
 
 use crate::content::content;
 use crate::devices::device;
@@ -15,7 +18,7 @@ use crate::failure::Failure;
 use crate::head::{Head, Sway};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
-use crate::setup::{LinkSettings, RealtimeSettings, SessionSetup};
+use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -40,6 +43,8 @@ pub struct Overrides {
     pub no_monitor: bool,
     /// Where the monitor records.
     pub record: Option<PathBuf>,
+    /// Where the session is recorded.
+    pub recording: Option<PathBuf>,
 }
 
 /// Puts the session together. Files are read and checked, nothing is started.
@@ -71,12 +76,13 @@ pub fn session_setup(
         key,
         max_clients: network.max_clients,
     };
-    let safety = SafetySettings {
-        max_force: built.settings.force_limit,
-        max_torque: built.settings.torque_limit,
-        ..SafetySettings::default()
-    };
+    let safety = safety(workbench, &built.settings);
+    let recording = overrides
+        .recording
+        .as_ref()
+        .map(|directory| recording(directory.clone(), &scene, &built));
     Ok(SessionSetup {
+        recording,
         device: device(&workbench.device, &built)?,
         settings: built.settings,
         start: built.start,
@@ -90,6 +96,28 @@ pub fn session_setup(
     })
 }
 
+fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> RecordingSettings {
+    let source = scene.source();
+    RecordingSettings {
+        directory,
+        manifest: Manifest {
+            format: FORMAT,
+            program: format!("taut {}", env!("CARGO_PKG_VERSION")),
+            scene: scene.name().to_owned(),
+            origin: source.directory.map_or(SceneOrigin::Shipped, |directory| {
+                // Where it is now counts; a directory that vanished meanwhile is told when it is looked into.
+                SceneOrigin::Directory(std::path::absolute(&directory).unwrap_or(directory))
+            }),
+            overrides: source.overrides,
+            identity: identity_of(&built.world, &built.settings, &built.start),
+            complete: false,
+            reason: Some("the session did not come to its end".to_owned()),
+            lost: Lost::default(),
+        },
+        scene: source.text,
+    }
+}
+
 fn head(viewer: &Viewer) -> Head {
     Head {
         rest: viewer.head,
@@ -98,6 +126,55 @@ fn head(viewer: &Viewer) -> Head {
             HeadTracking::Fixed => None,
             HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
         },
+    }
+}
+
+/// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
+fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings {
+    let wanted = &workbench.safety;
+    let nobody_is_hurt = matches!(
+        workbench.device,
+        Device::Simulated { .. } | Device::Trace { .. } | Device::Remote
+    );
+    let rearm = match wanted.rearm {
+        Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
+        Some(taut_scene::Rearm::Manual) => Rearm::Manual,
+        // Behind a bridge the bridge decides.
+        None if nobody_is_hurt => Rearm::Automatic,
+        None => Rearm::Manual,
+    };
+    // What comes over a network is stamped there and may be late; the device drops what is too late.
+    let time_slack = match workbench.device {
+        Device::Remote => DEFAULT_MAX_AGE,
+        _ => Duration::ZERO,
+    };
+    let default = ValidationSettings::default();
+    let within = |wanted: Option<f64>, scene: f64| wanted.map_or(scene, |wanted| wanted.min(scene));
+    SafetySettings {
+        max_force: within(wanted.max_force, scene.force_limit),
+        max_torque: within(wanted.max_torque, scene.torque_limit),
+        force_rate: wanted.force_slew * 1e3,
+        torque_rate: wanted.torque_slew * 1e3,
+        ramp_in: Duration::from_secs_f64(wanted.ramp_in),
+        period: HAPTICS_PERIOD,
+        rearm,
+        dead_man: wanted.dead_man,
+        arm_button: wanted.arm_button,
+        validation: ValidationSettings {
+            max_speed: wanted.max_speed,
+            max_turn_rate: wanted.max_turn_rate,
+            max_age: default.max_age + time_slack,
+            time_slack,
+            ..default
+        },
+        passivity: PassivitySettings {
+            mode: match wanted.passivity {
+                taut_scene::Passivity::Observe => Passivity::Observe,
+                taut_scene::Passivity::Control => Passivity::Control,
+            },
+            ..PassivitySettings::default()
+        },
+        ..SafetySettings::default()
     }
 }
 

@@ -12,6 +12,7 @@
 //!
 //! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
 
+pub mod arm;
 pub mod broadcast;
 pub mod checker;
 pub mod children;
@@ -32,6 +33,7 @@ pub mod loops;
 pub mod monitor;
 pub mod realtime;
 pub mod record;
+pub mod recorded_session;
 pub mod rendering;
 pub mod replay;
 pub mod report;

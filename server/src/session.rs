@@ -14,8 +14,9 @@ use std::time::Duration;
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose};
 use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
-use taut_bridge::{Device, RemoteDevice};
+use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
 
 use crate::broadcast::{self, BridgeCommands, StateWriter};
@@ -54,11 +55,13 @@ pub struct Session {
     ledger: RealtimeLedger,
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
+    arm_switch: Arc<ArmSwitch>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
+    recorder: Option<Recorder>,
     link: Option<ServerLink>,
     runtime: Runtime,
 }
@@ -91,6 +94,16 @@ impl Session {
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link)?;
 
+        let (taps, recorder) = match &setup.recording {
+            Some(wanted) => {
+                let (taps, recorder) =
+                    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
+                        .map_err(Failure::bad_input)?;
+                (Some(taps), Some(recorder))
+            }
+            None => (None, None),
+        };
+
         // Figure 3.
         let loops = WiredLoops::new(
             &setup.world,
@@ -98,6 +111,7 @@ impl Session {
             god_object,
             device,
             setup.safety,
+            taps,
         );
         let broadcaster = link.broadcaster();
         let mut session = Self {
@@ -107,10 +121,12 @@ impl Session {
             ledger,
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
+            arm_switch: loops.arm_switch.clone(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
             monitor: None,
+            recorder,
             link: Some(link),
             runtime,
         };
@@ -348,6 +364,11 @@ impl Session {
         self.ledger.report()
     }
 
+    /// Asks for force at the device, or for none.
+    pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
+        &self.arm_switch
+    }
+
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
@@ -366,6 +387,10 @@ impl Session {
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
+            if let LinkEvent::Arm { arm, .. } = event {
+                self.arm_switch
+                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            }
             lines.extend(
                 self.clients
                     .follow(&event)
@@ -377,6 +402,13 @@ impl Session {
                 terminal.say(&format!("taut: {line}"));
             }
             tracing::info!("{line}");
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: self.clock.now(),
+                    kind: "network".to_owned(),
+                    text: line.clone(),
+                });
+            }
             if let Some(monitor) = &self.monitor {
                 monitor.log(severity, &line);
             }
@@ -443,6 +475,17 @@ impl Session {
         match self.end() {
             Ok(dropped) => report.monitor_dropped = dropped,
             Err(error) => failure = failure.or(Some(error)),
+        }
+        if let Some(recorder) = self.recorder.take() {
+            let summary = recorder.finish();
+            if let Some(error) = summary.failure {
+                terminal.say(&format!("taut: the recording is not whole: {error}"));
+            } else if !summary.lost.is_none() {
+                terminal.say(&format!(
+                    "taut: the recording is not whole, the disk was too slow: {:?}",
+                    summary.lost
+                ));
+            }
         }
         report.realtime = self.ledger.report();
         (report.clients, report.observers) = self.clients.reports();
@@ -538,7 +581,10 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
-        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {

@@ -214,7 +214,8 @@ impl Arming {
             && situation.held;
         if situation.disarm {
             self.automatic = false;
-            return None;
+            self.state = ArmingState::Disarmed;
+            return Some(EventKind::Disarmed);
         }
         if !(situation.asked || self.automatic) {
             return None;

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use god_object::spatial::Pose;
-use taut_bridge::{Command, DevicePort, Reading, TickReport};
+use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Reading, TickReport};
+use taut_recording::{HapticsRecord, Tap};
 
-use super::arm_switch::{ArmSwitch, ArmWish};
 use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
@@ -25,9 +25,10 @@ pub struct HapticsLoop {
     wrench: Subscriber<WrenchCommand>,
     states: Publisher<DeviceState>,
     coupling: Waker,
-    switch: ArmSwitch,
+    switch: Arc<ArmSwitch>,
     state: DeviceState,
     last_tick: Option<Duration>,
+    recording: Option<Tap<HapticsRecord>>,
     statistics: Arc<HapticsStatistics>,
 }
 
@@ -63,7 +64,7 @@ impl HapticsLoop {
         wrench: Subscriber<WrenchCommand>,
         states: Publisher<DeviceState>,
         coupling: Waker,
-        switch: ArmSwitch,
+        switch: Arc<ArmSwitch>,
     ) -> Self {
         Self {
             port,
@@ -73,8 +74,16 @@ impl HapticsLoop {
             switch,
             state: DeviceState::at_start(start),
             last_tick: None,
+            recording: None,
             statistics: Arc::default(),
         }
+    }
+
+    /// The same, with every tick recorded.
+    #[must_use]
+    pub fn with_recording(mut self, tap: Option<Tap<HapticsRecord>>) -> Self {
+        self.recording = tap;
+        self
     }
 
     /// The counters that this loop writes.
@@ -129,6 +138,17 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        if let Some(tap) = &mut self.recording {
+            tap.push(HapticsRecord {
+                sequence: self.state.sequence,
+                time: self.state.time,
+                pose: self.state.pose,
+                velocity: self.state.velocity,
+                buttons: self.state.buttons,
+                faulty: self.state.faulty,
+                wrench: report.wrench,
+            });
+        }
     }
 }
 

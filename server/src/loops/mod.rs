@@ -9,7 +9,6 @@
 //! Each is a struct whose `tick(now)` does one round, so that a virtual clock can drive it; a thread of [`shell`] does it in time.
 //! [`wiring`] puts them together.
 
-pub mod arm_switch;
 pub mod coupling;
 pub mod god_object;
 pub mod haptics;

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
-use taut_bridge::{Device, DevicePort, SafetySettings};
+use taut_bridge::{ArmSwitch, Device, DevicePort, SafetySettings};
+use taut_recording::Taps;
 
-use super::arm_switch::ArmSwitch;
 use super::coupling::CouplingLoop;
-use super::god_object::GodObjectLoop;
+use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
 use crate::shared::contact_snapshot::ContactSnapshot;
@@ -28,7 +28,7 @@ pub struct WiredLoops {
     /// Wakes loop 2: loop 3 does after each sample, loop 1's thread after each constraint set.
     pub coupling_waker: Waker,
     /// Asks loop 3 for force or for none.
-    pub arm_switch: ArmSwitch,
+    pub arm_switch: Arc<ArmSwitch>,
     /// For those who look on.
     pub observers: Observers,
     /// What all of them count.
@@ -60,13 +60,14 @@ pub struct SharedView {
 }
 
 impl WiredLoops {
-    /// Puts the boxes between their arrows. `device` stands where the god-object does.
+    /// Puts the boxes between their arrows. `device` stands where the god-object does; with `taps` the loops are recorded.
     pub fn new(
         world: &Arc<World>,
         settings: &Settings,
         god_object: GodObject,
         device: Box<dyn Device>,
         safety: SafetySettings,
+        taps: Option<Taps>,
     ) -> Self {
         let start = *god_object.pose();
         let (states, device_readers) = device_state::channel(&start);
@@ -75,13 +76,21 @@ impl WiredLoops {
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
-        let arm_switch = ArmSwitch::default();
+        let arm_switch = Arc::<ArmSwitch>::default();
+        let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
+            let updates = UpdateTaps {
+                updates: taps.updates,
+                constraints: taps.constraints,
+            };
+            (Some(taps.haptics), Some(updates), Some(taps.forces))
+        });
 
         let god_object = GodObjectLoop::new(
             god_object,
             device_readers.god_object,
             shaded_reader,
             snapshots,
+            update_taps,
         );
         let coupling = CouplingLoop::new(
             Coupling::new(world, settings),
@@ -89,6 +98,7 @@ impl WiredLoops {
             contact_readers.coupling,
             wrenches,
             shaded,
+            force_tap,
         );
         let haptics = HapticsLoop::new(
             DevicePort::new(device, safety, world.body.reference_point, &start),
@@ -97,7 +107,8 @@ impl WiredLoops {
             states,
             coupling_waker.clone(),
             arm_switch.clone(),
-        );
+        )
+        .with_recording(haptics_tap);
         let statistics = Statistics {
             haptics: haptics.statistics(),
             coupling: coupling.statistics(),
