@@ -1,31 +1,23 @@
-//! One tick of the bridge: newest wrench in, through the safety stage to the device, newest pose out.
+//! One tick of the bridge: newest wrench in, through the port to the device, newest pose out.
 //!
 //! No sockets, threads or clocks: times are arguments, so a tick runs in real time and under a virtual clock.
 //! No allocation after `new`.
 
 use std::time::Duration;
 
-use nalgebra::{Point3, Vector6};
+use nalgebra::Vector6;
 use taut_link::proto::constraints::ConstraintSet;
 use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
 use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
 
-use crate::device::{Device, DeviceFault, Pose};
+use crate::device::DeviceFault;
 use crate::edge::EdgeCoupler;
-use crate::energy::EnergyObserver;
+use crate::port::{Command, DevicePort, Events};
 use crate::report::Durations;
-use crate::safety::{Safety, SafetyEvent};
 
 /// How many ticks a round trip may take to be measured: 1 s at 1 kHz.
 const REMEMBERED_TICKS: usize = 1024;
-
-/// What is worth telling a person, as it begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Notice {
-    Safety(SafetyEvent),
-    Fault(DeviceFault),
-}
 
 /// A command and when it arrived here.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +32,7 @@ pub(crate) struct TickOutput {
     /// To be sent.
     pub(crate) input: InputSample,
     /// To be told.
-    pub(crate) notice: Option<Notice>,
+    pub(crate) events: Events,
 }
 
 /// What the ticks have seen.
@@ -64,9 +56,7 @@ pub(crate) struct TickStats {
 
 /// The device side of a session.
 pub(crate) struct BridgeLoop {
-    device: Box<dyn Device>,
-    safety: Safety,
-    energy: EnergyObserver,
+    port: DevicePort,
     stats: TickStats,
     /// Number of the next reading; the first is 1, because 0 answers none.
     next_index: u64,
@@ -75,20 +65,12 @@ pub(crate) struct BridgeLoop {
     newest: Option<Arrival>,
     /// The coupling, where it is here and not at the server.
     edge: Option<Box<EdgeCoupler>>,
-    last_pose: Pose,
-    fault: Option<DeviceFault>,
 }
 
 impl BridgeLoop {
-    pub(crate) fn new(
-        device: Box<dyn Device>,
-        safety: Safety,
-        reference_point: Point3<f64>,
-    ) -> Self {
+    pub(crate) fn new(port: DevicePort) -> Self {
         Self {
-            device,
-            safety,
-            energy: EnergyObserver::new(reference_point),
+            port,
             stats: TickStats {
                 ticks: 0,
                 wrenches: 0,
@@ -106,26 +88,25 @@ impl BridgeLoop {
             sent: [Duration::ZERO; REMEMBERED_TICKS],
             newest: None,
             edge: None,
-            last_pose: Pose::identity(),
-            fault: None,
         }
     }
 
-    pub(crate) fn device(&self) -> &dyn Device {
-        self.device.as_ref()
+    /// What stands between this loop and the device.
+    pub(crate) fn port(&self) -> &DevicePort {
+        &self.port
+    }
+
+    pub(crate) fn port_mut(&mut self) -> &mut DevicePort {
+        &mut self.port
     }
 
     pub(crate) fn stats(&self) -> &TickStats {
         &self.stats
     }
 
-    pub(crate) fn energy(&self) -> &EnergyObserver {
-        &self.energy
-    }
-
     /// The fault that the device is in.
     pub(crate) fn fault(&self) -> Option<DeviceFault> {
-        self.fault
+        self.port.fault()
     }
 
     /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
@@ -133,13 +114,7 @@ impl BridgeLoop {
     pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
         self.newest = None;
         self.edge = edge.map(Box::new);
-        self.safety.reset();
-    }
-
-    /// No force from now on.
-    pub(crate) fn stop(&mut self, now: Duration) {
-        self.safety.reset();
-        self.device.write(now, &Vector6::zeros());
+        self.port.restart();
     }
 
     /// Whether constraint sets are wanted.
@@ -181,58 +156,48 @@ impl BridgeLoop {
         let index = self.next_index;
         self.next_index += 1;
         self.sent[index as usize % REMEMBERED_TICKS] = now;
-        let reading = self.device.read(now);
-        let (wrench, event) = match reading {
-            Ok(sample) => self.safe_wrench(now, &sample.pose),
-            // Where the hand is, nobody knows: no force, and a ramp when it is back.
-            Err(_) => {
-                self.safety.reset();
-                (Vector6::zeros(), None)
-            }
-        };
-        self.device.write(now, &wrench);
+        let (newest, edge) = (self.newest, &mut self.edge);
+        let report = self.port.tick(now, |reading| match edge {
+            Some(edge) => edge
+                .step(now, &reading.sample.pose)
+                .map(|felt| Command::fresh(felt.received, felt.wrench)),
+            None => newest.map(|arrival| command(&arrival)),
+        });
+
+        let wrench = &report.wrench;
         self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
         self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
-        self.stats.safety_events += u64::from(event.is_some());
-
-        let mut input = InputSample {
-            sample_time_ns: session_ns,
-            index,
-            pose: PoseF64::from_isometry(&self.last_pose),
-            velocity: [0.0; 6],
-            buttons: 0,
-            flags: INPUT_FAULT,
-            rendered: wrench.into(),
-            set_sequence: self
-                .edge
-                .as_ref()
-                .and_then(|edge| edge.sequence())
-                .unwrap_or(0),
+        self.stats.safety_events += report
+            .events
+            .iter()
+            .filter(|event| !event.kind.is_good_news())
+            .count() as u64;
+        let reading = &report.reading;
+        self.stats.faulty_ticks += u64::from(reading.fault.is_some());
+        let sample = &reading.sample;
+        let age = match reading.fault {
+            None => now.saturating_sub(sample.time).as_nanos() as u64,
+            Some(_) => 0,
         };
-        let mut notice = event.map(Notice::Safety);
-        match reading {
-            Ok(sample) => {
-                self.energy.step(&sample.pose, &wrench);
-                self.last_pose = sample.pose;
-                self.fault = None;
-                let age = now.saturating_sub(sample.time).as_nanos() as u64;
-                input.sample_time_ns = session_ns.saturating_sub(age);
-                input.pose = PoseF64::from_isometry(&sample.pose);
-                input.velocity = sample.velocity.into();
-                input.buttons = sample.buttons;
-                input.flags = 0;
-            }
-            Err(fault) => {
-                self.stats.faulty_ticks += 1;
-                if self.fault.replace(fault).is_none() {
-                    notice = Some(Notice::Fault(fault));
-                }
-            }
+        let faulty = reading.fault.map_or(0, |_| INPUT_FAULT);
+        let at_edge = self.edge.as_ref().map_or(0, |_| INPUT_AT_EDGE);
+        TickOutput {
+            input: InputSample {
+                sample_time_ns: session_ns.saturating_sub(age),
+                index,
+                pose: PoseF64::from_isometry(&sample.pose),
+                velocity: sample.velocity.into(),
+                buttons: sample.buttons,
+                flags: faulty | at_edge,
+                rendered: report.wrench.into(),
+                set_sequence: self
+                    .edge
+                    .as_ref()
+                    .and_then(|edge| edge.sequence())
+                    .unwrap_or(0),
+            },
+            events: report.events,
         }
-        if self.edge.is_some() {
-            input.flags |= INPUT_AT_EDGE;
-        }
-        TickOutput { input, notice }
     }
 
     /// Takes a command that is newer than the last one.
@@ -256,44 +221,39 @@ impl BridgeLoop {
             self.stats.round_trip.record(now.saturating_sub(taken));
         }
     }
+}
 
-    /// What the device may render: the coupling's answer to its pose, or the newest command.
-    fn safe_wrench(&mut self, now: Duration, pose: &Pose) -> (Vector6<f64>, Option<SafetyEvent>) {
-        if let Some(edge) = &mut self.edge {
-            let Some(felt) = edge.step(now, pose) else {
-                return (Vector6::zeros(), None);
-            };
-            let safe = self.safety.step(now, &felt.wrench, felt.received);
-            return (safe.wrench, safe.event);
-        }
-        let Some(Arrival { command, received }) = self.newest else {
-            return (Vector6::zeros(), None);
-        };
-        let commanded = if command.flags & WRENCH_PAUSED == 0 {
-            Vector6::from(command.wrench)
-        } else {
-            Vector6::zeros()
-        };
-        let safe = self.safety.step(now, &commanded, received);
-        (safe.wrench, safe.event)
-    }
+/// The command that arrived, for the port.
+fn command(arrival: &Arrival) -> Command {
+    let wrench = if arrival.command.flags & WRENCH_PAUSED == 0 {
+        Vector6::from(arrival.command.wrench)
+    } else {
+        Vector6::zeros()
+    };
+    Command::fresh(arrival.received, wrench)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::{Device, Pose};
     use crate::devices::{
         AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
     };
-    use crate::safety::SafetySettings;
+    use crate::port::{EventKind, SafetySettings};
+    use nalgebra::Point3;
 
     fn ms(time: u64) -> Duration {
         Duration::from_millis(time)
     }
 
     fn bridge(device: impl Device + 'static) -> BridgeLoop {
-        let safety = Safety::new(SafetySettings::default());
-        BridgeLoop::new(Box::new(device), safety, Point3::origin())
+        BridgeLoop::new(DevicePort::new(
+            Box::new(device),
+            SafetySettings::default(),
+            Point3::origin(),
+            &Pose::identity(),
+        ))
     }
 
     fn simulated() -> SimulatedDevice {
@@ -340,11 +300,12 @@ mod tests {
         let mut told = Vec::new();
         for tick in 1001..=1300 {
             let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
-            told.extend(output.notice);
-            let felt = bridge.safe_wrench(ms(tick), &Pose::identity()).0.norm();
+            told.extend(output.events.iter().copied());
+            let felt = bridge.port().rendered().norm();
             assert_eq!(felt == 0.0, tick >= 1120, "{felt} N at {tick} ms");
         }
-        assert_eq!(told, [Notice::Safety(SafetyEvent::Stale { age: ms(21) })]);
+        let told: Vec<_> = told.iter().map(|e| (e.kind, e.time, e.value)).collect();
+        assert_eq!(told, [(EventKind::ForceStale, ms(1021), 0.021)]);
     }
 
     #[test]
@@ -360,10 +321,7 @@ mod tests {
             };
             let _ = bridge.tick(ms(tick), 0, Some(repeated));
         }
-        assert_eq!(
-            bridge.safe_wrench(ms(1200), &Pose::identity()).0,
-            Vector6::zeros()
-        );
+        assert_eq!(*bridge.port().rendered(), Vector6::zeros());
         assert_eq!(bridge.stats().wrenches, 1000);
     }
 
@@ -396,8 +354,11 @@ mod tests {
                 .iter()
                 .all(|output| output.input.flags == INPUT_FAULT)
         );
-        let notices: Vec<_> = outputs.iter().filter_map(|output| output.notice).collect();
-        assert_eq!(notices, [Notice::Fault(DeviceFault::Ended)]);
+        let told: Vec<_> = outputs
+            .iter()
+            .flat_map(|output| output.events.iter().map(|event| event.kind))
+            .collect();
+        assert_eq!(told, [EventKind::DeviceEnded]);
         assert_eq!(bridge.fault(), Some(DeviceFault::Ended));
         // The last good pose goes on being sent, flagged.
         assert_eq!(outputs[19].input.pose.position[2], 0.01);
@@ -410,16 +371,19 @@ mod tests {
             let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
         }
         bridge.begin_session(None);
-        // The new server's clock starts at zero: its commands count although their time is smaller.
-        let first = Arrival {
-            received: ms(1001),
-            ..push(1, 5.0, 0)
-        };
-        let _ = bridge.tick(ms(1001), 0, Some(first));
-        assert_eq!(
-            bridge.safe_wrench(ms(1001), &Pose::identity()).0,
-            Vector6::zeros()
-        );
-        assert_eq!(bridge.stats().wrenches, 1001);
+        // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
+        // limit, and what comes ramps in.
+        let mut lowest = f64::INFINITY;
+        for tick in 1001..=1100 {
+            let first = Arrival {
+                received: ms(tick),
+                ..push(tick - 1000, 5.0, 0)
+            };
+            let _ = bridge.tick(ms(tick), 0, Some(first));
+            lowest = lowest.min(bridge.port().rendered().norm());
+        }
+        assert!(lowest < 0.2, "{lowest} N");
+        assert!(bridge.port().rendered().norm() < 1.01);
+        assert_eq!(bridge.stats().wrenches, 1100);
     }
 }

@@ -151,6 +151,13 @@ pub struct LogEvent {
     pub text: String,
 }
 
+/// An operator wants force at the device, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmRequest {
+    /// Force, or none.
+    pub arm: bool,
+}
+
 /// Last words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
@@ -176,6 +183,7 @@ pub enum ControlMessage {
     Stats(ClientStats),
     Log(LogEvent),
     Bye(Bye),
+    Arm(ArmRequest),
 }
 
 impl ControlMessage {
@@ -192,6 +200,7 @@ impl ControlMessage {
             ControlMessage::Stats(_) => "Stats",
             ControlMessage::Log(_) => "Log",
             ControlMessage::Bye(_) => "Bye",
+            ControlMessage::Arm(_) => "Arm",
         }
     }
 
@@ -264,7 +273,7 @@ macro_rules! wire_messages {
 wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
-    Coupling(CouplingOffer) = 9,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10,
 }
 
 wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
@@ -294,3 +303,4 @@ wire_struct!(MeshRequest { hash });
 wire_struct!(MeshHeader { hash, length });
 wire_struct!(LogEvent { level, text });
 wire_struct!(Bye { reason });
+wire_struct!(ArmRequest { arm });

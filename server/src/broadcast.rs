@@ -8,6 +8,7 @@ use std::time::Duration;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
 use god_object::{ConstraintSet, NonPenetrationConstraint};
+use taut_bridge::ArmingState;
 use taut_link::Broadcaster;
 use taut_proto::state::{
     ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState,
@@ -55,7 +56,8 @@ pub fn run(
         if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
             let fresh = wrenches.update();
             let command = wrenches.output_buffer();
-            let at_edge = sets.tick(now, command, states.contacts(), &mut broadcaster);
+            let armed = states.is_armed();
+            let at_edge = sets.tick(now, command, armed, states.contacts(), &mut broadcaster);
             if fresh && !at_edge {
                 broadcaster.send_wrench(command);
             }
@@ -107,6 +109,11 @@ impl StateWriter {
         }
     }
 
+    /// Whether the haptics loop's port gives force, as of the last state.
+    pub fn is_armed(&self) -> bool {
+        !self.shared.device.held().safety.arming.is_off()
+    }
+
     /// The newest of the god-object loop.
     pub fn contacts(&mut self) -> &ContactSnapshot {
         self.shared.contacts.newest()
@@ -127,11 +134,7 @@ impl StateWriter {
         state.sample_time_ns = nanoseconds(device.time);
         state.tick = device.sequence;
         state.scene_revision = self.scene_revision;
-        state.run = if device.faulty {
-            RunState::Fault
-        } else {
-            RunState::Running
-        };
+        state.run = run_state(device);
         state.constraint_age_us =
             u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
         state.head = head_state(&self.head, now, device.time);
@@ -142,6 +145,16 @@ impl StateWriter {
         nearest_contacts(&contacts.set, &mut state.contacts);
         state.events.clone_from(&self.events.recent);
         Some(&self.state)
+    }
+}
+
+/// Whether there are forces.
+fn run_state(device: &DeviceState) -> RunState {
+    match device.safety.arming {
+        _ if device.faulty => RunState::Fault,
+        ArmingState::Faulted => RunState::Fault,
+        ArmingState::Disarmed => RunState::Paused,
+        _ => RunState::Running,
     }
 }
 
@@ -247,6 +260,8 @@ struct EventTrail {
     touching: bool,
     buttons: u16,
     faulty: bool,
+    /// Number of the newest event of the port that was taken.
+    safety: u64,
 }
 
 impl EventTrail {
@@ -279,6 +294,10 @@ impl EventTrail {
             };
             self.push(tick, code);
         }
+        for event in device.safety.after(self.safety) {
+            self.push(tick, event_code::safety(event.kind as u8, event.value));
+            self.safety = event.number;
+        }
         (self.touching, self.buttons, self.faulty) = (touching, device.buttons, device.faulty);
     }
 
@@ -298,8 +317,10 @@ impl EventTrail {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shared::device_state::SafetyState;
     use crate::shared::{contact_snapshot, device_state, wrench_command};
     use god_object::constraint::{Feature, FeaturePair};
+    use taut_bridge::{EventKind, SafetyEvent};
 
     fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
         NonPenetrationConstraint {
@@ -315,6 +336,21 @@ mod tests {
             came: 0.0,
             shading_normal: None,
         }
+    }
+
+    /// A port in full force that has just limited one.
+    fn armed_after_a_limit() -> SafetyState {
+        let mut safety = SafetyState {
+            arming: ArmingState::Armed,
+            ..SafetyState::default()
+        };
+        safety.events[1] = Some(SafetyEvent {
+            number: 1,
+            time: Duration::from_millis(4),
+            kind: EventKind::ForceLimited,
+            value: 23.5,
+        });
+        safety
     }
 
     #[test]
@@ -341,6 +377,7 @@ mod tests {
             time: Duration::from_millis(5),
             pose: Pose::translation(0.0, 0.0, 0.05),
             buttons: 0b10,
+            safety: armed_after_a_limit(),
             ..DeviceState::at_start(&start)
         };
         states.publish(&device);
@@ -391,7 +428,8 @@ mod tests {
             codes,
             [
                 event_code::CONTACT_ON,
-                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT
+                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT,
+                event_code::safety(EventKind::ForceLimited as u8, 23.5)
             ]
         );
         assert_eq!(state.head.age_us, -2000);

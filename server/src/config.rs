@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_bridge::SafetySettings;
+use taut_bridge::{
+    MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings, ValidationSettings,
+};
 use taut_link::ClusterKey;
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{BuiltScene, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
@@ -75,11 +77,7 @@ pub fn session_setup(
         key,
         max_clients: network.max_clients,
     };
-    let safety = SafetySettings {
-        max_force: built.settings.force_limit,
-        max_torque: built.settings.torque_limit,
-        ..SafetySettings::default()
-    };
+    let safety = safety(workbench, &built.settings);
     let recording = overrides
         .recording
         .as_ref()
@@ -129,6 +127,56 @@ fn head(viewer: &Viewer) -> Head {
             HeadTracking::Fixed => None,
             HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
         },
+    }
+}
+
+/// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
+fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings {
+    let wanted = &workbench.safety;
+    let nobody_is_hurt = matches!(
+        workbench.device,
+        Device::Simulated { .. } | Device::Trace { .. } | Device::Remote
+    );
+    let rearm = match wanted.rearm {
+        Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
+        Some(taut_scene::Rearm::Manual) => Rearm::Manual,
+        // Behind a bridge the bridge decides.
+        None if nobody_is_hurt => Rearm::Automatic,
+        None => Rearm::Manual,
+    };
+    // What comes over a network is stamped there and may be late; the device drops what is too late, which for a bridge that couples
+    // by itself is much later.
+    let time_slack = match workbench.device {
+        Device::Remote => MAX_EDGE_DELAY,
+        _ => Duration::ZERO,
+    };
+    let default = ValidationSettings::default();
+    let within = |wanted: Option<f64>, scene: f64| wanted.map_or(scene, |wanted| wanted.min(scene));
+    SafetySettings {
+        max_force: within(wanted.max_force, scene.force_limit),
+        max_torque: within(wanted.max_torque, scene.torque_limit),
+        force_rate: wanted.force_slew * 1e3,
+        torque_rate: wanted.torque_slew * 1e3,
+        ramp_in: Duration::from_secs_f64(wanted.ramp_in),
+        period: HAPTICS_PERIOD,
+        rearm,
+        dead_man: wanted.dead_man,
+        arm_button: wanted.arm_button,
+        validation: ValidationSettings {
+            max_speed: wanted.max_speed,
+            max_turn_rate: wanted.max_turn_rate,
+            max_age: default.max_age + time_slack,
+            time_slack,
+            ..default
+        },
+        passivity: PassivitySettings {
+            mode: match wanted.passivity {
+                taut_scene::Passivity::Observe => Passivity::Observe,
+                taut_scene::Passivity::Control => Passivity::Control,
+            },
+            ..PassivitySettings::default()
+        },
+        ..SafetySettings::default()
     }
 }
 

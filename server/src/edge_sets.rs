@@ -53,10 +53,13 @@ impl EdgeSets {
     }
 
     /// Sends what is due at `now`, if the bridge that `command` answers couples by itself and is heard; whether it does.
+    ///
+    /// `armed`: the haptics loop's port lets force through; if not, the bridge's may not either.
     pub fn tick(
         &mut self,
         now: Duration,
         command: &WrenchCommand,
+        armed: bool,
         newest: &ContactSnapshot,
         broadcaster: &mut Broadcaster,
     ) -> bool {
@@ -69,7 +72,7 @@ impl EdgeSets {
             return true;
         }
         if self.sent >= self.due && now.saturating_sub(newest.published) <= OLDEST {
-            self.begin(newest);
+            self.begin(newest, armed);
         }
         let end = self.due.min(self.sent + DATAGRAMS_PER_TICK);
         for datagram in self.sent..end {
@@ -91,8 +94,11 @@ impl EdgeSets {
         }
     }
 
-    fn begin(&mut self, newest: &ContactSnapshot) {
+    fn begin(&mut self, newest: &ContactSnapshot, armed: bool) {
         write_set(&newest.set, self.separations, &mut self.set);
+        if !armed {
+            self.set.head.flags |= SET_PAUSED;
+        }
         self.set.head.made_ns = nanoseconds(newest.published);
         self.set.head.device_ns = nanoseconds(newest.device_time);
         self.division = Division::of(&self.set);

@@ -14,8 +14,8 @@ use std::time::Duration;
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
-use taut_bridge::realtime::{lock_memory, pin_to_core};
-use taut_bridge::{Device, RemoteDevice};
+use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
+use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use taut_recording::{EventRecord, Recorder};
@@ -58,6 +58,7 @@ pub struct Session {
     ledger: RealtimeLedger,
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
+    arm_switch: Arc<ArmSwitch>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -135,6 +136,7 @@ impl Session {
             ledger,
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
+            arm_switch: loops.arm_switch.clone(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -312,9 +314,13 @@ impl Session {
                         |now| haptics.tick(now),
                     );
                 }));
-                // Whatever ended the loop: no force is left on the hand.
-                haptics.release(clock.now());
-                if let Err(cause) = ticked {
+                // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
+                let released = catch_unwind(AssertUnwindSafe(|| {
+                    while !haptics.release_step(clock.now()) {
+                        sleep_until(clock.monotonic(clock.now() + period));
+                    }
+                }));
+                if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
             },
@@ -373,6 +379,11 @@ impl Session {
         self.ledger.report()
     }
 
+    /// Asks for force at the device, or for none.
+    pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
+        &self.arm_switch
+    }
+
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
@@ -391,6 +402,10 @@ impl Session {
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
+            if let LinkEvent::Arm { arm, .. } = event {
+                self.arm_switch
+                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            }
             lines.extend(
                 self.clients
                     .follow(&event)
@@ -583,7 +598,10 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
-        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {

@@ -79,12 +79,16 @@ fn run(coupling: &str) -> Run {
     let key_path = folder.path().join("key");
     let key = create_key_file(&key_path).expect("a key");
 
-    let free_ports = ["network.quic_port=0", "network.udp_port=0"];
+    let wanted = [
+        "network.quic_port=0",
+        "network.udp_port=0",
+        "device={kind=\"remote\"}",
+    ];
     let workbench = Workbench::parse_with_overrides(
         "workbench.toml",
         SHIPPED_WORKBENCH,
         Path::new(""),
-        &free_ports,
+        &wanted,
     )
     .unwrap_or_else(|error| panic!("{error}"));
     let overrides = Overrides {

@@ -9,8 +9,8 @@ use god_object::{GodObject, Pose};
 use taut::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
-    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings,
-    SimulatedDevice, ViaPoint,
+    Device, DeviceFault, DeviceInfo, DeviceSample, EventKind, Grip, Hand, MinJerkPath,
+    SafetySettings, SimulatedDevice, ViaPoint,
 };
 use taut_scene::{BuiltScene, Scene};
 
@@ -189,23 +189,22 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
         session.tick(1);
     }
     assert!(felt() > 2.0);
-    let before = session
-        .loops
-        .haptics
-        .statistics()
-        .safety_events
-        .load(std::sync::atomic::Ordering::Relaxed);
-    session.tick(1);
-    assert_eq!(felt(), 0.0, "dropped at once");
-    session.tick(1);
+    let count =
+        |session: &VirtualSession, kind| session.loops.haptics.statistics().incidents.of(kind);
+    assert_eq!(count(&session, EventKind::DeviceLost), 0);
+    let mut before = felt();
+    for age in 1..=200 {
+        session.tick(1);
+        assert!(before - felt() <= 0.5, "no step of {} N", before - felt());
+        assert_eq!(felt() == 0.0, age >= 120, "{} N after {age} ms", felt());
+        before = felt();
+    }
     assert!(session.loops.observers.monitor.device.newest().faulty);
-    let after = session
-        .loops
-        .haptics
-        .statistics()
-        .safety_events
-        .load(std::sync::atomic::Ordering::Relaxed);
-    assert_eq!(after, before + 1, "one event, not one per tick");
+    assert_eq!(
+        count(&session, EventKind::DeviceLost),
+        1,
+        "one event, not one per tick"
+    );
 }
 
 #[test]

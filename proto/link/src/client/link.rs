@@ -13,7 +13,7 @@ use std::{
 use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
     SceneDescription, SessionTime,
-    control::{Bye, ControlMessage, LogEvent, LogLevel},
+    control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -146,6 +146,12 @@ impl ClientLink {
     /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
     pub fn post_log(&self, level: LogLevel, text: String) -> bool {
         self.post(ControlMessage::Log(LogEvent { level, text }))
+    }
+
+    /// Asks for force at the device, or for none, without waiting; `false` if it was not taken. Counts if [`crate::Role::Operator`] joined; the
+    /// server ends the session of anybody else who asks.
+    pub fn post_arm(&self, arm: bool) -> bool {
+        self.post(ControlMessage::Arm(ArmRequest { arm }))
     }
 
     fn post(&self, message: ControlMessage) -> bool {

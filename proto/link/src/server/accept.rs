@@ -238,6 +238,12 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 node: session.node.clone(),
                 event,
             }),
+            Ok(ControlMessage::Arm(request)) if session.role == Role::Operator => {
+                shared.tell(LinkEvent::Arm {
+                    node: session.node.clone(),
+                    arm: request.arm,
+                });
+            }
             Ok(ControlMessage::Bye(bye)) => return bye.reason,
             Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
             Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),

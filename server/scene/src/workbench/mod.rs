@@ -2,10 +2,11 @@
 
 mod load;
 mod parse;
+mod safety;
 mod spec;
 
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
-    TransportKind, Viewer, Window,
+    Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
+    Safety, Screen, Show, Stereo, TransportKind, Viewer, Window,
 };
