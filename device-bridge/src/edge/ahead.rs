@@ -1,4 +1,4 @@
-//! How far the hand may be by the time at which a constraint set is used.
+//! Where the hand is by the time at which a constraint set is used: likely, and at most.
 //!
 //! | symbol | name in code | unit  | meaning                                                            |
 //! |--------|--------------|-------|--------------------------------------------------------------------|
@@ -7,11 +7,15 @@
 //! | v      | `velocity`   | m/s   | of the body's fastest point at the reading                         |
 //! | a      | `HAND_ACCELERATION` | m/s² | most that a hand adds                                        |
 //!
-//! The set must hold every row within `v t + a t² / 2`, or a surface would be felt only when the hand is through it.
+//! A half-space is a plane: off its pose by s, on a surface of curvature κ, it is wrong by `κ s² / 2` in depth and `κ s` in direction. So the
+//! god-object is sent to where the hand will be, [`device_predicted`], which leaves of `s = v t` what the hand's acceleration makes of it.
+//! And the set must hold every row within [`device_ahead`], `v t + a t² / 2`, or a surface would be felt only when the hand is through it.
 
 use std::time::Duration;
 
-use nalgebra::Vector6;
+use god_object::Pose;
+use god_object::spatial::{advance_pose, at_reference_point, from_reference_point};
+use nalgebra::{Point3, Vector6};
 
 /// A hand in contact tasks changes its speed by no more than this: assumption, m/s².
 const HAND_ACCELERATION: f64 = 5.0;
@@ -32,11 +36,44 @@ pub fn device_ahead(velocity: &Vector6<f64>, radius: f64, age: Duration, period:
     if ahead.is_finite() { ahead } else { 0.0 }
 }
 
+/// The pose (world from body) at which the hand will be when the set that answers the reading is first used: `2 age` and a period on, at the
+/// reading's velocity.
+///
+/// `pose` itself where the velocity is not finite.
+#[must_use]
+pub fn device_predicted(
+    pose: &Pose,
+    velocity: &Vector6<f64>,
+    reference_point: &Point3<f64>,
+    age: Duration,
+    period: Duration,
+) -> Pose {
+    if !velocity.iter().all(|x| x.is_finite()) {
+        return *pose;
+    }
+    let horizon = (2 * age.min(OLDEST) + period).as_secs_f64();
+    let start = at_reference_point(pose, reference_point);
+    let there = advance_pose(&start, &(velocity * horizon), 1.0);
+    from_reference_point(&there, reference_point)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_steady_hand_is_where_it_is_predicted_and_nan_predicts_nothing() {
+        let point = Point3::new(0.0, 0.0, 0.1);
+        let pose = Pose::translation(0.3, 0.0, 0.0);
+        let velocity = Vector6::new(0.2, 0.0, 0.0, 0.0, 0.0, 2.0);
+        let there = device_predicted(&pose, &velocity, &point, 20 * MS, 10 * MS);
+        assert!((there * point - Point3::new(0.31, 0.0, 0.1)).norm() < 1e-15);
+        assert!((there.rotation.scaled_axis().z - 0.1).abs() < 1e-15);
+        let broken = Vector6::repeat(f64::NAN);
+        assert_eq!(device_predicted(&pose, &broken, &point, MS, MS), pose);
+    }
 
     #[test]
     fn the_way_grows_with_speed_turn_and_delay_and_nan_is_none() {

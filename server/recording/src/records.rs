@@ -34,7 +34,7 @@ pub struct UpdateRecord {
     pub published: Duration,
     /// Sequence number of the device sample.
     pub device_sequence: u64,
-    /// Device pose that it followed.
+    /// Device pose that it followed: where a hand behind a network was taken to be.
     pub device_pose: Pose,
     /// Session time for which obstacles with a motion were moved.
     pub obstacle_time: Duration,

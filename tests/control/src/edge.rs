@@ -16,8 +16,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Coupling, GodObject};
-use nalgebra::{Vector3, Vector6};
-use taut_bridge::edge::{EdgeCoupler, device_ahead, offer_of, write_set};
+use nalgebra::{Point3, Vector3, Vector6};
+use taut_bridge::edge::{EdgeCoupler, device_ahead, device_predicted, offer_of, write_set};
 use taut_bridge::{Device, EnergyObserver, Grip, Hand, Pose, SimulatedDevice};
 use taut_proto::constraints::SetHead;
 use taut_proto::input::INPUT_AT_EDGE;
@@ -112,6 +112,7 @@ struct Server {
     god_object: GodObject,
     coupling: Coupling,
     radius: f64,
+    reference_point: Point3<f64>,
     separations: bool,
     newest: Option<InputSample>,
     wire: ConstraintSet,
@@ -126,6 +127,7 @@ impl Server {
             god_object: god_object(task),
             coupling: Coupling::new(&world, &scene.settings),
             radius: world.body.mesh.radius_about(&world.body.reference_point),
+            reference_point: scene.reference_point(),
             separations: scene.settings.implicit_rounds > 0,
             newest: None,
             wire: ConstraintSet::new(),
@@ -144,7 +146,7 @@ impl Server {
         let Some(input) = self.newest else {
             return;
         };
-        let Some(pose) = input.pose.to_isometry() else {
+        let Some(mut pose) = input.pose.to_isometry() else {
             return;
         };
         if self.mode == Mode::Edge {
@@ -152,6 +154,7 @@ impl Server {
             let velocity = Vector6::from(input.velocity);
             let ahead = device_ahead(&velocity, self.radius, age, TICK);
             self.god_object.set_device_ahead(ahead);
+            pose = device_predicted(&pose, &velocity, &self.reference_point, age, TICK);
         }
         self.god_object.step(&pose, None);
         let set = self.god_object.constraint_set();

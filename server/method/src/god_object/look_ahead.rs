@@ -1,5 +1,7 @@
 //! How far a published set looks ahead, and what that may cost: late updates must not make later ones still later.
 
+use nalgebra::Point3;
+
 use super::GodObject;
 use super::substep::Update;
 
@@ -23,6 +25,11 @@ impl GodObject {
     /// Most that look-ahead adds to the activation distance, m.
     pub(super) fn look_ahead_limit(&self) -> f64 {
         self.settings.look_ahead_limit.max(self.device_ahead)
+    }
+
+    /// The point G of the body, in its own frame, m.
+    pub fn reference_point(&self) -> &Point3<f64> {
+        &self.world.body.reference_point
     }
 
     /// Distance of the body's farthest point from the reference point, m.
