@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use nalgebra::Vector6;
 
-use crate::devices::min_jerk::stack;
+use taut_plant::stack;
 
 /// Limits and times of [`Safety`].
 #[derive(Clone, Copy, Debug, PartialEq)]
