@@ -65,9 +65,7 @@ impl ClosedLoop {
         self.tick += 1;
         self.plant.advance(now);
         let measured = self.plant.measured_pose();
-        let answer = self
-            .coupling
-            .step(now.as_secs_f64(), &measured, &self.set);
+        let answer = self.coupling.step(now.as_secs_f64(), &measured, &self.set);
         let last = self.last.replace(measured).unwrap_or(measured);
         let velocity = difference(&measured, &last) / PERIOD.as_secs_f64();
         let wrench = answer.wrench - self.virtual_damping.component_mul(&velocity);

@@ -11,7 +11,10 @@ fn main() -> ExitCode {
         .find(|name| RECIPES.iter().all(|recipe| recipe.name != name.as_str()))
     {
         let known: Vec<_> = RECIPES.iter().map(|recipe| recipe.name).collect();
-        eprintln!("there is no recipe `{unknown}`; there are {}", known.join(", "));
+        eprintln!(
+            "there is no recipe `{unknown}`; there are {}",
+            known.join(", ")
+        );
         return ExitCode::from(2);
     }
     let chosen = RECIPES

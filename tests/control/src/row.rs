@@ -18,7 +18,13 @@ pub struct Row {
 impl Row {
     /// A number that must be within a share of the expected one.
     #[must_use]
-    pub fn within(case: impl fmt::Display, measured: f64, expected: f64, share: f64, unit: &str) -> Self {
+    pub fn within(
+        case: impl fmt::Display,
+        measured: f64,
+        expected: f64,
+        share: f64,
+        unit: &str,
+    ) -> Self {
         Self {
             case: case.to_string(),
             measured: format!("{} {unit}", brief(measured)),
@@ -40,7 +46,12 @@ impl Row {
 
     /// Something that must be so.
     #[must_use]
-    pub fn holds(case: impl fmt::Display, measured: impl fmt::Display, expected: impl fmt::Display, pass: bool) -> Self {
+    pub fn holds(
+        case: impl fmt::Display,
+        measured: impl fmt::Display,
+        expected: impl fmt::Display,
+        pass: bool,
+    ) -> Self {
         Self {
             case: case.to_string(),
             measured: measured.to_string(),

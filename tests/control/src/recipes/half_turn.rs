@@ -37,7 +37,11 @@ fn torques(axis_turn: f64) -> (Vec<(f64, f64)>, f64, f64) {
     let mut torques = Vec::new();
     let mut beside = 0.0_f64;
     for tick in 0..=2 * there {
-        let up = if tick <= there { tick } else { 2 * there - tick };
+        let up = if tick <= there {
+            tick
+        } else {
+            2 * there - tick
+        };
         let angle = f64::from(up) * period * SPEED * axis_turn;
         let device = Pose::rotation(Vector3::z() * angle);
         let mut wrench = coupling
@@ -62,7 +66,12 @@ pub fn run() -> Vec<Row> {
             .iter()
             .map(|(_, torque)| torque * sense)
             .fold(f64::NEG_INFINITY, f64::max);
-        rows.push(Row::at_most(format!("{name}: torque with the turn"), wrong.max(0.0), 0.0, "N m"));
+        rows.push(Row::at_most(
+            format!("{name}: torque with the turn"),
+            wrong.max(0.0),
+            0.0,
+            "N m",
+        ));
         // K_r times the angle, up to the saturation: monotone, then constant.
         let error = torques
             .iter()
@@ -71,14 +80,29 @@ pub fn run() -> Vec<Row> {
                 (torque - ideal).abs() / limit
             })
             .fold(0.0, f64::max);
-        rows.push(Row::at_most(format!("{name}: error of K_r angle, saturated at 1 rad"), error, SAME, ""));
+        rows.push(Row::at_most(
+            format!("{name}: error of K_r angle, saturated at 1 rad"),
+            error,
+            SAME,
+            "",
+        ));
         let jump = torques
             .windows(2)
             .map(|pair| (pair[1].1 - pair[0].1).abs())
             .fold(0.0, f64::max);
         let allowed = 1.5 * rotational * SPEED * PERIOD.as_secs_f64();
-        rows.push(Row::at_most(format!("{name}: largest change of torque per ms"), jump, allowed, "N m"));
-        rows.push(Row::at_most(format!("{name}: force and other torque"), beside / limit, SAME, ""));
+        rows.push(Row::at_most(
+            format!("{name}: largest change of torque per ms"),
+            jump,
+            allowed,
+            "N m",
+        ));
+        rows.push(Row::at_most(
+            format!("{name}: force and other torque"),
+            beside / limit,
+            SAME,
+            "",
+        ));
     }
     rows
 }

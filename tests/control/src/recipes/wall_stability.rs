@@ -139,16 +139,12 @@ fn about_z(delay: f64) -> (f64, f64) {
     let simulated = critical(|stiffness| {
         let settings = linear(stiffness);
         let set = contacts(&settings, &stops_about_z());
-        let plant = Plant::new(
-            device,
-            Hand::RELEASED,
-            MinJerkPath::hold(Pose::identity()),
-        )
-        .with_motors(Motors {
-            delay: Duration::from_secs_f64(delay),
-            lag: Duration::ZERO,
-        })
-        .with_longest_step(PERIOD);
+        let plant = Plant::new(device, Hand::RELEASED, MinJerkPath::hold(Pose::identity()))
+            .with_motors(Motors {
+                delay: Duration::from_secs_f64(delay),
+                lag: Duration::ZERO,
+            })
+            .with_longest_step(PERIOD);
         let mut run = ClosedLoop::new(&world, &settings, set, plant);
         let turned = Pose::rotation(nalgebra::Vector3::z() * DISTURBANCE);
         run.plant.place(turned, Vector6::zeros());
@@ -196,9 +192,20 @@ pub fn run() -> Vec<Row> {
         };
         printed = printed.max((case.by_eigenvalues() / table - 1.0).abs());
         let name = format!("b 1, B 0, {} ms, light hand", delay * 1e3);
-        rows.push(Row::within(name, case.by_simulation(), table, TOLERANCE, "N/m"));
+        rows.push(Row::within(
+            name,
+            case.by_simulation(),
+            table,
+            TOLERANCE,
+            "N/m",
+        ));
     }
-    rows.push(Row::at_most("eigenvalues against the printed table", printed, PRINTED, ""));
+    rows.push(Row::at_most(
+        "eigenvalues against the printed table",
+        printed,
+        PRINTED,
+        "",
+    ));
     rows.push(sweep());
     for delay in [0.0, 1e-3] {
         let (simulated, exact) = about_z(delay);
