@@ -114,6 +114,29 @@ pub struct ReplayReport {
     pub work: WorkReport,
 }
 
+/// What came of computing a recorded session again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RecordedReport {
+    /// Name of the scene.
+    pub scene: String,
+    /// The session came to its end and nothing of it was lost.
+    pub complete: bool,
+    /// God-object updates computed again.
+    pub updates: u64,
+    /// Forces computed again.
+    pub forces: u64,
+    /// Updates whose pose, gap or number of rows is not the same bit by bit.
+    pub different_updates: u64,
+    /// Forces that are not the same bit by bit.
+    pub different_forces: u64,
+    /// What differed first.
+    pub first_difference: Option<String>,
+    /// Thread CPU time of one god-object update, here and now.
+    pub update_us: Distribution,
+    /// Thread CPU time of one force, here and now.
+    pub force_us: Distribution,
+}
+
 /// Counts of the god-object loop's work: the same on every machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkReport {
@@ -197,6 +220,37 @@ impl fmt::Display for SessionReport {
             )?;
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for RecordedReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = if self.complete { "" } else { " (not whole)" };
+        writeln!(f, "scene               {}{whole}", self.scene)?;
+        writeln!(
+            f,
+            "updates             {}, {} differ",
+            self.updates, self.different_updates
+        )?;
+        writeln!(
+            f,
+            "forces              {}, {} differ",
+            self.forces, self.different_forces
+        )?;
+        writeln!(
+            f,
+            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.update_us.p50, self.update_us.p99, self.update_us.max
+        )?;
+        write!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.force_us.p50, self.force_us.p99, self.force_us.max
+        )?;
+        match &self.first_difference {
+            Some(difference) => write!(f, "\nfirst difference    {difference}"),
+            None => Ok(()),
+        }
     }
 }
 
