@@ -51,6 +51,8 @@ struct Seen {
     largest_turn: f64,
     /// Turns in the last part, rad.
     at_end: f64,
+    /// Most sub-steps of an update in the last part: 1 finds nothing to do. A whole turn per update would look like rest.
+    busy: u32,
     /// From the device's orientation at the end, rad.
     left: f64,
     /// Smallest gap less the least allowed, m.
@@ -93,7 +95,7 @@ fn lead() -> (Seen, f64) {
         let height = LIFT.0 * ((time - wound) / LIFT.1).clamp(0.0, 1.0);
         device = Pose::new(Vector3::z() * height, Vector3::zeros())
             * Pose::rotation(Vector3::z() * angle);
-        god_object.step(&device, None);
+        let report = god_object.step(&device, None);
         let set = god_object.constraint_set();
         let torque = coupling.step(time, &device, set).wrench[5];
         seen.gap = seen.gap.min(set.gap_min - settings.minimum_gap);
@@ -112,6 +114,7 @@ fn lead() -> (Seen, f64) {
         last_torque = torque;
         if time > lifted + WAIT - STILL {
             seen.at_end += turn.norm();
+            seen.busy = seen.busy.max(report.substeps);
         }
     }
     seen.left = rotation_vector(&(device.rotation * last.rotation.inverse())).norm();
@@ -155,6 +158,12 @@ pub fn run() -> Vec<Row> {
         ),
         Row::at_most("from the device at the end", seen.left, SAME, "rad"),
         Row::at_most("turns in the last second", seen.at_end, SAME, "rad"),
+        Row::at_most(
+            "sub-steps of an update in the last second",
+            f64::from(seen.busy),
+            1.0,
+            "",
+        ),
         Row::holds(
             "gap",
             format!("{:.2e} m above the least", seen.gap),
