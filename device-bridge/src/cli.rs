@@ -74,6 +74,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
 
+    /// Limits of the force.
     #[command(flatten)]
     pub safety: SafetyArgs,
 

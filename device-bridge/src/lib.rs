@@ -25,8 +25,8 @@ pub use bridge::{BridgeError, run};
 pub use cli::{BridgeArgs, DeviceChoice, SafetyArgs, UnknownDevice, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,
-    RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError,
+    Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
     TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use port::{

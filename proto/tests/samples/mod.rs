@@ -9,7 +9,9 @@ use proptest::prelude::*;
 use taut_proto::{
     ArrayVec, ClientStats, ControlMessage, HotState, InputSample, MeshHash, Payload, PoseF32,
     PoseF64, Refusal, Role, SceneDescription, Transport, WrenchCommand,
-    control::{Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome},
+    control::{
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
+    },
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
@@ -213,6 +215,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
                 reason: "done".to_owned(),
             }),
         ),
+        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
     ]
 }
 
