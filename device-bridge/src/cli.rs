@@ -79,6 +79,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
 
+    /// Limits of the force.
     #[command(flatten)]
     pub safety: SafetyArgs,
 

@@ -7,10 +7,9 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Vector6;
 
-/// An element of SE(3), world from body: m and unit quaternion.
-pub type Pose = Isometry3<f64>;
+pub use taut_plant::Pose;
 
 /// A source of device poses that can be pushed with a wrench.
 ///

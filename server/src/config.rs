@@ -10,7 +10,9 @@ use taut_bridge::{
 };
 use taut_link::ClusterKey;
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
-use taut_scene::{BuiltScene, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
+use taut_scene::{
+    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench,
+};
 
 use crate::content::content;
 use crate::devices::device;

@@ -259,6 +259,38 @@ impl Events {
     }
 }
 
+/// Numbers events and keeps those of this tick. No allocation.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Teller {
+    now: Duration,
+    told: u64,
+    events: Events,
+}
+
+impl Teller {
+    /// Forgets the last tick's.
+    pub(super) fn begin_tick(&mut self, now: Duration) {
+        self.now = now;
+        self.events = Events::default();
+    }
+
+    /// Tells one.
+    pub(super) fn tell(&mut self, kind: EventKind, value: f64) {
+        self.told += 1;
+        self.events.push(SafetyEvent {
+            number: self.told,
+            time: self.now,
+            kind,
+            value,
+        });
+    }
+
+    /// What was told in this tick.
+    pub(super) fn events(&self) -> &Events {
+        &self.events
+    }
+}
+
 /// Something that comes and goes: it begins with its first tick, and is over once it has been gone for [`Spell::QUIET`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spell {

@@ -1,10 +1,13 @@
 //! The port with a device that says whatever a test wants.
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use nalgebra::{Point3, Vector6};
+use proptest::prelude::*;
 
 use super::*;
-use crate::device::{DeviceFault, DeviceLimits};
-use proptest::prelude::*;
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 
 type Answer = Result<DeviceSample, DeviceFault>;
 

@@ -25,6 +25,9 @@ use nalgebra::{Point3, Vector6};
 
 use crate::device::{DeviceFault, DeviceSample, Pose};
 
+/// Time over which the speed before a freeze is averaged: one count of an encoder is no movement.
+const SPEED_WINDOW: Duration = Duration::from_millis(10);
+
 /// How far the norm of a quaternion may be from one: rounding of single precision.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
 
@@ -87,7 +90,7 @@ pub(super) struct SampleCheck {
     freeze: Freeze,
 }
 
-/// Since when the pose has not changed, and how fast it was until then.
+/// Since when the pose has not changed, and how fast it was until then, on average.
 #[derive(Clone, Copy, Debug, Default)]
 struct Freeze {
     speed: f64,
@@ -206,10 +209,15 @@ impl SampleCheck {
     /// Whether the samples stopped in the middle of a movement.
     fn frozen(&mut self, last: &DeviceSample, sample: &DeviceSample) -> Result<(), DeviceFault> {
         if sample.pose != last.pose {
-            let passed = sample.time.saturating_sub(last.time).max(self.period);
+            let passed = sample
+                .time
+                .saturating_sub(self.freeze.changed)
+                .max(self.period);
             let travel = sample.pose * self.reference_point - last.pose * self.reference_point;
+            let speed = travel.norm() / passed.as_secs_f64();
+            let weight = (passed.as_secs_f64() / SPEED_WINDOW.as_secs_f64()).min(1.0);
             self.freeze = Freeze {
-                speed: travel.norm() / passed.as_secs_f64(),
+                speed: self.freeze.speed + weight * (speed - self.freeze.speed),
                 changed: sample.time,
                 suspect: false,
             };
@@ -350,6 +358,14 @@ mod tests {
         }
         let frozen = fault(check.judge(ms(69), Ok(at(69, x))));
         assert_eq!(frozen, DeviceFault::Frozen { time: ms(20) });
+
+        // Two counts of an encoder in one tick are no movement.
+        let mut check = self::check();
+        for tick in 0..200 {
+            let sample = at(tick, if tick < 100 { 0.0 } else { 6e-5 });
+            let verdict = check.judge(ms(tick), Ok(sample));
+            assert!(matches!(verdict, Verdict::Good(_)), "{tick}: {verdict:?}");
+        }
 
         // A device that comes to rest slowly may lie there for ever.
         let mut check = self::check();

@@ -13,7 +13,9 @@ use taut_proto::{
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
     },
-    control::{Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome},
+    control::{
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
+    },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
@@ -313,6 +315,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
                 reason: "done".to_owned(),
             }),
         ),
+        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
     ]
 }
 

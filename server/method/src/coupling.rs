@@ -17,6 +17,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector};
@@ -45,6 +46,8 @@ pub struct Coupling {
     rows_in_force: Vec<HalfSpace>,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
+    /// `None` where nothing is damped.
+    damping: Option<ContactDamping>,
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
@@ -158,6 +161,7 @@ impl Coupling {
             friction,
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
+            damping: ContactDamping::of(settings.damping_time, settings.solver),
             arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
@@ -194,6 +198,9 @@ impl Coupling {
             self.carry_rows(time, set);
         }
         let device = at_reference_point(device_pose, &self.body.reference_point);
+        if let Some(damping) = &mut self.damping {
+            damping.observe(time, &device);
+        }
         let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
         self.rotation = angular(&difference);
         let unconstrained = difference * self.settings.k_s;
@@ -257,6 +264,14 @@ impl Coupling {
 
         // F_c = k_h M (a_c - a_u)
         let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let damped = self.damping.as_mut().map(|damping| {
+            let in_force = |row: usize| HalfSpace {
+                bound: self.bounds[row],
+                ..self.rows[row]
+            };
+            let k_s = self.settings.k_s;
+            damping.held(metric, &unconstrained, k_s, &projection, in_force)
+        });
         let given = LinearAnswer {
             constraints: &set.constraints[..self.rows.len()],
             start: &self.prepared.god_object,
@@ -287,6 +302,9 @@ impl Coupling {
             projection.acceleration = moved * self.settings.k_s;
         }
         self.correction = projection.acceleration - unconstrained;
+        if let Some(damped) = damped {
+            held += damped;
+        }
         let mut wrench = held * self.settings.k_h;
         if let Some(textures) = &mut self.textures {
             let moved = projection.acceleration / self.settings.k_s;

@@ -28,6 +28,7 @@ mod adaptation;
 pub mod collision;
 pub mod constraint;
 mod coupling;
+mod damping;
 pub mod geometry;
 mod god_object;
 mod implicit;

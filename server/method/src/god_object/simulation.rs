@@ -14,10 +14,14 @@ use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
-    pose_is_finite,
+    pose_is_finite, six,
 };
 use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
 use crate::world::World;
+
+/// Most that the body turns in one update, rad: a quarter turn. A whole turn made in one update looks like none, and a body that owes
+/// one, wound up against a stop and let go, would make it for ever.
+const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_2;
 
 /// Loop 1 of the method.
 #[derive(Debug)]
@@ -133,6 +137,8 @@ impl GodObject {
             Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
             _ => difference * self.settings.k_s,
         };
+        let turn = angular(&unconstrained).cap_magnitude(LARGEST_TURN);
+        let unconstrained = six(&linear(&unconstrained), &turn);
         let goal = advance_pose(&start, &unconstrained, 1.0);
         let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))

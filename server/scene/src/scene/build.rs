@@ -324,6 +324,7 @@ impl Scene {
         let settings = Settings {
             k_s: coupling.k_s.unwrap_or(defaults.k_s),
             k_h: coupling.k_h.unwrap_or(defaults.k_h),
+            damping_time: coupling.damping_time.unwrap_or(defaults.damping_time),
             rotation_metric: coupling.rotation_metric.unwrap_or(defaults.rotation_metric),
             adaptation: match coupling.adaptation {
                 None => defaults.adaptation,

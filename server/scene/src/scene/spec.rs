@@ -192,6 +192,8 @@ pub struct CouplingSpec {
     pub k_h: Option<f64>,
     /// The rotational part of the metric.
     pub rotation_metric: Option<RotationMetric>,
+    /// Damping over stiffness, s.
+    pub damping_time: Option<f64>,
     /// Constraint adaptation.
     pub adaptation: Option<AdaptationSpec>,
     /// Contacts before they touch.
