@@ -37,8 +37,8 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH,
-    Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
+    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode,
+    SHIPPED_WORKBENCH, Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
 };
 
 /// Why a scene could not be used.

@@ -1,9 +1,11 @@
 //! The workbench: screens, nodes, viewer, device, network, monitoring, real time.
 
+mod dynamics;
 mod load;
 mod parse;
 mod spec;
 
+pub use dynamics::DeviceDynamics;
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
