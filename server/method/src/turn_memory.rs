@@ -7,8 +7,8 @@
 //!
 //! Where the device turns past pi against a blocked body, w turns to its opposite, and the torque would jump by 2 pi K_r. The way
 //! that the device went is kept instead: what w has along u pulls the other way, `w - 2 (w . u) u`. What it has across u pulls
-//! as it is, or a body that comes free would tip over. The pull is as long as the shorter arc, continuous at the half turn and at the
-//! whole one, where w passes zero and the memory ends: a whole turn is none.
+//! as it is, or a body that comes free would tip over. Near the whole turn the pull goes over to the shorter arc, and the memory
+//! ends: a whole turn is none. The pull is continuous throughout, and never longer than the shorter arc.
 //! Beyond the paper, whose difference of rotations (Section 4.1) is the shorter arc.
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -18,6 +18,12 @@ use crate::spatial::{Pose, Vector6, rotation_vector, six};
 
 /// A step across the half turn is known by the shorter arc turning to its opposite, when the way between is less than this, rad.
 const LARGEST_STEP: f64 = FRAC_PI_2;
+/// What is left to the whole turn where the shorter arc takes over, rad: more than a body's play between its stops, or one that stands
+/// at the far stop would make a turn for it when it comes free.
+const SHORT_WAY: f64 = 0.1;
+/// What is left to the whole turn where the pull begins to go over, rad: its slope between is 1.4, beneath the 1.5 that a torque may
+/// change by.
+const LONG_WAY: f64 = 6.0 * SHORT_WAY;
 
 /// Remembers the way past a half turn.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,7 +47,7 @@ impl TurnMemory {
         let short = rotation_vector(rotation);
         let last = std::mem::replace(&mut self.last, short);
         match self.axis {
-            Some(axis) if short.dot(&axis) >= 0.0 => self.axis = None,
+            Some(axis) if short.dot(&axis) >= -SHORT_WAY => self.axis = None,
             Some(_) => {}
             None => {
                 let (before, now) = (last.norm(), short.norm());
@@ -49,14 +55,25 @@ impl TurnMemory {
                 self.axis = crossed.then(|| last / before);
             }
         }
-        self.axis
-            .map_or(short, |axis| short - axis * (2.0 * short.dot(&axis)))
+        self.axis.map_or(short, |axis| {
+            let left = -short.dot(&axis);
+            short + axis * (left + kept(left))
+        })
     }
 
     /// The rotation vector of the last difference on the branch that is kept: of at most a whole turn.
     #[inline]
     pub(crate) fn branch(&self) -> Vector3<f64> {
         self.axis.map_or(self.last, |axis| self.last + axis * TAU)
+    }
+}
+
+/// The pull the way that the device went, `left` from the whole turn, rad.
+fn kept(left: f64) -> f64 {
+    if left >= LONG_WAY {
+        left
+    } else {
+        (left - SHORT_WAY) * (LONG_WAY + SHORT_WAY) / (LONG_WAY - SHORT_WAY) - SHORT_WAY
     }
 }
 
@@ -81,7 +98,7 @@ mod tests {
                 assert!(pull.norm() < PI + 1e-9);
                 if let Some(last) = last.replace(pull) {
                     assert!(
-                        (pull - last).norm() < 1.1 * step + 2.0 * tilt,
+                        (pull - last).norm() < 1.5 * step + 2.0 * tilt,
                         "{angle} {pull} {last}"
                     );
                 }
