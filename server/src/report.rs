@@ -6,7 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::timing::Distribution;
+use crate::timing::{Bin, Distribution};
 
 /// What `taut demo` and `taut serve` measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,8 @@ pub struct SessionReport {
     pub haptics_hz: f64,
     /// Time between two ticks of the haptics loop.
     pub haptics_period_us: Distribution,
+    /// The same as a histogram: what jitter looks like.
+    pub haptics_period_bins_us: Vec<Bin>,
     /// Deadlines of the haptics loop that passed without a tick in their period.
     pub deadline_misses: u64,
     /// Thread CPU time of one god-object update.
@@ -166,6 +168,19 @@ impl fmt::Display for SessionReport {
             "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed",
             self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses
         )?;
+        let ticks = period.count.max(1) as f64;
+        for bin in self
+            .haptics_period_bins_us
+            .iter()
+            .filter(|bin| bin.count > 0)
+        {
+            let share = 100.0 * bin.count as f64 / ticks;
+            let range = match bin.to {
+                Some(to) => format!("{:.0} to {to:.0} us", bin.from),
+                None => format!("from {:.0} us", bin.from),
+            };
+            writeln!(f, "  period {range:<16} {share:7.3} %")?;
+        }
         writeln!(
             f,
             "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
@@ -321,6 +336,7 @@ mod tests {
                 "duration_s",
                 "haptics_hz",
                 "haptics_period_us",
+                "haptics_period_bins_us",
                 "deadline_misses",
                 "god_object_update_us",
                 "force_us",
