@@ -28,6 +28,7 @@ use crate::spatial::{
 use crate::surface::{
     EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
 };
+use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
 /// Loop 2 of the method. `step` allocates nothing.
@@ -57,7 +58,7 @@ pub struct Coupling {
     /// The rows of the present set, with the bounds where they belong.
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
-    rotation: Vector3<f64>,
+    turn: TurnMemory,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
 }
@@ -177,7 +178,7 @@ impl Coupling {
                 .map(|a| AdaptationState::new(a, capacity)),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
-            rotation: Vector3::zeros(),
+            turn: TurnMemory::default(),
             correction: Vector6::zeros(),
         }
     }
@@ -201,8 +202,7 @@ impl Coupling {
         if let Some(damping) = &mut self.damping {
             damping.observe(time, &device);
         }
-        let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
-        self.rotation = angular(&difference);
+        let difference = self.turn.difference(&device, &self.prepared.god_object);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = &self.prepared.metric else {
             return self.without_force(ProjectionStatus::NotFinite);
@@ -276,7 +276,7 @@ impl Coupling {
             constraints: &set.constraints[..self.rows.len()],
             start: &self.prepared.god_object,
             goal: &device,
-            branch: self.rotation,
+            branch: self.turn.branch(),
             scale: self.settings.k_s,
             shaded: self.prepared.shaded,
             projection: &projection,

@@ -38,6 +38,7 @@ mod settings;
 pub mod shape;
 pub mod spatial;
 pub mod surface;
+mod turn_memory;
 mod world;
 
 pub use constraint::{ConstraintSet, NonPenetrationConstraint};

@@ -37,8 +37,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
-    SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
+    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
+    RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
+    Window, Workbench,
 };
 
 /// Why a scene could not be used.
