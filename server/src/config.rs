@@ -16,6 +16,7 @@ use crate::head::{Head, Sway};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, SessionSetup};
+use crate::shared::contact_snapshot::MAX_MOVING;
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -53,10 +54,11 @@ pub fn session_setup(
         None => workbench.load_scene()?,
     };
     let built = scene.build()?;
-    if let Some(motion) = built.motions.first() {
+    if built.motions.len() > MAX_MOVING {
         return Err(Failure::BadInput(format!(
-            "the obstacle \"{}\" has a motion, which only `taut replay` can follow: a session's checker and screens know obstacles at rest only; leave out `motion`",
-            built.world.obstacles[motion.obstacle].name
+            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+            built.name,
+            built.motions.len()
         )));
     }
     let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
@@ -78,6 +80,7 @@ pub fn session_setup(
     };
     Ok(SessionSetup {
         device: device(&workbench.device, &built)?,
+        motions: built.motions,
         settings: built.settings,
         start: built.start,
         world: Arc::new(built.world),

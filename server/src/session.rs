@@ -98,7 +98,8 @@ impl Session {
             god_object,
             device,
             setup.safety,
-        );
+        )
+        .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -519,6 +520,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.clone(),
         world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description

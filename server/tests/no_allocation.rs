@@ -16,7 +16,7 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 #[test]
 fn loops_two_and_three_allocate_nothing() {
-    for name in ["sphere-on-plane", "peg-in-a-hole"] {
+    for name in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
             Err(error) => panic!("{error}"),
@@ -40,7 +40,8 @@ fn loops_two_and_three_allocate_nothing() {
             god_object,
             device,
             SafetySettings::default(),
-        );
+        )
+        .with_motions(scene.motions);
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {
             let now = Duration::from_millis(tick);

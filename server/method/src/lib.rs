@@ -32,6 +32,7 @@ pub mod geometry;
 mod god_object;
 mod implicit;
 mod known_rows;
+mod obstacle_work;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;

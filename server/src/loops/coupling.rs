@@ -96,6 +96,7 @@ impl CouplingLoop {
             kkt: output.kkt,
             solved: output.status == ProjectionStatus::Solved,
             saturated: output.saturated,
+            obstacle_work: self.coupling.obstacle_work(),
         });
         if self.shading || output.shaded.is_some() {
             self.shaded.publish(&output.shaded);

@@ -48,6 +48,10 @@ pub struct HapticsStatistics {
     pub incidents: IncidentCounts,
     /// Energy given to the hand beyond what it had put in, J, as the bits of an `f64`.
     energy_injected_bits: AtomicU64,
+    /// Net work of moving obstacles on the hand, J, as the bits of an `f64`.
+    obstacle_work_bits: AtomicU64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
+    energy_generated_bits: AtomicU64,
     /// The device does not answer now.
     pub device_faulty: AtomicBool,
 }
@@ -56,6 +60,16 @@ impl HapticsStatistics {
     /// Energy given to the hand beyond what it had put in, J.
     pub fn energy_injected(&self) -> f64 {
         f64::from_bits(self.energy_injected_bits.load(Ordering::Relaxed))
+    }
+
+    /// Net work that moving obstacles have done on the hand, J.
+    pub fn obstacle_work(&self) -> f64 {
+        f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+    }
+
+    /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
+    pub fn energy_generated(&self) -> f64 {
+        f64::from_bits(self.energy_generated_bits.load(Ordering::Relaxed))
     }
 }
 
@@ -103,10 +117,20 @@ impl HapticsLoop {
             Vector6::zeros()
         };
         self.device.write(now, &wrench);
-        self.energy.step(&self.state.pose, &wrench);
+        let given = self.energy.step(&self.state.pose, &wrench);
         self.statistics
             .energy_injected_bits
             .store(self.energy.injected().to_bits(), Ordering::Relaxed);
+        self.tell_obstacle_work(given);
+    }
+
+    /// What of the energy given is the obstacles', and what nobody's.
+    fn tell_obstacle_work(&self, given: f64) {
+        let work = self.wrench.held().obstacle_work;
+        let generated = (given - work).max(self.statistics.energy_generated()); // NaN: as before
+        let store = |bits: &AtomicU64, energy: f64| bits.store(energy.to_bits(), Ordering::Relaxed);
+        store(&self.statistics.obstacle_work_bits, work);
+        store(&self.statistics.energy_generated_bits, generated);
     }
 
     /// Leaves the device without force.

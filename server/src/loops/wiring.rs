@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
 use super::god_object::GodObjectLoop;
@@ -122,6 +123,15 @@ impl WiredLoops {
             coupling_waker,
             observers,
             statistics,
+        }
+    }
+
+    /// The same with obstacles that move.
+    #[must_use]
+    pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
+        Self {
+            god_object: self.god_object.with_motions(motions),
+            ..self
         }
     }
 }

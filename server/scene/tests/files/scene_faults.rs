@@ -346,7 +346,7 @@ fn a_scene_that_is_neither_shipped_nor_a_file_lists_the_shipped_ones() {
     let found = Scene::named_or_file("peg-in-hole").unwrap_err().to_string();
     assert_eq!(
         found,
-        "peg-in-hole: is neither a file nor a shipped scene; write a path or one of peg-in-a-hole, two-bunnies, sphere-on-plane"
+        "peg-in-hole: is neither a file nor a shipped scene; write a path or one of peg-in-a-hole, two-bunnies, sphere-on-plane, moving-plate"
     );
 }
 
