@@ -51,7 +51,7 @@ pub(crate) fn metric_at(
     Metric::new(mass, &inertia_in_world)
 }
 
-/// A body that stands still.
+/// A body that stands still, unless [`GodObject::move_obstacle`](crate::GodObject::move_obstacle) sends it somewhere.
 #[derive(Clone, Debug)]
 pub struct Obstacle {
     /// Name in messages.
@@ -60,7 +60,7 @@ pub struct Obstacle {
     pub mesh: Mesh,
     /// The exact form, if it is one; the mesh, within it, then is for drawing and for independent checks.
     pub primitive: Option<Primitive>,
-    /// World from obstacle.
+    /// World from obstacle, at the start.
     pub pose: Pose,
     /// How the surface feels.
     pub surface: Surface,

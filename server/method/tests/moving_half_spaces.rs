@@ -212,7 +212,8 @@ proptest! {
                 let height = held.height(god_object.pose(), &place(&god_object));
                 prop_assert!(height >= settings.minimum_gap, "{:?}: {}", held, height);
                 prop_assert_eq!(report.solver_failures, 0);
-                prop_assert!((report.gap_min - height).abs() < 1e-9 || height > settings.activation_distance);
+                // Rows of a rim lie under it.
+                prop_assert!(report.gap_min <= height + 1e-9 || height > settings.activation_distance);
             }
         }
         // Nothing is on the other side: the floor may need some updates, but gets where it was sent.

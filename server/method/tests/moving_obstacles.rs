@@ -179,6 +179,44 @@ fn a_blade_that_turns_takes_the_body_along() {
 }
 
 #[test]
+fn a_body_in_a_slot_that_moves_goes_with_it() {
+    // Two jaws in one piece, 0.1 mm from the body on either side; it goes three clearances in each update, and turns.
+    let (half, clearance) = (Vector3::new(0.02, 0.02, 0.01), 1e-4);
+    let jaw = Vector3::new(0.005, 0.05, 0.05);
+    let middle = half.x + clearance + jaw.x;
+    let one = box_obstacle("slot", jaw, Vector3::zeros());
+    let (corners, faces) = (one.mesh.vertices(), one.mesh.triangles());
+    let vertices = [-middle, middle]
+        .into_iter()
+        .flat_map(|x| corners.iter().map(move |c| c + Vector3::x() * x));
+    let second = faces.iter().map(|t| t.map(|i| i + corners.len() as u32));
+    let triangles = faces.iter().copied().chain(second);
+    let mesh =
+        god_object::Mesh::new(vertices.collect(), triangles.collect()).expect("two closed boxes");
+    let world = Arc::new(World {
+        body: box_body(half),
+        obstacles: vec![god_object::Obstacle { mesh, ..one }],
+    });
+    let settings = Settings::for_size(0.04);
+    let mut god_object =
+        GodObject::new(world.clone(), settings, Pose::identity()).expect("a free start");
+    for update in 1..=100 {
+        let way = 3.0 * clearance * f64::from(update);
+        let slot = Pose::new(
+            Vector3::new(way, 0.0, 0.0),
+            Vector3::new(0.0, 0.0, 5e-3 * f64::from(update)),
+        );
+        god_object.move_obstacle(0, &slot);
+        let device = *god_object.pose();
+        let report = god_object.step(&device, None);
+        assert_eq!(report.obstacles_blocked, 0, "in update {update}");
+        assert!(!overlaps(&world, &god_object));
+        let aside = (slot.inverse() * god_object.pose()).translation.x;
+        assert!(aside.abs() < middle, "left the slot: {aside}");
+    }
+}
+
+#[test]
 fn an_obstacle_sent_to_where_it_is_changes_no_bit() {
     let world = world(5e-3, 0.06);
     let (mut still, mut still_coupling, _) = loops(&world);

@@ -26,6 +26,8 @@ use crate::world::Obstacle;
 const MAX_ALTERNATIONS: u32 = 12;
 /// How much less of its way an obstacle is to go at once when the body cannot be moved ahead of it.
 const SQUEEZED_SHARE: f64 = 0.5;
+/// What an alternation is to bring, of the way that it is for; otherwise the next one is for less.
+const LEAST_PROGRESS: f64 = 0.05;
 /// Smallest such share: below it the body is held.
 const LEAST_SHARE: f64 = 1e-2;
 
@@ -100,6 +102,8 @@ impl PlacedObstacle {
 /// What the body must make room for when it is projected.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead {
+    /// Whether the body may follow where an obstacle goes away: not before that has gone. A body in a hole that moves has no other room.
+    follows: bool,
     /// Whether rows nearer than the rest distance are eased out at the same time.
     eases: bool,
 }
@@ -151,11 +155,10 @@ impl GodObject {
             if self.longest_way_left() == 0.0 || share < LEAST_SHARE || !budget_left {
                 break;
             }
+            let enough = (LEAST_PROGRESS * share * asked).max(self.settings.motion_tolerance);
             match self.make_room(share, report) {
-                Some(made) if made + gone > self.settings.motion_tolerance => {
-                    share = (share / SQUEEZED_SHARE).min(1.0);
-                }
-                // No room; or, of a long turn, none where its end alone would need it.
+                Some(made) if made + gone > enough => share = (share / SQUEEZED_SHARE).min(1.0),
+                // No room; or none is needed at the end of a long turn, but on the way there.
                 _ => share *= SQUEEZED_SHARE,
             }
         }
@@ -249,8 +252,8 @@ impl GodObject {
                 placed.target
             };
         }
-        for eases in [true, false] {
-            let ahead = Ahead { eases };
+        for (follows, eases) in [(false, true), (false, false), (true, true), (true, false)] {
+            let ahead = Ahead { follows, eases };
             let Some(projected) = self.project(&Vector6::zeros(), Some(&ahead), report) else {
                 continue;
             };
@@ -280,6 +283,6 @@ impl GodObject {
             .get(usize::from(row.features.obstacle))
             .filter(|obstacle| obstacle.is_moving())
             .map_or(0.0, |obstacle| obstacle.ahead(&row.point, &row.normal));
-        standing + to_go
+        standing + if ahead.follows { to_go } else { to_go.max(0.0) }
     }
 }
