@@ -203,6 +203,11 @@ impl Replay {
             self.clock.updated(time);
         }
 
+        for motion in &self.motions {
+            if let Some(pose) = self.god_object.obstacle_poses().nth(motion.obstacle) {
+                self.coupling.place_obstacle(motion.obstacle, pose);
+            }
+        }
         let set = self.god_object.constraint_set();
         let before = thread_cpu_time();
         let output = self.coupling.step(time, device_pose, set);

@@ -345,6 +345,14 @@ impl Coupling {
         self.energy.as_ref()
     }
 
+    /// Tells where an obstacle is, world from obstacle, as of the next [`Self::step`]'s constraint set: its texture goes with it. What a
+    /// texture does not need is in the set. One that is never told is where the world has it.
+    pub fn place_obstacle(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(textures) = &mut self.textures {
+            textures.place(obstacle, pose);
+        }
+    }
+
     /// Net work that moving obstacles have done on the hand since the start, J: what the force's rows did along the obstacles' ways.
     /// Negative where obstacles gave way under the hand.
     pub fn obstacle_work(&self) -> f64 {

@@ -57,6 +57,26 @@ fn the_force_tilts_by_the_sine_and_keeps_its_magnitude() {
 }
 
 #[test]
+fn a_texture_goes_with_its_obstacle() {
+    let world = table_with(Some(Texture::Sine(SINE)));
+    let wrench = Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0);
+    let tilt = |place: &Pose, contact: Touched| {
+        let mut textures = Textures::of(&world).expect("a texture");
+        textures.place(0, place);
+        textures.place(7, &Pose::translation(9.0, 0.0, 0.0)); // none of the world's
+        let still = Vector6::zeros();
+        textures.tilt(&wrench, &Pose::identity(), &still, [contact].into_iter())
+    };
+    let stood = tilt(&Pose::identity(), contact_at(0.5e-3));
+    let gone = tilt(&Pose::translation(0.3e-3, 0.0, 0.0), contact_at(0.8e-3));
+    assert!((linear(&gone) - linear(&stood)).norm() < 1e-12);
+    // A quarter turn about the normal: the sine runs along y.
+    let turned = Pose::rotation(Vector3::z() * (0.25 * TAU));
+    let felt = tilt(&turned, (0, Point3::new(0.0, 0.5e-3, 0.0), Vector3::z()));
+    assert!((felt[1] / felt[2] - 0.2).abs() < 1e-12 && felt[0].abs() < 1e-12);
+}
+
+#[test]
 fn tilts_of_several_contacts_are_averaged() {
     let crest_and_trough = [contact_at(0.5e-3), contact_at(1.5e-3)];
     let felt = tilted(Texture::Sine(SINE), &crest_and_trough);

@@ -75,6 +75,13 @@ impl CouplingLoop {
         let device = self.device.held();
         let contacts = self.contacts.held();
 
+        if new_constraints {
+            for place in &contacts.moving {
+                self.coupling
+                    .place_obstacle(usize::from(place.obstacle), &place.pose);
+            }
+        }
+
         let before = thread_cpu_time();
         let output = self
             .coupling

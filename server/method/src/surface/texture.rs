@@ -55,6 +55,13 @@ impl Textures {
         })
     }
 
+    /// An obstacle is at this pose, world from obstacle, as of the constraint set in use: its texture goes with it.
+    pub fn place(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(surface) = self.surfaces.get_mut(obstacle) {
+            surface.pose = *pose;
+        }
+    }
+
     /// Tilts `wrench` (N, N m, at the reference point) by the textures of the obstacles touched.
     ///
     /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
