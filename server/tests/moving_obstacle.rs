@@ -82,7 +82,7 @@ impl VirtualSession {
             ..SafetySettings::default()
         };
         Self {
-            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety)
+            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None)
                 .with_motions(scene.motions.clone()),
             // A session is some time old when its loops begin.
             now: Duration::from_millis(300),

@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
 use god_object::{GodObject, ShadedAcceleration};
+use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 use taut_scene::BuiltMotion;
 
 use crate::shared::contact_snapshot::{ContactSnapshot, MAX_MOVING, MovingObstacle};
@@ -30,7 +31,17 @@ pub struct GodObjectLoop {
     shaded: Subscriber<Option<ShadedAcceleration>>,
     contacts: Publisher<ContactSnapshot>,
     snapshot: ContactSnapshot,
+    recording: Option<UpdateTaps>,
     statistics: Arc<GodObjectStatistics>,
+}
+
+/// Where the updates are recorded.
+#[derive(Debug)]
+pub struct UpdateTaps {
+    /// What each update was computed from, and its answer.
+    pub updates: Tap<UpdateRecord>,
+    /// The rows of its set.
+    pub constraints: Tap<ConstraintRecord>,
 }
 
 /// What loop 1 says about itself.
@@ -53,6 +64,7 @@ impl GodObjectLoop {
         device: Subscriber<DeviceState>,
         shaded: Subscriber<Option<ShadedAcceleration>>,
         mut contacts: Publisher<ContactSnapshot>,
+        recording: Option<UpdateTaps>,
     ) -> Self {
         let capacity = god_object.settings().max_constraints;
         let mut snapshot = ContactSnapshot::at_start(god_object.pose(), capacity);
@@ -66,6 +78,7 @@ impl GodObjectLoop {
             shaded,
             contacts,
             snapshot,
+            recording,
             statistics: Arc::default(),
         }
     }
@@ -90,10 +103,10 @@ impl GodObjectLoop {
     /// One update towards the newest device pose. `clock` is read for where the obstacles are to be, and again when the answer is
     /// there, for its age.
     pub fn tick(&mut self, clock: impl Fn() -> Duration) {
-        self.send_obstacles(&clock);
+        let obstacle_time = self.send_obstacles(&clock);
         self.device.refresh();
         let device = self.device.held();
-        let shaded = self.shaded.newest();
+        let shaded = *self.shaded.newest();
 
         let before = thread_cpu_time();
         let report = self.god_object.step(&device.pose, shaded.as_ref());
@@ -121,19 +134,35 @@ impl GodObjectLoop {
         self.snapshot.report = report;
         self.note_obstacles();
         self.contacts.publish(&self.snapshot);
+        if let Some(taps) = &mut self.recording {
+            let set = &self.snapshot.set;
+            taps.updates.push(UpdateRecord {
+                sequence: set.sequence,
+                published: self.snapshot.published,
+                device_sequence: device.sequence,
+                device_pose: device.pose,
+                obstacle_time,
+                shaded,
+                pose: set.god_object_pose,
+                contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
+                gap_min: set.gap_min,
+            });
+            taps.constraints.push_set(set);
+        }
     }
 
-    fn send_obstacles(&mut self, clock: impl Fn() -> Duration) {
+    /// Sends the obstacles to where their traces are now; the time on the traces.
+    fn send_obstacles(&mut self, clock: impl Fn() -> Duration) -> Duration {
         if self.motions.is_empty() {
-            return;
+            return Duration::ZERO;
         }
         let now = clock();
-        let began = *self.began.get_or_insert(now);
-        let elapsed = now.saturating_sub(began).as_secs_f64();
+        let elapsed = now.saturating_sub(*self.began.get_or_insert(now));
         for motion in &self.motions {
-            self.god_object
-                .move_obstacle(motion.obstacle, &motion.pose_at(elapsed));
+            let there = motion.pose_at(elapsed.as_secs_f64());
+            self.god_object.move_obstacle(motion.obstacle, &there);
         }
+        elapsed
     }
 
     /// Writes where the moving obstacles are into the snapshot.
