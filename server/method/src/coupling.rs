@@ -297,7 +297,13 @@ impl Coupling {
             let active = projection.active.iter();
             let touched = active.filter_map(|row| {
                 let contact = set.constraints.get(row.row as usize)?;
-                Some((contact.features.obstacle, contact.point, contact.normal))
+                let features = &contact.features;
+                Some((
+                    features.obstacle,
+                    features.on_obstacle,
+                    contact.point,
+                    contact.normal,
+                ))
             });
             wrench = textures.tilt(&wrench, &self.prepared.god_object, &moved, touched);
         }

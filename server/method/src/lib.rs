@@ -49,5 +49,7 @@ pub use quasi_statics::{ProjectionStatus, SolverKind};
 pub use settings::{Adaptation, RotationMetric, Settings, SettingsError};
 pub use shape::Primitive;
 pub use spatial::{Pose, Vector6};
-pub use surface::{HeightMap, HeightMapTexture, ShadedAcceleration};
+pub use surface::{
+    HeightMap, HeightMapTexture, ShadedAcceleration, TextureCoordinates, UvHeightMapTexture,
+};
 pub use world::{Body, ForceShading, Obstacle, SineTexture, Surface, Texture, World};

@@ -10,7 +10,7 @@ use crate::quasi_statics::Metric;
 use crate::settings::RotationMetric;
 use crate::shape::Primitive;
 use crate::spatial::Pose;
-use crate::surface::HeightMapTexture;
+use crate::surface::{HeightMapTexture, UvHeightMapTexture};
 
 /// The rigid body in the user's hand.
 #[derive(Clone, Debug)]
@@ -89,8 +89,10 @@ pub struct ForceShading {
 pub enum Texture {
     /// A sine.
     Sine(SineTexture),
-    /// The gradient of a height map.
+    /// The gradient of a height map, laid on along the axes.
     HeightMap(HeightMapTexture),
+    /// The gradient of a height map, laid on by the mesh's texture coordinates.
+    UvHeightMap(UvHeightMapTexture),
 }
 
 /// A sine along one axis that tilts the force, Section 6.2.
