@@ -7,6 +7,7 @@ use std::sync::Arc;
 use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Primitive, Settings, World};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use support::{box_body, box_obstacle};
 
 const RADIUS: f64 = 0.01;
@@ -190,7 +191,7 @@ fn a_half_space_in_the_hand_is_refused_with_a_reason() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 64, rng_seed: RngSeed::Fixed(14), failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Whatever hand and floor do, the body stays over the floor by at least the minimum gap.
     #[test]

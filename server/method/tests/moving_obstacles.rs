@@ -115,6 +115,52 @@ fn the_force_of_a_rising_plate_grows_evenly_between_slow_updates() {
 }
 
 #[test]
+fn passivity_lets_a_plate_push_the_hand_with_the_plates_own_energy() {
+    let world = world(5e-3, 0.5);
+    let (mut god_object, mut plain, settings) = loops(&world);
+    let mut passive = Coupling::new(
+        &world,
+        &Settings {
+            passive: true,
+            ..settings
+        },
+    );
+    let mut felt = 0.0;
+    for millisecond in 0..200 {
+        let time = f64::from(millisecond) * 1e-3;
+        // 5 mm into a hand that stands, then on with a hand that gives way: 5 N at 0.1 m/s.
+        let face = 0.018 + 0.1 * time;
+        let device = Pose::translation(0.0, 0.0, 0.03 + 0.1 * (time - 0.07).max(0.0));
+        god_object.move_obstacle(0, &Pose::translation(0.0, 0.0, face - 2.5e-3));
+        god_object.step(&device, None);
+        let set = god_object.constraint_set();
+        felt = plain.step(time, &device, set).wrench[2];
+        assert_eq!(
+            passive.step(time, &device, set).wrench[2],
+            felt,
+            "at {time} s"
+        );
+    }
+    assert!((felt - 5.0).abs() < 0.1, "{felt}");
+    let energy = passive.energy().expect("it is observed");
+    // 13 mm at 5 N.
+    assert!(
+        (energy.highest() - 5.0 * 0.013).abs() < 2e-3,
+        "{}",
+        energy.highest()
+    );
+    assert_eq!(energy.generated(), 0.0);
+    // And what compressed the coupling.
+    let spring = 0.5 * settings.stiffness(1.0) * 0.005 * 0.005;
+    let expected = 5.0 * 0.013 + spring;
+    assert!(
+        (plain.obstacle_work() - expected).abs() < 0.03 * expected,
+        "{}",
+        plain.obstacle_work()
+    );
+}
+
+#[test]
 fn a_body_between_plate_and_ceiling_stops_the_plate() {
     let world = world(2e-3, 0.05);
     let (mut god_object, _, settings) = loops(&world);

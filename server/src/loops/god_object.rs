@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
 use god_object::{GodObject, ShadedAcceleration};
+use taut_proto::ArrayVec;
 use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 use taut_scene::BuiltMotion;
 
@@ -90,7 +91,7 @@ impl GodObjectLoop {
     pub fn with_motions(mut self, mut motions: Vec<BuiltMotion>) -> Self {
         motions.truncate(MAX_MOVING);
         self.motions = motions;
-        self.note_obstacles();
+        note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         self
     }
@@ -132,7 +133,7 @@ impl GodObjectLoop {
         self.snapshot.published = clock();
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;
-        self.note_obstacles();
+        note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         if let Some(taps) = &mut self.recording {
             let set = &self.snapshot.set;
@@ -164,18 +165,22 @@ impl GodObjectLoop {
         }
         elapsed
     }
+}
 
-    /// Writes where the moving obstacles are into the snapshot.
-    fn note_obstacles(&mut self) {
-        self.snapshot.moving.clear();
-        for motion in &self.motions {
-            let place = self.god_object.obstacle_poses().nth(motion.obstacle);
-            if let (Some(pose), Ok(obstacle)) = (place, u16::try_from(motion.obstacle)) {
-                self.snapshot.moving.push(MovingObstacle {
-                    obstacle,
-                    pose: *pose,
-                });
-            }
+/// Writes where the obstacles that move are.
+fn note_obstacles(
+    motions: &[BuiltMotion],
+    god_object: &GodObject,
+    moving: &mut ArrayVec<MovingObstacle, MAX_MOVING>,
+) {
+    moving.clear();
+    for motion in motions {
+        let place = god_object.obstacle_poses().nth(motion.obstacle);
+        if let (Some(pose), Ok(obstacle)) = (place, u16::try_from(motion.obstacle)) {
+            moving.push(MovingObstacle {
+                obstacle,
+                pose: *pose,
+            });
         }
     }
 }
