@@ -18,8 +18,10 @@ use nalgebra::{Point3, Vector3};
 use super::{Arrival, CouplingOutput};
 use crate::adaptation::AdaptationState;
 use crate::constraint::ConstraintSet;
+use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
+use crate::obstacle_work::ObstacleWork;
 use crate::prepared_rows::{PreparedRows, RowBasis};
 use crate::quasi_statics::{
     HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus, Projector,
@@ -31,6 +33,7 @@ use crate::spatial::{
 use crate::surface::{
     EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
 };
+use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
 /// Loop 2 of the method. `step` allocates nothing.
@@ -51,6 +54,9 @@ pub struct Coupling {
     rough_rows: Vec<HalfSpace>,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
+    /// `None` where nothing is damped.
+    damping: Option<ContactDamping>,
+    obstacle_work: ObstacleWork,
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
@@ -60,7 +66,7 @@ pub struct Coupling {
     bounds: Vec<f64>,
     adaptation: Option<AdaptationState>,
     warm_start: Vec<u32>,
-    rotation: Vector3<f64>,
+    turn: TurnMemory,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
 }
@@ -110,6 +116,8 @@ impl Coupling {
             friction,
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
+            damping: ContactDamping::of(settings.damping_time, settings.solver),
+            obstacle_work: ObstacleWork::default(),
             arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
@@ -125,7 +133,7 @@ impl Coupling {
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
             warm_start: Vec::with_capacity(capacity.min(6)),
-            rotation: Vector3::zeros(),
+            turn: TurnMemory::default(),
             correction: Vector6::zeros(),
         }
     }
@@ -138,7 +146,8 @@ impl Coupling {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
             return self.without_force(ProjectionStatus::NotFinite);
         }
-        if !self.present.is(set) {
+        let arrived = !self.present.is(set);
+        if arrived {
             self.take(set);
             self.arrival.observe(time);
         }
@@ -146,8 +155,10 @@ impl Coupling {
             self.carry_rows(time, set);
         }
         let device = at_reference_point(device_pose, &self.basis.reference_point);
-        let difference = pose_difference(&device, &self.present.god_object, &self.rotation);
-        self.rotation = angular(&difference);
+        if let Some(damping) = &mut self.damping {
+            damping.observe(time, &device);
+        }
+        let difference = self.turn.difference(&device, &self.present.god_object);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = self.present.metric else {
             return self.without_force(ProjectionStatus::NotFinite);
@@ -190,11 +201,20 @@ impl Coupling {
 
         // F_c = k_h M (a_c - a_u)
         let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let damped = self.damping.as_mut().map(|damping| {
+            let center = Point3::from(self.present.god_object.translation.vector);
+            let in_force = |row: usize| HalfSpace {
+                bound: self.bounds[row],
+                ..self.basis.half_space(&set.constraints[row], &center)
+            };
+            let k_s = self.settings.k_s;
+            damping.held(&metric, &unconstrained, k_s, &projection, in_force)
+        });
         let given = LinearAnswer {
             constraints: &set.constraints[..self.bounds.len()],
             start: &self.present.god_object,
             goal: &device,
-            branch: self.rotation,
+            branch: self.turn.branch(),
             scale: self.settings.k_s,
             shaded: self.present.shaded,
             projection: &projection,
@@ -220,18 +240,45 @@ impl Coupling {
             projection.acceleration = moved * self.settings.k_s;
         }
         self.correction = projection.acceleration - unconstrained;
+        if let Some(damped) = damped {
+            held += damped;
+        }
         let mut wrench = held * self.settings.k_h;
         if let Some(textures) = &mut self.textures {
             let moved = projection.acceleration / self.settings.k_s;
             let active = projection.active.iter();
             let touched = active.filter_map(|row| {
                 let contact = set.constraints.get(row.row as usize)?;
-                Some((contact.features.obstacle, contact.point, contact.normal))
+                let features = &contact.features;
+                Some((
+                    features.obstacle,
+                    features.on_obstacle,
+                    contact.point,
+                    contact.normal,
+                ))
             });
             wrench = textures.tilt(&wrench, &self.present.god_object, &moved, touched);
         }
+        let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
+        if arrived {
+            let along = self.present.moving.then(|| {
+                let rows = projection.active.iter();
+                let done = rows.filter_map(|row| {
+                    let came = set.constraints.get(row.row as usize)?.came;
+                    Some(row.multiplier * came)
+                });
+                let felt = if unlimited > 0.0 {
+                    linear(&wrench).norm() / unlimited
+                } else {
+                    1.0
+                };
+                done.sum::<f64>() * self.settings.k_h * felt
+            });
+            self.obstacle_work.arrive(along);
+        }
         if let Some(mut energy) = self.energy {
+            energy.grant(self.obstacle_work.work());
             energy.arrive(&device);
             let (bounded, clamped) = self.limited(&energy.within_reserve(&metric, &wrench));
             energy.hold(&device, &bounded);
@@ -256,9 +303,24 @@ impl Coupling {
         self.energy.as_ref()
     }
 
+    /// Tells where an obstacle is, world from obstacle, as of the next [`Self::step`]'s constraint set: its texture goes with it. What a
+    /// texture does not need is in the set. One that is never told is where the world has it.
+    pub fn place_obstacle(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(textures) = &mut self.textures {
+            textures.place(obstacle, pose);
+        }
+    }
+
+    /// Net work that moving obstacles have done on the hand since the start, J: what the force's rows did along the obstacles' ways.
+    /// Negative where obstacles gave way under the hand.
+    pub fn obstacle_work(&self) -> f64 {
+        self.obstacle_work.work()
+    }
+
     /// No force, and nothing to remember of the body that it held.
     fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
         self.anchor.forget();
+        self.obstacle_work.arrive(None);
         if let Some(energy) = &mut self.energy {
             energy.release();
         }
