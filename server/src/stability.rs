@@ -9,7 +9,7 @@
 //! Any contact is at most as stiff as both together, so one axis of each kind tells. The force of a sample is rendered one tick
 //! later, to which a device adds its own delay.
 
-use god_object::{Body, Pose, RotationMetric, Settings};
+use god_object::{Body, RotationMetric, Settings};
 use nalgebra::SymmetricEigen;
 use taut_bridge::{Grip, Hand};
 use taut_plant::stability::{DeclaredAxis, SampledLoop};
