@@ -37,6 +37,7 @@ pub fn run(
     let setup = session_setup(&workbench, key, &overrides)?;
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
+    taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
     watch(&mut session, &mut signal, args.duration, terminal, |_| {});
     terminal.end_status();

@@ -6,10 +6,17 @@
 //! - [`row`]: what a recipe says.
 //! - [`walls`]: constraint sets made by hand, and a body to hold against them.
 //! - [`closed_loop`]: coupling, device and hand, tick by tick.
+//! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
+//! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.
 //! - [`wall_table`]: the printed table of critical stiffness.
 
 pub mod closed_loop;
+pub mod edge;
+pub mod edge_error;
+pub mod edge_network;
+pub mod edge_scenes;
+pub mod faulty_device;
 pub mod recipes;
 pub mod row;
 pub mod wall_table;
@@ -36,4 +43,7 @@ pub const RECIPES: &[Recipe] = &[
     Recipe { name: "R17", about: "handle released in the hole", run: recipes::release::run },
     Recipe { name: "R20", about: "rotation past a half turn", run: recipes::half_turn::run },
     Recipe { name: "R21", about: "wind-up of two turns", run: recipes::wind_up::run },
+    Recipe { name: "R22", about: "bad samples of the device", run: recipes::bad_samples::run },
+    Recipe { name: "R23", about: "saturation and ordinary contact", run: recipes::saturation::run },
+    Recipe { name: "PC", about: "passivity control of a wall that is too stiff", run: recipes::passivity::run },
 ];

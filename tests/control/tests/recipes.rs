@@ -39,6 +39,21 @@ fn r21_a_wound_up_body_returns_and_stays() {
 }
 
 #[test]
+fn r22_bad_samples_let_the_force_fade_and_somebody_arms_again() {
+    passes("R22");
+}
+
+#[test]
+fn r23_limits_keep_directions_and_ordinary_contact_is_untouched() {
+    passes("R23");
+}
+
+#[test]
+fn passivity_control_calms_a_wall_that_is_too_stiff() {
+    passes("PC");
+}
+
+#[test]
 fn names_are_unique() {
     let mut names: Vec<_> = RECIPES.iter().map(|recipe| recipe.name).collect();
     names.sort_unstable();

@@ -6,7 +6,7 @@ use god_object::Pose;
 
 use super::dynamics::DeviceDynamics;
 use super::parse::parse;
-use super::spec::{Device, Monitoring, Network, Node, RealTime, Screen, Show, Viewer};
+use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::problem::FileError;
@@ -40,6 +40,8 @@ pub struct Workbench {
     pub monitoring: Monitoring,
     /// Scheduling.
     pub realtime: RealTime,
+    /// What no force may pass.
+    pub safety: Safety,
     /// What is drawn beside the bodies.
     pub show: Show,
     pub(super) scene_at: At,

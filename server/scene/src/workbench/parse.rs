@@ -9,6 +9,7 @@ use nalgebra::Point3;
 
 use super::dynamics::dynamics;
 use super::load::Workbench;
+use super::safety::safety;
 use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
     TransportKind, Viewer, Window,
@@ -70,6 +71,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let network = network(root.section("network"), &root, &files);
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
+    let safety = table(&root, "safety", safety).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
@@ -104,6 +106,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         network,
         monitoring,
         realtime,
+        safety,
         show,
         scene_at,
     })
