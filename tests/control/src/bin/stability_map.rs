@@ -52,7 +52,7 @@ const PANELS: [Panel; 3] = [
         name: "delay",
         axis: "delay of the force, ms",
         from: 0.25,
-        to: 5.0,
+        to: 8.0,
         case: |ms| Case {
             delay: ms * 1e-3,
             ..STANDARD
@@ -127,6 +127,7 @@ fn draw(
     chart
         .configure_mesh()
         .x_desc(panel.axis)
+        .x_labels(5)
         .y_desc("critical stiffness, N/m")
         .label_style(("sans-serif", 15))
         .y_label_formatter(&|k| format!("{k:.0}"))
