@@ -18,18 +18,19 @@ use std::thread;
 use std::time::Duration;
 
 use nalgebra::Point3;
-use taut_link::proto::SceneDescription;
 use taut_link::proto::control::LogLevel;
+use taut_link::proto::{CouplingOffer, SceneDescription};
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
 use crate::arm_switch::{self, ArmSwitch};
 use crate::bridge_loop::BridgeLoop;
-use crate::cli::{BridgeArgs, DeviceChoice};
+use crate::cli::{BridgeArgs, CouplingChoice, DeviceChoice};
 use crate::device::{Device, DeviceFault};
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::devices::{
     AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
 };
+use crate::edge::{EdgeCoupler, OfferError};
 use crate::port::{DevicePort, SafetyEvent, SafetySettings};
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
@@ -96,6 +97,17 @@ pub enum BridgeError {
         "the server's scene has a start pose that is no pose; check the scene with `taut check`"
     )]
     NoStartPose,
+    /// The server does not let the bridge couple.
+    #[error(
+        "the server couples by itself ({reason}): leave out `--coupling edge`, and keep the network short"
+    )]
+    NoEdge {
+        /// What it says.
+        reason: String,
+    },
+    /// The server's offer makes no coupling.
+    #[error(transparent)]
+    Offer(#[from] OfferError),
     /// A thread cannot be started.
     #[error("cannot start a thread for {what}: {cause}; end other programs or raise the limit")]
     Thread {
@@ -279,6 +291,29 @@ fn build_loop(
     )))
 }
 
+/// The coupling of a session, if it is to be here.
+fn edge_coupler(
+    choice: Option<CouplingChoice>,
+    offer: Option<&CouplingOffer>,
+) -> Result<Option<EdgeCoupler>, BridgeError> {
+    match (choice, offer) {
+        (Some(CouplingChoice::Server), _) | (None, None) => Ok(None),
+        (_, Some(CouplingOffer::AtEdge(offer))) => Ok(Some(EdgeCoupler::new(offer)?)),
+        (None, Some(CouplingOffer::AtServer { reason })) => {
+            tracing::info!("the server computes the force: {reason}");
+            Ok(None)
+        }
+        (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
+            Err(BridgeError::NoEdge {
+                reason: reason.clone(),
+            })
+        }
+        (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {
+            reason: "it says nothing of another way".to_owned(),
+        }),
+    }
+}
+
 async fn stop_on_signal(stop: Arc<AtomicBool>) {
     #[cfg(unix)]
     {
@@ -407,7 +442,7 @@ impl Run<'_> {
             core: self.args.core,
             totals: std::mem::replace(&mut self.totals, Totals::new()),
         };
-        bridge.begin_session();
+        bridge.begin_session(edge_coupler(self.args.coupling, link.coupling())?);
         let thread = thread::Builder::new()
             .name("taut-bridge-dev".to_owned())
             .spawn(move || {
@@ -483,6 +518,10 @@ impl Run<'_> {
             ticks: stats.ticks,
             missed_periods: totals.missed,
             period_us: totals.period.summary(),
+            coupling: if bridge.couples() { "edge" } else { "server" }.to_owned(),
+            sets: stats.sets,
+            broken_sets: stats.broken_sets,
+            set_age_us: stats.set_age.summary(),
             wrenches: stats.wrenches,
             wrench_age_us: stats.wrench_age.summary(),
             round_trip_us: stats.round_trip.summary(),

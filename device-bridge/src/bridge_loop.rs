@@ -6,11 +6,13 @@
 use std::time::Duration;
 
 use nalgebra::Vector6;
-use taut_link::proto::input::INPUT_FAULT;
+use taut_link::proto::constraints::ConstraintSet;
+use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
 use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
 
 use crate::device::DeviceFault;
+use crate::edge::EdgeCoupler;
 use crate::port::{Command, DevicePort, Events};
 use crate::report::Durations;
 
@@ -37,6 +39,11 @@ pub(crate) struct TickOutput {
 pub(crate) struct TickStats {
     pub(crate) ticks: u64,
     pub(crate) wrenches: u64,
+    /// Constraint sets taken, and those that were none.
+    pub(crate) sets: u64,
+    pub(crate) broken_sets: u64,
+    /// Session time now minus that of the set's making, at its first use.
+    pub(crate) set_age: Durations,
     pub(crate) safety_events: u64,
     pub(crate) faulty_ticks: u64,
     /// Session time now minus session time of the command, at arrival.
@@ -56,6 +63,8 @@ pub(crate) struct BridgeLoop {
     /// When reading i was taken, at i modulo the length.
     sent: [Duration; REMEMBERED_TICKS],
     newest: Option<Arrival>,
+    /// The coupling, where it is here and not at the server.
+    edge: Option<Box<EdgeCoupler>>,
 }
 
 impl BridgeLoop {
@@ -65,6 +74,9 @@ impl BridgeLoop {
             stats: TickStats {
                 ticks: 0,
                 wrenches: 0,
+                sets: 0,
+                broken_sets: 0,
+                set_age: Durations::new(),
                 safety_events: 0,
                 faulty_ticks: 0,
                 wrench_age: Durations::new(),
@@ -75,6 +87,7 @@ impl BridgeLoop {
             next_index: 1,
             sent: [Duration::ZERO; REMEMBERED_TICKS],
             newest: None,
+            edge: None,
         }
     }
 
@@ -96,10 +109,37 @@ impl BridgeLoop {
         self.port.fault()
     }
 
-    /// Forgets the last session: no force until a command of the new one, which ramps in.
-    pub(crate) fn begin_session(&mut self) {
+    /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
+    /// is computed here.
+    pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
         self.newest = None;
+        self.edge = edge.map(Box::new);
         self.port.restart();
+    }
+
+    /// Whether constraint sets are wanted.
+    pub(crate) fn couples(&self) -> bool {
+        self.edge.is_some()
+    }
+
+    /// Takes the newest constraint set, that was completed or confirmed at `received`; once or again. `session_ns` is
+    /// session time, 0 while unknown.
+    pub(crate) fn take_set(&mut self, set: &ConstraintSet, received: Duration, session_ns: u64) {
+        let Some(edge) = &mut self.edge else {
+            return;
+        };
+        let new = edge.sequence() != Some(set.head.sequence);
+        match edge.take(set, received) {
+            Ok(()) if new => {
+                self.stats.sets += 1;
+                if session_ns > 0 {
+                    let age = session_ns.saturating_sub(set.head.made_ns);
+                    self.stats.set_age.record(Duration::from_nanos(age));
+                }
+            }
+            Ok(()) => {}
+            Err(_) => self.stats.broken_sets += 1,
+        }
     }
 
     /// One tick at `now`. `session_ns` is session time, 0 while unknown; `arrival` is the newest command,
@@ -116,8 +156,13 @@ impl BridgeLoop {
         let index = self.next_index;
         self.next_index += 1;
         self.sent[index as usize % REMEMBERED_TICKS] = now;
-        let command = self.newest.map(|arrival| command(&arrival));
-        let report = self.port.tick(now, |_| command);
+        let (newest, edge) = (self.newest, &mut self.edge);
+        let report = self.port.tick(now, |reading| match edge {
+            Some(edge) => edge
+                .step(now, &reading.sample.pose)
+                .map(|felt| Command::fresh(felt.received, felt.wrench)),
+            None => newest.map(|arrival| command(&arrival)),
+        });
 
         let wrench = &report.wrench;
         self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
@@ -134,6 +179,8 @@ impl BridgeLoop {
             None => now.saturating_sub(sample.time).as_nanos() as u64,
             Some(_) => 0,
         };
+        let faulty = reading.fault.map_or(0, |_| INPUT_FAULT);
+        let at_edge = self.edge.as_ref().map_or(0, |_| INPUT_AT_EDGE);
         TickOutput {
             input: InputSample {
                 sample_time_ns: session_ns.saturating_sub(age),
@@ -141,11 +188,13 @@ impl BridgeLoop {
                 pose: PoseF64::from_isometry(&sample.pose),
                 velocity: sample.velocity.into(),
                 buttons: sample.buttons,
-                flags: if reading.fault.is_some() {
-                    INPUT_FAULT
-                } else {
-                    0
-                },
+                flags: faulty | at_edge,
+                rendered: report.wrench.into(),
+                set_sequence: self
+                    .edge
+                    .as_ref()
+                    .and_then(|edge| edge.sequence())
+                    .unwrap_or(0),
             },
             events: report.events,
         }
@@ -321,7 +370,7 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
         }
-        bridge.begin_session();
+        bridge.begin_session(None);
         // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
         // limit, and what comes ramps in.
         let mut lowest = f64::INFINITY;

@@ -62,6 +62,11 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "T", default_value = "udp", value_parser = parse_transport)]
     pub transport: Transport,
 
+    /// Where the force is computed: `edge`, beside the device, so that it never waits for the network; or `server`. Without it, edge
+    /// where the server offers that.
+    #[arg(long, value_name = "WHERE", value_enum)]
+    pub coupling: Option<CouplingChoice>,
+
     /// When the server is lost, try again until --duration is over instead of ending.
     #[arg(long)]
     pub reconnect: bool,
@@ -81,6 +86,15 @@ pub struct BridgeArgs {
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Where the force is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum CouplingChoice {
+    /// Beside the device, from constraint sets.
+    Edge,
+    /// At the server; the force travels.
+    Server,
 }
 
 /// What no force may pass: docs/safety.md.
@@ -245,6 +259,9 @@ mod tests {
         assert_eq!(args.device, DeviceChoice::Simulated);
         assert_eq!(args.hand, HandPreset::Light);
         assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
+        assert_eq!(args.coupling, None);
+        let args = parse(&["--server", "pc:1", "--coupling", "edge"]).expect("valid");
+        assert_eq!(args.coupling, Some(CouplingChoice::Edge));
     }
 
     #[test]

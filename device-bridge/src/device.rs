@@ -29,6 +29,21 @@ pub trait Device: Send {
     ///
     /// The one caller is [`crate::DevicePort`], which has made the wrench safe; a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
+
+    /// What the hand feels as of the last reading, where the device is far away and tells; `None` where that is what
+    /// [`Device::write`] says.
+    fn felt(&self) -> Option<Felt> {
+        None
+    }
+}
+
+/// What a device at the far end of a network renders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Force then torque on the hand at the reference point, N and N m, world axes.
+    pub wrench: Vector6<f64>,
+    /// It is computed there, from constraint sets.
+    pub at_edge: bool,
 }
 
 /// What a device is: its name and its limits.

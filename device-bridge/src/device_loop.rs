@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
+use taut_link::proto::ConstraintSet;
 use taut_link::{ClientCounters, ClientLink};
 
 use crate::arm_switch::{ArmSwitch, ArmWish};
@@ -35,6 +36,7 @@ impl DeviceLoop {
         self.request_realtime();
         let mut ticker = Ticker::new(self.period);
         let mut last = None;
+        let mut set = ConstraintSet::new();
         while !self.end.load(Ordering::Relaxed) {
             self.totals.missed += ticker.wait();
             let now = monotonic_now();
@@ -49,6 +51,12 @@ impl DeviceLoop {
                 command: wrench.command,
                 received: now.saturating_sub(wrench.received.elapsed()),
             });
+            if bridge.couples()
+                && let Some(confirmed) = self.link.newest_set(&mut set)
+            {
+                let received = now.saturating_sub(confirmed.elapsed());
+                bridge.take_set(&set, received, session_ns);
+            }
             match self.wishes.take() {
                 Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
                 Some(ArmWish::Disarm) => bridge.port_mut().ask_to_disarm(),

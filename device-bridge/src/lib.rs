@@ -4,6 +4,7 @@
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
+//! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
@@ -15,6 +16,7 @@ mod cli;
 mod device;
 mod device_loop;
 mod devices;
+pub mod edge;
 mod port;
 pub mod realtime;
 mod report;
@@ -22,12 +24,12 @@ mod trace_file;
 
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run};
-pub use cli::{BridgeArgs, DeviceChoice, SafetyArgs, UnknownDevice, execute};
-pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+pub use cli::{BridgeArgs, CouplingChoice, DeviceChoice, SafetyArgs, UnknownDevice, execute};
+pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError,
-    Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, min_jerk,
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
+    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError,
+    TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use port::{
     ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,

@@ -4,13 +4,16 @@ use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
+use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
     AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, Grip, Hand, MinJerkPath,
     Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
     SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
-use taut_link::proto::{InputSample, PoseF64};
+use taut_link::proto::constraints::ConstraintRow;
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSolver, EdgeSurface};
+use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
 
 #[global_allocator]
 static HEAP: AllocDisabler = AllocDisabler;
@@ -83,9 +86,73 @@ fn a_remote_device_does_not_allocate() {
                 velocity: [0.0; 6],
                 buttons: 0,
                 flags: 0,
+                rendered: [0.0; 6],
+                set_sequence: 0,
             },
             received_ns: tick * 1_000_000,
             session: 1,
         }));
     });
+}
+
+#[test]
+fn coupling_at_the_edge_does_not_allocate() {
+    let surface = |friction| EdgeSurface {
+        pose: PoseF64::IDENTITY,
+        friction,
+        sine: None,
+    };
+    let offer = EdgeCoupling {
+        mass: 1.0,
+        inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
+        reference_point: [0.0; 3],
+        radius: 0.02,
+        k_s: 0.5,
+        k_h: 2000.0,
+        radius_of_gyration: None,
+        adaptation: Some(EdgeAdaptation {
+            duration: 0.02,
+            threshold: -1e-3,
+        }),
+        look_ahead: true,
+        passive: true,
+        force_limit: 20.0,
+        torque_limit: 0.5,
+        rest_distance: 4e-6,
+        motion_tolerance: 2e-8,
+        max_constraints: 1024,
+        implicit_rounds: 2,
+        solver: EdgeSolver::ActiveSet,
+        set_rate_hz: 1000.0,
+        obstacles: vec![surface(0.0), surface(0.3)],
+    };
+    let mut coupler = EdgeCoupler::new(&offer).expect("an offer");
+    // Rows come and go, up to the capacity; half of them are rough.
+    let sets: Vec<ConstraintSet> = (0..200_u16)
+        .map(|k| {
+            let mut set = ConstraintSet::new();
+            set.head.sequence = u64::from(k);
+            let rows = if k == 100 { 1024 } else { k % 40 };
+            set.rows.extend((0..rows).map(|row| ConstraintRow {
+                obstacle: row % 2,
+                arm: [f32::from(row % 7) * 1e-3, 0.0, -0.02],
+                normal: [0.0, 0.0, 1.0],
+                ..ConstraintRow::default()
+            }));
+            set.rows.sort_by_key(|row| row.obstacle);
+            set
+        })
+        .collect();
+    let mut forces = 0;
+    assert_no_alloc(|| {
+        for (tick, set) in (0..).zip(&sets) {
+            let now = Duration::from_millis(tick);
+            let pose = Pose::translation(0.0, 1e-5 * tick as f64, -1e-3);
+            let taken = coupler.take(set, now);
+            let felt = coupler.step(now, &pose);
+            let pushes = felt.is_some_and(|felt| felt.wrench[2] > 0.0);
+            forces += u32::from(taken.is_ok() && pushes);
+        }
+    });
+    assert!(forces > 100, "{forces}");
 }

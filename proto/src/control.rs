@@ -11,12 +11,14 @@
 //! | 7      | tag     | 1     | which message                        |
 //! | 8      | body    |       | its fields                           |
 //!
-//! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, or `Refused`. There is no challenge:
+//! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, to a device bridge also `Coupling`, or
+//! `Refused`. There is no challenge:
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
 //! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
 
 use crate::{
-    ClientStats, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION, SceneDescription,
+    ClientStats, CouplingOffer, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION,
+    SceneDescription,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
     version::MAGIC,
 };
@@ -175,6 +177,7 @@ pub enum ControlMessage {
     Hello(Hello),
     Welcome(Welcome),
     Scene(SceneDescription),
+    Coupling(CouplingOffer),
     MeshRequest(MeshRequest),
     MeshHeader(MeshHeader),
     Stats(ClientStats),
@@ -191,6 +194,7 @@ impl ControlMessage {
             ControlMessage::Hello(_) => "Hello",
             ControlMessage::Welcome(_) => "Welcome",
             ControlMessage::Scene(_) => "Scene",
+            ControlMessage::Coupling(_) => "Coupling",
             ControlMessage::MeshRequest(_) => "MeshRequest",
             ControlMessage::MeshHeader(_) => "MeshHeader",
             ControlMessage::Stats(_) => "Stats",
@@ -268,7 +272,8 @@ macro_rules! wire_messages {
 }
 wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
-    MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8, Arm(ArmRequest) = 10,
+    MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10,
 }
 
 wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });

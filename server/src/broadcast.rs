@@ -18,6 +18,7 @@ use taut_proto::wrench::WRENCH_PAUSED;
 use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 
 use crate::clock::{SessionClock, nanoseconds};
+use crate::edge_sets::EdgeSets;
 use crate::head::Head;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
@@ -31,8 +32,14 @@ const BUTTONS: u32 = u16::BITS;
 /// The number of a button in an event's code.
 const BUTTON_SHIFT: u32 = 16;
 
-/// The wrenches for a remote device, newest wins.
-pub type BridgeCommands = triple_buffer::Output<WireWrench>;
+/// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
+#[derive(Debug)]
+pub struct BridgeCommands {
+    /// From the haptics loop.
+    pub wrenches: triple_buffer::Output<WireWrench>,
+    /// For a bridge that couples by itself.
+    pub sets: EdgeSets,
+}
 
 /// Sends states, and the wrenches of a remote device, until the end is asked for.
 pub fn run(
@@ -46,17 +53,22 @@ pub fn run(
     // A state that comes late is followed by the next one; nothing is owed to anybody.
     let late = AtomicU64::new(0);
     run_at_deadlines(clock, period, shutdown, &late, |now| {
-        if let Some(commands) = &mut bridge_commands
-            && commands.update()
-        {
-            broadcaster.send_wrench(commands.output_buffer());
+        if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
+            let fresh = wrenches.update();
+            let command = wrenches.output_buffer();
+            let armed = states.is_armed();
+            let at_edge = sets.tick(now, command, armed, states.contacts(), &mut broadcaster);
+            if fresh && !at_edge {
+                broadcaster.send_wrench(command);
+            }
         }
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
             let _ = broadcaster.send(state);
         }
     });
-    if bridge_commands.is_some() {
+    if let Some(commands) = &mut bridge_commands {
+        commands.sets.pause(&mut broadcaster);
         broadcaster.send_wrench(&WireWrench {
             time_ns: nanoseconds(clock.now()),
             input_index: 0,
@@ -95,6 +107,16 @@ impl StateWriter {
             motion: MotionEstimate::default(),
             events: EventTrail::default(),
         }
+    }
+
+    /// Whether the haptics loop's port gives force, as of the last state.
+    pub fn is_armed(&self) -> bool {
+        !self.shared.device.held().safety.arming.is_off()
+    }
+
+    /// The newest of the god-object loop.
+    pub fn contacts(&mut self) -> &ContactSnapshot {
+        self.shared.contacts.newest()
     }
 
     /// The state now; `None` while the device has not been sampled since the last one.
@@ -158,13 +180,15 @@ fn tool_state(
         0
     };
     let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
+    // What a bridge says that it renders is the truth; what was computed here answers a pose that is older.
+    let felt = device.felt.map_or(wrench.wrench, |felt| felt.wrench);
     ToolState {
         god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
         device: PoseF32::from_isometry(&device.pose),
         linear_velocity: single(&linear(velocity)),
         angular_velocity: single(&angular(velocity)),
-        force: single(&linear(&wrench.wrench)),
-        torque: single(&angular(&wrench.wrench)),
+        force: single(&linear(&felt)),
+        torque: single(&angular(&felt)),
         buttons: device.buttons,
         flags: limited | silent,
         id: 0,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use taut_bridge::{
-    DEFAULT_MAX_AGE, Passivity, PassivitySettings, Rearm, SafetySettings, ValidationSettings,
+    MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings, ValidationSettings,
 };
 use taut_link::ClusterKey;
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
@@ -75,6 +75,7 @@ pub fn session_setup(
         udp: overrides
             .udp
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        announced_udp_port: None,
         key,
         max_clients: network.max_clients,
     };
@@ -145,9 +146,10 @@ fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings
         None if nobody_is_hurt => Rearm::Automatic,
         None => Rearm::Manual,
     };
-    // What comes over a network is stamped there and may be late; the device drops what is too late.
+    // What comes over a network is stamped there and may be late; the device drops what is too late, which for a bridge that couples
+    // by itself is much later.
     let time_slack = match workbench.device {
-        Device::Remote => DEFAULT_MAX_AGE,
+        Device::Remote => MAX_EDGE_DELAY,
         _ => Duration::ZERO,
     };
     let default = ValidationSettings::default();

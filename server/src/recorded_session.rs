@@ -183,6 +183,7 @@ impl RecordedSession {
         let Some(update) = self.updates.next_record().map_err(Failure::bad_input)? else {
             return Ok(None);
         };
+        self.god_object.set_device_ahead(update.device_ahead);
         let before = thread_cpu_time();
         let _ = self
             .god_object

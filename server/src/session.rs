@@ -12,9 +12,11 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose};
+use god_object::{GodObject, Pose, Settings};
+use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
 use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
+use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
@@ -23,6 +25,7 @@ use crate::broadcast::{self, BridgeCommands, StateWriter};
 use crate::checker::{self, PenetrationChecker};
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
+use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
@@ -84,15 +87,27 @@ impl Session {
         let picture = picture(&setup);
         let opening = opening(&setup);
         let scene_revision = setup.content.description.revision;
+        let coupling = match &setup.device {
+            DeviceSource::Remote { .. } => offer_of(
+                &setup.world,
+                &setup.settings,
+                setup.realtime.broadcast_period.as_secs_f64().recip(),
+            ),
+            DeviceSource::Local(_) => CouplingOffer::AtServer {
+                reason: "its workbench has a device of its own".to_owned(),
+            },
+        };
         let options = ServerOptions {
+            coupling,
             quic: setup.link.quic,
             udp: setup.link.udp,
+            announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
-        let (device, bridge_commands) = connect_device(setup.device, &link)?;
+        let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
 
         let (taps, recorder) = match &setup.recording {
             Some(wanted) => {
@@ -535,6 +550,7 @@ fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Fai
 fn connect_device(
     source: DeviceSource,
     link: &ServerLink,
+    settings: &Settings,
 ) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
     match source {
         DeviceSource::Local(device) => Ok((device, None)),
@@ -542,8 +558,9 @@ fn connect_device(
             let inputs = link.device_inputs().ok_or_else(|| {
                 Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
             })?;
-            let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
-            Ok((Box::new(device), Some(commands)))
+            let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
+            let sets = EdgeSets::new(settings);
+            Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
         }
     }
 }

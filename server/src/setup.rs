@@ -71,6 +71,8 @@ pub struct LinkSettings {
     pub quic: SocketAddr,
     /// Of the state plane.
     pub udp: SocketAddr,
+    /// Port of the state plane that clients are told, where a router or relay forwards to `udp`; `None`: its own.
+    pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
     /// Most clients at a time.

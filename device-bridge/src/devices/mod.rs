@@ -5,7 +5,7 @@ pub(crate) mod remote;
 pub(crate) mod simulated;
 
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};
-pub use remote::{DEFAULT_MAX_AGE, RemoteDevice};
+pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
 pub use simulated::SimulatedDevice;
 pub use taut_plant::{
     Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError, Progress, Tremor,

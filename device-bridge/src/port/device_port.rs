@@ -14,7 +14,7 @@ use super::settings::SafetySettings;
 use super::slew::{SlewLimit, Slewed};
 use super::validation::{SampleCheck, Verdict, at_rest};
 use super::watchdog::{Command, Freshness, LATE, Missing, freshness};
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Pose};
 
 /// What the device says in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +23,8 @@ pub struct Reading {
     pub sample: DeviceSample,
     /// Why there is no newer one.
     pub fault: Option<DeviceFault>,
+    /// What the hand feels, where the device is far away and tells.
+    pub felt: Option<Felt>,
 }
 
 /// What a tick did.
@@ -186,7 +188,9 @@ impl DevicePort {
         let command = command(&reading);
         let wrench = self.render(now, passed, command);
         self.device.write(now, &wrench);
-        self.energy.hold(&wrench);
+        // A bridge's own word is what does the work.
+        let felt = reading.felt.map_or(wrench, |felt| felt.wrench);
+        self.energy.hold(&felt);
         TickReport {
             reading,
             wrench,
@@ -242,6 +246,7 @@ impl DevicePort {
         Reading {
             sample: self.sample,
             fault: self.fault,
+            felt: self.device.felt(),
         }
     }
 

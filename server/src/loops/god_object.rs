@@ -8,13 +8,17 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
-use god_object::{GodObject, ShadedAcceleration};
+use god_object::{GodObject, Pose, ShadedAcceleration};
+use taut_bridge::edge::{device_ahead, device_predicted};
 use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::timing::Histogram;
+
+/// Sets reach a bridge that couples by itself at least this often.
+const SET_PERIOD: Duration = Duration::from_millis(1);
 
 /// Loop 1 with its ends of the shared data.
 #[derive(Debug)]
@@ -82,9 +86,11 @@ impl GodObjectLoop {
         self.device.refresh();
         let device = self.device.held();
         let shaded = *self.shaded.newest();
+        let (device_pose, ahead) = followed(device, clock(), &self.god_object);
+        self.god_object.set_device_ahead(ahead);
 
         let before = thread_cpu_time();
-        let report = self.god_object.step(&device.pose, shaded.as_ref());
+        let report = self.god_object.step(&device_pose, shaded.as_ref());
         self.statistics
             .update
             .record_time(thread_cpu_time().saturating_sub(before));
@@ -108,8 +114,9 @@ impl GodObjectLoop {
                 sequence: set.sequence,
                 published: self.snapshot.published,
                 device_sequence: device.sequence,
-                device_pose: device.pose,
+                device_pose,
                 obstacle_time: Duration::ZERO,
+                device_ahead: ahead,
                 shaded,
                 pose: set.god_object_pose,
                 contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
@@ -118,4 +125,20 @@ impl GodObjectLoop {
             taps.constraints.push_set(set);
         }
     }
+}
+
+/// The device pose to follow, and how much farther on the device may be, m.
+///
+/// For a hand beside a bridge that couples by itself: where it will be when the set is there. For any other its pose.
+fn followed(device: &DeviceState, now: Duration, god_object: &GodObject) -> (Pose, f64) {
+    if !device.felt.is_some_and(|felt| felt.at_edge) {
+        return (device.pose, 0.0);
+    }
+    let age = now.saturating_sub(device.time);
+    let (pose, velocity) = (&device.pose, &device.velocity);
+    let point = god_object.reference_point();
+    (
+        device_predicted(pose, velocity, point, age, SET_PERIOD),
+        device_ahead(velocity, god_object.radius(), age, SET_PERIOD),
+    )
 }

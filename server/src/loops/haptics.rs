@@ -138,6 +138,10 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        let felt = report
+            .reading
+            .felt
+            .map_or(report.wrench, |felt| felt.wrench);
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
@@ -146,7 +150,7 @@ impl HapticsLoop {
                 velocity: self.state.velocity,
                 buttons: self.state.buttons,
                 faulty: self.state.faulty,
-                wrench: report.wrench,
+                wrench: felt,
             });
         }
     }
@@ -160,6 +164,7 @@ fn follow(state: &mut DeviceState, reading: &Reading) {
     state.pose = reading.sample.pose;
     state.velocity = reading.sample.velocity;
     state.buttons = reading.sample.buttons;
+    state.felt = reading.felt;
 }
 
 /// The newest wrench of the coupling, as the port takes it.

@@ -233,7 +233,7 @@ fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> Moni
         god_object_pose: contacts.set.god_object_pose,
         device_pose: device.pose,
         head_pose: head.moves().then(|| frame.pose(&head.pose(now))),
-        wrench: wrench.wrench,
+        wrench: device.felt.map_or(wrench.wrench, |felt| felt.wrench),
         contacts: contacts
             .set
             .constraints

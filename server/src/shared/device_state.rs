@@ -8,7 +8,7 @@
 use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6};
-use taut_bridge::{ArmingState, SafetyEvent, TickReport};
+use taut_bridge::{ArmingState, Felt, SafetyEvent, TickReport};
 
 use super::fanout::{Publisher, Subscriber, fanout};
 
@@ -27,6 +27,8 @@ pub struct DeviceState {
     pub buttons: u16,
     /// The device does not answer; the pose is the last good one.
     pub faulty: bool,
+    /// What the hand feels from `time` on, where a bridge tells it; `None` where it is the haptics loop's wrench.
+    pub felt: Option<Felt>,
     /// What the port did in the tick before.
     pub safety: SafetyState,
 }
@@ -74,6 +76,7 @@ impl DeviceState {
             velocity: Vector6::zeros(),
             buttons: 0,
             faulty: false,
+            felt: None,
             safety: SafetyState::default(),
         }
     }

@@ -6,11 +6,16 @@
 //! - [`row`]: what a recipe says.
 //! - [`walls`]: constraint sets made by hand, and a body to hold against them.
 //! - [`closed_loop`]: coupling, device and hand, tick by tick.
+//! - [`edge`] and its neighbours: the coupling next to the device, over a network.
 //! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
 //! - [`wall_table`]: the printed table of critical stiffness.
 
 pub mod closed_loop;
+pub mod edge;
+pub mod edge_error;
+pub mod edge_network;
+pub mod edge_scenes;
 pub mod faulty_device;
 pub mod recipes;
 pub mod row;

@@ -11,7 +11,8 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, InputSample, MeshBlob, MeshHash, Payload, SceneDescription, SessionTime,
+    ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
+    SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
 };
 use tokio::{sync::mpsc, time::timeout};
@@ -28,6 +29,7 @@ pub struct ClientLink {
     hot: Arc<Hot>,
     session: u16,
     description: SceneDescription,
+    coupling: Option<CouplingOffer>,
     meshes: Meshes,
     outbox: mpsc::Sender<ControlMessage>,
 }
@@ -40,6 +42,7 @@ impl ClientLink {
         hot: Arc<Hot>,
         session: u16,
         description: SceneDescription,
+        coupling: Option<CouplingOffer>,
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
@@ -50,6 +53,7 @@ impl ClientLink {
             hot,
             session,
             description,
+            coupling,
             meshes: Meshes::default(),
             outbox,
         }
@@ -58,6 +62,11 @@ impl ClientLink {
     /// The scene and the workbench, as at join.
     pub fn description(&self) -> &SceneDescription {
         &self.description
+    }
+
+    /// Where the force may be computed, as at join; `None` unless [`crate::Role::Device`] joined.
+    pub fn coupling(&self) -> Option<&CouplingOffer> {
+        self.coupling.as_ref()
     }
 
     /// Number of this session at the server.
@@ -100,6 +109,15 @@ impl ClientLink {
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.
     pub fn latest_wrench(&self) -> Option<ReceivedWrench> {
         self.hot.inbound.latest_wrench()
+    }
+
+    /// Copies the newest whole constraint set into `out`, unless it is there already, and tells when it was completed or came again:
+    /// the measure for the bridge's watchdog. `None` before the first, and unless [`crate::Role::Device`] joined. No allocation if `out` has
+    /// the capacity of [`ConstraintSet::new`].
+    ///
+    /// `out` must be of this session: a set is known by its sequence number.
+    pub fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
+        self.hot.inbound.newest_set(out)
     }
 
     /// Sends a report, waiting while earlier ones are not away yet.

@@ -87,6 +87,9 @@ async fn join(
         .await
         .is_ok();
     welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
+    if session.role == Role::Device {
+        welcomed = welcomed && send.write_all(&shared.content.coupling).await.is_ok();
+    }
     if !welcomed {
         shared.sessions.remove(session.number);
         return None;

@@ -43,6 +43,8 @@ pub struct GodObject {
     pub(super) radius: f64,
     pub(super) trust_length: f64,
     pub(super) last_device: Option<Pose>,
+    /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
+    pub(super) device_ahead: f64,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
@@ -87,6 +89,7 @@ impl GodObject {
             radius,
             trust_length: f64::INFINITY,
             last_device: None,
+            device_ahead: 0.0,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };
@@ -139,7 +142,7 @@ impl GodObject {
         let goal = advance_pose(&start, &unconstrained, 1.0);
         let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
-        });
+        }) + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
         let obstacles_moved = self.carry_obstacles(&mut report);
