@@ -65,7 +65,7 @@ fn main() {
             Some(Command::fresh(now, push))
         });
         let after = thread_cpu_time();
-        std::hint::black_box(report);
+        let _ = std::hint::black_box(report);
         let us = |time: Duration| time.as_secs_f64() * 1e6;
         clock_only.push(us(between.saturating_sub(before)));
         cost.push(us(after.saturating_sub(between)));

@@ -81,6 +81,9 @@ pub struct DemoArgs {
     /// Where the render clients write their pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -117,6 +120,9 @@ pub struct ServeArgs {
     /// Do without the monitor, whatever the workbench file says
     #[arg(long)]
     pub no_monitor: bool,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,

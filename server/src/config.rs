@@ -21,6 +21,8 @@ use crate::head::{Head, Sway};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
+use crate::shared::contact_snapshot::MAX_MOVING;
+use crate::stability::{declared, judge};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -41,6 +43,8 @@ pub struct Overrides {
     pub quic: Option<SocketAddr>,
     /// Address of the state plane.
     pub udp: Option<SocketAddr>,
+    /// Start although the scene is stiffer than the device bears.
+    pub allow_unstable: bool,
     /// Without monitor.
     pub no_monitor: bool,
     /// Where the monitor records.
@@ -60,11 +64,19 @@ pub fn session_setup(
         None => workbench.load_scene()?,
     };
     let built = scene.build()?;
-    if let Some(motion) = built.motions.first() {
+    if built.motions.len() > MAX_MOVING {
         return Err(Failure::BadInput(format!(
-            "the obstacle \"{}\" has a motion, which only `taut replay` can follow: a session's checker and screens know obstacles at rest only; leave out `motion`",
-            built.world.obstacles[motion.obstacle].name
+            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+            built.name,
+            built.motions.len()
         )));
+    }
+    let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
+    if let Some(dynamics) = declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)? {
+        let body = &built.world.body;
+        for warning in judge(&dynamics, &built.settings, body, overrides.allow_unstable)? {
+            tracing::warn!("{warning}");
+        }
     }
     let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
     let network = &workbench.network;
@@ -87,6 +99,7 @@ pub fn session_setup(
     Ok(SessionSetup {
         recording,
         device: device(&workbench.device, &built)?,
+        motions: built.motions,
         settings: built.settings,
         start: built.start,
         world: Arc::new(built.world),

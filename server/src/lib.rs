@@ -44,6 +44,7 @@ pub mod setup;
 pub mod shared;
 pub mod shutdown;
 pub mod signals;
+pub mod stability;
 pub mod statistics;
 pub mod terminal;
 pub mod timing;

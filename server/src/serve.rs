@@ -27,6 +27,7 @@ pub fn run(
     let key = workbench_key(args.key.as_deref(), &workbench)?;
     let overrides = Overrides {
         scene: args.scene.clone(),
+        allow_unstable: args.allow_unstable,
         quic: args.quic,
         udp: args.udp,
         no_monitor: args.no_monitor,

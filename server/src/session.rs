@@ -129,7 +129,8 @@ impl Session {
             device,
             setup.safety,
             taps,
-        );
+        )
+        .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -607,6 +608,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.clone(),
         world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description

@@ -202,7 +202,7 @@ impl Plant {
         &self.rendered
     }
 
-    /// The grip's part of the kinetic energy, J.
+    /// Kinetic energy of grip and hand, J.
     #[must_use]
     pub fn kinetic_energy(&self) -> f64 {
         let inertia = self.grip.inertia() + self.hand.inertia();

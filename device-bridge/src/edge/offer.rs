@@ -43,20 +43,21 @@ pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> Couplin
     if settings.solver == SolverKind::Clarabel {
         return at_server("its solver takes memory, which a device's loop may not");
     }
-    let surface = |obstacle: &Obstacle| match &obstacle.surface.texture {
-        Some(Texture::HeightMap(_)) => None,
-        texture => Some(EdgeSurface {
+    let surface = |obstacle: &Obstacle| {
+        let sine = match &obstacle.surface.texture {
+            None => None,
+            Some(Texture::Sine(sine)) => Some(EdgeSine {
+                axis: sine.axis.into(),
+                wavelength: sine.wavelength,
+                amplitude: sine.amplitude,
+            }),
+            Some(_) => return None,
+        };
+        Some(EdgeSurface {
             pose: PoseF64::from_isometry(&obstacle.pose),
             friction: obstacle.surface.friction,
-            sine: match texture {
-                Some(Texture::Sine(sine)) => Some(EdgeSine {
-                    axis: sine.axis.into(),
-                    wavelength: sine.wavelength,
-                    amplitude: sine.amplitude,
-                }),
-                _ => None,
-            },
-        }),
+            sine,
+        })
     };
     let Some(obstacles) = world.obstacles.iter().map(surface).collect() else {
         return at_server("a surface has a height map, which does not travel");

@@ -189,8 +189,8 @@ impl DevicePort {
         let wrench = self.render(now, passed, command);
         self.device.write(now, &wrench);
         // A bridge's own word is what does the work.
-        let felt = reading.felt.map_or(wrench, |felt| felt.wrench);
-        self.energy.hold(&felt);
+        self.energy
+            .hold(&reading.felt.map_or(wrench, |felt| felt.wrench));
         TickReport {
             reading,
             wrench,

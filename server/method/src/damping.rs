@@ -12,7 +12,7 @@
 //! `b = a_u + k_s tau v`. So a body that touches nothing feels nothing, a motion along a surface is not braked, and a motion away
 //! from a surface makes its force smaller but never pulls. The coupling alone is a spring: a light device that is let go under load
 //! swings as its own damping lets it.
-//! Source: the virtual damper of Colgate & Schenkel 1997, along the active constraints of Ortega et al. 2007, Section 5.
+//! Source: the virtual damper of Colgate, Schenkel 1997, along the active constraints of Ortega et al. 2007, Section 5.
 
 use crate::quasi_statics::{
     HalfSpace, Metric, Projection, ProjectionStatus, Projector, SolverKind,

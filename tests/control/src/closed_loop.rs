@@ -6,7 +6,7 @@ use god_object::{ConstraintSet, Coupling, Pose, Settings, Vector6, World};
 use nalgebra::Vector3;
 use taut_plant::{Grip, Plant};
 
-/// Period of the loop: 1 kHz.
+/// Period of the loop unless it says otherwise: 1 kHz.
 pub const PERIOD: Duration = Duration::from_millis(1);
 
 /// The device of the published stability figures: 0.2 kg, `damping` N s/m, motors without limit.
@@ -31,6 +31,8 @@ pub struct ClosedLoop {
     pub virtual_damping: Vector6,
     /// A force and a torque that push the device all the time, N and N m.
     pub push: Vector6,
+    /// T.
+    pub period: Duration,
     last: Option<Pose>,
     tick: u32,
 }
@@ -54,6 +56,7 @@ impl ClosedLoop {
             set,
             virtual_damping: Vector6::zeros(),
             push: Vector6::zeros(),
+            period: PERIOD,
             last: None,
             tick: 0,
         }
@@ -61,13 +64,13 @@ impl ClosedLoop {
 
     /// Samples the device, computes the wrench and commands it. The delay is the motors'.
     pub fn tick(&mut self) -> Answer {
-        let now = PERIOD * self.tick;
+        let now = self.period * self.tick;
         self.tick += 1;
         self.plant.advance(now);
         let measured = self.plant.measured_pose();
         let answer = self.coupling.step(now.as_secs_f64(), &measured, &self.set);
         let last = self.last.replace(measured).unwrap_or(measured);
-        let velocity = difference(&measured, &last) / PERIOD.as_secs_f64();
+        let velocity = difference(&measured, &last) / self.period.as_secs_f64();
         let wrench = answer.wrench - self.virtual_damping.component_mul(&velocity);
         self.plant.command(&(wrench + self.push));
         Answer { measured, wrench }

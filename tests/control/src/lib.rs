@@ -9,6 +9,7 @@
 //! - [`edge`] and its neighbours: the coupling next to the device, over a network.
 //! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
+//! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.
 //! - [`wall_table`]: the printed table of critical stiffness.
 
 pub mod closed_loop;

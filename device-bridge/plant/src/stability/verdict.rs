@@ -134,8 +134,8 @@ impl DeclaredAxis {
 impl fmt::Display for StableLimit {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match self {
-            Self::NoDamping => "neither device nor hand has damping",
-            Self::VirtualDamping => "the wall's own damping is more than the sampling bears",
+            Self::NoDamping => "the lack of damping in device and hand",
+            Self::VirtualDamping => "the wall's own damping, more than the sampling bears",
             Self::Hold => "the hold of a sample, against the damping of device and hand",
             Self::Delay => "the delay of the force, against the damping of device and hand",
         })
@@ -145,7 +145,7 @@ impl fmt::Display for StableLimit {
 impl fmt::Display for PassiveLimit {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match self {
-            Self::VirtualDamping => "the wall's own damping is more than the device's",
+            Self::VirtualDamping => "the wall's own damping, more than the device's",
             Self::Damping => "the device's damping, against hold and delay",
             Self::Resolution => "the device's friction, against the steps of its encoder",
         })

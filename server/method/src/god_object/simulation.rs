@@ -14,14 +14,11 @@ use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, at_reference_point, linear, pose_difference,
-    pose_is_finite, six,
+    pose_is_finite,
 };
 use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
+use crate::turn_memory::TurnMemory;
 use crate::world::World;
-
-/// Most that the body turns in one update, rad: a quarter turn. A whole turn made in one update looks like none, and a body that owes
-/// one, wound up against a stop and let go, would make it for ever.
-const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_2;
 
 /// Loop 1 of the method.
 #[derive(Debug)]
@@ -39,7 +36,7 @@ pub struct GodObject {
     pub(super) implicit: ImplicitRounds,
     pub(super) rows: Vec<HalfSpace>,
     pub(super) warm_start: Vec<u32>,
-    pub(super) rotation: Vector3<f64>,
+    pub(super) turn: TurnMemory,
     pub(super) radius: f64,
     pub(super) trust_length: f64,
     pub(super) last_device: Option<Pose>,
@@ -85,7 +82,7 @@ impl GodObject {
             ),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
-            rotation: Vector3::zeros(),
+            turn: TurnMemory::default(),
             radius,
             trust_length: f64::INFINITY,
             last_device: None,
@@ -131,14 +128,11 @@ impl GodObject {
         // 1. and 2. The share of the way that this update is to cover, as a pose to arrive at.
         let start = self.pose_at_reference_point();
         let device = at_reference_point(device_pose, &self.world.body.reference_point);
-        let difference = pose_difference(&device, &start, &self.rotation);
-        self.rotation = angular(&difference);
+        let difference = self.turn.difference(&device, &start);
         let unconstrained = match shaded {
             Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
             _ => difference * self.settings.k_s,
         };
-        let turn = angular(&unconstrained).cap_magnitude(LARGEST_TURN);
-        let unconstrained = six(&linear(&unconstrained), &turn);
         let goal = advance_pose(&start, &unconstrained, 1.0);
         let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
@@ -178,7 +172,9 @@ impl GodObject {
         if self.reduction.is_none() && self.collected_within < published {
             self.collect(published, &mut report.work);
         }
-        let difference = pose_difference(&device, &self.pose_at_reference_point(), &self.rotation);
+        let difference = self
+            .turn
+            .difference(&device, &self.pose_at_reference_point());
         self.publish(&difference, &update, &mut report);
         self.describe_set(&mut report);
         report

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use god_object::Pose;
 
+use super::dynamics::DeviceDynamics;
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
@@ -31,6 +32,8 @@ pub struct Workbench {
     pub viewer: Viewer,
     /// The device.
     pub device: Device,
+    /// What a real device is, where it is declared.
+    pub dynamics: Option<DeviceDynamics>,
     /// The network.
     pub network: Network,
     /// The rerun stream.

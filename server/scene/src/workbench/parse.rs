@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use god_object::Pose;
 use nalgebra::Point3;
 
+use super::dynamics::dynamics;
 use super::load::Workbench;
 use super::safety::safety;
 use super::spec::{
@@ -66,6 +67,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         seed: 0,
     };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
+    let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
@@ -100,6 +102,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         nodes,
         viewer,
         device,
+        dynamics,
         network,
         monitoring,
         realtime,

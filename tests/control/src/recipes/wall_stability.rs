@@ -44,6 +44,8 @@ pub struct Case {
     pub virtual_damping: f64,
     /// t_d, s.
     pub delay: f64,
+    /// T, s.
+    pub period: f64,
     /// Who holds the device.
     pub hand: HandPreset,
 }
@@ -58,7 +60,7 @@ impl Case {
             damping: self.damping,
             delay: self.delay,
             virtual_damping: self.virtual_damping,
-            ..SampledLoop::at_period(PERIOD.as_secs_f64())
+            ..SampledLoop::at_period(self.period)
         }
         .held_along(&Hand::from(self.hand))
         .critical_stiffness()
@@ -77,6 +79,7 @@ impl Case {
         let mut run = ClosedLoop::new(&cube(), &settings, set, self.plant());
         run.plant
             .place(Pose::translation(DISTURBANCE, 0.0, 0.0), Vector6::zeros());
+        run.period = Duration::from_secs_f64(self.period);
         run.virtual_damping = Vector6::x() * self.virtual_damping;
         let mass = 0.2 + Hand::from(self.hand).mass;
         let frequency = (stiffness / mass).sqrt();
@@ -164,6 +167,7 @@ fn about_z(delay: f64) -> (f64, f64) {
 #[must_use]
 pub fn run() -> Vec<Row> {
     let mut rows = Vec::new();
+    let period = PERIOD.as_secs_f64();
     let mut printed = 0.0_f64;
     for (damping, virtual_damping, table) in CRITICAL {
         for (delay, table) in DELAYS.into_iter().zip(table) {
@@ -171,6 +175,7 @@ pub fn run() -> Vec<Row> {
                 damping,
                 virtual_damping,
                 delay,
+                period,
                 hand: HandPreset::Released,
             };
             printed = printed.max((case.by_eigenvalues() / table - 1.0).abs());
@@ -188,6 +193,7 @@ pub fn run() -> Vec<Row> {
             damping: 1.0,
             virtual_damping: 0.0,
             delay,
+            period,
             hand: HandPreset::Light,
         };
         printed = printed.max((case.by_eigenvalues() / table - 1.0).abs());
@@ -226,6 +232,7 @@ fn sweep() -> Row {
                     damping,
                     virtual_damping,
                     delay,
+                    period: PERIOD.as_secs_f64(),
                     hand,
                 };
                 let ratio = case.by_simulation() / case.by_eigenvalues();
