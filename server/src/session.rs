@@ -30,6 +30,7 @@ use crate::failure::Failure;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
+use crate::loops::incidents::{self, IncidentNews};
 use crate::loops::shell::{Waker, run_at_deadlines, spawn};
 use crate::loops::wiring::WiredLoops;
 use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, NetworkCounts, Severity};
@@ -59,6 +60,7 @@ pub struct Session {
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
     arm_switch: Arc<ArmSwitch>,
+    incidents: IncidentNews,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -138,6 +140,7 @@ impl Session {
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
             arm_switch: loops.arm_switch.clone(),
+            incidents: IncidentNews::default(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -398,6 +401,7 @@ impl Session {
     /// Tells what happened on the network since the last time: errors here, everything to monitor and log. Call it a few times a
     /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
+        self.tell_incidents();
         let Some(link) = &self.link else {
             return;
         };
@@ -442,6 +446,26 @@ impl Session {
             u32::try_from(clients.len()).unwrap_or(u32::MAX),
             Ordering::Relaxed,
         );
+    }
+
+    /// Tells of the device port's events, to the log and the recording; the monitor looks by itself.
+    fn tell_incidents(&mut self) {
+        let counts = &self.statistics.haptics.incidents;
+        for (event, times) in self.incidents.since_last(counts) {
+            let text = incidents::line(&event, times);
+            if event.kind.is_good_news() {
+                tracing::info!("{text}");
+            } else {
+                tracing::warn!("{text}");
+            }
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: event.time,
+                    kind: "safety".to_owned(),
+                    text,
+                });
+            }
+        }
     }
 
     /// One line of what goes on.

@@ -4,7 +4,8 @@
 
 #[cfg(not(feature = "monitor"))]
 mod absent;
-#[cfg(feature = "monitor")]
+// Needs nothing of the monitor, so its tests run in every build.
+#[cfg(any(test, feature = "monitor"))]
 mod events;
 #[cfg(feature = "monitor")]
 mod streaming;
