@@ -1,0 +1,340 @@
+//! Wrench to tensions: bounded, as commanded where that is possible, in its direction where it is not.
+//!
+//! | symbol   | name in code     | unit | meaning                                                     |
+//! |----------|------------------|------|-------------------------------------------------------------|
+//! | f        | `wrench`         | N, N m | commanded, about the grip's centre, frame axes            |
+//! | A        | scaled rows      | -    | `(u_i, w_i / G)`: torque over G counts like force           |
+//! | Z        |                  | N    | every scaled wrench `A t` with `t_min <= t <= t_max`        |
+//! | s        | `regularisation` | -    | weight of tension against wrench error                      |
+//! | alpha    | `scale`          | -    | share of the command that is rendered                       |
+//!
+//! 1. **A wrench in Z is rendered.** `min |A t - f|^2 + s |t - t_min|^2` within the bounds. s only picks the lowest of the
+//!    many tensions that render one wrench; its share of the wrench error is about s. The published weights
+//!    (s = 0.3, torque 6) let the tension term win a quarter of the force.
+//! 2. **A wrench outside Z is rendered in its direction**: `alpha f` with the largest alpha in [0, 1] for which it lies in Z.
+//!    Force and torque shrink together, so that the axis of the wrench (its screw) stays; a torque that cannot be
+//!    rendered thus costs force as well. alpha comes from cutting planes: the nearest point of Z says by its normal how far
+//!    alpha must fall at least, which ends after as many planes as the ray has facets to pass.
+//! 3. **Where even no wrench at all cannot be rendered** (the grip is outside the workspace, or a motor is dead), no direction
+//!    can be kept, and the nearest wrench of Z is rendered. Between the two, within [`TensionSettings::margin`] of
+//!    that boundary, alpha goes continuously from one to the other, so that tensions never jump along a motion.
+//!
+//! The tensions are the solution of a strictly convex problem whose data vary continuously, so they vary continuously, too.
+
+use nalgebra::Vector6;
+
+use crate::box_program::{Bounds, BoxAnswer, BoxProgram, Side};
+use crate::string_matrix::StringMatrix;
+use crate::{Geometry, PerString, STRINGS};
+
+/// Most cutting planes of one search for the scale.
+const MAX_CUTS: u32 = 12;
+/// A wrench is in Z if it is this near, relative to itself: a tenth of what is promised.
+const RELATIVE_NEARNESS: f64 = 1e-4;
+/// The same, absolute, N: above what the regularisation adds, a thousandth of what a finger feels.
+const NEARNESS: f64 = 2e-5;
+
+/// Weights of the distribution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TensionSettings {
+    /// s: weight of tension against wrench error, without unit. The wrench error is about s times the tensions.
+    pub regularisation: f64,
+    /// Share of the tension range by which every string must be able to exceed its least tension at zero command, for the
+    /// direction to be kept fully. Below it the answer goes over to the nearest wrench.
+    pub margin: f64,
+}
+
+impl Default for TensionSettings {
+    fn default() -> Self {
+        Self {
+            regularisation: 1e-7,
+            margin: 0.01,
+        }
+    }
+}
+
+/// What a motor does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MotorState {
+    /// It pulls as it is told.
+    #[default]
+    Working,
+    /// It does not pull; its string is slack.
+    Dead,
+    /// Nobody knows how it pulls, between nothing and its limit. Taken as nothing; see [`TensionAnswer::uncertainty`].
+    Unknown,
+}
+
+/// How the rendered wrench relates to the commanded one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TensionStatus {
+    /// They agree within 0.1 % (or a micronewton).
+    Rendered,
+    /// It has the same direction in all six components, and [`TensionAnswer::scale`] of the size.
+    Scaled,
+    /// It is the nearest that can be rendered: the grip is outside or at the edge of the workspace, or a motor is dead.
+    Nearest,
+    /// The command or the pose is not finite, or the iterations ran out: every working string has its least tension.
+    NotFinite,
+}
+
+/// Tensions, and what they render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
+pub struct TensionAnswer {
+    /// N, within the limits of each motor.
+    pub tensions: PerString,
+    /// What they render: N, N m about the grip's centre, frame axes.
+    pub wrench: Vector6<f64>,
+    /// How that relates to the command.
+    pub status: TensionStatus,
+    /// alpha: share of the command that was aimed at.
+    pub scale: f64,
+    /// Certificate of optimality: largest violation of the KKT conditions of the last problem, N; zero at its optimum.
+    pub kkt_residual: f64,
+    /// Largest force that strings of unknown tension may add, N; their torque is at most that times G.
+    pub uncertainty: f64,
+    /// Factorisations used, all problems together.
+    pub factorisations: u32,
+}
+
+/// Distributes wrenches over the strings. Keeps which tensions were at a limit, so that the next answer costs less.
+/// No allocation; at most 26 bounded problems of 60 factorisations each, and one of two or three as a rule.
+#[derive(Clone, Debug)]
+pub struct TensionSolver {
+    arm: f64,
+    least: f64,
+    most: f64,
+    settings: TensionSettings,
+    motors: [MotorState; STRINGS],
+    sides: [Side; STRINGS],
+}
+
+impl TensionSolver {
+    /// A solver for one device with all motors working.
+    #[must_use]
+    pub fn new(geometry: &Geometry, settings: TensionSettings) -> Self {
+        assert!(
+            settings.regularisation > 0.0 && settings.margin > 0.0 && settings.margin < 1.0,
+            "regularisation above zero, margin between 0 and 1"
+        );
+        Self {
+            arm: geometry.arm(),
+            least: geometry.tension_min,
+            most: geometry.tension_max,
+            settings,
+            motors: [MotorState::Working; STRINGS],
+            sides: [Side::Lower; STRINGS],
+        }
+    }
+
+    /// Says what a motor does from now on.
+    pub fn set_motor(&mut self, string: usize, state: MotorState) {
+        self.motors[string] = state;
+    }
+
+    /// What each motor does.
+    #[must_use]
+    pub fn motors(&self) -> &[MotorState; STRINGS] {
+        &self.motors
+    }
+
+    /// Tensions for a wrench (N, N m about the grip's centre, frame axes) at the pose of `strings`.
+    pub fn distribute(&mut self, strings: &StringMatrix, wrench: &Vector6<f64>) -> TensionAnswer {
+        let rows = strings.scaled_rows(self.arm);
+        let target = self.scaled(wrench);
+        let finite = rows.iter().flatten().chain(&target).all(|x| x.is_finite());
+        if !finite {
+            return self.least_tensions(strings);
+        }
+        let search = Search {
+            program: BoxProgram::new(&rows, self.settings.regularisation),
+            bounds: self.bounds(self.least),
+            sides: self.sides,
+            factorisations: 0,
+        };
+        self.answer(search, strings, &target)
+    }
+
+    /// The largest alpha in [0, 1] with `alpha wrench` in Z, `None` if there is none. What [`crate::capability`] is made of.
+    #[must_use]
+    pub fn feasible_scale(&self, strings: &StringMatrix, wrench: &Vector6<f64>) -> Option<f64> {
+        let rows = strings.scaled_rows(self.arm);
+        let target = self.scaled(wrench);
+        if !rows.iter().flatten().chain(&target).all(|x| x.is_finite()) {
+            return None;
+        }
+        let mut search = Search {
+            program: BoxProgram::new(&rows, self.settings.regularisation),
+            bounds: self.bounds(self.least),
+            sides: self.sides,
+            factorisations: 0,
+        };
+        search.largest_scale(&target).map(|(scale, _)| scale)
+    }
+
+    fn answer(
+        &mut self,
+        mut search: Search,
+        strings: &StringMatrix,
+        target: &[f64; 6],
+    ) -> TensionAnswer {
+        let mut found = search.nearest(target);
+        let (mut status, mut scale) = (TensionStatus::Rendered, 1.0);
+        if distance(&found.image, target) > nearness(target) {
+            // How far inside the workspace: 1 is far enough to keep the direction.
+            let inside = self.insideness(&mut search);
+            let along = if inside > 0.0 {
+                search.largest_scale(target)
+            } else {
+                None
+            };
+            scale = along.map_or(1.0, |(alpha, _)| inside * alpha + (1.0 - inside));
+            found = search.nearest(&target.map(|f| scale * f));
+            status = if along.is_some() && inside >= 1.0 {
+                TensionStatus::Scaled
+            } else {
+                TensionStatus::Nearest
+            };
+        }
+        if !(found.solved && search.factorisations > 0) {
+            return self.least_tensions(strings);
+        }
+        self.sides = found.sides;
+        TensionAnswer {
+            tensions: found.x,
+            wrench: strings.wrench(&found.x),
+            status,
+            scale,
+            kkt_residual: found.kkt_residual,
+            uncertainty: self.uncertainty(),
+            factorisations: search.factorisations,
+        }
+    }
+
+    /// Share (0 to 1) of the margin by which every string can exceed its least tension while the wrench is zero.
+    fn insideness(&self, search: &mut Search) -> f64 {
+        let margin = self.settings.margin * (self.most - self.least);
+        // With t = t_min + mu margin + x, zero wrench is `A (t_min + x) = -mu margin A 1`: again a largest scale.
+        let working = self.motors.map(|motor| motor == MotorState::Working);
+        let raised = working.map(|working| if working { margin } else { 0.0 });
+        let direction = search.program.image(&raised).map(|f| -f);
+        let mut narrowed = Search {
+            program: search.program,
+            bounds: search.bounds,
+            sides: search.sides,
+            factorisations: 0,
+        };
+        for i in 0..STRINGS {
+            if working[i] {
+                narrowed.bounds.upper[i] -= margin;
+            }
+        }
+        let found = narrowed.largest_scale(&direction);
+        search.factorisations += narrowed.factorisations;
+        found.map_or(0.0, |(scale, _)| scale)
+    }
+
+    fn scaled(&self, wrench: &Vector6<f64>) -> [f64; 6] {
+        std::array::from_fn(|k| {
+            if k < 3 {
+                wrench[k]
+            } else {
+                wrench[k] / self.arm
+            }
+        })
+    }
+
+    fn bounds(&self, least: f64) -> Bounds {
+        let bound = |working: f64| {
+            self.motors.map(|motor| match motor {
+                MotorState::Working => working,
+                MotorState::Dead | MotorState::Unknown => 0.0,
+            })
+        };
+        Bounds {
+            lower: bound(least),
+            upper: bound(self.most),
+        }
+    }
+
+    fn uncertainty(&self) -> f64 {
+        let unknown = self
+            .motors
+            .iter()
+            .filter(|motor| **motor == MotorState::Unknown);
+        self.most * unknown.count() as f64
+    }
+
+    fn least_tensions(&self, strings: &StringMatrix) -> TensionAnswer {
+        let tensions = self.bounds(self.least).lower;
+        TensionAnswer {
+            tensions,
+            wrench: strings.wrench(&tensions),
+            status: TensionStatus::NotFinite,
+            scale: 0.0,
+            kkt_residual: f64::INFINITY,
+            uncertainty: self.uncertainty(),
+            factorisations: 0,
+        }
+    }
+}
+
+/// One pose's problem, and the sides that the last solution had.
+struct Search {
+    program: BoxProgram,
+    bounds: Bounds,
+    sides: [Side; STRINGS],
+    factorisations: u32,
+}
+
+impl Search {
+    /// The nearest point of Z to `target`, with the lowest tensions that render it.
+    fn nearest(&mut self, target: &[f64; 6]) -> BoxAnswer {
+        let found = self
+            .program
+            .solve(target, &self.bounds.lower, &self.bounds, &self.sides);
+        self.factorisations += found.factorisations;
+        if found.solved {
+            self.sides = found.sides;
+        }
+        found
+    }
+
+    /// The largest alpha in [0, 1] with `alpha f` in Z, and how it is rendered. `None` if the ray misses Z.
+    fn largest_scale(&mut self, f: &[f64; 6]) -> Option<(f64, BoxAnswer)> {
+        let mut alpha = 1.0;
+        for _ in 0..MAX_CUTS {
+            let target = f.map(|f| alpha * f);
+            let found = self.nearest(&target);
+            let gap = distance(&found.image, &target);
+            if gap <= nearness(&target) {
+                return found.solved.then_some((alpha, found));
+            }
+            // Z lies behind the plane through its nearest point; n = (target - nearest) / gap is the plane's normal.
+            let along: f64 = (0..6).map(|k| (target[k] - found.image[k]) * f[k]).sum();
+            let fall = gap * gap / along;
+            let falls = along > 0.0 && fall <= alpha; // false for NaN
+            if !falls {
+                return None;
+            }
+            alpha -= fall;
+        }
+        None
+    }
+}
+
+fn nearness(f: &[f64; 6]) -> f64 {
+    NEARNESS + RELATIVE_NEARNESS * norm(f)
+}
+
+fn norm(f: &[f64; 6]) -> f64 {
+    f.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    (0..6)
+        .map(|k| (a[k] - b[k]) * (a[k] - b[k]))
+        .sum::<f64>()
+        .sqrt()
+}
