@@ -25,8 +25,8 @@ pub use cli::{BridgeArgs, DeviceChoice, UnknownDevice, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,
-    RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, min_jerk,
+    RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice, SpidarPlacement, Trace,
+    TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use energy::EnergyObserver;
 pub use report::{BridgeReport, Quantiles};

@@ -24,6 +24,7 @@ pub mod demo;
 pub mod demo_directory;
 pub mod devices;
 pub mod doctor;
+pub mod doctor_device;
 pub mod failure;
 pub mod finished_file;
 pub mod head;

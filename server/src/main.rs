@@ -9,7 +9,7 @@ use taut::cli::{CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, Repla
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
 use taut::terminal::Terminal;
-use taut::{demo, doctor, record, rendering, replay, serve};
+use taut::{demo, doctor, doctor_device, record, rendering, replay, serve};
 use tracing_subscriber::EnvFilter;
 
 /// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
@@ -108,6 +108,15 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
+    if let Some(device) = &args.device {
+        let report = doctor_device::examine(device, args.out.as_deref())?;
+        if args.json {
+            print_json(&report)?;
+        } else {
+            println!("{report}");
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;

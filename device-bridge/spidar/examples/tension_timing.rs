@@ -28,7 +28,7 @@ fn main() {
         distribution(&geometry, "inside", TICKS, |tick| {
             (motion(&geometry, tick), wrench(&geometry, tick, small))
         });
-        let large = 3.0 * geometry.tension_max;
+        let large = geometry.tension_max;
         distribution(&geometry, "in and out", TICKS, |tick| {
             (motion(&geometry, tick), wrench(&geometry, tick, large))
         });

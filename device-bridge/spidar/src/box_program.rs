@@ -91,6 +91,11 @@ impl BoxProgram {
         std::array::from_fn(|k| (0..STRINGS).map(|i| self.rows[k][i] * x[i]).sum())
     }
 
+    /// `normal . a_i`.
+    pub(crate) fn along(&self, normal: &[f64; 6], i: usize) -> f64 {
+        (0..6).map(|k| normal[k] * self.rows[k][i]).sum()
+    }
+
     /// Solves for one target. `guess` is the sides of a problem near by; any guess gives the same answer.
     pub(crate) fn solve(
         &self,

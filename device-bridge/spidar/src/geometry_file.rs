@@ -442,11 +442,9 @@ mod tests {
 
     #[test]
     fn an_unknown_key_is_named_with_its_line_and_the_nearest_key() {
-        let text = GOOD.replace("tension_max", "tension_maks");
-        let message = refused(&text);
-        let line = line_of(&text, "tension_maks");
+        let text = GOOD.replace("tension_max =", "tension_maks =");
+        let line = line_of(&text, "tension_maks =");
         // The missing key is complained of at the table's head, the wrong one at its own line.
-        assert!(message.starts_with("my.toml:"), "{message}");
         let Err(error) = read("my.toml", &text) else {
             panic!("refused");
         };

@@ -29,6 +29,8 @@ const SINGULAR_PIVOT: f64 = 1e-6;
 const SINGULAR_DAMPING: f64 = 1e-6;
 /// Relative rounding of a cost near its minimum.
 const ROUNDING: f64 = 1e-12;
+/// A pose whose lengths disagree by more than this share of the arm may be the wrong one of several minima.
+const WRONG_MINIMUM: f64 = 0.2;
 /// A string shorter than this has no useful direction, m.
 pub const NEAREST_MOTOR: f64 = 10e-3;
 /// Strings cross beyond this rotation from rest, rad.
@@ -134,12 +136,13 @@ impl ForwardKinematics {
                 return Err(StringFault::NotFinite(i));
             }
         }
-        let from_last = self.descend(self.pose, lengths);
-        let answer = match from_last {
-            Err(StringFault::NotConverged | StringFault::Singular) => {
-                self.descend(Pose::identity(), lengths)
-            }
-            other => other,
+        let answer = match self.descend(self.pose, lengths) {
+            Ok(found) if found.disagreement() <= WRONG_MINIMUM * self.geometry.arm() => Ok(found),
+            Ok(found) => Ok(match self.descend(Pose::identity(), lengths) {
+                Ok(other) if other.disagreement() < found.disagreement() => other,
+                _ => found,
+            }),
+            Err(_) => self.descend(Pose::identity(), lengths),
         }?;
         trusted(&answer)?;
         self.pose = answer.frame_from_grip;

@@ -10,7 +10,7 @@
 //!
 //! If string i alone is wrong by e, the best estimate over many poses is `-B_i / D_i`, and it explains `B_i^2 / D_i` of S. At
 //! one pose two strings may explain the same residual (by symmetry, opposite ones do at the centre); along a
-//! motion only the right one goes on explaining it. That is why the sums are kept over a second, while the alarm looks
+//! motion only the right one goes on explaining it. That is why the sums are kept over a second, from the first alarm on, while the alarm looks
 //! at the present residual.
 //!
 //! Source: Baarda 1968 (data snooping), with a constant error over many poses.
@@ -23,6 +23,8 @@ use crate::{PerString, STRINGS};
 pub const DISAGREEMENT: f64 = 0.2e-3;
 /// Samples over which the sums fade by 1/e: a second at 1 kHz.
 const FADING_SAMPLES: f64 = 1000.0;
+/// An alarm after so many quiet samples is a new fault, and what was seen before it says nothing about it.
+const QUIET_SAMPLES: u32 = 1000;
 /// A string is named if its error explains this share of the residuals ...
 const EXPLAINED: f64 = 0.9;
 /// ... and leaves at most this share of what the next best leaves.
@@ -68,6 +70,8 @@ pub struct ResidualMonitor {
     energy: f64,
     sums: PerString,
     weights: PerString,
+    /// Samples since the last alarm.
+    quiet: u32,
 }
 
 impl ResidualMonitor {
@@ -86,6 +90,15 @@ impl ResidualMonitor {
     pub fn step(&mut self, answer: &PoseAnswer) -> Consistency {
         let keep = 1.0 - 1.0 / FADING_SAMPLES;
         let disagreement = answer.disagreement();
+        let alarm = !(disagreement <= DISAGREEMENT); // true for NaN
+        if alarm && self.quiet >= QUIET_SAMPLES {
+            self.reset();
+        }
+        self.quiet = if alarm {
+            0
+        } else {
+            self.quiet.saturating_add(1)
+        };
         self.energy = keep * self.energy + disagreement * disagreement;
         for i in 0..STRINGS {
             self.sums[i] = keep * self.sums[i] + answer.residuals[i];
@@ -93,7 +106,7 @@ impl ResidualMonitor {
         }
         Consistency {
             disagreement,
-            alarm: !(disagreement <= DISAGREEMENT), // true for NaN
+            alarm,
             suspect: self.suspect(),
         }
     }

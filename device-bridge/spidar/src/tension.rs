@@ -13,13 +13,15 @@
 //!    (s = 0.3, torque 6) let the tension term win a quarter of the force.
 //! 2. **A wrench outside Z is rendered in its direction**: `alpha f` with the largest alpha in [0, 1] for which it lies in Z.
 //!    Force and torque shrink together, so that the axis of the wrench (its screw) stays; a torque that cannot be
-//!    rendered thus costs force as well. alpha comes from cutting planes: the nearest point of Z says by its normal how far
-//!    alpha must fall at least, which ends after as many planes as the ray has facets to pass.
+//!    rendered thus costs force as well. alpha comes from cutting planes: the way to the nearest point of Z is the normal of a plane
+//!    that Z lies behind, and alpha falls to where the ray meets that plane, until it is in Z.
 //! 3. **Where even no wrench at all cannot be rendered** (the grip is outside the workspace, or a motor is dead), no direction
 //!    can be kept, and the nearest wrench of Z is rendered. Between the two, within [`TensionSettings::margin`] of
 //!    that boundary, alpha goes continuously from one to the other, so that tensions never jump along a motion.
 //!
-//! The tensions are the solution of a strictly convex problem whose data vary continuously, so they vary continuously, too.
+//! The tensions are the solution of a strictly convex problem whose data vary continuously, so they vary continuously, too; but
+//! steeply where the wrench is at an edge of Z. Whenever two sets of tensions render one wrench, so does every
+//! mixture of them, so that motors with one lag change from one to the other without the hand noticing.
 
 use nalgebra::Vector6;
 
@@ -29,10 +31,18 @@ use crate::{Geometry, PerString, STRINGS};
 
 /// Most cutting planes of one search for the scale.
 const MAX_CUTS: u32 = 12;
-/// A wrench is in Z if it is this near, relative to itself: a tenth of what is promised.
-const RELATIVE_NEARNESS: f64 = 1e-4;
+/// s of the searches for a scale, where only the wrench counts: the planes are off by s times the squares of the tensions.
+const SEARCH_REGULARISATION: f64 = 1e-11;
+/// Largest weights of tension outside Z, where a wrench can lie on two faces of Z at once and its tensions would switch from one
+/// to the other: where the direction is kept, and where it is not. They grow with the distance from Z, in N, from nothing.
+const SOFTNESS: (f64, f64) = (1e-6, 1e-4);
+/// A wrench is in Z if it is this near, relative to itself. Small, because tensions near the edge of Z may change two hundred
+/// times as much as the wrench.
+const RELATIVE_NEARNESS: f64 = 1e-6;
 /// The same, absolute, N: above what the regularisation adds, a thousandth of what a finger feels.
 const NEARNESS: f64 = 2e-5;
+/// A wrench counts as rendered if it errs by at most this, relative to itself: a tenth of what is promised.
+const RENDERED: f64 = 1e-4;
 
 /// Weights of the distribution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +117,33 @@ pub struct TensionSolver {
     most: f64,
     settings: TensionSettings,
     motors: [MotorState; STRINGS],
+    memory: Memory,
+}
+
+/// What the last answers leave for the next ones: only their cost depends on it.
+#[derive(Clone, Copy, Debug)]
+struct Memory {
+    /// Of the nearest point to the command.
+    command: [Side; STRINGS],
+    /// Of the zero wrench with every string above its least tension.
+    rest: Ray,
+    /// Of the command's direction.
+    direction: Ray,
+}
+
+/// What a search along a ray leaves for the next one.
+#[derive(Clone, Copy, Debug)]
+struct Ray {
     sides: [Side; STRINGS],
+    /// Normal of the last cutting plane, of any length.
+    normal: [f64; 6],
+}
+
+impl Ray {
+    const UNKNOWN: Self = Self {
+        sides: [Side::Lower; STRINGS],
+        normal: [0.0; 6],
+    };
 }
 
 impl TensionSolver {
@@ -124,7 +160,11 @@ impl TensionSolver {
             most: geometry.tension_max,
             settings,
             motors: [MotorState::Working; STRINGS],
-            sides: [Side::Lower; STRINGS],
+            memory: Memory {
+                command: [Side::Lower; STRINGS],
+                rest: Ray::UNKNOWN,
+                direction: Ray::UNKNOWN,
+            },
         }
     }
 
@@ -147,13 +187,7 @@ impl TensionSolver {
         if !finite {
             return self.least_tensions(strings);
         }
-        let search = Search {
-            program: BoxProgram::new(&rows, self.settings.regularisation),
-            bounds: self.bounds(self.least),
-            sides: self.sides,
-            factorisations: 0,
-        };
-        self.answer(search, strings, &target)
+        self.answer(&rows, strings, &target)
     }
 
     /// The largest alpha in [0, 1] with `alpha wrench` in Z, `None` if there is none. What [`crate::capability`] is made of.
@@ -164,43 +198,52 @@ impl TensionSolver {
         if !rows.iter().flatten().chain(&target).all(|x| x.is_finite()) {
             return None;
         }
-        let mut search = Search {
-            program: BoxProgram::new(&rows, self.settings.regularisation),
-            bounds: self.bounds(self.least),
-            sides: self.sides,
-            factorisations: 0,
-        };
-        search.largest_scale(&target).map(|(scale, _)| scale)
+        let mut ray = Ray::UNKNOWN;
+        let mut search = self.search(&rows, SEARCH_REGULARISATION);
+        search.largest_scale(&target, &mut ray)
     }
 
     fn answer(
         &mut self,
-        mut search: Search,
+        rows: &[PerString; 6],
         strings: &StringMatrix,
         target: &[f64; 6],
     ) -> TensionAnswer {
-        let mut found = search.nearest(target);
+        let mut memory = self.memory;
+        let mut search = self.search(rows, self.settings.regularisation);
+        let mut found = search.nearest(target, &mut memory.command);
         let (mut status, mut scale) = (TensionStatus::Rendered, 1.0);
-        if distance(&found.image, target) > nearness(target) {
+        let gap = distance(&found.image, target);
+        if gap > NEARNESS + RELATIVE_NEARNESS * norm(target) {
             // How far inside the workspace: 1 is far enough to keep the direction.
-            let inside = self.insideness(&mut search);
+            let mut rays = self.search(rows, SEARCH_REGULARISATION);
+            let inside = self.insideness(&mut rays, &mut memory.rest);
             let along = if inside > 0.0 {
-                search.largest_scale(target)
+                rays.largest_scale(target, &mut memory.direction)
             } else {
                 None
             };
-            scale = along.map_or(1.0, |(alpha, _)| inside * alpha + (1.0 - inside));
-            found = search.nearest(&target.map(|f| scale * f));
-            status = if along.is_some() && inside >= 1.0 {
+            scale = along.map_or(1.0, |alpha| inside * alpha + (1.0 - inside));
+            search.factorisations += rays.factorisations;
+            let aim = target.map(|f| scale * f);
+            let softest = inside * SOFTNESS.0 + (1.0 - inside) * SOFTNESS.1;
+            let soft = self.settings.regularisation + softest * gap / (gap + 1.0);
+            let mut softer = self.search(rows, soft);
+            found = softer.nearest(&aim, &mut memory.direction.sides);
+            search.factorisations += softer.factorisations;
+            let off = distance(&found.image, target);
+            status = if off <= NEARNESS + RENDERED * norm(target) {
+                TensionStatus::Rendered
+            } else if along.is_some() && inside >= 1.0 {
                 TensionStatus::Scaled
             } else {
                 TensionStatus::Nearest
             };
         }
-        if !(found.solved && search.factorisations > 0) {
+        if !found.solved {
             return self.least_tensions(strings);
         }
-        self.sides = found.sides;
+        self.memory = memory;
         TensionAnswer {
             tensions: found.x,
             wrench: strings.wrench(&found.x),
@@ -213,26 +256,29 @@ impl TensionSolver {
     }
 
     /// Share (0 to 1) of the margin by which every string can exceed its least tension while the wrench is zero.
-    fn insideness(&self, search: &mut Search) -> f64 {
+    fn insideness(&self, search: &mut Search, ray: &mut Ray) -> f64 {
         let margin = self.settings.margin * (self.most - self.least);
         // With t = t_min + mu margin + x, zero wrench is `A (t_min + x) = -mu margin A 1`: again a largest scale.
-        let working = self.motors.map(|motor| motor == MotorState::Working);
-        let raised = working.map(|working| if working { margin } else { 0.0 });
+        let raised = self.motors.map(|motor| match motor {
+            MotorState::Working => margin,
+            MotorState::Dead | MotorState::Unknown => 0.0,
+        });
         let direction = search.program.image(&raised).map(|f| -f);
-        let mut narrowed = Search {
-            program: search.program,
-            bounds: search.bounds,
-            sides: search.sides,
-            factorisations: 0,
-        };
-        for i in 0..STRINGS {
-            if working[i] {
-                narrowed.bounds.upper[i] -= margin;
-            }
+        let all = search.bounds;
+        for (upper, raised) in search.bounds.upper.iter_mut().zip(&raised) {
+            *upper -= raised;
         }
-        let found = narrowed.largest_scale(&direction);
-        search.factorisations += narrowed.factorisations;
-        found.map_or(0.0, |(scale, _)| scale)
+        let found = search.largest_scale(&direction, ray);
+        search.bounds = all;
+        found.unwrap_or(0.0)
+    }
+
+    fn search(&self, rows: &[PerString; 6], regularisation: f64) -> Search {
+        Search {
+            program: BoxProgram::new(rows, regularisation),
+            bounds: self.bounds(),
+            factorisations: 0,
+        }
     }
 
     fn scaled(&self, wrench: &Vector6<f64>) -> [f64; 6] {
@@ -245,7 +291,7 @@ impl TensionSolver {
         })
     }
 
-    fn bounds(&self, least: f64) -> Bounds {
+    fn bounds(&self) -> Bounds {
         let bound = |working: f64| {
             self.motors.map(|motor| match motor {
                 MotorState::Working => working,
@@ -253,7 +299,7 @@ impl TensionSolver {
             })
         };
         Bounds {
-            lower: bound(least),
+            lower: bound(self.least),
             upper: bound(self.most),
         }
     }
@@ -267,7 +313,7 @@ impl TensionSolver {
     }
 
     fn least_tensions(&self, strings: &StringMatrix) -> TensionAnswer {
-        let tensions = self.bounds(self.least).lower;
+        let tensions = self.bounds().lower;
         TensionAnswer {
             tensions,
             wrench: strings.wrench(&tensions),
@@ -280,56 +326,72 @@ impl TensionSolver {
     }
 }
 
-/// One pose's problem, and the sides that the last solution had.
+/// One pose's problem.
 struct Search {
     program: BoxProgram,
     bounds: Bounds,
-    sides: [Side; STRINGS],
     factorisations: u32,
 }
 
 impl Search {
-    /// The nearest point of Z to `target`, with the lowest tensions that render it.
-    fn nearest(&mut self, target: &[f64; 6]) -> BoxAnswer {
+    /// The nearest point of Z to `target`, with the lowest tensions that render it. `sides` is a guess and becomes the answer's.
+    fn nearest(&mut self, target: &[f64; 6], sides: &mut [Side; STRINGS]) -> BoxAnswer {
         let found = self
             .program
-            .solve(target, &self.bounds.lower, &self.bounds, &self.sides);
+            .solve(target, &self.bounds.lower, &self.bounds, sides);
         self.factorisations += found.factorisations;
         if found.solved {
-            self.sides = found.sides;
+            *sides = found.sides;
         }
         found
     }
 
-    /// The largest alpha in [0, 1] with `alpha f` in Z, and how it is rendered. `None` if the ray misses Z.
-    fn largest_scale(&mut self, f: &[f64; 6]) -> Option<(f64, BoxAnswer)> {
-        let mut alpha = 1.0;
+    /// The largest alpha in [0, 1] with `alpha f` in Z; `None` if the ray misses Z. `ray` only saves time.
+    ///
+    /// Never less than the true one: `n . z <= support(n)` on Z for every n, exact or not, so that each cut is valid.
+    fn largest_scale(&mut self, f: &[f64; 6], ray: &mut Ray) -> Option<f64> {
+        // The last search's normal is a good first cut.
+        let first = self.support(&ray.normal) / dot(&ray.normal, f);
+        let cuts = dot(&ray.normal, f) > 0.0 && (0.0..1.0).contains(&first);
+        let mut alpha = if cuts { first } else { 1.0 };
         for _ in 0..MAX_CUTS {
             let target = f.map(|f| alpha * f);
-            let found = self.nearest(&target);
-            let gap = distance(&found.image, &target);
-            if gap <= nearness(&target) {
-                return found.solved.then_some((alpha, found));
+            let found = self.nearest(&target, &mut ray.sides);
+            let normal: [f64; 6] = std::array::from_fn(|k| target[k] - found.image[k]);
+            if norm(&normal) <= NEARNESS + RELATIVE_NEARNESS * norm(&target) {
+                break;
             }
-            // Z lies behind the plane through its nearest point; n = (target - nearest) / gap is the plane's normal.
-            let along: f64 = (0..6).map(|k| (target[k] - found.image[k]) * f[k]).sum();
-            let fall = gap * gap / along;
-            let falls = along > 0.0 && fall <= alpha; // false for NaN
-            if !falls {
+            let (along, support) = (dot(&normal, f), self.support(&normal));
+            let separated = alpha * along > support; // false for NaN
+            if !separated {
+                break; // what is left is rounding
+            }
+            if along <= 0.0 || support < 0.0 {
                 return None;
             }
-            alpha -= fall;
+            ray.normal = normal;
+            alpha = support / along;
         }
-        None
+        Some(alpha)
+    }
+
+    /// The largest `n . z` over z in Z.
+    fn support(&self, normal: &[f64; 6]) -> f64 {
+        (0..STRINGS)
+            .map(|i| {
+                let along = self.program.along(normal, i);
+                (along * self.bounds.lower[i]).max(along * self.bounds.upper[i])
+            })
+            .sum()
     }
 }
 
-fn nearness(f: &[f64; 6]) -> f64 {
-    NEARNESS + RELATIVE_NEARNESS * norm(f)
+fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    (0..6).map(|k| a[k] * b[k]).sum()
 }
 
 fn norm(f: &[f64; 6]) -> f64 {
-    f.iter().map(|x| x * x).sum::<f64>().sqrt()
+    dot(f, f).sqrt()
 }
 
 fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {

@@ -119,8 +119,9 @@ mod tests {
             |t| 0.1 + 0.02 * (omega * t).sin(),
             |t| 0.02 * omega * (omega * t).cos(),
         );
-        // The peak is 377 mm/s; the plain difference errs by 20 mm/s of quantisation alone.
-        assert!(worst < 0.02, "{worst}");
+        // The peak is 377 mm/s. Where the speed changes most (7.1 m/s^2), a window that hides one count is 4.7 ms long, and
+        // its middle 2.4 ms old: 17 mm/s, plus a count over the window.
+        assert!(worst < 0.025, "{worst}");
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl From<&DeviceFault> for Incident {
             DeviceFault::Lost { .. } => Self::DeviceLost,
             DeviceFault::NotFinite => Self::DeviceNotFinite,
             DeviceFault::TimeNotOnClock => Self::DeviceNotOnClock,
-            DeviceFault::ReportedFault => Self::DeviceReportedFault,
+            DeviceFault::ReportedFault | DeviceFault::Strings(_) => Self::DeviceReportedFault,
             DeviceFault::Reconnected => Self::DeviceReconnected,
             DeviceFault::Ended => Self::DeviceEnded,
         }

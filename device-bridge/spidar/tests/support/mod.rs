@@ -5,11 +5,11 @@ use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 use taut_spidar::{Geometry, PerString, Pose, StringMatrix};
 
 /// xorshift64*: the same numbers on every machine.
-pub struct Random(pub u64);
+pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     /// Evenly in [-1, 1).
-    pub fn signed(&mut self) -> f64 {
+    pub(crate) fn signed(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -18,7 +18,7 @@ impl Random {
     }
 
     /// Evenly in the unit ball.
-    pub fn in_ball(&mut self) -> Vector3<f64> {
+    pub(crate) fn in_ball(&mut self) -> Vector3<f64> {
         loop {
             let v = Vector3::new(self.signed(), self.signed(), self.signed());
             if v.norm_squared() <= 1.0 {
@@ -28,7 +28,7 @@ impl Random {
     }
 
     /// A unit vector.
-    pub fn direction(&mut self) -> Vector3<f64> {
+    pub(crate) fn direction(&mut self) -> Vector3<f64> {
         loop {
             let v = self.in_ball();
             if v.norm() > 1e-3 {
@@ -38,28 +38,28 @@ impl Random {
     }
 
     /// A pose within `radius` (m) and `angle` (rad).
-    pub fn pose(&mut self, radius: f64, angle: f64) -> Pose {
+    pub(crate) fn pose(&mut self, radius: f64, angle: f64) -> Pose {
         Pose::new(self.in_ball() * radius, self.in_ball() * angle)
     }
 }
 
 /// A shipped geometry.
-pub fn shipped(name: &str) -> Geometry {
+pub(crate) fn shipped(name: &str) -> Geometry {
     Geometry::shipped(name).unwrap_or_else(|| panic!("{name} is shipped"))
 }
 
 /// The shipped geometries.
-pub fn all() -> Vec<Geometry> {
+pub(crate) fn all() -> Vec<Geometry> {
     Geometry::shipped_names().map(shipped).collect()
 }
 
 /// Where a hand moves in a device: radius of positions, m.
-pub fn reach(geometry: &Geometry) -> f64 {
+pub(crate) fn reach(geometry: &Geometry) -> f64 {
     geometry.half_width() / 3.0
 }
 
 /// A smooth motion of a hand: sines of 1 to 3 Hz, `reach` metres and `angle` radians, incommensurable.
-pub fn motion(time: f64, reach: f64, angle: f64) -> Pose {
+pub(crate) fn motion(time: f64, reach: f64, angle: f64) -> Pose {
     let wave = |hz: f64, phase: f64| (std::f64::consts::TAU * hz * time + phase).sin();
     Pose::new(
         reach * Vector3::new(wave(1.0, 0.3), wave(1.7, 1.1), wave(2.3, 2.0)) / 3_f64.sqrt(),
@@ -68,7 +68,7 @@ pub fn motion(time: f64, reach: f64, angle: f64) -> Pose {
 }
 
 /// Distance (m) and angle (rad) between poses.
-pub fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+pub(crate) fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
     (
         (a.translation.vector - b.translation.vector).norm(),
         a.rotation.angle_to(&b.rotation),
@@ -76,7 +76,7 @@ pub fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
 }
 
 /// One step of the published forward kinematics: damped by `sigma` in unscaled units, two iterations.
-pub fn published_kinematics(
+pub(crate) fn published_kinematics(
     geometry: &Geometry,
     start: &Pose,
     lengths: &PerString,
@@ -104,7 +104,7 @@ pub fn published_kinematics(
 
 /// `min |W t - f|^2 + (torque weight) |.|^2 + s |t|^2` within bounds, by projected coordinate descent: slow, plain, and
 /// nothing in common with the solver under test. The published driver has s = 0.3 and a torque weight of 6.
-pub fn plain_distribution(
+pub(crate) fn plain_distribution(
     strings: &StringMatrix,
     wrench: &Vector6<f64>,
     s: f64,
