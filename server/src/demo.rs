@@ -53,6 +53,7 @@ pub fn run(
         scene: Some(scene),
         no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
         record: args.record.clone(),
+        recording: args.recording.clone(),
         ..Overrides::default()
     };
     let mut setup = session_setup(&workbench, key, &overrides)?;

@@ -35,7 +35,7 @@ const MAX_CUTS: u32 = 12;
 const SEARCH_REGULARISATION: f64 = 1e-11;
 /// Largest weights of tension outside Z, where a wrench can lie on two faces of Z at once and its tensions would switch from one
 /// to the other: where the direction is kept, and where it is not. They grow with the distance from Z, in N, from nothing.
-const SOFTNESS: (f64, f64) = (1e-6, 1e-4);
+const SOFTNESS: (f64, f64) = (3e-7, 1e-4);
 /// A wrench is in Z if it is this near, relative to itself. Small, because tensions near the edge of Z may change two hundred
 /// times as much as the wrench.
 const RELATIVE_NEARNESS: f64 = 1e-6;

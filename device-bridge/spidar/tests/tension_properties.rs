@@ -307,8 +307,8 @@ fn tensions_never_jump_along_a_motion() {
     for geometry in all() {
         for (force, dead) in [(0.0, None), (0.3, None), (1.5, None), (0.3, Some(2))] {
             let force = force * geometry.tension_max;
-            let coarse = largest_change(&geometry, 1.0, 10_000, force, dead);
-            let fine = largest_change(&geometry, 1.0, 160_000, force, dead);
+            let coarse = largest_change(&geometry, 0.5, 2_500, force, dead);
+            let fine = largest_change(&geometry, 0.5, 40_000, force, dead);
             println!(
                 "{} {force} N dead {dead:?}: tensions {:.4} N, wrench {:.4} N; at a sixteenth of the step {:.5} N, {:.5} N",
                 geometry.name, coarse.0, coarse.1, fine.0, fine.1
