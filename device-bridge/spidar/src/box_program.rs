@@ -23,8 +23,8 @@ pub(crate) const MAX_FACTORISATIONS: u32 = 60;
 /// Exchanges of all offenders without progress before Murty's rule takes over.
 const MAX_BLOCK_FAILURES: u32 = 4;
 /// An unknown or a gradient may be this much on the wrong side, relative to the largest entry of the right-hand side
-/// (plus one newton): the rounding of the factorisation.
-const SIDE_TOLERANCE: f64 = 1e-12;
+/// (plus one newton): some twenty times the rounding of a gradient. Over s it is how far a tension may be off, N.
+const SIDE_TOLERANCE: f64 = 2e-14;
 
 /// Where an unknown is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -57,8 +57,8 @@ pub struct TensionSettings {
 impl Default for TensionSettings {
     fn default() -> Self {
         Self {
-            regularisation: 1e-7,
-            margin: 0.01,
+            regularisation: 1e-8,
+            margin: 0.03,
         }
     }
 }
