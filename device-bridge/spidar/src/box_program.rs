@@ -66,6 +66,10 @@ pub(crate) struct BoxAnswer {
     pub(crate) solved: bool,
 }
 
+#[allow(
+    clippy::needless_range_loop,
+    reason = "loops over eight lanes of several arrays, as the compiler vectorises them"
+)]
 impl BoxProgram {
     pub(crate) fn new(rows: &[PerString; 6], regularisation: f64) -> Self {
         let mut gram = [[0.0; STRINGS]; STRINGS];

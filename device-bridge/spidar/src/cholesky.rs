@@ -9,6 +9,10 @@ pub(crate) struct Cholesky<const N: usize> {
     pub(crate) smallest_pivot_ratio: f64,
 }
 
+#[allow(
+    clippy::needless_range_loop,
+    reason = "indices as in the textbook factorisation"
+)]
 impl<const N: usize> Cholesky<N> {
     /// Factorises; reads the lower triangle. `None` if a pivot is not above zero (NaN included).
     #[inline]

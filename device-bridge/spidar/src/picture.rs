@@ -10,7 +10,7 @@ const EDGE: f64 = 300.0;
 /// Space around the drawings, px.
 const MARGIN: f64 = 70.0;
 /// Height of the title, px.
-const TITLE: f64 = 96.0;
+const TITLE: f64 = 104.0;
 /// Space for one legend, px.
 const LEGEND: f64 = 130.0;
 /// Colours from weak to strong, dark to bright, told apart by lightness alone, too.
@@ -27,7 +27,7 @@ const MM: f64 = 1e3;
 #[must_use]
 pub fn picture(geometry: &Geometry, summary: &WorkspaceSummary, map: &WorkspaceMap) -> String {
     let width = 3.0 * EDGE + 4.0 * MARGIN + LEGEND;
-    let height = TITLE + 2.0 * (EDGE + MARGIN) + MARGIN;
+    let height = TITLE + 2.0 * (EDGE + MARGIN);
     let mut svg = String::new();
     let drawn = draw(&mut svg, geometry, summary, map, width, height);
     debug_assert!(drawn.is_ok(), "writing to a string cannot fail");
@@ -60,7 +60,7 @@ fn draw(
     );
     text(svg, MARGIN, 54.0, "start", 13, &figures)?;
     let taut = format!(
-        "All strings taut without any wrench at {:.0} % of the poses within {:.0} mm and {:.0} degrees. Grey: they cannot be, or the grip is at a motor.",
+        "All strings taut without any wrench at {:.0} % of the poses within {:.0} mm and {:.0} degrees. Grey: they cannot be, or the grip is at a motor (red).",
         100.0 * summary.ball_pretension,
         MM * summary.ball_radius,
         summary.ball_rotation.to_degrees(),

@@ -27,8 +27,10 @@ const FADING_SAMPLES: f64 = 1000.0;
 const QUIET_SAMPLES: u32 = 1000;
 /// A string is named if its error explains this share of the residuals ...
 const EXPLAINED: f64 = 0.9;
-/// ... and leaves at most this share of what the next best leaves.
+/// ... leaves at most this share of what the next best leaves ...
 const CLEARER_THAN_NEXT: f64 = 0.5;
+/// ... and that is at least this share of all: more than what the curvature of a large error leaves.
+const NEXT_LEAVES: f64 = 0.03;
 
 /// The string whose error explains the residuals best.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +92,8 @@ impl ResidualMonitor {
     pub fn step(&mut self, answer: &PoseAnswer) -> Consistency {
         let keep = 1.0 - 1.0 / FADING_SAMPLES;
         let disagreement = answer.disagreement();
-        let alarm = !(disagreement <= DISAGREEMENT); // true for NaN
+        let agree = disagreement <= DISAGREEMENT; // false for NaN
+        let alarm = !agree;
         if alarm && self.quiet >= QUIET_SAMPLES {
             self.reset();
         }
@@ -138,7 +141,8 @@ impl ResidualMonitor {
             error: -self.sums[string] / self.weights[string],
             explained: explained / energy,
             certain: explained >= EXPLAINED * self.energy
-                && left <= CLEARER_THAN_NEXT * left_by_next,
+                && left <= CLEARER_THAN_NEXT * left_by_next
+                && left_by_next >= NEXT_LEAVES * self.energy,
         })
     }
 }

@@ -78,7 +78,7 @@ pub fn self_calibrate(
         if !informative {
             return Err(SelfCalibrationError::TooAlike);
         }
-        let inverse = spectrum.eigenvectors.clone()
+        let inverse = spectrum.eigenvectors
             * SMatrix::from_diagonal(&spectrum.eigenvalues.map(f64::recip))
             * spectrum.eigenvectors.transpose();
         let step = inverse * system.residuals;

@@ -11,8 +11,8 @@ use crate::{Geometry, Pose, STRINGS};
 const CELLS: usize = 41;
 /// Largest rotation of the slices of rotation, rad: 60 degrees.
 const SLICE_ROTATION: f64 = std::f64::consts::FRAC_PI_3;
-/// Share of the half width of the frame that the slices of position cover.
-const SLICE_SHARE: f64 = 0.9;
+/// Share of the half width of the frame that the slices of position cover: the motors are just inside.
+const SLICE_SHARE: f64 = 1.05;
 /// Rotation up to which poses of the ball are drawn, rad: 29 degrees.
 const BALL_ROTATION: f64 = 0.5;
 /// Poses drawn in the ball.

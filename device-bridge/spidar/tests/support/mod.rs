@@ -86,11 +86,11 @@ pub(crate) fn published_kinematics(
     for _ in 0..2 {
         let strings = StringMatrix::at(geometry, &pose);
         let (mut normal, mut right) = (Matrix6::identity() * sigma, Vector6::zeros());
-        for i in 0..8 {
+        for (i, measured) in lengths.iter().enumerate() {
             let (u, w) = (strings.direction(i), strings.moment(i));
             let row = Vector6::new(u.x, u.y, u.z, w.x, w.y, w.z);
             normal += row * row.transpose();
-            right += row * (strings.lengths[i] - lengths[i]);
+            right += row * (strings.lengths[i] - measured);
         }
         let step = normal.cholesky().expect("damped").solve(&right);
         let turn: Vector3<f64> = step.fixed_rows::<3>(3).into();
