@@ -63,7 +63,7 @@ fn distribution(
 ) {
     let mut solver = TensionSolver::new(geometry, TensionSettings::default());
     let mut times = Vec::new();
-    let (mut rendered, mut factorisations) = (0_u32, 0);
+    let (mut rendered, mut factorisations, mut most) = (0_u32, 0, 0);
     for tick in 0..ticks {
         let (pose, wrench) = at(tick);
         let strings = StringMatrix::at(geometry, &pose);
@@ -71,9 +71,10 @@ fn distribution(
         times.push(time);
         rendered += u32::from(answer.status == TensionStatus::Rendered);
         factorisations += answer.factorisations;
+        most = most.max(answer.factorisations);
     }
     let note = format!(
-        "{:.0} % rendered fully, {:.2} factorisations each",
+        "{:.0} % rendered fully, {:.2} factorisations each, at most {most}",
         100.0 * f64::from(rendered) / f64::from(ticks),
         f64::from(factorisations) / f64::from(ticks)
     );

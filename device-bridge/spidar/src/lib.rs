@@ -29,18 +29,20 @@ mod geometry_file;
 mod hardware;
 pub mod kinematics;
 mod picture;
+mod reach;
 mod residual;
 mod self_calibration;
 mod simulated;
 mod string_matrix;
 pub mod tension;
+mod toml_reader;
 mod velocity;
 mod workspace;
 
 pub use calibration::Encoders;
 pub use fault::StringFault;
 pub use geometry::Geometry;
-pub use geometry_file::{GeometryError, GeometryProblem};
+pub use geometry_file::GeometryError;
 pub use hardware::{Reading, StringHardware};
 pub use kinematics::{ForwardKinematics, PoseAnswer};
 pub use picture::picture;
@@ -49,6 +51,7 @@ pub use self_calibration::{SelfCalibration, SelfCalibrationError, self_calibrate
 pub use simulated::{SimulatedStrings, StringLosses};
 pub use string_matrix::StringMatrix;
 pub use tension::{MotorState, TensionAnswer, TensionSettings, TensionSolver, TensionStatus};
+pub use toml_reader::GeometryProblem;
 pub use velocity::LengthRates;
 pub use workspace::{
     Capability, Extreme, Slice, WorkspaceMap, WorkspaceSummary, ball, capability, summary,

@@ -25,22 +25,16 @@
 
 use nalgebra::Vector6;
 
-use crate::box_program::{Bounds, BoxAnswer, BoxProgram, Side};
+use crate::box_program::{Bounds, BoxProgram, Side};
+use crate::reach::{NEARNESS, Ray, Search, distance, nearness, norm};
 use crate::string_matrix::StringMatrix;
 use crate::{Geometry, PerString, STRINGS};
 
-/// Most cutting planes of one search for the scale.
-const MAX_CUTS: u32 = 12;
 /// s of the searches for a scale, where only the wrench counts: the planes are off by s times the squares of the tensions.
 const SEARCH_REGULARISATION: f64 = 1e-11;
 /// Largest weights of tension outside Z, where a wrench can lie on two faces of Z at once and its tensions would switch from one
 /// to the other: where the direction is kept, and where it is not. They grow with the distance from Z, in N, from nothing.
 const SOFTNESS: (f64, f64) = (3e-7, 1e-4);
-/// A wrench is in Z if it is this near, relative to itself. Small, because tensions near the edge of Z may change two hundred
-/// times as much as the wrench.
-const RELATIVE_NEARNESS: f64 = 1e-6;
-/// The same, absolute, N: above what the regularisation adds, a thousandth of what a finger feels.
-const NEARNESS: f64 = 2e-5;
 /// A wrench counts as rendered if it errs by at most this, relative to itself: a tenth of what is promised.
 const RENDERED: f64 = 1e-4;
 
@@ -78,7 +72,7 @@ pub enum MotorState {
 /// How the rendered wrench relates to the commanded one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TensionStatus {
-    /// They agree within 0.1 % (or a micronewton).
+    /// They agree within 0.01 % and 20 micronewtons, torque over G.
     Rendered,
     /// It has the same direction in all six components, and [`TensionAnswer::scale`] of the size.
     Scaled,
@@ -129,21 +123,6 @@ struct Memory {
     rest: Ray,
     /// Of the command's direction.
     direction: Ray,
-}
-
-/// What a search along a ray leaves for the next one.
-#[derive(Clone, Copy, Debug)]
-struct Ray {
-    sides: [Side; STRINGS],
-    /// Normal of the last cutting plane, of any length.
-    normal: [f64; 6],
-}
-
-impl Ray {
-    const UNKNOWN: Self = Self {
-        sides: [Side::Lower; STRINGS],
-        normal: [0.0; 6],
-    };
 }
 
 impl TensionSolver {
@@ -214,7 +193,7 @@ impl TensionSolver {
         let mut found = search.nearest(target, &mut memory.command);
         let (mut status, mut scale) = (TensionStatus::Rendered, 1.0);
         let gap = distance(&found.image, target);
-        if gap > NEARNESS + RELATIVE_NEARNESS * norm(target) {
+        if gap > nearness(target) {
             // How far inside the workspace: 1 is far enough to keep the direction.
             let mut rays = self.search(rows, SEARCH_REGULARISATION);
             let inside = self.insideness(&mut rays, &mut memory.rest);
@@ -324,79 +303,4 @@ impl TensionSolver {
             factorisations: 0,
         }
     }
-}
-
-/// One pose's problem.
-struct Search {
-    program: BoxProgram,
-    bounds: Bounds,
-    factorisations: u32,
-}
-
-impl Search {
-    /// The nearest point of Z to `target`, with the lowest tensions that render it. `sides` is a guess and becomes the answer's.
-    fn nearest(&mut self, target: &[f64; 6], sides: &mut [Side; STRINGS]) -> BoxAnswer {
-        let found = self
-            .program
-            .solve(target, &self.bounds.lower, &self.bounds, sides);
-        self.factorisations += found.factorisations;
-        if found.solved {
-            *sides = found.sides;
-        }
-        found
-    }
-
-    /// The largest alpha in [0, 1] with `alpha f` in Z; `None` if the ray misses Z. `ray` only saves time.
-    ///
-    /// Never less than the true one: `n . z <= support(n)` on Z for every n, exact or not, so that each cut is valid.
-    fn largest_scale(&mut self, f: &[f64; 6], ray: &mut Ray) -> Option<f64> {
-        // The last search's normal is a good first cut.
-        let first = self.support(&ray.normal) / dot(&ray.normal, f);
-        let cuts = dot(&ray.normal, f) > 0.0 && (0.0..1.0).contains(&first);
-        let mut alpha = if cuts { first } else { 1.0 };
-        for _ in 0..MAX_CUTS {
-            let target = f.map(|f| alpha * f);
-            let found = self.nearest(&target, &mut ray.sides);
-            let normal: [f64; 6] = std::array::from_fn(|k| target[k] - found.image[k]);
-            if norm(&normal) <= NEARNESS + RELATIVE_NEARNESS * norm(&target) {
-                break;
-            }
-            let (along, support) = (dot(&normal, f), self.support(&normal));
-            let separated = alpha * along > support; // false for NaN
-            if !separated {
-                break; // what is left is rounding
-            }
-            if along <= 0.0 || support < 0.0 {
-                return None;
-            }
-            ray.normal = normal;
-            alpha = support / along;
-        }
-        Some(alpha)
-    }
-
-    /// The largest `n . z` over z in Z.
-    fn support(&self, normal: &[f64; 6]) -> f64 {
-        (0..STRINGS)
-            .map(|i| {
-                let along = self.program.along(normal, i);
-                (along * self.bounds.lower[i]).max(along * self.bounds.upper[i])
-            })
-            .sum()
-    }
-}
-
-fn dot(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    (0..6).map(|k| a[k] * b[k]).sum()
-}
-
-fn norm(f: &[f64; 6]) -> f64 {
-    dot(f, f).sqrt()
-}
-
-fn distance(a: &[f64; 6], b: &[f64; 6]) -> f64 {
-    (0..6)
-        .map(|k| (a[k] - b[k]) * (a[k] - b[k]))
-        .sum::<f64>()
-        .sqrt()
 }
