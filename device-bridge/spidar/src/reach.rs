@@ -3,8 +3,8 @@
 //! Z is the set of scaled wrenches `A t` within the bounds, see [`crate::tension`]. It is convex, so the way from its nearest point to a
 //! target outside is the normal of a plane that Z lies behind.
 
+use crate::STRINGS;
 use crate::box_program::{Bounds, BoxAnswer, BoxProgram, Side};
-use crate::{PerString, STRINGS};
 
 /// Most cutting planes of one search for the scale.
 const MAX_CUTS: u32 = 12;

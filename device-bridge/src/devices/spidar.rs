@@ -20,7 +20,6 @@ use taut_spidar::{
     TensionSettings, TensionSolver, capability,
 };
 
-use super::min_jerk::stack;
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 
 /// Rate of the published controllers, Hz.
@@ -244,6 +243,10 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
         self.tensions = Some(answer);
         self.hardware.write_tensions(now, &answer.tensions);
     }
+}
+
+fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] })
 }
 
 fn halves(six: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
