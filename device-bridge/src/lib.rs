@@ -28,8 +28,9 @@ pub use cli::{BridgeArgs, CouplingChoice, DeviceChoice, SafetyArgs, UnknownDevic
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
-    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError,
-    TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, min_jerk,
+    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
+    SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
+    min_jerk,
 };
 pub use port::{
     ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,

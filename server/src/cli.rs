@@ -41,7 +41,7 @@ pub enum Command {
     Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
-    /// Says what this machine lacks for real time and for rendering
+    /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Makes a cluster key, the secret that all machines of a workbench share
     Keys(KeysArgs),
@@ -225,8 +225,16 @@ pub struct CheckArgs {
 
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut doctor --json")]
+#[command(
+    after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
+)]
 pub struct DoctorArgs {
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub device: Option<String>,
+    /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
+    #[arg(long, value_name = "FILE.svg", requires = "device")]
+    pub out: Option<PathBuf>,
     /// Print the findings as JSON on standard output
     #[arg(long)]
     pub json: bool,
