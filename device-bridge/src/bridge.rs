@@ -22,12 +22,14 @@ use taut_link::proto::control::LogLevel;
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
 use crate::bridge_loop::{BridgeLoop, Notice};
-use crate::cli::{BridgeArgs, DeviceChoice};
+use crate::choice::{DeviceChoice, InputChoice, InputError};
+use crate::cli::BridgeArgs;
 use crate::device::{Device, DeviceFault};
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::devices::{
     AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
 };
+use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
 use crate::safety::{Safety, SafetySettings};
@@ -86,6 +88,12 @@ pub enum BridgeError {
         /// Why.
         cause: TraceError,
     },
+    /// An input device cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The mouse is none of a bridge's.
+    #[error("the mouse belongs to a render window: use `taut render --hold` instead of a bridge")]
+    Mouse,
     /// The server cannot be joined.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -168,6 +176,7 @@ enum Motion {
     Sway,
     Path(MinJerkPath),
     Trace(PathBuf, Trace),
+    Input(InputChoice),
 }
 
 fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
@@ -194,6 +203,8 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
     }
 
     let motion = match (&args.device, &args.path) {
+        (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
+        (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
         (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
         (DeviceChoice::Simulated, None) => Motion::Sway,
         (DeviceChoice::Simulated, Some(file)) => {
@@ -235,6 +246,9 @@ fn build_loop(
     let device: Box<dyn Device> = match motion {
         Motion::Sway => Box::new(held(MinJerkPath::sway(start, SWAY.0, SWAY.1))),
         Motion::Path(path) => Box::new(held(path.clone())),
+        Motion::Input(input) => {
+            input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
+        }
         Motion::Trace(path, trace) => {
             let at_end = if args.looping {
                 AtEnd::Loop

@@ -2,17 +2,17 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
 
 use taut_link::Transport;
 
 use crate::bridge::{BridgeError, run};
+use crate::choice::{DeviceChoice, drivers_help};
 use crate::devices::HandPreset;
 
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Example: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.
@@ -27,7 +27,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "NAME", default_value = "bridge")]
     pub node: String,
 
-    /// Device: `simulated`, or `trace:FILE` to replay a recorded one.
+    /// Device: `simulated`, `trace:FILE`, `space-mouse`, `vrpn:TRACKER@HOST`; options below.
     #[arg(long, value_name = "D", default_value = "simulated")]
     pub device: DeviceChoice,
 
@@ -75,32 +75,6 @@ pub struct BridgeArgs {
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Which device a bridge reads.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum DeviceChoice {
-    /// [`crate::SimulatedDevice`].
-    Simulated,
-    /// [`crate::RecordedDevice`] of a trace file.
-    Trace(PathBuf),
-}
-
-/// A word that names no device.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no device `{0}`; use simulated or trace:FILE")]
-pub struct UnknownDevice(String);
-
-impl FromStr for DeviceChoice {
-    type Err = UnknownDevice;
-
-    fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        match text.split_once(':') {
-            None if text == "simulated" => Ok(Self::Simulated),
-            Some(("trace", file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
-            _ => Err(UnknownDevice(text.to_owned())),
-        }
-    }
 }
 
 fn parse_transport(text: &str) -> Result<Transport, String> {
@@ -186,8 +160,8 @@ mod tests {
     #[test]
     fn a_wrong_word_is_answered_with_the_right_ones() {
         for (words, part) in [
-            (["--device", "spidar"], "use simulated or trace:FILE"),
-            (["--device", "trace:"], "use simulated or trace:FILE"),
+            (["--device", "simulator"], "did you mean `simulated`?"),
+            (["--device", "trace:"], "write trace:FILE"),
             (["--hand", "fist"], "use released, light, firm or arm"),
             (["--transport", "tcp"], "use udp or quic"),
         ] {
