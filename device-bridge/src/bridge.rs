@@ -144,6 +144,36 @@ impl BridgeError {
 /// [`BridgeError`]: bad input is found before anything is started.
 pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let (options, motion) = prepare(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    run_loop(args, options, stop, |scene| {
+        build_loop(args, &motion, scene)
+    })
+}
+
+/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
+/// `--device`, `--hand` and `--path` of `args` are not looked at.
+///
+/// # Errors
+/// [`BridgeError`].
+pub fn run_device(
+    args: &BridgeArgs,
+    stop: Arc<AtomicBool>,
+    make: impl FnOnce(Placement) -> Box<dyn Device>,
+) -> Result<BridgeReport, BridgeError> {
+    let options = client_options(args)?;
+    run_loop(args, options, stop, |scene| {
+        let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
+        let reference_point = placement.reference_point;
+        Ok(with_safety(make(placement), reference_point))
+    })
+}
+
+fn run_loop(
+    args: &BridgeArgs,
+    options: ClientOptions,
+    stop: Arc<AtomicBool>,
+    build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
+) -> Result<BridgeReport, BridgeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("taut-bridge-net")
@@ -153,11 +183,10 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
             what: "the network",
             cause,
         })?;
-    let stop = Arc::new(AtomicBool::new(false));
     runtime.spawn(stop_on_signal(Arc::clone(&stop)));
 
     let first = runtime.block_on(connect(options.clone()))?;
-    let bridge = build_loop(args, &motion, first.description())?;
+    let bridge = build(first.description())?;
     let mut run = Run {
         args,
         options,
@@ -216,6 +245,10 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         }
     };
 
+    Ok((client_options(args)?, motion))
+}
+
+fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
     let key_file = args
         .key
         .clone()
@@ -225,7 +258,7 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;
-    Ok((options, motion))
+    Ok(options)
 }
 
 fn build_loop(
@@ -262,13 +295,17 @@ fn build_loop(
             })?)
         }
     };
+    Ok(with_safety(device, reference_point))
+}
+
+fn with_safety(device: Box<dyn Device>, reference_point: Point3<f64>) -> BridgeLoop {
     let limits = device.info().limits;
     let safety = Safety::new(SafetySettings {
         max_force: limits.max_force,
         max_torque: limits.max_torque,
         ..SafetySettings::default()
     });
-    Ok(BridgeLoop::new(device, safety, reference_point))
+    BridgeLoop::new(device, safety, reference_point)
 }
 
 async fn stop_on_signal(stop: Arc<AtomicBool>) {

@@ -64,7 +64,7 @@ pub struct BridgeArgs {
     #[arg(long)]
     pub reconnect: bool,
 
-    /// Real-time priority of the device loop, 1 to 99; 0 asks for none.
+    /// Real-time priority of the device loop, 1 to 99; 0 asks for no real time at all.
     #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     pub priority: u8,
 
@@ -75,6 +75,22 @@ pub struct BridgeArgs {
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+impl BridgeArgs {
+    /// The arguments of `taut bridge --server SERVER --node NODE`, all others as when they are left out.
+    #[must_use]
+    pub fn joining(server: &str, node: &str) -> Option<Self> {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            args: BridgeArgs,
+        }
+        let server = format!("--server={server}");
+        let node = format!("--node={node}");
+        let line = <Line as clap::Parser>::try_parse_from(["taut-bridge", &server, &node]);
+        line.ok().map(|line| line.args)
+    }
 }
 
 fn parse_transport(text: &str) -> Result<Transport, String> {
@@ -135,6 +151,16 @@ mod tests {
         assert_eq!(args.device, DeviceChoice::Simulated);
         assert_eq!(args.hand, HandPreset::Light);
         assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
+    }
+
+    #[test]
+    fn arguments_can_be_made_without_a_command_line() {
+        let args = BridgeArgs::joining("pc:4857", "wall-hand").expect("valid");
+        assert_eq!(
+            (args.server.as_str(), args.node.as_str()),
+            ("pc:4857", "wall-hand")
+        );
+        assert_eq!(args.rate, 1000.0);
     }
 
     #[test]

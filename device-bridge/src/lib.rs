@@ -24,16 +24,16 @@ mod safety;
 mod trace_file;
 mod vrpn;
 
-pub use bridge::{BridgeError, run};
+pub use bridge::{BridgeError, run, run_device};
 pub use choice::{
     DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
 };
 pub use cli::{BridgeArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 pub use devices::{
-    Anchor, CapMode, CapSettings, CapState, Glide, HidPort, MODELS, Model, RateControl, Report,
-    ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, TrackerReader, VrpnDevice,
-    VrpnSettings,
+    Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
+    Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,
+    VrpnDevice, VrpnSettings,
 };
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,

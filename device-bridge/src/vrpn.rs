@@ -10,6 +10,7 @@
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::str::FromStr;
+use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
@@ -90,9 +91,14 @@ pub struct TrackerState {
     pub is_connected: bool,
 }
 
-/// The reader's end. Dropping it ends the thread.
+/// A reader's end. Dropping the last one ends the thread.
 pub struct TrackerFeed {
     newest: triple_buffer::Output<TrackerState>,
+    _thread: Arc<ListeningThread>,
+}
+
+/// Dropping it ends the thread.
+struct ListeningThread {
     end: Option<oneshot::Sender<()>>,
     thread: Option<thread::JoinHandle<()>>,
 }
@@ -103,7 +109,23 @@ impl TrackerFeed {
     /// # Errors
     /// No thread or no socket can be had.
     pub fn start(source: VrpnSource) -> std::io::Result<Self> {
-        let (output, newest) = triple_buffer::TripleBuffer::new(&TrackerState::default()).split();
+        let [feed] = Self::start_for(source)?;
+        Ok(feed)
+    }
+
+    /// The same for several readers of one connection.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn start_for<const READERS: usize>(source: VrpnSource) -> std::io::Result<[Self; READERS]> {
+        let buffers = std::array::from_fn::<_, READERS, _>(|_| {
+            triple_buffer::TripleBuffer::new(&TrackerState::default()).split()
+        });
+        let mut outputs = Vec::with_capacity(READERS);
+        let readers = buffers.map(|(output, newest)| {
+            outputs.push(output);
+            newest
+        });
         let (end, ended) = oneshot::channel();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
@@ -114,15 +136,18 @@ impl TrackerFeed {
                 runtime.block_on(async {
                     tokio::select! {
                         _ = ended => {}
-                        () = Listener::new(source, output).run() => {}
+                        () = Listener::new(source, outputs).run() => {}
                     }
                 });
             })?;
-        Ok(Self {
-            newest,
+        let thread = Arc::new(ListeningThread {
             end: Some(end),
             thread: Some(thread),
-        })
+        });
+        Ok(readers.map(|newest| Self {
+            newest,
+            _thread: Arc::clone(&thread),
+        }))
     }
 
     /// What the tracker said last. Neither waits nor allocates.
@@ -131,7 +156,7 @@ impl TrackerFeed {
     }
 }
 
-impl Drop for TrackerFeed {
+impl Drop for ListeningThread {
     fn drop(&mut self) {
         drop(self.end.take());
         if let Some(thread) = self.thread.take() {
@@ -175,15 +200,15 @@ struct Connection {
 /// The thread's own.
 struct Listener {
     source: VrpnSource,
-    output: triple_buffer::Input<TrackerState>,
+    outputs: Vec<triple_buffer::Input<TrackerState>>,
     state: TrackerState,
 }
 
 impl Listener {
-    fn new(source: VrpnSource, output: triple_buffer::Input<TrackerState>) -> Self {
+    fn new(source: VrpnSource, outputs: Vec<triple_buffer::Input<TrackerState>>) -> Self {
         Self {
             source,
-            output,
+            outputs,
             state: TrackerState::default(),
         }
     }
@@ -221,7 +246,13 @@ impl Listener {
     fn set_connected(&mut self, is_connected: bool) {
         self.state.is_connected = is_connected;
         self.state.buttons = 0;
-        self.output.write(self.state);
+        self.publish();
+    }
+
+    fn publish(&mut self) {
+        for output in &mut self.outputs {
+            output.write(self.state);
+        }
     }
 
     async fn call(&self) -> Result<Connection, Lost> {
@@ -319,7 +350,7 @@ impl Listener {
                 changed |= self.take(event);
             }
             if changed {
-                self.output.write(self.state);
+                self.publish();
             }
         }
     }

@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_bridge::SafetySettings;
+use taut_bridge::{InputChoice, SafetySettings};
 use taut_link::ClusterKey;
 use taut_scene::{HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
 
 use crate::content::content;
-use crate::devices::device;
+use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
-use crate::head::{Head, Sway};
+use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, SessionSetup};
@@ -40,6 +40,8 @@ pub struct Overrides {
     pub no_monitor: bool,
     /// Where the monitor records.
     pub record: Option<PathBuf>,
+    /// An input device instead of the workbench's.
+    pub input: Option<InputChoice>,
 }
 
 /// Puts the session together. Files are read and checked, nothing is started.
@@ -59,7 +61,8 @@ pub fn session_setup(
             built.world.obstacles[motion.obstacle].name
         )));
     }
-    let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
+    let workbench_from_scene = workbench.workbench_from_scene(&scene);
+    let content = content(&built, workbench, &workbench_from_scene)?;
     let network = &workbench.network;
     let link = LinkSettings {
         quic: overrides
@@ -77,7 +80,10 @@ pub fn session_setup(
         ..SafetySettings::default()
     };
     Ok(SessionSetup {
-        device: device(&workbench.device, &built)?,
+        device: match &overrides.input {
+            Some(choice) => input(choice, &built, &workbench_from_scene)?,
+            None => device(&workbench.device, &built, &workbench_from_scene)?,
+        },
         settings: built.settings,
         start: built.start,
         world: Arc::new(built.world),
@@ -90,13 +96,20 @@ pub fn session_setup(
     })
 }
 
-fn head(viewer: &Viewer) -> Head {
-    Head {
+fn head(viewer: &Viewer) -> HeadSource {
+    HeadSource {
         rest: viewer.head,
         eye_separation: viewer.eye_separation,
-        sway: match viewer.tracking {
-            HeadTracking::Fixed => None,
-            HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
+        motion: match &viewer.tracking {
+            HeadTracking::Fixed => HeadMotion::Still,
+            HeadTracking::Sway { amplitude, period } => HeadMotion::Sway(Sway {
+                amplitude: *amplitude,
+                period: *period,
+            }),
+            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(TrackerSource {
+                source: vrpn_source(sensor),
+                mapping: sensor.mapping,
+            }),
         },
     }
 }

@@ -31,6 +31,7 @@ pub fn run(
         udp: args.udp,
         no_monitor: args.no_monitor,
         record: args.record.clone(),
+        input: None,
     };
     let setup = session_setup(&workbench, key, &overrides)?;
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;

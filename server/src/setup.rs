@@ -8,7 +8,7 @@ use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::{ClusterKey, Content};
 
-use crate::head::Head;
+use crate::head::HeadSource;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -25,7 +25,7 @@ pub struct SessionSetup {
     /// Limits and times of the force.
     pub safety: SafetySettings,
     /// The viewer.
-    pub head: Head,
+    pub head: HeadSource,
     /// What clients fetch at join.
     pub content: Content,
     /// Addresses, key and limits of the network.

@@ -3,6 +3,7 @@
 pub(crate) mod glide;
 pub(crate) mod grip;
 pub(crate) mod hand;
+pub(crate) mod led;
 pub(crate) mod min_jerk;
 pub(crate) mod rate_control;
 pub(crate) mod recorded;
@@ -15,6 +16,7 @@ pub(crate) mod vrpn;
 pub use glide::Glide;
 pub use grip::Grip;
 pub use hand::{Hand, HandPreset, UnknownHand};
+pub use led::{LedDevice, Target};
 pub use min_jerk::{MinJerkPath, PathError, Progress, ViaPoint, min_jerk};
 pub use rate_control::{CapMode, CapSettings, RateControl};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};

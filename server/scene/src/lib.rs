@@ -38,7 +38,7 @@ pub use trace::{
 };
 pub use workbench::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH,
-    Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
+    Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window, Workbench,
 };
 
 /// Why a scene could not be used.

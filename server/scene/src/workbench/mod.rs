@@ -3,9 +3,10 @@
 mod load;
 mod parse;
 mod spec;
+mod tracker;
 
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
-    TransportKind, Viewer, Window,
+    TransportKind, Viewer, VrpnSensor, Window,
 };
