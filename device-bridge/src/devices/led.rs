@@ -11,9 +11,8 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
-use super::min_jerk::{is_finite, stack};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
-use crate::placement::Placement;
+use crate::placement::{Placement, stacked};
 
 /// tau: two frames of a slow window.
 const LAG_S: f64 = 0.04;
@@ -84,7 +83,7 @@ impl Device for LedDevice {
         let last = self.last.replace(now).unwrap_or(now);
         let passed = now.saturating_sub(last).min(MAX_STEP).as_secs_f64();
         let target = *self.targets.read();
-        let (linear, angular) = if is_finite(&target.pose) {
+        let (linear, angular) = if target.pose.to_homogeneous().iter().all(|x| x.is_finite()) {
             self.approach(&target.pose)
         } else {
             (Vector3::zeros(), Vector3::zeros())
@@ -98,7 +97,7 @@ impl Device for LedDevice {
         Ok(DeviceSample {
             time: now,
             pose: self.placement.from_reference_point(&self.pose),
-            velocity: stack(&linear, &angular),
+            velocity: stacked(&linear, &angular),
             buttons: target.buttons,
         })
     }

@@ -18,9 +18,8 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 
-use super::min_jerk::stack;
 use crate::device::Pose;
-use crate::placement::Placement;
+use crate::placement::{Placement, stacked};
 
 /// Time constant of the approach to a position, s: slower than the hand's own tremor, faster than its patience.
 const POSITION_LAG_S: f64 = 0.05;
@@ -141,7 +140,7 @@ impl RateControl {
             turn * self.pose.rotation,
         );
         self.pose.rotation.renormalize_fast();
-        self.velocity = stack(&linear, &angular);
+        self.velocity = stacked(&linear, &angular);
     }
 
     /// Velocity of G and angular velocity that the cap asks for, world axes.

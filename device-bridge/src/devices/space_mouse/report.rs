@@ -16,6 +16,8 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use crate::placement::stacked;
+
 /// Counts that count as full deflection.
 pub(crate) const FULL_DEFLECTION: f64 = 350.0;
 
@@ -120,7 +122,7 @@ impl CapState {
             let [x, y, z] = counts.map(|count| f64::from(count) / FULL_DEFLECTION);
             Vector3::new(x, -y, -z).map(|u| u.clamp(-1.0, 1.0))
         };
-        super::super::min_jerk::stack(&upright(self.translation), &upright(self.rotation))
+        stacked(&upright(self.translation), &upright(self.rotation))
     }
 }
 
