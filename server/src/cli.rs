@@ -71,6 +71,9 @@ pub struct DemoArgs {
     /// Also write what the monitor shows to this file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
+    /// Record the session into this new directory, to be computed again by `taut replay --recording`
+    #[arg(long, value_name = "DIR")]
+    pub recording: Option<PathBuf>,
     /// Do without the monitor and its web viewer
     #[arg(long)]
     pub no_monitor: bool,
@@ -110,6 +113,9 @@ pub struct ServeArgs {
     /// Also write what the monitor shows to this file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
+    /// Record the session into this new directory, to be computed again by `taut replay --recording`
+    #[arg(long, value_name = "DIR")]
+    pub recording: Option<PathBuf>,
     /// Do without the monitor, whatever the workbench file says
     #[arg(long)]
     pub no_monitor: bool,
@@ -125,14 +131,21 @@ pub struct ServeArgs {
 )]
 pub struct ReplayArgs {
     /// A shipped scene by its name, or a scene file
-    #[arg(long, value_name = "F")]
-    pub scene: String,
+    #[arg(long, value_name = "F", required_unless_present = "recording")]
+    pub scene: Option<String>,
     /// The device trace
-    #[arg(long, value_name = "T")]
-    pub trace: PathBuf,
-    /// Where the answer goes, a CSV file
-    #[arg(long, value_name = "O")]
-    pub out: PathBuf,
+    #[arg(long, value_name = "T", required_unless_present = "recording")]
+    pub trace: Option<PathBuf>,
+    /// Instead of scene and trace: a recorded session, computed again and compared bit by bit
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["scene", "trace", "god_object_rate", "budget_us", "solver", "overrides"]
+    )]
+    pub recording: Option<PathBuf>,
+    /// Where the answer goes, a CSV file; a recorded session needs none
+    #[arg(long, value_name = "O", required_unless_present = "recording")]
+    pub out: Option<PathBuf>,
     /// Virtual rate of the god-object loop (default: once per row of the trace)
     #[arg(long, value_name = "HZ", value_parser = positive_rate)]
     pub god_object_rate: Option<f64>,

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use taut_bridge::{InputChoice, SafetySettings};
 use taut_link::ClusterKey;
-use taut_scene::{HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
+use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
+use taut_scene::{BuiltScene, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
 
 use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
@@ -15,7 +16,7 @@ use crate::failure::Failure;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
-use crate::setup::{LinkSettings, RealtimeSettings, SessionSetup};
+use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -42,6 +43,8 @@ pub struct Overrides {
     pub record: Option<PathBuf>,
     /// An input device instead of the workbench's.
     pub input: Option<InputChoice>,
+    /// Where the session is recorded.
+    pub recording: Option<PathBuf>,
 }
 
 /// Puts the session together. Files are read and checked, nothing is started.
@@ -79,7 +82,12 @@ pub fn session_setup(
         max_torque: built.settings.torque_limit,
         ..SafetySettings::default()
     };
+    let recording = overrides
+        .recording
+        .as_ref()
+        .map(|directory| recording(directory.clone(), &scene, &built));
     Ok(SessionSetup {
+        recording,
         device: match &overrides.input {
             Some(choice) => input(choice, &built, &workbench_from_scene)?,
             None => device(&workbench.device, &built, &workbench_from_scene)?,
@@ -94,6 +102,28 @@ pub fn session_setup(
         realtime: realtime(workbench),
         monitor: monitor(&workbench.monitoring, overrides),
     })
+}
+
+fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> RecordingSettings {
+    let source = scene.source();
+    RecordingSettings {
+        directory,
+        manifest: Manifest {
+            format: FORMAT,
+            program: format!("taut {}", env!("CARGO_PKG_VERSION")),
+            scene: scene.name().to_owned(),
+            origin: source.directory.map_or(SceneOrigin::Shipped, |directory| {
+                // Where it is now counts; a directory that vanished meanwhile is told when it is looked into.
+                SceneOrigin::Directory(std::path::absolute(&directory).unwrap_or(directory))
+            }),
+            overrides: source.overrides,
+            identity: identity_of(&built.world, &built.settings, &built.start),
+            complete: false,
+            reason: Some("the session did not come to its end".to_owned()),
+            lost: Lost::default(),
+        },
+        scene: source.text,
+    }
 }
 
 fn head(viewer: &Viewer) -> HeadSource {

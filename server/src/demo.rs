@@ -75,6 +75,7 @@ pub fn run(
             DeviceChoice::Input(input) if !args.bridge => Some(input),
             _ => None,
         },
+        recording: args.recording.clone(),
         ..Overrides::default()
     };
     let mut setup = session_setup(&workbench, key, &overrides)?;

@@ -32,6 +32,7 @@ pub mod loops;
 pub mod monitor;
 pub mod realtime;
 pub mod record;
+pub mod recorded_session;
 pub mod rendering;
 pub mod replay;
 pub mod report;

@@ -1,5 +1,6 @@
 //! The binary `taut`: one sub-command per role.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -8,8 +9,9 @@ use serde::Serialize;
 use taut::cli::{CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs};
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
+use taut::signals::BlockingEndSignal;
 use taut::terminal::Terminal;
-use taut::{demo, doctor, record, rendering, replay, serve};
+use taut::{demo, doctor, record, recorded_session, rendering, replay, serve};
 use tracing_subscriber::EnvFilter;
 
 /// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
@@ -70,6 +72,9 @@ fn end_session(
 }
 
 fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
+    if let Some(directory) = &args.recording {
+        return recorded_command(directory, args);
+    }
     let report: ReplayReport = replay::run(args)?;
     if args.json {
         print_json(&report)?;
@@ -77,6 +82,24 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
         println!("{report}");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A session computed again must come to the same: a difference is a failure.
+fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
+    let interrupted = BlockingEndSignal::listen()
+        .and_then(BlockingEndSignal::into_request)
+        .map_err(Failure::failed)?;
+    let report = recorded_session::run(directory, args.out.as_deref(), args.timings, &interrupted)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        println!("{report}");
+    }
+    Ok(if report.first_difference.is_none() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(EXIT_FAILED)
+    })
 }
 
 fn record_command(args: &RecordArgs) -> Result<ExitCode> {

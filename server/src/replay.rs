@@ -38,8 +38,13 @@ const EARLY_SHARE: f64 = 1e-6;
 
 /// `taut replay`: the trace through the scene, the answer into a file. Nothing is left of a replay that does not end.
 pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
-    let scene = Scene::named_or_file(&args.scene)?.with_overrides(&args.overrides)?;
-    let trace = DeviceTrace::load(&args.trace)?;
+    let (Some(scene), Some(trace), Some(out)) = (&args.scene, &args.trace, &args.out) else {
+        return Err(Failure::bad_input(
+            "a replay needs --scene, --trace and --out, or --recording",
+        ));
+    };
+    let scene = Scene::named_or_file(scene)?.with_overrides(&args.overrides)?;
+    let trace = DeviceTrace::load(trace)?;
     let built = scene.build()?;
     let mut settings = built.settings;
     if let Some(solver) = args.solver {
@@ -63,16 +68,16 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
     let cannot_write = |error: io::Error| {
         Failure::BadInput(format!(
             "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",
-            args.out.display()
+            out.display()
         ))
     };
-    let file = FinishedFile::create(&args.out).map_err(cannot_write)?;
+    let file = FinishedFile::create(out).map_err(cannot_write)?;
     let mut writer = ReplayWriter::new(file, args.timings).map_err(cannot_write)?;
     write_answers(&mut replay, &trace, &mut writer, &interrupted).map_err(cannot_write)?;
     if interrupted.is_asked() {
         return Err(Failure::Failed(format!(
             "the replay was interrupted, and {} was not written",
-            args.out.display()
+            out.display()
         )));
     }
     writer

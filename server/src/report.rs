@@ -6,7 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::timing::Distribution;
+use crate::timing::{Bin, Distribution};
 
 /// What `taut demo` and `taut serve` measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,8 @@ pub struct SessionReport {
     pub haptics_hz: f64,
     /// Time between two ticks of the haptics loop.
     pub haptics_period_us: Distribution,
+    /// The same as a histogram: what jitter looks like.
+    pub haptics_period_bins_us: Vec<Bin>,
     /// Deadlines of the haptics loop that passed without a tick in their period.
     pub deadline_misses: u64,
     /// Thread CPU time of one god-object update.
@@ -114,6 +116,29 @@ pub struct ReplayReport {
     pub work: WorkReport,
 }
 
+/// What came of computing a recorded session again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RecordedReport {
+    /// Name of the scene.
+    pub scene: String,
+    /// The session came to its end and nothing of it was lost.
+    pub complete: bool,
+    /// God-object updates computed again.
+    pub updates: u64,
+    /// Forces computed again.
+    pub forces: u64,
+    /// Updates whose pose, gap or number of rows is not the same bit by bit.
+    pub different_updates: u64,
+    /// Forces that are not the same bit by bit.
+    pub different_forces: u64,
+    /// What differed first.
+    pub first_difference: Option<String>,
+    /// Thread CPU time of one god-object update, here and now.
+    pub update_us: Distribution,
+    /// Thread CPU time of one force, here and now.
+    pub force_us: Distribution,
+}
+
 /// Counts of the god-object loop's work: the same on every machine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WorkReport {
@@ -143,6 +168,19 @@ impl fmt::Display for SessionReport {
             "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed",
             self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses
         )?;
+        let ticks = period.count.max(1) as f64;
+        for bin in self
+            .haptics_period_bins_us
+            .iter()
+            .filter(|bin| bin.count > 0)
+        {
+            let share = 100.0 * bin.count as f64 / ticks;
+            let range = match bin.to {
+                Some(to) => format!("{:.0} to {to:.0} us", bin.from),
+                None => format!("from {:.0} us", bin.from),
+            };
+            writeln!(f, "  period {range:<16} {share:7.3} %")?;
+        }
         writeln!(
             f,
             "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
@@ -197,6 +235,37 @@ impl fmt::Display for SessionReport {
             )?;
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for RecordedReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = if self.complete { "" } else { " (not whole)" };
+        writeln!(f, "scene               {}{whole}", self.scene)?;
+        writeln!(
+            f,
+            "updates             {}, {} differ",
+            self.updates, self.different_updates
+        )?;
+        writeln!(
+            f,
+            "forces              {}, {} differ",
+            self.forces, self.different_forces
+        )?;
+        writeln!(
+            f,
+            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.update_us.p50, self.update_us.p99, self.update_us.max
+        )?;
+        write!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.force_us.p50, self.force_us.p99, self.force_us.max
+        )?;
+        match &self.first_difference {
+            Some(difference) => write!(f, "\nfirst difference    {difference}"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -267,6 +336,7 @@ mod tests {
                 "duration_s",
                 "haptics_hz",
                 "haptics_period_us",
+                "haptics_period_bins_us",
                 "deadline_misses",
                 "god_object_update_us",
                 "force_us",

@@ -16,6 +16,7 @@ use god_object::{GodObject, Pose};
 use taut_bridge::realtime::{lock_memory, pin_to_core};
 use taut_bridge::{Device, RemoteDevice};
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
 
 use crate::broadcast::{self, BridgeCommands, StateWriter};
@@ -59,6 +60,7 @@ pub struct Session {
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
+    recorder: Option<Recorder>,
     link: Option<ServerLink>,
     runtime: Runtime,
 }
@@ -94,6 +96,16 @@ impl Session {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
+        let (taps, recorder) = match &setup.recording {
+            Some(wanted) => {
+                let (taps, recorder) =
+                    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
+                        .map_err(Failure::bad_input)?;
+                (Some(taps), Some(recorder))
+            }
+            None => (None, None),
+        };
+
         // Figure 3.
         let loops = WiredLoops::new(
             &setup.world,
@@ -101,6 +113,7 @@ impl Session {
             god_object,
             device,
             setup.safety,
+            taps,
         );
         let broadcaster = link.broadcaster();
         let mut session = Self {
@@ -114,6 +127,7 @@ impl Session {
             clients: ClientLedger::default(),
             threads: Vec::new(),
             monitor: None,
+            recorder,
             link: Some(link),
             runtime,
         };
@@ -377,6 +391,13 @@ impl Session {
                 terminal.say(&format!("taut: {line}"));
             }
             tracing::info!("{line}");
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: self.clock.now(),
+                    kind: "network".to_owned(),
+                    text: line.clone(),
+                });
+            }
             if let Some(monitor) = &self.monitor {
                 monitor.log(severity, &line);
             }
@@ -443,6 +464,17 @@ impl Session {
         match self.end() {
             Ok(dropped) => report.monitor_dropped = dropped,
             Err(error) => failure = failure.or(Some(error)),
+        }
+        if let Some(recorder) = self.recorder.take() {
+            let summary = recorder.finish();
+            if let Some(error) = summary.failure {
+                terminal.say(&format!("taut: the recording is not whole: {error}"));
+            } else if !summary.lost.is_none() {
+                terminal.say(&format!(
+                    "taut: the recording is not whole, the disk was too slow: {:?}",
+                    summary.lost
+                ));
+            }
         }
         report.realtime = self.ledger.report();
         (report.clients, report.observers) = self.clients.reports();

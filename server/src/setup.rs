@@ -1,12 +1,14 @@
 //! What a session is made of: bodies, device, addresses, rates. Plain data; [`crate::session`] brings it to life.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::{ClusterKey, Content};
+use taut_recording::Manifest;
 
 use crate::head::HeadSource;
 use crate::monitor::MonitorSettings;
@@ -34,6 +36,19 @@ pub struct SessionSetup {
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.
     pub monitor: Option<MonitorSettings>,
+    /// Where the session is recorded; `None` does without.
+    pub recording: Option<RecordingSettings>,
+}
+
+/// Where a session is recorded, so that it can be computed again.
+#[derive(Clone, Debug)]
+pub struct RecordingSettings {
+    /// New or empty.
+    pub directory: PathBuf,
+    /// What the recording says about itself.
+    pub manifest: Manifest,
+    /// Text of the scene.
+    pub scene: Arc<str>,
 }
 
 /// What moves the god-object.

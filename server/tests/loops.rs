@@ -62,7 +62,7 @@ impl VirtualSession {
             ..SafetySettings::default()
         };
         Self {
-            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety),
+            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None),
             now: Duration::ZERO,
         }
     }

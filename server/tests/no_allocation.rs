@@ -9,10 +9,25 @@ use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
 use taut::setup::DeviceSource;
 use taut_bridge::SafetySettings;
+use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
 use taut_scene::{Device, Scene};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+fn manifest() -> Manifest {
+    Manifest {
+        format: FORMAT,
+        program: "a test".to_owned(),
+        scene: "any".to_owned(),
+        origin: SceneOrigin::Shipped,
+        overrides: Vec::new(),
+        identity: String::new(),
+        complete: false,
+        reason: None,
+        lost: Lost::default(),
+    }
+}
 
 #[test]
 fn loops_two_and_three_allocate_nothing() {
@@ -34,12 +49,20 @@ fn loops_two_and_three_allocate_nothing() {
         let Ok(god_object) = GodObject::new(world.clone(), scene.settings, scene.start) else {
             panic!("{name} starts in penetration");
         };
+        // Recorded, too.
+        let Ok(directory) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let Ok((taps, _recorder)) = Recorder::start(directory.path(), manifest(), "") else {
+            panic!("cannot record");
+        };
         let mut loops = WiredLoops::new(
             &world,
             &scene.settings,
             god_object,
             device,
             SafetySettings::default(),
+            Some(taps),
         );
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {

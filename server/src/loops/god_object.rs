@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
 use god_object::{GodObject, ShadedAcceleration};
+use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
@@ -23,7 +24,17 @@ pub struct GodObjectLoop {
     shaded: Subscriber<Option<ShadedAcceleration>>,
     contacts: Publisher<ContactSnapshot>,
     snapshot: ContactSnapshot,
+    recording: Option<UpdateTaps>,
     statistics: Arc<GodObjectStatistics>,
+}
+
+/// Where the updates are recorded.
+#[derive(Debug)]
+pub struct UpdateTaps {
+    /// What each update was computed from, and its answer.
+    pub updates: Tap<UpdateRecord>,
+    /// The rows of its set.
+    pub constraints: Tap<ConstraintRecord>,
 }
 
 /// What loop 1 says about itself.
@@ -44,6 +55,7 @@ impl GodObjectLoop {
         device: Subscriber<DeviceState>,
         shaded: Subscriber<Option<ShadedAcceleration>>,
         mut contacts: Publisher<ContactSnapshot>,
+        recording: Option<UpdateTaps>,
     ) -> Self {
         let capacity = god_object.settings().max_constraints;
         let mut snapshot = ContactSnapshot::at_start(god_object.pose(), capacity);
@@ -55,6 +67,7 @@ impl GodObjectLoop {
             shaded,
             contacts,
             snapshot,
+            recording,
             statistics: Arc::default(),
         }
     }
@@ -68,7 +81,7 @@ impl GodObjectLoop {
     pub fn tick(&mut self, clock: impl Fn() -> Duration) {
         self.device.refresh();
         let device = self.device.held();
-        let shaded = self.shaded.newest();
+        let shaded = *self.shaded.newest();
 
         let before = thread_cpu_time();
         let report = self.god_object.step(&device.pose, shaded.as_ref());
@@ -89,5 +102,20 @@ impl GodObjectLoop {
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;
         self.contacts.publish(&self.snapshot);
+        if let Some(taps) = &mut self.recording {
+            let set = &self.snapshot.set;
+            taps.updates.push(UpdateRecord {
+                sequence: set.sequence,
+                published: self.snapshot.published,
+                device_sequence: device.sequence,
+                device_pose: device.pose,
+                obstacle_time: Duration::ZERO,
+                shaded,
+                pose: set.god_object_pose,
+                contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
+                gap_min: set.gap_min,
+            });
+            taps.constraints.push_set(set);
+        }
     }
 }

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6};
 use taut_bridge::{Device, EnergyObserver, Safety};
+use taut_recording::{HapticsRecord, Tap};
 
 use super::incidents::{Incident, IncidentCounts};
 use super::shell::Waker;
@@ -32,6 +33,7 @@ pub struct HapticsLoop {
     coupling: Waker,
     state: DeviceState,
     last_tick: Option<Duration>,
+    recording: Option<Tap<HapticsRecord>>,
     statistics: Arc<HapticsStatistics>,
 }
 
@@ -79,8 +81,16 @@ impl HapticsLoop {
             coupling,
             state: DeviceState::at_start(start),
             last_tick: None,
+            recording: None,
             statistics: Arc::default(),
         }
+    }
+
+    /// The same, with every tick recorded.
+    #[must_use]
+    pub fn with_recording(mut self, tap: Option<Tap<HapticsRecord>>) -> Self {
+        self.recording = tap;
+        self
     }
 
     /// The counters that this loop writes.
@@ -107,6 +117,17 @@ impl HapticsLoop {
         self.statistics
             .energy_injected_bits
             .store(self.energy.injected().to_bits(), Ordering::Relaxed);
+        if let Some(tap) = &mut self.recording {
+            tap.push(HapticsRecord {
+                sequence: self.state.sequence,
+                time: self.state.time,
+                pose: self.state.pose,
+                velocity: self.state.velocity,
+                buttons: self.state.buttons,
+                faulty: self.state.faulty,
+                wrench,
+            });
+        }
     }
 
     /// Leaves the device without force.

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+use taut_recording::Taps;
 
 use super::coupling::CouplingLoop;
-use super::god_object::GodObjectLoop;
+use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
 use crate::shared::contact_snapshot::ContactSnapshot;
@@ -57,13 +58,14 @@ pub struct SharedView {
 }
 
 impl WiredLoops {
-    /// Puts the boxes between their arrows. `device` stands where the god-object does.
+    /// Puts the boxes between their arrows. `device` stands where the god-object does; with `taps` the loops are recorded.
     pub fn new(
         world: &Arc<World>,
         settings: &Settings,
         god_object: GodObject,
         device: Box<dyn Device>,
         safety: SafetySettings,
+        taps: Option<Taps>,
     ) -> Self {
         let start = *god_object.pose();
         let (states, device_readers) = device_state::channel(&start);
@@ -72,12 +74,20 @@ impl WiredLoops {
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
+        let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
+            let updates = UpdateTaps {
+                updates: taps.updates,
+                constraints: taps.constraints,
+            };
+            (Some(taps.haptics), Some(updates), Some(taps.forces))
+        });
 
         let god_object = GodObjectLoop::new(
             god_object,
             device_readers.god_object,
             shaded_reader,
             snapshots,
+            update_taps,
         );
         let coupling = CouplingLoop::new(
             Coupling::new(world, settings),
@@ -85,6 +95,7 @@ impl WiredLoops {
             contact_readers.coupling,
             wrenches,
             shaded,
+            force_tap,
         );
         let haptics = HapticsLoop::new(
             device,
@@ -94,7 +105,8 @@ impl WiredLoops {
             wrench_readers.haptics,
             states,
             coupling_waker.clone(),
-        );
+        )
+        .with_recording(haptics_tap);
         let statistics = Statistics {
             haptics: haptics.statistics(),
             coupling: coupling.statistics(),

@@ -26,11 +26,24 @@ enum Origin {
     Shipped,
 }
 
+/// What a scene was read from: enough to read it again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSource {
+    /// The text of the file.
+    pub text: Arc<str>,
+    /// Where its own files are; `None` for a scene that is shipped in the program.
+    pub directory: Option<PathBuf>,
+    /// What was set beside the text, in order.
+    pub overrides: Vec<String>,
+}
+
 /// A scene that was read and checked; its meshes are not loaded yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     document: Document,
     origin: Origin,
+    text: Arc<str>,
+    overrides: Vec<String>,
     pub(super) spec: SceneSpec,
 }
 
@@ -39,19 +52,13 @@ impl Scene {
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path, MAX_TOML_BYTES)?;
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Self::from_document(
-            Document::parse(&path.display().to_string(), &text)?,
-            Origin::Directory(directory),
-        )
+        Self::parse(&path.display().to_string(), &text, &directory)
     }
 
     /// One of [`SHIPPED_SCENES`] by its name, or else the file of this path.
     pub fn named_or_file(name_or_path: &str) -> Result<Self, FileError> {
         if let Some(text) = shipped_scene_text(name_or_path) {
-            return Self::from_document(
-                Document::parse(&format!("{name_or_path}.toml"), text)?,
-                Origin::Shipped,
-            );
+            return Self::from_text(&format!("{name_or_path}.toml"), text, Origin::Shipped);
         }
         let path = Path::new(name_or_path);
         if !path.exists() && path.extension().is_none() {
@@ -67,28 +74,46 @@ impl Scene {
 
     /// Reads a scene from text; `file` is its name in messages, files are looked for in `directory`.
     pub fn parse(file: &str, text: &str, directory: &Path) -> Result<Self, FileError> {
-        Self::from_document(
-            Document::parse(file, text)?,
-            Origin::Directory(directory.to_path_buf()),
-        )
+        Self::from_text(file, text, Origin::Directory(directory.to_path_buf()))
     }
 
-    fn from_document(document: Document, origin: Origin) -> Result<Self, FileError> {
+    /// Reads a scene again; `file` is its name in messages.
+    pub fn from_source(file: &str, source: &SceneSource) -> Result<Self, FileError> {
+        let origin = source
+            .directory
+            .clone()
+            .map_or(Origin::Shipped, Origin::Directory);
+        Self::from_text(file, &source.text, origin)?.with_overrides(&source.overrides)
+    }
+
+    fn from_text(file: &str, text: &str, origin: Origin) -> Result<Self, FileError> {
+        let document = Document::parse(file, text)?;
         let spec = parse(&document)?;
         Ok(Self {
             document,
             origin,
+            text: text.into(),
+            overrides: Vec::new(),
             spec,
         })
+    }
+
+    /// What it was read from.
+    pub fn source(&self) -> SceneSource {
+        SceneSource {
+            text: self.text.clone(),
+            directory: match &self.origin {
+                Origin::Directory(directory) => Some(directory.clone()),
+                Origin::Shipped => None,
+            },
+            overrides: self.overrides.clone(),
+        }
     }
 
     /// The same scene with one value changed, as by `--set coupling.k_s=1.0`. Lists are counted from 0:
     /// `obstacle.0.name="box"`.
     pub fn with_override(&self, assignment: &str) -> Result<Self, FileError> {
-        Self::from_document(
-            self.document.with_override(assignment)?,
-            self.origin.clone(),
-        )
+        self.with_overrides(&[assignment])
     }
 
     /// [`Scene::with_override`] for each, in order, checked once at the end: overrides that only fit together are fine.
@@ -97,7 +122,16 @@ impl Scene {
         for assignment in assignments {
             document = document.with_override(assignment.as_ref())?;
         }
-        Self::from_document(document, self.origin.clone())
+        let spec = parse(&document)?;
+        let mut overrides = self.overrides.clone();
+        overrides.extend(assignments.iter().map(|text| text.as_ref().to_owned()));
+        Ok(Self {
+            document,
+            spec,
+            overrides,
+            origin: self.origin.clone(),
+            text: self.text.clone(),
+        })
     }
 
     /// The scene's name.

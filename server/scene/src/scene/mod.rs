@@ -8,7 +8,7 @@ mod shipped;
 mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
-pub use load::Scene;
+pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::pose_of;
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
