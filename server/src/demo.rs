@@ -7,7 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use taut_bridge::DeviceChoice;
-use taut_scene::{Device, Scene, Workbench};
+use taut_scene::{Device, HeadTracking, Scene, Workbench};
 
 use crate::children::{NamedChild, wait_or_kill};
 use crate::cli::DemoArgs;
@@ -59,6 +59,10 @@ pub fn run(
     } else {
         None
     };
+    if hold {
+        // A picture that sways under the mouse is no help.
+        workbench.viewer.tracking = HeadTracking::Fixed;
+    }
     if args.bridge || hold {
         workbench.device = Device::Remote;
     } else if let DeviceChoice::Trace(path) = &choice {
@@ -233,8 +237,8 @@ impl<'a> Launcher<'a> {
     ) -> Result<NamedChild, Failure> {
         let mut command = self.role("render", node);
         if self.args.device.as_deref() == Some("mouse") {
-            // Who looks at a desk's screen has no glasses on.
-            command.args(["--stereo", "mono"]);
+            // Who looks at a desk's screen has no glasses on, and sees the force that nobody feels.
+            command.args(["--stereo", "mono", "--show", "force"]);
         }
         if hold {
             command.arg("--hold");
