@@ -20,7 +20,7 @@ use crate::rendering;
 use crate::report::SessionReport;
 use crate::serve::{announce, watch};
 use crate::session::Session;
-use crate::setup::SessionSetup;
+use crate::setup::{DeviceSource, SessionSetup};
 use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
@@ -28,6 +28,8 @@ use crate::terminal::Terminal;
 const GRACE: Duration = Duration::from_secs(3);
 /// Sets what a process logs.
 const LOG_VARIABLE: &str = "TAUT_LOG";
+/// Silence after which the mouse counts as lost.
+const MOUSE_MAX_AGE: Duration = Duration::from_millis(200);
 /// How the mouse holds the body.
 const HELP_MOUSE: &str = "mouse in the first window: left button moves the body along the screen, right button or wheel to and fro, middle button (or Shift + left) turns it; P lets go or takes hold, R goes back to the start, arrow and page keys move in small steps; more in docs/devices.md";
 /// What the bridge is called.
@@ -86,6 +88,10 @@ pub fn run(
     // A scene that is refused gets its one sentence and nothing else, so other lines come after this.
     if !MonitorFeed::BUILT_IN {
         terminal.say("this program was built without the monitor; the demo goes on without it");
+    }
+    if let (true, DeviceSource::Remote { max_age, .. }) = (hold, &mut setup.device) {
+        // Drawing shares the processor with the mouse; a pose that is late harms nobody who feels no force.
+        *max_age = MOUSE_MAX_AGE;
     }
     take_free_ports(&mut setup, terminal);
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
@@ -242,6 +248,10 @@ impl<'a> Launcher<'a> {
         }
         if hold {
             command.arg("--hold");
+            if std::env::var_os(LOG_VARIABLE).is_none() {
+                // A force that comes late is felt by nobody: no word of it.
+                command.env(LOG_VARIABLE, "warn,taut_bridge=error");
+            }
         }
         // Drawing in software takes every core that it gets; the loops come first.
         after_parent(&mut command);
