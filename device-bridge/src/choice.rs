@@ -77,7 +77,7 @@ pub enum InputChoice {
     /// [`SpaceMouse`].
     SpaceMouse(CapSettings),
     /// [`VrpnDevice`].
-    Vrpn(VrpnSettings),
+    Vrpn(Box<VrpnSettings>),
 }
 
 /// Why an input device cannot be read.
@@ -189,7 +189,9 @@ impl FromStr for DeviceChoice {
                 let settings = cap_settings(rest.trim_start_matches(','))?;
                 Ok(Self::Input(InputChoice::SpaceMouse(settings)))
             }
-            ("vrpn", Some(rest)) => Ok(Self::Input(InputChoice::Vrpn(vrpn_settings(rest)?))),
+            ("vrpn", Some(rest)) => Ok(Self::Input(InputChoice::Vrpn(Box::new(vrpn_settings(
+                rest,
+            )?)))),
             _ => Err(incomplete),
         }
     }

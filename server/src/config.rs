@@ -136,10 +136,10 @@ fn head(viewer: &Viewer) -> HeadSource {
                 amplitude: *amplitude,
                 period: *period,
             }),
-            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(TrackerSource {
+            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
                 source: vrpn_source(sensor),
                 mapping: sensor.mapping,
-            }),
+            })),
         },
     }
 }

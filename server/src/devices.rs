@@ -33,7 +33,11 @@ pub fn device(
             on_workbench,
         } => {
             let settings = vrpn_settings(sensor, *on_workbench);
-            input(&InputChoice::Vrpn(settings), scene, workbench_from_scene)
+            input(
+                &InputChoice::Vrpn(Box::new(settings)),
+                scene,
+                workbench_from_scene,
+            )
         }
         taut_scene::Device::SpaceMouse { .. } => {
             let settings = cap_settings(wanted);

@@ -41,7 +41,7 @@ pub enum HeadMotion {
     /// Simulated.
     Sway(Sway),
     /// Tracked.
-    Tracker(TrackerSource),
+    Tracker(Box<TrackerSource>),
 }
 
 /// Simulated movement of a head.
@@ -76,11 +76,15 @@ pub struct Head {
 enum Motion {
     Still,
     Sway(Sway),
-    Tracker {
-        feed: TrackerFeed,
-        mapping: SensorMapping,
-        last: Pose,
-    },
+    Tracker(Box<Tracked>),
+}
+
+#[derive(Debug)]
+struct Tracked {
+    feed: TrackerFeed,
+    mapping: SensorMapping,
+    /// Where it was seen last.
+    last: Pose,
 }
 
 impl HeadSource {
@@ -102,13 +106,14 @@ impl HeadSource {
         Ok(match motion {
             HeadMotion::Still => std::array::from_fn(|_| head(Motion::Still)),
             HeadMotion::Sway(sway) => std::array::from_fn(|_| head(Motion::Sway(sway))),
-            HeadMotion::Tracker(TrackerSource { source, mapping }) => {
+            HeadMotion::Tracker(tracker) => {
+                let TrackerSource { source, mapping } = *tracker;
                 TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
-                    head(Motion::Tracker {
+                    head(Motion::Tracker(Box::new(Tracked {
                         feed,
                         mapping,
                         last: rest,
-                    })
+                    })))
                 })
             }
         })
@@ -121,16 +126,12 @@ impl Head {
         match &mut self.motion {
             Motion::Still => self.rest,
             Motion::Sway(sway) => self.rest * sway.displacement(now),
-            Motion::Tracker {
-                feed,
-                mapping,
-                last,
-            } => {
-                let report = feed.newest().pose;
-                if let Some(pose) = report.and_then(|report| mapping.pose(&report)) {
-                    *last = pose;
+            Motion::Tracker(tracked) => {
+                let report = tracked.feed.newest().pose;
+                if let Some(pose) = report.and_then(|report| tracked.mapping.pose(&report)) {
+                    tracked.last = pose;
                 }
-                *last
+                tracked.last
             }
         }
     }
@@ -202,14 +203,14 @@ mod tests {
         let source = HeadSource {
             rest,
             eye_separation: 0.064,
-            motion: HeadMotion::Tracker(TrackerSource {
+            motion: HeadMotion::Tracker(Box::new(TrackerSource {
                 source: VrpnSource {
                     address: "Head@127.0.0.1:1".parse().expect("valid"),
                     sensor: 0,
                     mode: taut_bridge::VrpnMode::Tcp,
                 },
                 mapping: SensorMapping::identity(),
-            }),
+            })),
         };
         let mut heads = source.start::<2>().expect("a thread");
         for head in &mut heads {

@@ -9,7 +9,7 @@
 //!
 //! - [`Client`]: one connection to a server, from its first byte on.
 //! - [`PoseReport`], [`VelocityReport`], [`ButtonChange`], [`ButtonStates`]: what devices say.
-//! - [`Address`]: `Tracker0@host:3883`.
+//! - Where a device is, [`Address`], as in `Tracker0@host:3883`.
 //! - [`SensorMapping`]: from a tracker's axes and units to poses in metres.
 //!
 //! Source of the facts: the protocol description and the behaviour of VRPN 07.36 (vrpn.org); the golden bytes of the

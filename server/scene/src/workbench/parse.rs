@@ -288,7 +288,7 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
         section.complain(&node.at, text);
     }
     let tracking = match tracker {
-        Some(sensor) => HeadTracking::Vrpn(sensor?),
+        Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
         None => sway.unwrap_or(HeadTracking::Fixed),
     };
     Some(Viewer {
@@ -360,7 +360,7 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
             let anchors = [("start", false), ("workbench", true)];
             let on_workbench = section.choice("anchor", &anchors).unwrap_or(false);
             Some(Device::Vrpn {
-                sensor: vrpn_sensor(section)?,
+                sensor: Box::new(vrpn_sensor(section)?),
                 on_workbench,
             })
         }

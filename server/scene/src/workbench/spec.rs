@@ -86,7 +86,7 @@ pub enum HeadTracking {
         period: f64,
     },
     /// A VRPN tracker says where it is.
-    Vrpn(VrpnSensor),
+    Vrpn(Box<VrpnSensor>),
 }
 
 /// A sensor of a VRPN tracker, and where the thing that it is fixed to is on the workbench.
@@ -143,7 +143,7 @@ pub enum Device {
     /// A sensor of a VRPN tracker; no force.
     Vrpn {
         /// Which.
-        sensor: VrpnSensor,
+        sensor: Box<VrpnSensor>,
         /// The body is where the sensor is on the workbench; else it moves from its start as the sensor does.
         on_workbench: bool,
     },
