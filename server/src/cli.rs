@@ -37,6 +37,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Takes a live session's device trace, to be replayed
     Record(RecordArgs),
+    /// Asks for force at the device of a session, or for none
+    Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
     /// Says what this machine lacks for real time and for rendering
@@ -83,6 +85,9 @@ pub struct DemoArgs {
     /// Where the render clients write their pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -119,6 +124,9 @@ pub struct ServeArgs {
     /// Do without the monitor, whatever the workbench file says
     #[arg(long)]
     pub no_monitor: bool,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -190,6 +198,21 @@ pub struct RecordArgs {
     /// End after this many seconds (default: at Ctrl-C, or with the session)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
+}
+
+/// `taut arm`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key cluster.key")]
+pub struct ArmArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// The cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// No force instead: it fades, and stays away until somebody arms
+    #[arg(long)]
+    pub off: bool,
 }
 
 /// `taut check`.

@@ -75,6 +75,7 @@ pub fn run(
     }
     let overrides = Overrides {
         scene: Some(scene),
+        allow_unstable: args.allow_unstable,
         no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
         record: args.record.clone(),
         input: match choice {

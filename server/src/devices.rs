@@ -207,7 +207,8 @@ fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
     trace.samples().iter().map(point).collect()
 }
 
-fn impedance(preset: HandPreset) -> Hand {
+/// The hand of this name.
+pub(crate) fn impedance(preset: HandPreset) -> Hand {
     match preset {
         HandPreset::Released => Hand::RELEASED,
         HandPreset::Light => Hand::LIGHT,

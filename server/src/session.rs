@@ -12,9 +12,11 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose};
-use taut_bridge::realtime::{lock_memory, pin_to_core};
-use taut_bridge::{Device, RemoteDevice};
+use god_object::{GodObject, Pose, Settings};
+use taut_bridge::edge::offer_of;
+use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
+use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
+use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
@@ -23,6 +25,7 @@ use crate::broadcast::{self, BridgeCommands, StateWriter};
 use crate::checker::{self, PenetrationChecker};
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
+use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
@@ -55,6 +58,7 @@ pub struct Session {
     ledger: RealtimeLedger,
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
+    arm_switch: Arc<ArmSwitch>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -83,15 +87,27 @@ impl Session {
         let picture = picture(&setup);
         let opening = opening(&setup);
         let scene_revision = setup.content.description.revision;
+        let coupling = match &setup.device {
+            DeviceSource::Remote { .. } => offer_of(
+                &setup.world,
+                &setup.settings,
+                setup.realtime.broadcast_period.as_secs_f64().recip(),
+            ),
+            DeviceSource::Local(_) => CouplingOffer::AtServer {
+                reason: "its workbench has a device of its own".to_owned(),
+            },
+        };
         let options = ServerOptions {
+            coupling,
             quic: setup.link.quic,
             udp: setup.link.udp,
+            announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
-        let (device, bridge_commands) = connect_device(setup.device, &link)?;
+        let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
         let [head, watched_head] = setup.head.start().map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
@@ -114,7 +130,8 @@ impl Session {
             device,
             setup.safety,
             taps,
-        );
+        )
+        .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -123,6 +140,7 @@ impl Session {
             ledger,
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
+            arm_switch: loops.arm_switch.clone(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -301,9 +319,13 @@ impl Session {
                         |now| haptics.tick(now),
                     );
                 }));
-                // Whatever ended the loop: no force is left on the hand.
-                haptics.release(clock.now());
-                if let Err(cause) = ticked {
+                // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
+                let released = catch_unwind(AssertUnwindSafe(|| {
+                    while !haptics.release_step(clock.now()) {
+                        sleep_until(clock.monotonic(clock.now() + period));
+                    }
+                }));
+                if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
             },
@@ -362,6 +384,11 @@ impl Session {
         self.ledger.report()
     }
 
+    /// Asks for force at the device, or for none.
+    pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
+        &self.arm_switch
+    }
+
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
@@ -380,6 +407,10 @@ impl Session {
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
+            if let LinkEvent::Arm { arm, .. } = event {
+                self.arm_switch
+                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            }
             lines.extend(
                 self.clients
                     .follow(&event)
@@ -524,6 +555,7 @@ fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Fai
 fn connect_device(
     source: DeviceSource,
     link: &ServerLink,
+    settings: &Settings,
 ) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
     match source {
         DeviceSource::Local(device) => Ok((device, None)),
@@ -531,8 +563,9 @@ fn connect_device(
             let inputs = link.device_inputs().ok_or_else(|| {
                 Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
             })?;
-            let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
-            Ok((Box::new(device), Some(commands)))
+            let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
+            let sets = EdgeSets::new(settings);
+            Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
         }
     }
 }
@@ -555,6 +588,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.clone(),
         world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description
@@ -570,7 +604,10 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
-        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {

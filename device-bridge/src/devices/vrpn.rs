@@ -1,6 +1,6 @@
 //! A sensor of a VRPN tracker as a six-degree-of-freedom input without force.
 //!
-//! Reports come about 100 times a second; between them the body glides ([`super::glide`]), one interval late. A
+//! Reports come about 100 times a second; between them the body glides ([`super::glide`]), one and a half intervals late. A
 //! tracker that falls silent, loses the sensor from sight or reports what is no pose is a fault at once or after
 //! [`VrpnSettings::max_age`].
 

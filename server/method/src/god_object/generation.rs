@@ -97,7 +97,7 @@ impl GodObject {
                     continue;
                 }
             } else if pairs < self.settings.look_ahead_pairs / 2 {
-                let limit = self.settings.activation_distance + self.settings.look_ahead_limit;
+                let limit = self.settings.activation_distance + self.look_ahead_limit();
                 self.affordable = (self.affordable * LOOK_AHEAD_GROWS).min(limit);
             }
             break;
@@ -147,7 +147,7 @@ impl GodObject {
         }
         self.reduction = Some(reduction);
         let reach = self.settings.activation_distance
-            + update.all_moved.min(self.settings.look_ahead_limit);
+            + update.all_moved.min(self.look_ahead_limit());
         self.choose(difference, reach, &mut report.work);
     }
 

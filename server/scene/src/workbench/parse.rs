@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use god_object::Pose;
 use nalgebra::Point3;
 
+use super::dynamics::dynamics;
 use super::load::Workbench;
+use super::safety::safety;
 use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
     TransportKind, Viewer, Window,
@@ -66,9 +68,11 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         seed: 0,
     };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
+    let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
+    let safety = table(&root, "safety", safety).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
@@ -99,9 +103,11 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         nodes,
         viewer,
         device,
+        dynamics,
         network,
         monitoring,
         realtime,
+        safety,
         show,
         scene_at,
     })

@@ -247,6 +247,75 @@ pub struct RealTime {
     pub god_object_rate: Option<f64>,
 }
 
+/// Who arms the force at the start and after a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rearm {
+    /// The program, once device and forces are in order.
+    Automatic,
+    /// A person.
+    Manual,
+}
+
+/// What is done about energy that comes out of the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Passivity {
+    /// It is measured.
+    #[default]
+    Observe,
+    /// It is damped away.
+    Control,
+}
+
+/// What no force may pass. `None` leaves it to the scene or the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Safety {
+    /// Largest norm of the force, N.
+    pub max_force: Option<f64>,
+    /// Largest norm of the torque, N m.
+    pub max_torque: Option<f64>,
+    /// Fastest change of the force, N/ms.
+    pub force_slew: f64,
+    /// Fastest change of the torque, N m/ms.
+    pub torque_slew: f64,
+    /// From no force to all of it on arming, s.
+    pub ramp_in: f64,
+    /// A device that is faster has jumped, m/s.
+    pub max_speed: f64,
+    /// A device that turns faster has jumped, rad/s.
+    pub max_turn_rate: f64,
+    /// Who arms; `None` is by device.
+    pub rearm: Option<Rearm>,
+    /// Number of the button that must be held.
+    pub dead_man: Option<u8>,
+    /// Number of the button whose press arms.
+    pub arm_button: Option<u8>,
+    /// Energy.
+    pub passivity: Passivity,
+}
+
+impl Safety {
+    /// Time in which a force fades once its inputs are lost, ms: fixed, because what is promised of faults rests on it.
+    pub const FADE_MS: f64 = 100.0;
+}
+
+impl Default for Safety {
+    fn default() -> Self {
+        Self {
+            max_force: None,
+            max_torque: None,
+            force_slew: 0.5,
+            torque_slew: 0.05,
+            ramp_in: 0.5,
+            max_speed: 3.0,
+            max_turn_rate: 30.0,
+            rearm: None,
+            dead_man: None,
+            arm_button: None,
+            passivity: Passivity::Observe,
+        }
+    }
+}
+
 /// What render nodes draw beside the god-object and the obstacles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Show {
