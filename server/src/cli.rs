@@ -49,7 +49,7 @@ pub enum Command {
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = "Example: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_bridge::drivers_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
@@ -63,7 +63,11 @@ pub struct DemoArgs {
     /// How poses reach the render clients
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// Put the simulated device in a process of its own
+    /// What moves the god-object: `simulated`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
+    /// (default: the scene's simulated hand)
+    #[arg(long, value_name = "D", value_parser = device_text)]
+    pub device: Option<String>,
+    /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
     /// Also write what the monitor shows to this file
@@ -313,6 +317,12 @@ pub enum MethodChoice {
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
+
+/// The text of a device, as it is, if it names one.
+fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
+    text.parse::<taut_bridge::DeviceChoice>()
+        .map(|_| text.to_owned())
+}
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     positive(text, MAX_SECONDS, "seconds")

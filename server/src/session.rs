@@ -110,6 +110,9 @@ impl Session {
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
+        let [head, watched_head] = setup.head.start().map_err(|error| {
+            Failure::failed(format!("the head tracker cannot be listened to ({error})"))
+        })?;
 
         let (taps, recorder) = match &setup.recording {
             Some(wanted) => {
@@ -153,6 +156,7 @@ impl Session {
         // From here on a failure drops the session, which ends what was started.
         if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
+                head: watched_head,
                 shared: loops.observers.monitor,
                 statistics: loops.statistics.clone(),
                 clock,
@@ -171,7 +175,7 @@ impl Session {
         }
         let states = StateWriter::new(
             loops.observers.broadcast,
-            setup.head,
+            head,
             &setup.world.body.reference_point,
             scene_revision,
         );
@@ -616,7 +620,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
             .to_isometry()
             .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
-        head: setup.head,
+        head: setup.head.rest,
         rest_distance: setup.settings.rest_distance,
     }
 }
