@@ -24,13 +24,15 @@ use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect
 
 use crate::arm_switch::{self, ArmSwitch};
 use crate::bridge_loop::BridgeLoop;
-use crate::cli::{BridgeArgs, CouplingChoice, DeviceChoice};
-use crate::device::{Device, DeviceFault};
+use crate::choice::{DeviceChoice, InputChoice, InputError};
+use crate::cli::{BridgeArgs, CouplingChoice};
+use crate::device::{Device, DeviceFault, Pose};
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::devices::{
     AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
 };
 use crate::edge::{EdgeCoupler, OfferError};
+use crate::placement::Placement;
 use crate::port::{DevicePort, SafetyEvent, SafetySettings};
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
@@ -89,6 +91,12 @@ pub enum BridgeError {
         /// Why.
         cause: TraceError,
     },
+    /// An input device cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The mouse is none of a bridge's.
+    #[error("the mouse belongs to a render window: use `taut render --hold` instead of a bridge")]
+    Mouse,
     /// The server cannot be joined.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -150,6 +158,45 @@ impl BridgeError {
 /// [`BridgeError`]: bad input is found before anything is started.
 pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let (options, motion) = prepare(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let wishes = Arc::default();
+    arm_switch::listen_at_console(&wishes);
+    run_loop(args, options, stop, wishes, |scene| {
+        build_loop(args, &motion, scene)
+    })
+}
+
+/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
+/// `--device`, `--hand` and `--path` of `args` are not looked at.
+///
+/// # Errors
+/// [`BridgeError`].
+pub fn run_device(
+    args: &BridgeArgs,
+    stop: Arc<AtomicBool>,
+    make: impl FnOnce(Placement) -> Box<dyn Device>,
+) -> Result<BridgeReport, BridgeError> {
+    let options = client_options(args)?;
+    // The console is the caller's.
+    run_loop(args, options, stop, Arc::default(), |scene| {
+        let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
+        let device = make(placement);
+        Ok(behind_port(
+            args,
+            device,
+            placement.reference_point,
+            &placement.start,
+        ))
+    })
+}
+
+fn run_loop(
+    args: &BridgeArgs,
+    options: ClientOptions,
+    stop: Arc<AtomicBool>,
+    wishes: Arc<ArmSwitch>,
+    build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
+) -> Result<BridgeReport, BridgeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("taut-bridge-net")
@@ -159,14 +206,13 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
             what: "the network",
             cause,
         })?;
-    let stop = Arc::new(AtomicBool::new(false));
     runtime.spawn(stop_on_signal(Arc::clone(&stop)));
 
     let first = runtime.block_on(connect(options.clone()))?;
-    let bridge = build_loop(args, &motion, first.description())?;
+    let bridge = build(first.description())?;
     let mut run = Run {
         safety: *bridge.port().settings(),
-        wishes: Arc::default(),
+        wishes,
         args,
         options,
         runtime,
@@ -176,7 +222,6 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
             .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds)),
         totals: Totals::new(),
     };
-    arm_switch::listen_at_console(&run.wishes);
     run.sessions(first, bridge)
 }
 
@@ -185,6 +230,7 @@ enum Motion {
     Sway,
     Path(MinJerkPath),
     Trace(PathBuf, Trace),
+    Input(InputChoice),
 }
 
 fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
@@ -224,6 +270,8 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
     }
 
     let motion = match (&args.device, &args.path) {
+        (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
+        (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
         (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
         (DeviceChoice::Simulated, None) => Motion::Sway,
         (DeviceChoice::Simulated, Some(file)) => {
@@ -235,6 +283,10 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         }
     };
 
+    Ok((client_options(args)?, motion))
+}
+
+fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
     let key_file = args
         .key
         .clone()
@@ -244,7 +296,7 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;
-    Ok((options, motion))
+    Ok(options)
 }
 
 fn build_loop(
@@ -265,6 +317,9 @@ fn build_loop(
     let device: Box<dyn Device> = match motion {
         Motion::Sway => Box::new(held(MinJerkPath::sway(start, SWAY.0, SWAY.1))),
         Motion::Path(path) => Box::new(held(path.clone())),
+        Motion::Input(input) => {
+            input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
+        }
         Motion::Trace(path, trace) => {
             let at_end = if args.looping {
                 AtEnd::Loop
@@ -278,17 +333,20 @@ fn build_loop(
             })?)
         }
     };
-    let nobody_is_hurt = matches!(
-        args.device,
-        DeviceChoice::Simulated | DeviceChoice::Trace(_)
-    );
+    Ok(behind_port(args, device, reference_point, &start))
+}
+
+/// The device behind the port that makes every force safe. What has no motors, or no hand at them, arms by itself.
+fn behind_port(
+    args: &BridgeArgs,
+    device: Box<dyn Device>,
+    reference_point: Point3<f64>,
+    start: &Pose,
+) -> BridgeLoop {
+    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated)
+        || device.info().actuated_degrees_of_freedom == 0;
     let safety = args.safety.settings(args.rate, nobody_is_hurt);
-    Ok(BridgeLoop::new(DevicePort::new(
-        device,
-        safety,
-        reference_point,
-        &start,
-    )))
+    BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
 }
 
 /// The coupling of a session, if it is to be here.

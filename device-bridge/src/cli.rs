@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
 use std::time::Duration;
 
 use taut_link::Transport;
 
 use crate::bridge::{BridgeError, run};
+use crate::choice::{DeviceChoice, drivers_help};
 use crate::devices::HandPreset;
 use crate::port::{Passivity, PassivitySettings, Rearm, SafetySettings};
 
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Example: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.
@@ -29,7 +29,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "NAME", default_value = "bridge")]
     pub node: String,
 
-    /// Device: `simulated`, or `trace:FILE` to replay a recorded one.
+    /// Device: `simulated`, `trace:FILE`, `space-mouse`, `vrpn:TRACKER@HOST`; options below.
     #[arg(long, value_name = "D", default_value = "simulated")]
     pub device: DeviceChoice,
 
@@ -71,7 +71,7 @@ pub struct BridgeArgs {
     #[arg(long)]
     pub reconnect: bool,
 
-    /// Real-time priority of the device loop, 1 to 99; 0 asks for none.
+    /// Real-time priority of the device loop, 1 to 99; 0 asks for no real time at all.
     #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     pub priority: u8,
 
@@ -175,29 +175,19 @@ fn parse_rearm(text: &str) -> Result<Rearm, String> {
     }
 }
 
-/// Which device a bridge reads.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum DeviceChoice {
-    /// [`crate::SimulatedDevice`].
-    Simulated,
-    /// [`crate::RecordedDevice`] of a trace file.
-    Trace(PathBuf),
-}
-
-/// A word that names no device.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no device `{0}`; use simulated or trace:FILE")]
-pub struct UnknownDevice(String);
-
-impl FromStr for DeviceChoice {
-    type Err = UnknownDevice;
-
-    fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        match text.split_once(':') {
-            None if text == "simulated" => Ok(Self::Simulated),
-            Some(("trace", file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
-            _ => Err(UnknownDevice(text.to_owned())),
+impl BridgeArgs {
+    /// The arguments of `taut bridge --server SERVER --node NODE`, all others as when they are left out.
+    #[must_use]
+    pub fn joining(server: &str, node: &str) -> Option<Self> {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            args: BridgeArgs,
         }
+        let server = format!("--server={server}");
+        let node = format!("--node={node}");
+        let line = <Line as clap::Parser>::try_parse_from(["taut-bridge", &server, &node]);
+        line.ok().map(|line| line.args)
     }
 }
 
@@ -265,6 +255,16 @@ mod tests {
     }
 
     #[test]
+    fn arguments_can_be_made_without_a_command_line() {
+        let args = BridgeArgs::joining("pc:4857", "wall-hand").expect("valid");
+        assert_eq!(
+            (args.server.as_str(), args.node.as_str()),
+            ("pc:4857", "wall-hand")
+        );
+        assert_eq!(args.rate, 1000.0);
+    }
+
+    #[test]
     fn devices_hands_and_transports_are_named() {
         let args = parse(&[
             "--server",
@@ -287,8 +287,8 @@ mod tests {
     #[test]
     fn a_wrong_word_is_answered_with_the_right_ones() {
         for (words, part) in [
-            (["--device", "spidar"], "use simulated or trace:FILE"),
-            (["--device", "trace:"], "use simulated or trace:FILE"),
+            (["--device", "simulator"], "did you mean `simulated`?"),
+            (["--device", "trace:"], "write trace:FILE"),
             (["--hand", "fist"], "use released, light, firm or arm"),
             (["--transport", "tcp"], "use udp or quic"),
             (["--rearm", "never"], "use automatic or manual"),

@@ -126,6 +126,9 @@ pub enum DeviceFault {
     /// Another bridge, or the same one anew, has taken over: the pose may have jumped.
     #[error("the device bridge has just reconnected; the force ramps in again")]
     Reconnected,
+    /// A string-driven device has no pose that may be trusted.
+    #[error("{0}")]
+    Strings(taut_spidar::StringFault),
     /// A recorded trace came to its end.
     #[error("the recorded trace ended; loop it or hold its last pose to go on")]
     Ended,

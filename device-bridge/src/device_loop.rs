@@ -79,8 +79,9 @@ impl DeviceLoop {
 
     /// Asks for this thread; what was granted is told in the report, and what not also in the log.
     fn request_realtime(&mut self) {
-        let mut grants = vec![realtime::sharpen_timers(), realtime::lock_memory()];
+        let mut grants = vec![realtime::sharpen_timers()];
         if self.priority > 0 {
+            grants.push(realtime::lock_memory());
             grants.push(realtime::request_fifo(self.priority));
         }
         grants.extend(self.core.map(realtime::pin_to_core));

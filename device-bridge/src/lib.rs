@@ -3,6 +3,7 @@
 //! Used by the server's haptics loop and by `taut bridge` (here the thin binary `taut-bridge`).
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
+//! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
@@ -12,25 +13,38 @@
 mod arm_switch;
 mod bridge;
 mod bridge_loop;
+mod choice;
 mod cli;
 mod device;
 mod device_loop;
 mod devices;
 pub mod edge;
+mod placement;
 mod port;
 pub mod realtime;
 mod report;
 mod trace_file;
+mod vrpn;
 
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
-pub use bridge::{BridgeError, run};
-pub use cli::{BridgeArgs, CouplingChoice, DeviceChoice, SafetyArgs, UnknownDevice, execute};
+pub use bridge::{BridgeError, run, run_device};
+pub use choice::{
+    DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
+};
+pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
-    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError,
-    TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, min_jerk,
+    Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
+    Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,
+    VrpnDevice, VrpnSettings,
 };
+pub use devices::{
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
+    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
+    SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
+    min_jerk,
+};
+pub use placement::Placement;
 pub use port::{
     ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,
     Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings, TickReport,
@@ -38,3 +52,4 @@ pub use port::{
 };
 pub use report::{BridgeReport, Quantiles};
 pub use trace_file::{TraceFileError, read_trace, via_points};
+pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

@@ -137,7 +137,7 @@ impl StateWriter {
         state.run = run_state(device);
         state.constraint_age_us =
             u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
-        state.head = head_state(&self.head, now, device.time);
+        state.head = head_state(&mut self.head, now, device.time);
         state.tools.clear();
         state
             .tools
@@ -160,7 +160,7 @@ fn run_state(device: &DeviceState) -> RunState {
     }
 }
 
-fn head_state(head: &Head, now: Duration, sampled: Duration) -> HeadState {
+fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
     let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
     HeadState {
         pose: PoseF32::from_isometry(&head.pose(now)),
@@ -369,11 +369,12 @@ mod tests {
         let (mut states, state_readers) = device_state::channel(&start);
         let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
         let (mut wrenches, wrench_readers) = wrench_command::channel();
-        let head = Head {
+        let source = crate::head::HeadSource {
             rest: Pose::translation(0.0, -1.0, 1.0),
             eye_separation: 0.064,
-            sway: None,
+            motion: crate::head::HeadMotion::Still,
         };
+        let [head] = source.start().expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,

@@ -41,7 +41,7 @@ pub enum Command {
     Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
-    /// Says what this machine lacks for real time and for rendering
+    /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Makes a cluster key, the secret that all machines of a workbench share
     Keys(KeysArgs),
@@ -49,7 +49,7 @@ pub enum Command {
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = "Example: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_bridge::drivers_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
@@ -63,7 +63,11 @@ pub struct DemoArgs {
     /// How poses reach the render clients
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// Put the simulated device in a process of its own
+    /// What moves the god-object: `simulated`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
+    /// (default: the scene's simulated hand)
+    #[arg(long, value_name = "D", value_parser = device_text)]
+    pub device: Option<String>,
+    /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
     /// Also write what the monitor shows to this file
@@ -225,8 +229,16 @@ pub struct CheckArgs {
 
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut doctor --json")]
+#[command(
+    after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
+)]
 pub struct DoctorArgs {
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub device: Option<String>,
+    /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
+    #[arg(long, value_name = "FILE.svg", requires = "device")]
+    pub out: Option<PathBuf>,
     /// Print the findings as JSON on standard output
     #[arg(long)]
     pub json: bool,
@@ -305,6 +317,12 @@ pub enum MethodChoice {
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
+
+/// The text of a device, as it is, if it names one.
+fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
+    text.parse::<taut_bridge::DeviceChoice>()
+        .map(|_| text.to_owned())
+}
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     positive(text, MAX_SECONDS, "seconds")

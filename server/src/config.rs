@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use taut_bridge::{
-    MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings, ValidationSettings,
+    InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
+    ValidationSettings,
 };
 use taut_link::ClusterKey;
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
@@ -15,9 +16,9 @@ use taut_scene::{
 };
 
 use crate::content::content;
-use crate::devices::device;
+use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
-use crate::head::{Head, Sway};
+use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
@@ -49,6 +50,8 @@ pub struct Overrides {
     pub no_monitor: bool,
     /// Where the monitor records.
     pub record: Option<PathBuf>,
+    /// An input device instead of the workbench's.
+    pub input: Option<InputChoice>,
     /// Where the session is recorded.
     pub recording: Option<PathBuf>,
 }
@@ -78,7 +81,8 @@ pub fn session_setup(
             tracing::warn!("{warning}");
         }
     }
-    let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
+    let workbench_from_scene = workbench.workbench_from_scene(&scene);
+    let content = content(&built, workbench, &workbench_from_scene)?;
     let network = &workbench.network;
     let link = LinkSettings {
         quic: overrides
@@ -98,7 +102,10 @@ pub fn session_setup(
         .map(|directory| recording(directory.clone(), &scene, &built));
     Ok(SessionSetup {
         recording,
-        device: device(&workbench.device, &built)?,
+        device: match &overrides.input {
+            Some(choice) => input(choice, &built, &workbench_from_scene)?,
+            None => device(&workbench.device, &built, &workbench_from_scene)?,
+        },
         motions: built.motions,
         settings: built.settings,
         start: built.start,
@@ -134,13 +141,20 @@ fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> Recording
     }
 }
 
-fn head(viewer: &Viewer) -> Head {
-    Head {
+fn head(viewer: &Viewer) -> HeadSource {
+    HeadSource {
         rest: viewer.head,
         eye_separation: viewer.eye_separation,
-        sway: match viewer.tracking {
-            HeadTracking::Fixed => None,
-            HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
+        motion: match &viewer.tracking {
+            HeadTracking::Fixed => HeadMotion::Still,
+            HeadTracking::Sway { amplitude, period } => HeadMotion::Sway(Sway {
+                amplitude: *amplitude,
+                period: *period,
+            }),
+            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
+                source: vrpn_source(sensor),
+                mapping: sensor.mapping,
+            })),
         },
     }
 }
@@ -150,7 +164,11 @@ fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings
     let wanted = &workbench.safety;
     let nobody_is_hurt = matches!(
         workbench.device,
-        Device::Simulated { .. } | Device::Trace { .. } | Device::Remote
+        Device::Simulated { .. }
+            | Device::Trace { .. }
+            | Device::Vrpn { .. }
+            | Device::SpaceMouse { .. }
+            | Device::Remote
     );
     let rearm = match wanted.rearm {
         Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,

@@ -25,6 +25,7 @@ pub mod demo;
 pub mod demo_directory;
 pub mod devices;
 pub mod doctor;
+pub mod doctor_device;
 pub mod edge_sets;
 pub mod failure;
 pub mod finished_file;

@@ -11,7 +11,7 @@ use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
 use taut::signals::BlockingEndSignal;
 use taut::terminal::Terminal;
-use taut::{arm, demo, doctor, record, recorded_session, rendering, replay, serve};
+use taut::{arm, demo, doctor, doctor_device, record, recorded_session, rendering, replay, serve};
 use tracing_subscriber::EnvFilter;
 
 /// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
@@ -142,6 +142,15 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
+    if let Some(device) = &args.device {
+        let report = doctor_device::examine(device, args.out.as_deref())?;
+        if args.json {
+            print_json(&report)?;
+        } else {
+            println!("{report}");
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;

@@ -32,6 +32,7 @@ pub fn run(
         udp: args.udp,
         no_monitor: args.no_monitor,
         record: args.record.clone(),
+        input: None,
         recording: args.recording.clone(),
     };
     let setup = session_setup(&workbench, key, &overrides)?;

@@ -30,6 +30,7 @@ use crate::failure::Failure;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
+use crate::loops::incidents::{self, IncidentNews};
 use crate::loops::shell::{Waker, run_at_deadlines, spawn};
 use crate::loops::wiring::WiredLoops;
 use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, NetworkCounts, Severity};
@@ -59,6 +60,7 @@ pub struct Session {
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
     arm_switch: Arc<ArmSwitch>,
+    incidents: IncidentNews,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -108,6 +110,9 @@ impl Session {
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
+        let [head, watched_head] = setup.head.start().map_err(|error| {
+            Failure::failed(format!("the head tracker cannot be listened to ({error})"))
+        })?;
 
         let (taps, recorder) = match &setup.recording {
             Some(wanted) => {
@@ -138,6 +143,7 @@ impl Session {
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
             arm_switch: loops.arm_switch.clone(),
+            incidents: IncidentNews::default(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -150,6 +156,7 @@ impl Session {
         // From here on a failure drops the session, which ends what was started.
         if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
+                head: watched_head,
                 shared: loops.observers.monitor,
                 statistics: loops.statistics.clone(),
                 clock,
@@ -168,7 +175,7 @@ impl Session {
         }
         let states = StateWriter::new(
             loops.observers.broadcast,
-            setup.head,
+            head,
             &setup.world.body.reference_point,
             scene_revision,
         );
@@ -398,6 +405,7 @@ impl Session {
     /// Tells what happened on the network since the last time: errors here, everything to monitor and log. Call it a few times a
     /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
+        self.tell_incidents();
         let Some(link) = &self.link else {
             return;
         };
@@ -442,6 +450,26 @@ impl Session {
             u32::try_from(clients.len()).unwrap_or(u32::MAX),
             Ordering::Relaxed,
         );
+    }
+
+    /// Tells of the device port's events, to the log and the recording; the monitor looks by itself.
+    fn tell_incidents(&mut self) {
+        let counts = &self.statistics.haptics.incidents;
+        for (event, times) in self.incidents.since_last(counts) {
+            let text = incidents::line(&event, times);
+            if event.kind.is_good_news() {
+                tracing::info!("{text}");
+            } else {
+                tracing::warn!("{text}");
+            }
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: event.time,
+                    kind: "safety".to_owned(),
+                    text,
+                });
+            }
+        }
     }
 
     /// One line of what goes on.
@@ -592,7 +620,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
             .to_isometry()
             .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
-        head: setup.head,
+        head: setup.head.rest,
         rest_distance: setup.settings.rest_distance,
     }
 }

@@ -11,7 +11,7 @@ use taut_link::{ClusterKey, Content};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
 
-use crate::head::Head;
+use crate::head::HeadSource;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -31,7 +31,7 @@ pub struct SessionSetup {
     /// Limits and times of the force.
     pub safety: SafetySettings,
     /// The viewer.
-    pub head: Head,
+    pub head: HeadSource,
     /// What clients fetch at join.
     pub content: Content,
     /// Addresses, key and limits of the network.

@@ -47,7 +47,8 @@ pub fn declared(
                 hand: hand.or(scene_hand).unwrap_or_default(),
             }))
         }
-        (Device::Trace { .. }, _) => Ok(None), // it feels nothing
+        // They feel nothing.
+        (Device::Trace { .. } | Device::Vrpn { .. } | Device::SpaceMouse { .. }, _) => Ok(None),
         (_, dynamics) => Ok(dynamics.copied()),
     }
 }

@@ -7,7 +7,7 @@ use god_object::spatial::linear;
 use god_object::{GodObject, Pose, World};
 use taut::broadcast::StateWriter;
 use taut::checker::PenetrationChecker;
-use taut::head::Head;
+use taut::head::{HeadMotion, HeadSource};
 use taut::loops::wiring::WiredLoops;
 use taut::replay::Replay;
 use taut_bridge::{
@@ -188,10 +188,13 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
     let scene = scene();
     let motion = motion(&scene);
     let session = VirtualSession::new(&scene, yielding_hand(&scene));
-    let head = Head {
+    let source = HeadSource {
         rest: Pose::identity(),
         eye_separation: 0.064,
-        sway: None,
+        motion: HeadMotion::Still,
+    };
+    let Ok([head]) = source.start() else {
+        panic!("a still head has nothing to start");
     };
     let WiredLoops {
         mut god_object,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use god_object::GodObject;
+use god_object::{GodObject, Pose};
 use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
 use taut::setup::DeviceSource;
@@ -42,7 +42,7 @@ fn loops_two_and_three_allocate_nothing() {
             tremor: 5e-5,
             seed: 1,
         };
-        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene) else {
+        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
             panic!("no simulated device");
         };
         let world = Arc::new(scene.world);

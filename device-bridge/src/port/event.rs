@@ -222,7 +222,9 @@ pub fn kind_of_fault(fault: &DeviceFault) -> (EventKind, f64) {
         DeviceFault::Lost { age } => (EventKind::DeviceLost, age.as_secs_f64()),
         DeviceFault::NotFinite => (EventKind::DeviceNotFinite, 0.0),
         DeviceFault::TimeNotOnClock => (EventKind::DeviceNotOnClock, 0.0),
-        DeviceFault::ReportedFault => (EventKind::DeviceReportedFault, 0.0),
+        DeviceFault::ReportedFault | DeviceFault::Strings(_) => {
+            (EventKind::DeviceReportedFault, 0.0)
+        }
         DeviceFault::Reconnected => (EventKind::DeviceReconnected, 0.0),
         DeviceFault::Ended => (EventKind::DeviceEnded, 0.0),
         DeviceFault::Teleported { speed } => (EventKind::DeviceTeleported, *speed),

@@ -39,7 +39,7 @@ pub use trace::{
 pub use workbench::{
     Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
     RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
-    Window, Workbench,
+    VrpnSensor, Window, Workbench,
 };
 
 /// Why a scene could not be used.

@@ -51,6 +51,44 @@ impl IncidentCounts {
     }
 }
 
+/// What one listener has heard of the counts.
+#[derive(Debug)]
+pub struct IncidentNews([u64; EventKind::ALL.len()]);
+
+impl Default for IncidentNews {
+    fn default() -> Self {
+        Self([0; EventKind::ALL.len()])
+    }
+}
+
+impl IncidentNews {
+    /// The newest event of each kind that happened since the last call, with how often it did, in the order of their numbers.
+    pub fn since_last(&mut self, counts: &IncidentCounts) -> Vec<(SafetyEvent, u64)> {
+        let mut news = Vec::new();
+        for (kind, told) in EventKind::ALL.into_iter().zip(&mut self.0) {
+            let count = counts.of(kind);
+            let grown = count - *told;
+            *told = count;
+            if grown > 0 {
+                news.extend(counts.newest(kind).map(|event| (event, grown)));
+            }
+        }
+        news.sort_by_key(|(event, _)| event.number);
+        news
+    }
+}
+
+/// The line that tells of an event that happened `times` times.
+pub fn line(event: &SafetyEvent, times: u64) -> String {
+    let time_s = event.time.as_secs_f64();
+    let line = format!("{event} at {time_s:.3} s, no. {}", event.number);
+    if times > 1 {
+        line + &format!(" ({times} times)")
+    } else {
+        line
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,5 +114,32 @@ mod tests {
         for (place, kind) in EventKind::ALL.into_iter().enumerate() {
             assert_eq!(counts.of(kind), place as u64 + 1, "{kind:?}");
         }
+    }
+
+    #[test]
+    fn a_listener_hears_of_each_kind_once_and_how_often() {
+        let (counts, mut news) = (IncidentCounts::default(), IncidentNews::default());
+        let event = |number, kind| SafetyEvent {
+            number,
+            time: Duration::from_millis(1500),
+            kind,
+            value: 0.021,
+        };
+        counts.count(&event(1, EventKind::DeviceLost));
+        counts.count(&event(2, EventKind::Arming));
+        counts.count(&event(3, EventKind::DeviceLost));
+        let heard = news.since_last(&counts);
+        let lines: Vec<_> = heard
+            .iter()
+            .map(|(event, times)| line(event, *times))
+            .collect();
+        assert_eq!(
+            lines,
+            [
+                "safety: the force ramps in at 1.500 s, no. 2",
+                "device: lost, the force fades (0.021 s) at 1.500 s, no. 3 (2 times)"
+            ]
+        );
+        assert!(news.since_last(&counts).is_empty());
     }
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use taut_bridge::EventKind;
 
 use super::Severity;
+use crate::loops::incidents::line;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::statistics::Statistics;
 
@@ -105,15 +106,7 @@ impl EventLog {
             } else {
                 Severity::Warning
             };
-            let mut line = format!(
-                "{newest} at {:.3} s, no. {}",
-                newest.time.as_secs_f64(),
-                newest.number
-            );
-            if news > 1 {
-                line += &format!(" ({news} times)");
-            }
-            say(severity, &line);
+            say(severity, &line(&newest, news));
         }
         let checks = &statistics.checks;
         let count = checks.penetrations.load(Ordering::Relaxed);
@@ -187,6 +180,7 @@ mod tests {
     use god_object::constraint::{Feature, FeaturePair, NonPenetrationConstraint};
     use god_object::nalgebra::{Point3, Vector3};
     use god_object::spatial::Pose;
+    use taut_bridge::SafetyEvent;
 
     const REST: f64 = 1e-5;
 

@@ -20,7 +20,6 @@ use super::events::EventLog;
 use super::{MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
 use crate::clock::nanoseconds;
 use crate::failure::Failure;
-use crate::head::Head;
 use crate::loops::shell::spawn;
 use crate::shutdown::Shutdown;
 use crate::timing::{Histogram, HistogramWindow};
@@ -64,9 +63,8 @@ impl MonitorFeed {
         let obstacles = picture.world.obstacles.iter();
         let names = obstacles.map(|obstacle| obstacle.name.clone());
         let events = EventLog::new(names, picture.rest_distance);
-        let head = picture.head;
         let thread = spawn("monitor feed", shutdown, move || {
-            feed(sources, sender, events, &network, &head, &frame, &asked);
+            feed(sources, sender, events, &network, &frame, &asked);
         })
         .map_err(Failure::failed)?;
         Ok(Self { monitor, thread })
@@ -177,7 +175,7 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
         .iter()
         .map(|screen| outline(screen, frame))
         .collect();
-    scene.head = Some(frame.pose(&picture.head.rest));
+    scene.head = Some(frame.pose(&picture.head));
     scene.reference_point = world.body.reference_point;
     scene.up = frame.scene_from_workbench.rotation * Vector3::z();
     scene
@@ -199,7 +197,6 @@ fn feed(
     mut sender: MonitorSender,
     mut events: EventLog,
     network: &NetworkCounts,
-    head: &Head,
     frame: &SceneFrame,
     shutdown: &Shutdown,
 ) {
@@ -208,7 +205,7 @@ fn feed(
     while !shutdown.is_asked() {
         deadline = sources.clock.now().max(deadline + SAMPLE_PERIOD);
         sleep_until(sources.clock.monotonic(deadline));
-        let mut sample = sample(&mut sources, head, frame);
+        let mut sample = sample(&mut sources, frame);
         times.follow(&sources, &mut sample);
         sample.packets_sent = network.packets_sent.load(Ordering::Relaxed);
         sample.packets_received = network.packets_received.load(Ordering::Relaxed);
@@ -223,7 +220,7 @@ fn feed(
     }
 }
 
-fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> MonitorSample {
+fn sample(sources: &mut MonitorSources, frame: &SceneFrame) -> MonitorSample {
     let now = sources.clock.now();
     let device = *sources.shared.device.newest();
     let wrench = *sources.shared.wrench.newest();
@@ -234,11 +231,13 @@ fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> Moni
         // There is room for as many as a session has.
         moving.push(place.obstacle, place.pose);
     }
+    let head = &mut sources.head;
+    let head_pose = head.moves().then(|| frame.pose(&head.pose(now)));
     MonitorSample {
         god_object_pose: contacts.set.god_object_pose,
         moving,
         device_pose: device.pose,
-        head_pose: head.moves().then(|| frame.pose(&head.pose(now))),
+        head_pose,
         wrench: device.felt.map_or(wrench.wrench, |felt| felt.wrench),
         contacts: contacts
             .set

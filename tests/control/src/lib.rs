@@ -6,6 +6,7 @@
 //! - [`row`]: what a recipe says.
 //! - [`walls`]: constraint sets made by hand, and a body to hold against them.
 //! - [`closed_loop`]: coupling, device and hand, tick by tick.
+//! - [`edge`] and its neighbours: the coupling next to the device, over a network.
 //! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
 //! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.

@@ -5,10 +5,11 @@ mod load;
 mod parse;
 mod safety;
 mod spec;
+mod tracker;
 
 pub use dynamics::DeviceDynamics;
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
-    Safety, Screen, Show, Stereo, TransportKind, Viewer, Window,
+    Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
 };

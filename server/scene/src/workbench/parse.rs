@@ -14,6 +14,7 @@ use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
     TransportKind, Viewer, Window,
 };
+use super::tracker::vrpn_sensor;
 use crate::document::{Document, Range, Section};
 use crate::problem::FileError;
 use crate::scene::{HandPreset, pose_of, shipped_scene_text};
@@ -287,7 +288,15 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
             ),
         );
     }
-    let tracking = sway.unwrap_or(HeadTracking::Fixed);
+    let tracker = table(section, "tracker", vrpn_sensor);
+    if let (Some(_), Some(_), Some(node)) = (&sway, &tracker, section.get("tracker")) {
+        let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
+        section.complain(&node.at, text);
+    }
+    let tracking = match tracker {
+        Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
+        None => sway.unwrap_or(HeadTracking::Fixed),
+    };
     Some(Viewer {
         eye_separation,
         head: head.flatten()?,
@@ -302,6 +311,8 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     enum Kind {
         Simulated,
         Trace,
+        Vrpn,
+        SpaceMouse,
         Remote,
     }
     if !section.has("kind") {
@@ -310,11 +321,26 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     let kinds = [
         ("simulated", Kind::Simulated),
         ("trace", Kind::Trace),
+        ("vrpn", Kind::Vrpn),
+        ("space-mouse", Kind::SpaceMouse),
+        ("mouse", Kind::Remote),
         ("remote", Kind::Remote),
     ];
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
-        for key in ["hand", "path", "tremor", "seed", "loop"] {
+        for key in ["hand", "path", "tremor", "seed", "loop"]
+            .iter()
+            .chain(&["server", "sensor", "mode", "axes", "scale", "max_age"])
+            .chain(&[
+                "origin",
+                "mount",
+                "anchor",
+                "dead_zone",
+                "speed",
+                "turn_rate",
+            ])
+            .chain(&["reach", "tilt", "yield_force", "yield_torque"])
+        {
             section.has(key);
         }
         return None;
@@ -334,6 +360,29 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
             Some(Device::Trace {
                 path: files.path(section, "path")?,
                 repeat: section.boolean("loop").unwrap_or(false),
+            })
+        }
+        Kind::Vrpn => {
+            let anchors = [("start", false), ("workbench", true)];
+            let on_workbench = section.choice("anchor", &anchors).unwrap_or(false);
+            Some(Device::Vrpn {
+                sensor: Box::new(vrpn_sensor(section)?),
+                on_workbench,
+            })
+        }
+        Kind::SpaceMouse => {
+            let number = |key, most| section.number(key, Range::PositiveUpTo(most));
+            Some(Device::SpaceMouse {
+                position: section
+                    .choice("mode", &[("rate", false), ("position", true)])
+                    .unwrap_or(false),
+                dead_zone: section.number("dead_zone", Range::UpTo(0.9)),
+                speed: number("speed", 10.0),
+                turn_rate: number("turn_rate", 100.0),
+                reach: number("reach", 10.0),
+                tilt: number("tilt", 3.0),
+                yield_force: number("yield_force", 1e3),
+                yield_torque: number("yield_torque", 1e3),
             })
         }
         Kind::Remote => Some(Device::Remote),
