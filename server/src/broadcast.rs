@@ -11,8 +11,8 @@ use god_object::{ConstraintSet, NonPenetrationConstraint};
 use taut_bridge::ArmingState;
 use taut_link::Broadcaster;
 use taut_proto::state::{
-    ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState,
-    TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
+    BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS,
+    RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
 };
 use taut_proto::wrench::WRENCH_PAUSED;
 use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
@@ -22,7 +22,7 @@ use crate::edge_sets::EdgeSets;
 use crate::head::Head;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
-use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::device_state::DeviceState;
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shutdown::Shutdown;
@@ -142,6 +142,8 @@ impl StateWriter {
         state
             .tools
             .push(tool_state(device, contacts, wrench, &self.motion.velocity));
+        state.bodies.clear();
+        state.bodies.extend(contacts.moving.iter().map(body_state));
         nearest_contacts(&contacts.set, &mut state.contacts);
         state.events.clone_from(&self.events.recent);
         Some(&self.state)
@@ -192,6 +194,14 @@ fn tool_state(
         buttons: device.buttons,
         flags: limited | silent,
         id: 0,
+    }
+}
+
+fn body_state(moving: &MovingObstacle) -> BodyState {
+    BodyState {
+        id: moving.obstacle,
+        flags: 0,
+        pose: PoseF32::from_isometry(&moving.pose),
     }
 }
 
@@ -388,6 +398,10 @@ mod tests {
             .extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
         snapshot.published = Duration::from_millis(6);
         snapshot.report.active = 1;
+        snapshot.moving.push(MovingObstacle {
+            obstacle: 3,
+            pose: Pose::translation(0.0, 0.25, 0.0),
+        });
         contacts.publish(&snapshot);
         let wrench = WrenchCommand {
             wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
@@ -423,6 +437,13 @@ mod tests {
             .map(|contact| contact.pair[1])
             .collect();
         assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
+        let bodies: Vec<_> = state
+            .bodies
+            .iter()
+            .map(|body| (body.id, body.pose))
+            .collect();
+        let plate = PoseF32::from_isometry(&Pose::translation(0.0, 0.25, 0.0));
+        assert_eq!(bodies, [(3, plate)], "by the obstacle's number");
         let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
         assert_eq!(
             codes,
@@ -451,6 +472,7 @@ mod tests {
             panic!("a sample was published");
         };
         assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
+        assert_eq!(state.bodies.len(), 1, "told again, not added");
         assert_eq!(state.run, RunState::Fault);
         assert_eq!(
             state.tools[0].flags & TOOL_DEVICE_SILENT,

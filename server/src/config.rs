@@ -21,6 +21,7 @@ use crate::head::{Head, Sway};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
+use crate::shared::contact_snapshot::MAX_MOVING;
 use crate::stability::{declared, judge};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
@@ -63,10 +64,11 @@ pub fn session_setup(
         None => workbench.load_scene()?,
     };
     let built = scene.build()?;
-    if let Some(motion) = built.motions.first() {
+    if built.motions.len() > MAX_MOVING {
         return Err(Failure::BadInput(format!(
-            "the obstacle \"{}\" has a motion, which only `taut replay` can follow: a session's checker and screens know obstacles at rest only; leave out `motion`",
-            built.world.obstacles[motion.obstacle].name
+            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+            built.name,
+            built.motions.len()
         )));
     }
     let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
@@ -97,6 +99,7 @@ pub fn session_setup(
     Ok(SessionSetup {
         recording,
         device: device(&workbench.device, &built)?,
+        motions: built.motions,
         settings: built.settings,
         start: built.start,
         world: Arc::new(built.world),

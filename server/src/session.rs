@@ -127,7 +127,8 @@ impl Session {
             device,
             setup.safety,
             taps,
-        );
+        )
+        .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -583,6 +584,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.clone(),
         world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description

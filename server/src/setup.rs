@@ -9,6 +9,7 @@ use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::{ClusterKey, Content};
 use taut_recording::Manifest;
+use taut_scene::BuiltMotion;
 
 use crate::head::Head;
 use crate::monitor::MonitorSettings;
@@ -18,6 +19,9 @@ use crate::realtime::RealtimePolicy;
 pub struct SessionSetup {
     /// Bodies.
     pub world: Arc<World>,
+    /// How obstacles move; nothing for those that stand still. At most
+    /// [`MAX_MOVING`](crate::shared::contact_snapshot::MAX_MOVING).
+    pub motions: Vec<BuiltMotion>,
     /// Of the method.
     pub settings: Settings,
     /// Where god-object and device start.

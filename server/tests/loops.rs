@@ -62,7 +62,8 @@ impl VirtualSession {
             ..SafetySettings::default()
         };
         Self {
-            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None),
+            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None)
+                .with_motions(scene.motions.clone()),
             now: Duration::ZERO,
         }
     }
@@ -92,20 +93,14 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
         let mut largest: f64 = 0.0;
         for _ in 0..3500 {
             session.tick(god_object_ticks);
-            let pose = session
-                .loops
-                .observers
-                .monitor
-                .contacts
-                .newest()
-                .set
-                .god_object_pose;
+            let contacts = session.loops.observers.monitor.contacts.newest();
+            let pose = contacts.set.god_object_pose;
             assert!(
                 pose.translation.z >= 0.019,
                 "centre at {}",
                 pose.translation.z
             );
-            assert_eq!(checker.penetrated_obstacle(&pose), None);
+            assert_eq!(checker.penetrated_obstacle(&pose, &contacts.moving), None);
             let force = linear(&session.loops.observers.monitor.wrench.newest().wrench);
             // Frictionless, so nothing but along the normal.
             assert!(force.xy().norm() < 1e-3 * force.norm().max(1.0), "{force}");

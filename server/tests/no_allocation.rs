@@ -31,7 +31,7 @@ fn manifest() -> Manifest {
 
 #[test]
 fn loops_two_and_three_allocate_nothing() {
-    for name in ["sphere-on-plane", "peg-in-a-hole"] {
+    for name in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
             Err(error) => panic!("{error}"),
@@ -63,7 +63,8 @@ fn loops_two_and_three_allocate_nothing() {
             device,
             SafetySettings::default(),
             Some(taps),
-        );
+        )
+        .with_motions(scene.motions);
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {
             let now = Duration::from_millis(tick);

@@ -20,6 +20,7 @@ use crate::constraint::{ConstraintSet, contact_jacobian};
 use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
+use crate::obstacle_work::ObstacleWork;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -49,6 +50,7 @@ pub struct Coupling {
     energy: Option<EnergyObserver>,
     /// `None` where nothing is damped.
     damping: Option<ContactDamping>,
+    obstacle_work: ObstacleWork,
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
@@ -163,6 +165,7 @@ impl Coupling {
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
             damping: ContactDamping::of(settings.damping_time, settings.solver),
+            obstacle_work: ObstacleWork::default(),
             arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
@@ -191,7 +194,8 @@ impl Coupling {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
             return self.without_force(ProjectionStatus::NotFinite);
         }
-        if !self.prepared.serves(set) {
+        let arrived = !self.prepared.serves(set);
+        if arrived {
             self.prepare(set);
             self.arrival.observe(time);
         }
@@ -311,12 +315,36 @@ impl Coupling {
             let active = projection.active.iter();
             let touched = active.filter_map(|row| {
                 let contact = set.constraints.get(row.row as usize)?;
-                Some((contact.features.obstacle, contact.point, contact.normal))
+                let features = &contact.features;
+                Some((
+                    features.obstacle,
+                    features.on_obstacle,
+                    contact.point,
+                    contact.normal,
+                ))
             });
             wrench = textures.tilt(&wrench, &self.prepared.god_object, &moved, touched);
         }
+        let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
+        if arrived {
+            let along = self.prepared.moving.then(|| {
+                let rows = projection.active.iter();
+                let done = rows.filter_map(|row| {
+                    let came = set.constraints.get(row.row as usize)?.came;
+                    Some(row.multiplier * came)
+                });
+                let felt = if unlimited > 0.0 {
+                    linear(&wrench).norm() / unlimited
+                } else {
+                    1.0
+                };
+                done.sum::<f64>() * self.settings.k_h * felt
+            });
+            self.obstacle_work.arrive(along);
+        }
         if let Some(mut energy) = self.energy {
+            energy.grant(self.obstacle_work.work());
             energy.arrive(&device);
             let (bounded, clamped) = self.limited(&energy.within_reserve(metric, &wrench));
             energy.hold(&device, &bounded);
@@ -341,9 +369,24 @@ impl Coupling {
         self.energy.as_ref()
     }
 
+    /// Tells where an obstacle is, world from obstacle, as of the next [`Self::step`]'s constraint set: its texture goes with it. What a
+    /// texture does not need is in the set. One that is never told is where the world has it.
+    pub fn place_obstacle(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(textures) = &mut self.textures {
+            textures.place(obstacle, pose);
+        }
+    }
+
+    /// Net work that moving obstacles have done on the hand since the start, J: what the force's rows did along the obstacles' ways.
+    /// Negative where obstacles gave way under the hand.
+    pub fn obstacle_work(&self) -> f64 {
+        self.obstacle_work.work()
+    }
+
     /// No force, and nothing to remember of the body that it held.
     fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
         self.anchor.forget();
+        self.obstacle_work.arrive(None);
         if let Some(energy) = &mut self.energy {
             energy.release();
         }

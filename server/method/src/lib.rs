@@ -33,6 +33,7 @@ pub mod geometry;
 mod god_object;
 mod implicit;
 mod known_rows;
+mod obstacle_work;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;
@@ -50,5 +51,7 @@ pub use quasi_statics::{ProjectionStatus, SolverKind};
 pub use settings::{Adaptation, RotationMetric, Settings, SettingsError};
 pub use shape::Primitive;
 pub use spatial::{Pose, Vector6};
-pub use surface::{HeightMap, HeightMapTexture, ShadedAcceleration};
+pub use surface::{
+    HeightMap, HeightMapTexture, ShadedAcceleration, TextureCoordinates, UvHeightMapTexture,
+};
 pub use world::{Body, ForceShading, Obstacle, SineTexture, Surface, Texture, World};

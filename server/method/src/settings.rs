@@ -64,7 +64,7 @@ pub struct Settings {
     pub adaptation: Option<Adaptation>,
     /// Publish contacts before they touch, with their gaps. Off: the paper's cone of touching contacts.
     pub look_ahead: bool,
-    /// Bound the energy that the hand takes out over a run by what it has put in, see
+    /// Bound the energy that the hand takes out over a run by what it and obstacles that move have put in, see
     /// [`EnergyObserver`](crate::surface::EnergyObserver).
     pub passive: bool,
     /// Largest force on the hand, N; clamped by norm.

@@ -36,7 +36,7 @@ pub struct UpdateRecord {
     pub device_sequence: u64,
     /// Device pose that it followed: where a hand behind a network was taken to be.
     pub device_pose: Pose,
-    /// Session time for which obstacles with a motion were moved.
+    /// Time on the traces of obstacles with a motion, since these began: where the obstacles were sent.
     pub obstacle_time: Duration,
     /// How much farther than its pose the device was taken to be, m.
     pub device_ahead: f64,

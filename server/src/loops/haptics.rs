@@ -45,6 +45,10 @@ pub struct HapticsStatistics {
     pub incidents: IncidentCounts,
     /// Energy given to the hand beyond what it had put in, J, as the bits of an `f64`.
     energy_injected_bits: AtomicU64,
+    /// Net work of moving obstacles on the hand, J, as the bits of an `f64`.
+    obstacle_work_bits: AtomicU64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
+    energy_generated_bits: AtomicU64,
     /// The device does not answer now.
     pub device_faulty: AtomicBool,
 }
@@ -53,6 +57,16 @@ impl HapticsStatistics {
     /// Energy given to the hand beyond what it had put in, J.
     pub fn energy_injected(&self) -> f64 {
         f64::from_bits(self.energy_injected_bits.load(Ordering::Relaxed))
+    }
+
+    /// Net work that moving obstacles have done on the hand, J.
+    pub fn obstacle_work(&self) -> f64 {
+        f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+    }
+
+    /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
+    pub fn energy_generated(&self) -> f64 {
+        f64::from_bits(self.energy_generated_bits.load(Ordering::Relaxed))
     }
 }
 
@@ -122,6 +136,16 @@ impl HapticsLoop {
         self.port.release_step(now)
     }
 
+    /// What of the energy given is the obstacles', and what nobody's.
+    fn tell_obstacle_work(&self) {
+        let given = self.port.energy().delivered();
+        let work = self.wrench.held().obstacle_work;
+        let generated = (given - work).max(self.statistics.energy_generated()); // NaN: as before
+        let store = |bits: &AtomicU64, energy: f64| bits.store(energy.to_bits(), Ordering::Relaxed);
+        store(&self.statistics.obstacle_work_bits, work);
+        store(&self.statistics.energy_generated_bits, generated);
+    }
+
     fn count(&mut self, report: &TickReport) {
         let statistics = &self.statistics;
         for event in report.events.iter() {
@@ -138,6 +162,7 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        self.tell_obstacle_work();
         let felt = report
             .reading
             .felt

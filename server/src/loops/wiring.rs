@@ -5,6 +5,7 @@ use std::sync::Arc;
 use god_object::{Coupling, GodObject, Settings, World};
 use taut_bridge::{ArmSwitch, Device, DevicePort, SafetySettings};
 use taut_recording::Taps;
+use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
 use super::god_object::{GodObjectLoop, UpdateTaps};
@@ -137,6 +138,15 @@ impl WiredLoops {
             arm_switch,
             observers,
             statistics,
+        }
+    }
+
+    /// The same with obstacles that move.
+    #[must_use]
+    pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
+        Self {
+            god_object: self.god_object.with_motions(motions),
+            ..self
         }
     }
 }

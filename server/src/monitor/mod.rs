@@ -51,6 +51,8 @@ pub struct MonitorPicture {
     pub name: String,
     /// Bodies and their meshes.
     pub world: Arc<World>,
+    /// Indices of the obstacles that move.
+    pub moving: Vec<usize>,
     /// Where the god-object starts.
     pub start: Pose,
     /// The screens, workbench frame.

@@ -12,7 +12,7 @@ use god_object::spatial::Pose;
 use taut_bridge::realtime::sleep_until;
 use taut_monitor::{
     BodyRole, LogLevel, LoopTime, Monitor, MonitorBody, MonitorError, MonitorOptions,
-    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, ShownContact,
+    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, MovingObstacles, ShownContact,
 };
 use taut_proto::scene::ScreenDescription;
 
@@ -164,13 +164,13 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
         BodyRole::GodObject,
         &picture.start,
     );
-    for obstacle in &world.obstacles {
-        body(
-            &obstacle.name,
-            &obstacle.mesh,
-            BodyRole::Obstacle,
-            &obstacle.pose,
-        );
+    for (index, obstacle) in world.obstacles.iter().enumerate() {
+        let role = if picture.moving.contains(&index) {
+            BodyRole::MovingObstacle
+        } else {
+            BodyRole::Obstacle
+        };
+        body(&obstacle.name, &obstacle.mesh, role, &obstacle.pose);
     }
     scene.screens = picture
         .screens
@@ -229,8 +229,14 @@ fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> Moni
     let wrench = *sources.shared.wrench.newest();
     let contacts = sources.shared.contacts.newest();
     let gap_min = contacts.set.gap_min;
+    let mut moving = MovingObstacles::default();
+    for place in &contacts.moving {
+        // There is room for as many as a session has.
+        moving.push(place.obstacle, place.pose);
+    }
     MonitorSample {
         god_object_pose: contacts.set.god_object_pose,
+        moving,
         device_pose: device.pose,
         head_pose: head.moves().then(|| frame.pose(&head.pose(now))),
         wrench: device.felt.map_or(wrench.wrench, |felt| felt.wrench),

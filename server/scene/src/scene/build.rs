@@ -126,9 +126,10 @@ impl Scene {
         let textures: Vec<Option<Texture>> = spec
             .obstacles
             .iter()
-            .map(|o| {
-                let map = o.height_map.as_ref()?;
-                self.height_map(map)
+            .zip(&obstacle_meshes)
+            .map(|(o, mesh)| {
+                let (map, mesh) = (o.height_map.as_ref()?, mesh.as_ref()?);
+                self.height_map(map, &o.shape, mesh)
                     .map_err(|error| problems.extend(error.into_problems()))
                     .ok()
             })
