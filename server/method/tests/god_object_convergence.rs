@@ -1,6 +1,6 @@
 //! With the device at rest the god-object comes to the constrained minimiser and stays there, bit for bit.
 //!
-//! Every run draws other presses. A longer run: `PROPTEST_CASES=20000 cargo test --release -p god-object --test god_object_convergence`.
+//! Other presses: `PROPTEST_RNG_SEED=2 PROPTEST_CASES=20000 cargo test --release -p god-object --test god_object_convergence`.
 
 mod support;
 
@@ -12,6 +12,7 @@ use god_object::quasi_statics::{HalfSpace, Projector, SolverKind, kkt_residual};
 use god_object::spatial::{angular, linear, pose_difference};
 use god_object::{GodObject, Obstacle, Pose, Settings, World};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use support::{box_body, box_obstacle, penetrates};
 
 /// Updates after which nothing may move any more. Most presses take a hundred; where the contacts are bent so that they nearly cancel the
@@ -30,8 +31,22 @@ fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
     }
 }
 
+/// The same presses in every run, unless others are asked for.
+fn config() -> ProptestConfig {
+    let asked = ProptestConfig::default();
+    let rng_seed = match asked.rng_seed {
+        RngSeed::Random => RngSeed::Fixed(1),
+        fixed => fixed,
+    };
+    ProptestConfig {
+        failure_persistence: None,
+        rng_seed,
+        ..asked
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn a_pressing_hand_at_rest_leads_to_the_minimiser_and_no_further(
