@@ -37,9 +37,11 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Takes a live session's device trace, to be replayed
     Record(RecordArgs),
+    /// Asks for force at the device of a session, or for none
+    Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
-    /// Says what this machine lacks for real time and for rendering
+    /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Makes a cluster key, the secret that all machines of a workbench share
     Keys(KeysArgs),
@@ -47,7 +49,7 @@ pub enum Command {
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = "Example: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_bridge::drivers_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
@@ -61,12 +63,19 @@ pub struct DemoArgs {
     /// How poses reach the render clients
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// Put the simulated device in a process of its own
+    /// What moves the god-object: `simulated`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
+    /// (default: the scene's simulated hand)
+    #[arg(long, value_name = "D", value_parser = device_text)]
+    pub device: Option<String>,
+    /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
     /// Also write what the monitor shows to this file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
+    /// Record the session into this new directory, to be computed again by `taut replay --recording`
+    #[arg(long, value_name = "DIR")]
+    pub recording: Option<PathBuf>,
     /// Do without the monitor and its web viewer
     #[arg(long)]
     pub no_monitor: bool,
@@ -76,6 +85,9 @@ pub struct DemoArgs {
     /// Where the render clients write their pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -106,9 +118,15 @@ pub struct ServeArgs {
     /// Also write what the monitor shows to this file
     #[arg(long, value_name = "FILE.rrd")]
     pub record: Option<PathBuf>,
+    /// Record the session into this new directory, to be computed again by `taut replay --recording`
+    #[arg(long, value_name = "DIR")]
+    pub recording: Option<PathBuf>,
     /// Do without the monitor, whatever the workbench file says
     #[arg(long)]
     pub no_monitor: bool,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -121,14 +139,21 @@ pub struct ServeArgs {
 )]
 pub struct ReplayArgs {
     /// A shipped scene by its name, or a scene file
-    #[arg(long, value_name = "F")]
-    pub scene: String,
+    #[arg(long, value_name = "F", required_unless_present = "recording")]
+    pub scene: Option<String>,
     /// The device trace
-    #[arg(long, value_name = "T")]
-    pub trace: PathBuf,
-    /// Where the answer goes, a CSV file
-    #[arg(long, value_name = "O")]
-    pub out: PathBuf,
+    #[arg(long, value_name = "T", required_unless_present = "recording")]
+    pub trace: Option<PathBuf>,
+    /// Instead of scene and trace: a recorded session, computed again and compared bit by bit
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["scene", "trace", "god_object_rate", "budget_us", "solver", "overrides"]
+    )]
+    pub recording: Option<PathBuf>,
+    /// Where the answer goes, a CSV file; a recorded session needs none
+    #[arg(long, value_name = "O", required_unless_present = "recording")]
+    pub out: Option<PathBuf>,
     /// Virtual rate of the god-object loop (default: once per row of the trace)
     #[arg(long, value_name = "HZ", value_parser = positive_rate)]
     pub god_object_rate: Option<f64>,
@@ -175,6 +200,21 @@ pub struct RecordArgs {
     pub duration: Option<f64>,
 }
 
+/// `taut arm`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key cluster.key")]
+pub struct ArmArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// The cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// No force instead: it fades, and stays away until somebody arms
+    #[arg(long)]
+    pub off: bool,
+}
+
 /// `taut check`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Example: taut check workbench.toml scene.toml part.ply hand.csv")]
@@ -189,8 +229,16 @@ pub struct CheckArgs {
 
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut doctor --json")]
+#[command(
+    after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
+)]
 pub struct DoctorArgs {
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub device: Option<String>,
+    /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
+    #[arg(long, value_name = "FILE.svg", requires = "device")]
+    pub out: Option<PathBuf>,
     /// Print the findings as JSON on standard output
     #[arg(long)]
     pub json: bool,
@@ -269,6 +317,12 @@ pub enum MethodChoice {
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
+
+/// The text of a device, as it is, if it names one.
+fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
+    text.parse::<taut_bridge::DeviceChoice>()
+        .map(|_| text.to_owned())
+}
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     positive(text, MAX_SECONDS, "seconds")

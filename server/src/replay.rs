@@ -13,13 +13,13 @@ use std::io::{self, IsTerminal};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use god_object::nalgebra::Vector3;
-use god_object::spatial::{Pose, linear};
+use god_object::nalgebra::{Point3, Vector3};
+use god_object::spatial::{Pose, at_reference_point, linear};
+use god_object::surface::EnergyObserver;
 use god_object::{
     Coupling, GodObject, Settings, ShadedAcceleration, StartError, StepReport, World,
 };
 use indicatif::ProgressBar;
-use taut_bridge::EnergyObserver;
 use taut_scene::{BuiltMotion, DeviceTrace, ReplayRow, ReplayWriter, Scene};
 
 use crate::cli::{MethodChoice, ReplayArgs};
@@ -38,8 +38,13 @@ const EARLY_SHARE: f64 = 1e-6;
 
 /// `taut replay`: the trace through the scene, the answer into a file. Nothing is left of a replay that does not end.
 pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
-    let scene = Scene::named_or_file(&args.scene)?.with_overrides(&args.overrides)?;
-    let trace = DeviceTrace::load(&args.trace)?;
+    let (Some(scene), Some(trace), Some(out)) = (&args.scene, &args.trace, &args.out) else {
+        return Err(Failure::bad_input(
+            "a replay needs --scene, --trace and --out, or --recording",
+        ));
+    };
+    let scene = Scene::named_or_file(scene)?.with_overrides(&args.overrides)?;
+    let trace = DeviceTrace::load(trace)?;
     let built = scene.build()?;
     let mut settings = built.settings;
     if let Some(solver) = args.solver {
@@ -63,16 +68,16 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
     let cannot_write = |error: io::Error| {
         Failure::BadInput(format!(
             "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",
-            args.out.display()
+            out.display()
         ))
     };
-    let file = FinishedFile::create(&args.out).map_err(cannot_write)?;
+    let file = FinishedFile::create(out).map_err(cannot_write)?;
     let mut writer = ReplayWriter::new(file, args.timings).map_err(cannot_write)?;
     write_answers(&mut replay, &trace, &mut writer, &interrupted).map_err(cannot_write)?;
     if interrupted.is_asked() {
         return Err(Failure::Failed(format!(
             "the replay was interrupted, and {} was not written",
-            args.out.display()
+            out.display()
         )));
     }
     writer
@@ -118,6 +123,7 @@ pub struct Replay {
     /// Virtual time of the first row, at which the obstacles' traces begin, s.
     began: Option<f64>,
     shaded: Option<ShadedAcceleration>,
+    reference_point: Point3<f64>,
     energy: EnergyObserver,
     last_force: Option<Vector3<f64>>,
     seen: Seen,
@@ -155,7 +161,7 @@ impl Replay {
         god_object_rate: Option<f64>,
     ) -> Result<Self, StartError> {
         let coupling = Coupling::new(&world, &settings);
-        let energy = EnergyObserver::new(world.body.reference_point);
+        let reference_point = world.body.reference_point;
         Ok(Self {
             god_object: GodObject::new(world, settings, start)?,
             coupling,
@@ -168,7 +174,8 @@ impl Replay {
             motions: Vec::new(),
             began: None,
             shaded: None,
-            energy,
+            reference_point,
+            energy: EnergyObserver::new(),
             last_force: None,
             seen: Seen {
                 gap_min: f64::INFINITY,
@@ -201,6 +208,11 @@ impl Replay {
             self.clock.updated(time);
         }
 
+        for motion in &self.motions {
+            if let Some(pose) = self.god_object.obstacle_poses().nth(motion.obstacle) {
+                self.coupling.place_obstacle(motion.obstacle, pose);
+            }
+        }
         let set = self.god_object.constraint_set();
         let before = thread_cpu_time();
         let output = self.coupling.step(time, device_pose, set);
@@ -219,7 +231,10 @@ impl Replay {
             stale: time - self.clock.last,
             timings_us: (microseconds(update_time), microseconds(force_time)),
         };
-        self.energy.step(device_pose, &output.wrench);
+        let device = at_reference_point(device_pose, &self.reference_point);
+        self.energy.grant(self.coupling.obstacle_work());
+        self.energy.arrive(&device);
+        self.energy.hold(&device, &output.wrench);
         self.observe(&answer);
         answer
     }
@@ -247,7 +262,9 @@ impl Replay {
             contacts: distribution_of(&self.seen.contacts),
             active: distribution_of(&self.seen.active),
             gap_min_m: self.seen.gap_min.is_finite().then_some(self.seen.gap_min),
-            energy_injected_j: self.energy.injected(),
+            energy_injected_j: self.energy.highest(),
+            energy_from_obstacles_j: self.coupling.obstacle_work(),
+            energy_generated_j: self.energy.generated(),
             ..self.seen.report.clone()
         }
     }
@@ -274,6 +291,7 @@ impl Seen {
     fn update(&mut self, step: &StepReport, took: Duration) {
         self.update_us.push(microseconds(took));
         self.report.solver_fallbacks += u64::from(step.solver_fallbacks);
+        self.report.obstacle_blocked_updates += u64::from(step.obstacles_blocked > 0);
         let work = &mut self.report.work;
         *work = WorkReport {
             node_pairs: work.node_pairs + step.work.node_pairs,

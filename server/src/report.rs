@@ -6,7 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::timing::Distribution;
+use crate::timing::{Bin, Distribution};
 
 /// What `taut demo` and `taut serve` measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +17,8 @@ pub struct SessionReport {
     pub haptics_hz: f64,
     /// Time between two ticks of the haptics loop.
     pub haptics_period_us: Distribution,
+    /// The same as a histogram: what jitter looks like.
+    pub haptics_period_bins_us: Vec<Bin>,
     /// Deadlines of the haptics loop that passed without a tick in their period.
     pub deadline_misses: u64,
     /// Thread CPU time of one god-object update.
@@ -41,8 +43,14 @@ pub struct SessionReport {
     pub packets_refused: u64,
     /// Times at which the safety stage or a device fault changed the force.
     pub safety_events: u64,
-    /// Energy given to the hand beyond what it had put in, J.
+    /// Energy given to the hand beyond what it had put in, J; obstacles that move may truly give some.
     pub energy_injected_j: f64,
+    /// Net work that obstacles that move did on the hand, J; negative where they gave way under it.
+    pub energy_from_obstacles_j: f64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J: the coupling made it.
+    pub energy_generated_j: f64,
+    /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
+    pub obstacle_blocked_updates: u64,
     /// Projections that the chosen solver did not certify and another one answered.
     pub solver_fallbacks: u64,
     /// Samples that the monitor had no room for.
@@ -104,14 +112,43 @@ pub struct ReplayReport {
     pub kkt_max: f64,
     /// Projections that the chosen solver did not certify and another one answered.
     pub solver_fallbacks: u64,
-    /// Energy given to the hand beyond what it had put in, J.
+    /// Energy given to the hand beyond what it had put in, J; obstacles that move may truly give some.
     pub energy_injected_j: f64,
+    /// Net work that obstacles that move did on the hand, J; negative where they gave way under it.
+    pub energy_from_obstacles_j: f64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J: the coupling made it.
+    pub energy_generated_j: f64,
+    /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
+    pub obstacle_blocked_updates: u64,
     /// Largest change of the force from one row to the next, N.
     pub max_force_step_n: f64,
     /// Largest force, N.
     pub max_force_n: f64,
     /// What the god-object loop did, counted.
     pub work: WorkReport,
+}
+
+/// What came of computing a recorded session again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RecordedReport {
+    /// Name of the scene.
+    pub scene: String,
+    /// The session came to its end and nothing of it was lost.
+    pub complete: bool,
+    /// God-object updates computed again.
+    pub updates: u64,
+    /// Forces computed again.
+    pub forces: u64,
+    /// Updates whose pose, gap or number of rows is not the same bit by bit.
+    pub different_updates: u64,
+    /// Forces that are not the same bit by bit.
+    pub different_forces: u64,
+    /// What differed first.
+    pub first_difference: Option<String>,
+    /// Thread CPU time of one god-object update, here and now.
+    pub update_us: Distribution,
+    /// Thread CPU time of one force, here and now.
+    pub force_us: Distribution,
 }
 
 /// Counts of the god-object loop's work: the same on every machine.
@@ -143,6 +180,19 @@ impl fmt::Display for SessionReport {
             "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed",
             self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses
         )?;
+        let ticks = period.count.max(1) as f64;
+        for bin in self
+            .haptics_period_bins_us
+            .iter()
+            .filter(|bin| bin.count > 0)
+        {
+            let share = 100.0 * bin.count as f64 / ticks;
+            let range = match bin.to {
+                Some(to) => format!("{:.0} to {to:.0} us", bin.from),
+                None => format!("from {:.0} us", bin.from),
+            };
+            writeln!(f, "  period {range:<16} {share:7.3} %")?;
+        }
         writeln!(
             f,
             "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
@@ -167,6 +217,12 @@ impl fmt::Display for SessionReport {
             f,
             "safety events       {}, energy injected {:.2e} J",
             self.safety_events, self.energy_injected_j
+        )?;
+        write_obstacles(
+            f,
+            self.energy_from_obstacles_j,
+            self.energy_generated_j,
+            self.obstacle_blocked_updates,
         )?;
         write!(
             f,
@@ -200,6 +256,37 @@ impl fmt::Display for SessionReport {
     }
 }
 
+impl fmt::Display for RecordedReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = if self.complete { "" } else { " (not whole)" };
+        writeln!(f, "scene               {}{whole}", self.scene)?;
+        writeln!(
+            f,
+            "updates             {}, {} differ",
+            self.updates, self.different_updates
+        )?;
+        writeln!(
+            f,
+            "forces              {}, {} differ",
+            self.forces, self.different_forces
+        )?;
+        writeln!(
+            f,
+            "god-object update   p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.update_us.p50, self.update_us.p99, self.update_us.max
+        )?;
+        write!(
+            f,
+            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            self.force_us.p50, self.force_us.p99, self.force_us.max
+        )?;
+        match &self.first_difference {
+            Some(difference) => write!(f, "\nfirst difference    {difference}"),
+            None => Ok(()),
+        }
+    }
+}
+
 impl fmt::Display for ReplayReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "rows                {}", self.steps)?;
@@ -218,6 +305,12 @@ impl fmt::Display for ReplayReport {
             "contacts            p50 {:.0}, max {:.0}; active max {:.0}",
             self.contacts.p50, self.contacts.max, self.active.max
         )?;
+        write_obstacles(
+            f,
+            self.energy_from_obstacles_j,
+            self.energy_generated_j,
+            self.obstacle_blocked_updates,
+        )?;
         match self.gap_min_m {
             Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
             None => writeln!(f, "smallest gap        never near")?,
@@ -233,6 +326,22 @@ impl fmt::Display for ReplayReport {
             self.kkt_max, self.solver_fallbacks, self.energy_injected_j
         )
     }
+}
+
+/// A line on moving obstacles, where some did work or were held up.
+fn write_obstacles(
+    f: &mut fmt::Formatter<'_>,
+    work: f64,
+    generated: f64,
+    blocked: u64,
+) -> fmt::Result {
+    if work == 0.0 && blocked == 0 {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "moving obstacles    gave the hand {work:.2e} J, held up in {blocked} updates; the coupling itself made {generated:.2e} J"
+    )
 }
 
 #[cfg(test)]
@@ -267,6 +376,7 @@ mod tests {
                 "duration_s",
                 "haptics_hz",
                 "haptics_period_us",
+                "haptics_period_bins_us",
                 "deadline_misses",
                 "god_object_update_us",
                 "force_us",
@@ -278,6 +388,9 @@ mod tests {
                 "packets_sent",
                 "safety_events",
                 "energy_injected_j",
+                "energy_from_obstacles_j",
+                "energy_generated_j",
+                "obstacle_blocked_updates",
                 "clients",
                 "observers",
             ],
@@ -318,6 +431,9 @@ mod tests {
                 "kkt_max",
                 "solver_fallbacks",
                 "energy_injected_j",
+                "energy_from_obstacles_j",
+                "energy_generated_j",
+                "obstacle_blocked_updates",
                 "max_force_step_n",
                 "work",
             ],

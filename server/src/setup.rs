@@ -1,14 +1,17 @@
 //! What a session is made of: bodies, device, addresses, rates. Plain data; [`crate::session`] brings it to life.
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::{ClusterKey, Content};
+use taut_recording::Manifest;
+use taut_scene::BuiltMotion;
 
-use crate::head::Head;
+use crate::head::HeadSource;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -16,6 +19,9 @@ use crate::realtime::RealtimePolicy;
 pub struct SessionSetup {
     /// Bodies.
     pub world: Arc<World>,
+    /// How obstacles move; nothing for those that stand still. At most
+    /// [`MAX_MOVING`](crate::shared::contact_snapshot::MAX_MOVING).
+    pub motions: Vec<BuiltMotion>,
     /// Of the method.
     pub settings: Settings,
     /// Where god-object and device start.
@@ -25,7 +31,7 @@ pub struct SessionSetup {
     /// Limits and times of the force.
     pub safety: SafetySettings,
     /// The viewer.
-    pub head: Head,
+    pub head: HeadSource,
     /// What clients fetch at join.
     pub content: Content,
     /// Addresses, key and limits of the network.
@@ -34,6 +40,19 @@ pub struct SessionSetup {
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.
     pub monitor: Option<MonitorSettings>,
+    /// Where the session is recorded; `None` does without.
+    pub recording: Option<RecordingSettings>,
+}
+
+/// Where a session is recorded, so that it can be computed again.
+#[derive(Clone, Debug)]
+pub struct RecordingSettings {
+    /// New or empty.
+    pub directory: PathBuf,
+    /// What the recording says about itself.
+    pub manifest: Manifest,
+    /// Text of the scene.
+    pub scene: Arc<str>,
 }
 
 /// What moves the god-object.
@@ -56,6 +75,8 @@ pub struct LinkSettings {
     pub quic: SocketAddr,
     /// Of the state plane.
     pub udp: SocketAddr,
+    /// Port of the state plane that clients are told, where a router or relay forwards to `udp`; `None`: its own.
+    pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
     /// Most clients at a time.

@@ -10,6 +10,11 @@ use crate::loops::god_object::GodObjectStatistics;
 use crate::loops::haptics::HapticsStatistics;
 use crate::report::SessionReport;
 
+/// Edges of the bins of the haptics period: within 5 %, 10 %, 20 %, a half of a millisecond, and what missed deadlines.
+const PERIOD_EDGES_US: [f64; 10] = [
+    500.0, 800.0, 900.0, 950.0, 1050.0, 1100.0, 1200.0, 1500.0, 2000.0, 5000.0,
+];
+
 /// Handles on what each thread counts. Clones read the same counters.
 #[derive(Clone, Debug, Default)]
 pub struct Statistics {
@@ -40,6 +45,7 @@ impl Statistics {
             duration_s,
             haptics_hz: per_second(haptics_period_us.count),
             haptics_period_us,
+            haptics_period_bins_us: self.haptics.period.bins_us(&PERIOD_EDGES_US),
             deadline_misses: self.haptics.deadline_misses.load(Ordering::Relaxed),
             god_object_hz: per_second(god_object_update_us.count),
             god_object_update_us,
@@ -50,6 +56,9 @@ impl Statistics {
             penetration_checks: self.checks.checks.load(Ordering::Relaxed),
             safety_events: self.haptics.safety_events.load(Ordering::Relaxed),
             energy_injected_j: self.haptics.energy_injected(),
+            energy_from_obstacles_j: self.haptics.obstacle_work(),
+            energy_generated_j: self.haptics.energy_generated(),
+            obstacle_blocked_updates: self.god_object.blocked_updates.load(Ordering::Relaxed),
             solver_fallbacks: self.god_object.solver_fallbacks.load(Ordering::Relaxed),
             ..SessionReport::default()
         }

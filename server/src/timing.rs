@@ -48,6 +48,17 @@ impl Distribution {
     }
 }
 
+/// How many values lie in a range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bin {
+    /// From here, included; the unit is in the name that the bin stands under.
+    pub from: f64,
+    /// To here, excluded; `null` where there is no end.
+    pub to: Option<f64>,
+    /// How many values.
+    pub count: u64,
+}
+
 /// A fixed-size histogram of counts, or of times from 1 ns to 18 minutes; longer ones count as the longest.
 #[derive(Debug)]
 pub struct Histogram {
@@ -105,6 +116,25 @@ impl Histogram {
     /// The distribution of times since the start, in microseconds.
     pub fn distribution_us(&self) -> Distribution {
         self.distribution().scaled(MICROSECONDS_PER_NANOSECOND)
+    }
+
+    /// How many times since the start lie below, between and above these edges, in ascending order, in microseconds. A time within 1.6 % of an
+    /// edge may be counted beyond it.
+    pub fn bins_us(&self, edges: &[f64]) -> Vec<Bin> {
+        let mut bins: Vec<Bin> = (0..=edges.len())
+            .map(|index| Bin {
+                from: index.checked_sub(1).map_or(0.0, |last| edges[last]),
+                to: edges.get(index).copied(),
+                count: 0,
+            })
+            .collect();
+        for (index, count) in self.counts.iter().enumerate() {
+            let (low, width) = bucket_range(index);
+            let middle = (low as f64 + 0.5 * (width - 1) as f64) * MICROSECONDS_PER_NANOSECOND;
+            let bin = edges.partition_point(|edge| *edge <= middle);
+            bins[bin].count += count.load(Ordering::Relaxed);
+        }
+        bins
     }
 }
 
@@ -268,6 +298,23 @@ mod tests {
         histogram.record_time(Duration::from_secs(10_000));
         let found = histogram.distribution_us();
         assert_eq!((found.count, found.max), (1, 1e10));
+    }
+
+    #[test]
+    fn bins_hold_every_time_once() {
+        let histogram = Histogram::default();
+        for microseconds in 1..=1000 {
+            histogram.record_time(Duration::from_micros(10 * microseconds));
+        }
+        let bins = histogram.bins_us(&[1000.0, 5000.0]);
+        assert_eq!(bins.len(), 3);
+        assert_eq!(bins.iter().map(|bin| bin.count).sum::<u64>(), 1000);
+        for (bin, expected) in bins.iter().zip([100.0, 400.0, 500.0]) {
+            // Within a bucket at each edge.
+            assert!((bin.count as f64 - expected).abs() <= 10.0, "{bin:?}");
+        }
+        assert_eq!((bins[1].from, bins[1].to), (1000.0, Some(5000.0)));
+        assert_eq!(bins[2].to, None);
     }
 
     #[test]

@@ -4,19 +4,34 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use god_object::GodObject;
+use god_object::{GodObject, Pose};
 use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
 use taut::setup::DeviceSource;
 use taut_bridge::SafetySettings;
+use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
 use taut_scene::{Device, Scene};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
+fn manifest() -> Manifest {
+    Manifest {
+        format: FORMAT,
+        program: "a test".to_owned(),
+        scene: "any".to_owned(),
+        origin: SceneOrigin::Shipped,
+        overrides: Vec::new(),
+        identity: String::new(),
+        complete: false,
+        reason: None,
+        lost: Lost::default(),
+    }
+}
+
 #[test]
 fn loops_two_and_three_allocate_nothing() {
-    for name in ["sphere-on-plane", "peg-in-a-hole"] {
+    for name in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
             Err(error) => panic!("{error}"),
@@ -27,12 +42,19 @@ fn loops_two_and_three_allocate_nothing() {
             tremor: 5e-5,
             seed: 1,
         };
-        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene) else {
+        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
             panic!("no simulated device");
         };
         let world = Arc::new(scene.world);
         let Ok(god_object) = GodObject::new(world.clone(), scene.settings, scene.start) else {
             panic!("{name} starts in penetration");
+        };
+        // Recorded, too.
+        let Ok(directory) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let Ok((taps, _recorder)) = Recorder::start(directory.path(), manifest(), "") else {
+            panic!("cannot record");
         };
         let mut loops = WiredLoops::new(
             &world,
@@ -40,7 +62,9 @@ fn loops_two_and_three_allocate_nothing() {
             god_object,
             device,
             SafetySettings::default(),
-        );
+            Some(taps),
+        )
+        .with_motions(scene.motions);
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {
             let now = Duration::from_millis(tick);

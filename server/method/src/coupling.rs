@@ -17,8 +17,10 @@ use nalgebra::{Point3, Vector3};
 
 use crate::adaptation::AdaptationState;
 use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
+use crate::obstacle_work::ObstacleWork;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{
@@ -27,6 +29,7 @@ use crate::spatial::{
 use crate::surface::{
     EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
 };
+use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
 /// Loop 2 of the method. `step` allocates nothing.
@@ -45,6 +48,9 @@ pub struct Coupling {
     rows_in_force: Vec<HalfSpace>,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
+    /// `None` where nothing is damped.
+    damping: Option<ContactDamping>,
+    obstacle_work: ObstacleWork,
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
@@ -54,7 +60,7 @@ pub struct Coupling {
     /// The rows of the present set, with the bounds where they belong.
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
-    rotation: Vector3<f64>,
+    turn: TurnMemory,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
 }
@@ -158,6 +164,8 @@ impl Coupling {
             friction,
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
+            damping: ContactDamping::of(settings.damping_time, settings.solver),
+            obstacle_work: ObstacleWork::default(),
             arrival: Arrival::default(),
             implicit: ImplicitRounds::new(
                 settings,
@@ -173,7 +181,7 @@ impl Coupling {
                 .map(|a| AdaptationState::new(a, capacity)),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
-            rotation: Vector3::zeros(),
+            turn: TurnMemory::default(),
             correction: Vector6::zeros(),
         }
     }
@@ -186,7 +194,8 @@ impl Coupling {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
             return self.without_force(ProjectionStatus::NotFinite);
         }
-        if !self.prepared.serves(set) {
+        let arrived = !self.prepared.serves(set);
+        if arrived {
             self.prepare(set);
             self.arrival.observe(time);
         }
@@ -194,8 +203,10 @@ impl Coupling {
             self.carry_rows(time, set);
         }
         let device = at_reference_point(device_pose, &self.body.reference_point);
-        let difference = pose_difference(&device, &self.prepared.god_object, &self.rotation);
-        self.rotation = angular(&difference);
+        if let Some(damping) = &mut self.damping {
+            damping.observe(time, &device);
+        }
+        let difference = self.turn.difference(&device, &self.prepared.god_object);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = &self.prepared.metric else {
             return self.without_force(ProjectionStatus::NotFinite);
@@ -257,11 +268,19 @@ impl Coupling {
 
         // F_c = k_h M (a_c - a_u)
         let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
+        let damped = self.damping.as_mut().map(|damping| {
+            let in_force = |row: usize| HalfSpace {
+                bound: self.bounds[row],
+                ..self.rows[row]
+            };
+            let k_s = self.settings.k_s;
+            damping.held(metric, &unconstrained, k_s, &projection, in_force)
+        });
         let given = LinearAnswer {
             constraints: &set.constraints[..self.rows.len()],
             start: &self.prepared.god_object,
             goal: &device,
-            branch: self.rotation,
+            branch: self.turn.branch(),
             scale: self.settings.k_s,
             shaded: self.prepared.shaded,
             projection: &projection,
@@ -287,18 +306,45 @@ impl Coupling {
             projection.acceleration = moved * self.settings.k_s;
         }
         self.correction = projection.acceleration - unconstrained;
+        if let Some(damped) = damped {
+            held += damped;
+        }
         let mut wrench = held * self.settings.k_h;
         if let Some(textures) = &mut self.textures {
             let moved = projection.acceleration / self.settings.k_s;
             let active = projection.active.iter();
             let touched = active.filter_map(|row| {
                 let contact = set.constraints.get(row.row as usize)?;
-                Some((contact.features.obstacle, contact.point, contact.normal))
+                let features = &contact.features;
+                Some((
+                    features.obstacle,
+                    features.on_obstacle,
+                    contact.point,
+                    contact.normal,
+                ))
             });
             wrench = textures.tilt(&wrench, &self.prepared.god_object, &moved, touched);
         }
+        let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
+        if arrived {
+            let along = self.prepared.moving.then(|| {
+                let rows = projection.active.iter();
+                let done = rows.filter_map(|row| {
+                    let came = set.constraints.get(row.row as usize)?.came;
+                    Some(row.multiplier * came)
+                });
+                let felt = if unlimited > 0.0 {
+                    linear(&wrench).norm() / unlimited
+                } else {
+                    1.0
+                };
+                done.sum::<f64>() * self.settings.k_h * felt
+            });
+            self.obstacle_work.arrive(along);
+        }
         if let Some(mut energy) = self.energy {
+            energy.grant(self.obstacle_work.work());
             energy.arrive(&device);
             let (bounded, clamped) = self.limited(&energy.within_reserve(metric, &wrench));
             energy.hold(&device, &bounded);
@@ -323,9 +369,24 @@ impl Coupling {
         self.energy.as_ref()
     }
 
+    /// Tells where an obstacle is, world from obstacle, as of the next [`Self::step`]'s constraint set: its texture goes with it. What a
+    /// texture does not need is in the set. One that is never told is where the world has it.
+    pub fn place_obstacle(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(textures) = &mut self.textures {
+            textures.place(obstacle, pose);
+        }
+    }
+
+    /// Net work that moving obstacles have done on the hand since the start, J: what the force's rows did along the obstacles' ways.
+    /// Negative where obstacles gave way under the hand.
+    pub fn obstacle_work(&self) -> f64 {
+        self.obstacle_work.work()
+    }
+
     /// No force, and nothing to remember of the body that it held.
     fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
         self.anchor.forget();
+        self.obstacle_work.arrive(None);
         if let Some(energy) = &mut self.energy {
             energy.release();
         }

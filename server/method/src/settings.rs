@@ -4,6 +4,7 @@
 //! |----------|---------------------------------|-------|---------|----------------------------------------------------|
 //! | k_s      | [`Settings::k_s`]               | –     | 0.5     | share of the pose difference covered in one update |
 //! | k_h      | [`Settings::k_h`]               | 1/s^2 | –       | coupling constant                                  |
+//! | tau      | [`Settings::damping_time`]      | s     | –       | damping of a contact over its stiffness            |
 //! | K_t      | [`Settings::stiffness`]         | N/m   | –       | k_h k_s m: what the hand feels in translation      |
 //! | delta_c  | [`Settings::rest_distance`]     | m     | –       | gap at which the god-object rests                  |
 //! | delta_min| [`Settings::minimum_gap`]       | m     | –       | gap below which it never comes                     |
@@ -54,13 +55,16 @@ pub struct Settings {
     pub k_s: f64,
     /// Coupling constant, 1/s^2.
     pub k_h: f64,
+    /// Damping of a contact over its stiffness, s: a wall of 1000 N/m and 20 ms damps as 20 N s/m. 0, the default, is the paper's
+    /// spring. What the sampling bears is the device's matter, as for the stiffness.
+    pub damping_time: f64,
     /// The rotational part of the metric.
     pub rotation_metric: RotationMetric,
     /// Constraint adaptation; `None` lets every constraint in at once.
     pub adaptation: Option<Adaptation>,
     /// Publish contacts before they touch, with their gaps. Off: the paper's cone of touching contacts.
     pub look_ahead: bool,
-    /// Bound the energy that the hand takes out over a run by what it has put in, see
+    /// Bound the energy that the hand takes out over a run by what it and obstacles that move have put in, see
     /// [`EnergyObserver`](crate::surface::EnergyObserver).
     pub passive: bool,
     /// Largest force on the hand, N; clamped by norm.
@@ -105,6 +109,7 @@ impl Settings {
         Self {
             k_s: 0.5,
             k_h: 2000.0,
+            damping_time: 0.0,
             rotation_metric: RotationMetric::Inertia,
             adaptation: Some(Adaptation {
                 duration: 0.02,
@@ -238,6 +243,12 @@ impl Settings {
                     large,
                 });
             }
+        }
+        if !(self.damping_time.is_finite() && self.damping_time >= 0.0) {
+            return Err(SettingsError::NotPositive {
+                key: "damping_time",
+                value: self.damping_time,
+            });
         }
         if !(self.look_ahead_limit.is_finite() && self.look_ahead_limit >= 0.0) {
             return Err(SettingsError::NotPositive {

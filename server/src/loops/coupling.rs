@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
 use god_object::{Coupling, ProjectionStatus, ShadedAcceleration};
+use taut_recording::{ForceRecord, Tap};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
@@ -27,6 +28,7 @@ pub struct CouplingLoop {
     /// The last pass of force shading was a real one: its end must be told once.
     shading: bool,
     sequence: u64,
+    recording: Option<Tap<ForceRecord>>,
     statistics: Arc<CouplingStatistics>,
 }
 
@@ -47,6 +49,7 @@ impl CouplingLoop {
         contacts: Subscriber<ContactSnapshot>,
         wrench: Publisher<WrenchCommand>,
         shaded: Publisher<Option<ShadedAcceleration>>,
+        recording: Option<Tap<ForceRecord>>,
     ) -> Self {
         Self {
             coupling,
@@ -56,6 +59,7 @@ impl CouplingLoop {
             shaded,
             shading: false,
             sequence: 0,
+            recording,
             statistics: Arc::default(),
         }
     }
@@ -74,6 +78,13 @@ impl CouplingLoop {
         }
         let device = self.device.held();
         let contacts = self.contacts.held();
+
+        if new_constraints {
+            for place in &contacts.moving {
+                self.coupling
+                    .place_obstacle(usize::from(place.obstacle), &place.pose);
+            }
+        }
 
         let before = thread_cpu_time();
         let output = self
@@ -96,7 +107,18 @@ impl CouplingLoop {
             kkt: output.kkt,
             solved: output.status == ProjectionStatus::Solved,
             saturated: output.saturated,
+            obstacle_work: self.coupling.obstacle_work(),
         });
+        if let Some(tap) = &mut self.recording {
+            tap.push(ForceRecord {
+                sequence: self.sequence,
+                time: now,
+                device_sequence: device.sequence,
+                device_pose: device.pose,
+                constraint_sequence: contacts.set.sequence,
+                wrench: output.wrench,
+            });
+        }
         if self.shading || output.shaded.is_some() {
             self.shaded.publish(&output.shaded);
             self.shading = output.shaded.is_some();

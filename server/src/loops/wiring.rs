@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
-use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+use taut_bridge::{ArmSwitch, Device, DevicePort, SafetySettings};
+use taut_recording::Taps;
+use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
-use super::god_object::GodObjectLoop;
+use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
 use crate::shared::contact_snapshot::ContactSnapshot;
@@ -26,6 +28,8 @@ pub struct WiredLoops {
     pub haptics: HapticsLoop,
     /// Wakes loop 2: loop 3 does after each sample, loop 1's thread after each constraint set.
     pub coupling_waker: Waker,
+    /// Asks loop 3 for force or for none.
+    pub arm_switch: Arc<ArmSwitch>,
     /// For those who look on.
     pub observers: Observers,
     /// What all of them count.
@@ -57,13 +61,14 @@ pub struct SharedView {
 }
 
 impl WiredLoops {
-    /// Puts the boxes between their arrows. `device` stands where the god-object does.
+    /// Puts the boxes between their arrows. `device` stands where the god-object does; with `taps` the loops are recorded.
     pub fn new(
         world: &Arc<World>,
         settings: &Settings,
         god_object: GodObject,
         device: Box<dyn Device>,
         safety: SafetySettings,
+        taps: Option<Taps>,
     ) -> Self {
         let start = *god_object.pose();
         let (states, device_readers) = device_state::channel(&start);
@@ -72,12 +77,21 @@ impl WiredLoops {
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
+        let arm_switch = Arc::<ArmSwitch>::default();
+        let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
+            let updates = UpdateTaps {
+                updates: taps.updates,
+                constraints: taps.constraints,
+            };
+            (Some(taps.haptics), Some(updates), Some(taps.forces))
+        });
 
         let god_object = GodObjectLoop::new(
             god_object,
             device_readers.god_object,
             shaded_reader,
             snapshots,
+            update_taps,
         );
         let coupling = CouplingLoop::new(
             Coupling::new(world, settings),
@@ -85,16 +99,17 @@ impl WiredLoops {
             contact_readers.coupling,
             wrenches,
             shaded,
+            force_tap,
         );
         let haptics = HapticsLoop::new(
-            device,
-            Safety::new(safety),
-            EnergyObserver::new(world.body.reference_point),
+            DevicePort::new(device, safety, world.body.reference_point, &start),
             &start,
             wrench_readers.haptics,
             states,
             coupling_waker.clone(),
-        );
+            arm_switch.clone(),
+        )
+        .with_recording(haptics_tap);
         let statistics = Statistics {
             haptics: haptics.statistics(),
             coupling: coupling.statistics(),
@@ -120,8 +135,18 @@ impl WiredLoops {
             coupling,
             haptics,
             coupling_waker,
+            arm_switch,
             observers,
             statistics,
+        }
+    }
+
+    /// The same with obstacles that move.
+    #[must_use]
+    pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
+        Self {
+            god_object: self.god_object.with_motions(motions),
+            ..self
         }
     }
 }

@@ -126,8 +126,8 @@ impl GodObject {
             }
         }
         self.reduction = Some(reduction);
-        let reach = self.settings.activation_distance
-            + update.all_moved.min(self.settings.look_ahead_limit);
+        let reach =
+            self.settings.activation_distance + update.all_moved.min(self.look_ahead_limit());
         self.choose(difference, reach, &mut report.work);
     }
 

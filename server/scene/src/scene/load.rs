@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use god_object::{HeightMapTexture, Texture};
+use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
 
 use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
-    BodySpec, CouplingSpec, HandPathSpec, HeightMapSpec, LimitSpec, MethodSpec, ObstacleSpec, View,
+    BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
+    ObstacleSpec, Shape, View,
 };
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
-use crate::mesh_file::{RawMesh, read_mesh};
+use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
 
@@ -26,11 +27,24 @@ enum Origin {
     Shipped,
 }
 
+/// What a scene was read from: enough to read it again.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSource {
+    /// The text of the file.
+    pub text: Arc<str>,
+    /// Where its own files are; `None` for a scene that is shipped in the program.
+    pub directory: Option<PathBuf>,
+    /// What was set beside the text, in order.
+    pub overrides: Vec<String>,
+}
+
 /// A scene that was read and checked; its meshes are not loaded yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     document: Document,
     origin: Origin,
+    text: Arc<str>,
+    overrides: Vec<String>,
     pub(super) spec: SceneSpec,
 }
 
@@ -39,19 +53,13 @@ impl Scene {
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path, MAX_TOML_BYTES)?;
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Self::from_document(
-            Document::parse(&path.display().to_string(), &text)?,
-            Origin::Directory(directory),
-        )
+        Self::parse(&path.display().to_string(), &text, &directory)
     }
 
     /// One of [`SHIPPED_SCENES`] by its name, or else the file of this path.
     pub fn named_or_file(name_or_path: &str) -> Result<Self, FileError> {
         if let Some(text) = shipped_scene_text(name_or_path) {
-            return Self::from_document(
-                Document::parse(&format!("{name_or_path}.toml"), text)?,
-                Origin::Shipped,
-            );
+            return Self::from_text(&format!("{name_or_path}.toml"), text, Origin::Shipped);
         }
         let path = Path::new(name_or_path);
         if !path.exists() && path.extension().is_none() {
@@ -67,28 +75,46 @@ impl Scene {
 
     /// Reads a scene from text; `file` is its name in messages, files are looked for in `directory`.
     pub fn parse(file: &str, text: &str, directory: &Path) -> Result<Self, FileError> {
-        Self::from_document(
-            Document::parse(file, text)?,
-            Origin::Directory(directory.to_path_buf()),
-        )
+        Self::from_text(file, text, Origin::Directory(directory.to_path_buf()))
     }
 
-    fn from_document(document: Document, origin: Origin) -> Result<Self, FileError> {
+    /// Reads a scene again; `file` is its name in messages.
+    pub fn from_source(file: &str, source: &SceneSource) -> Result<Self, FileError> {
+        let origin = source
+            .directory
+            .clone()
+            .map_or(Origin::Shipped, Origin::Directory);
+        Self::from_text(file, &source.text, origin)?.with_overrides(&source.overrides)
+    }
+
+    fn from_text(file: &str, text: &str, origin: Origin) -> Result<Self, FileError> {
+        let document = Document::parse(file, text)?;
         let spec = parse(&document)?;
         Ok(Self {
             document,
             origin,
+            text: text.into(),
+            overrides: Vec::new(),
             spec,
         })
+    }
+
+    /// What it was read from.
+    pub fn source(&self) -> SceneSource {
+        SceneSource {
+            text: self.text.clone(),
+            directory: match &self.origin {
+                Origin::Directory(directory) => Some(directory.clone()),
+                Origin::Shipped => None,
+            },
+            overrides: self.overrides.clone(),
+        }
     }
 
     /// The same scene with one value changed, as by `--set coupling.k_s=1.0`. Lists are counted from 0:
     /// `obstacle.0.name="box"`.
     pub fn with_override(&self, assignment: &str) -> Result<Self, FileError> {
-        Self::from_document(
-            self.document.with_override(assignment)?,
-            self.origin.clone(),
-        )
+        self.with_overrides(&[assignment])
     }
 
     /// [`Scene::with_override`] for each, in order, checked once at the end: overrides that only fit together are fine.
@@ -97,7 +123,16 @@ impl Scene {
         for assignment in assignments {
             document = document.with_override(assignment.as_ref())?;
         }
-        Self::from_document(document, self.origin.clone())
+        let spec = parse(&document)?;
+        let mut overrides = self.overrides.clone();
+        overrides.extend(assignments.iter().map(|text| text.as_ref().to_owned()));
+        Ok(Self {
+            document,
+            spec,
+            overrides,
+            origin: self.origin.clone(),
+            text: self.text.clone(),
+        })
     }
 
     /// The scene's name.
@@ -167,14 +202,53 @@ impl Scene {
         read_mesh(&self.locate(name, at)?)
     }
 
-    /// The texture of a height map, its picture read.
-    pub(super) fn height_map(&self, spec: &HeightMapSpec) -> Result<Texture, FileError> {
-        let map = read_height_map(&self.locate(&spec.path, &spec.at)?)?;
+    /// The texture of a height map, its picture read and laid on this shape with this mesh.
+    pub(super) fn height_map(
+        &self,
+        spec: &HeightMapSpec,
+        shape: &Shape,
+        mesh: &Mesh,
+    ) -> Result<Texture, FileError> {
+        let map = Arc::new(read_height_map(&self.locate(&spec.path, &spec.at)?)?);
+        let amplitude = spec.amplitude;
+        let tile = match spec.mapping {
+            HeightMapMapping::Triplanar { tile } => tile,
+            HeightMapMapping::Uv => {
+                return Ok(Texture::UvHeightMap(UvHeightMapTexture {
+                    map,
+                    coordinates: Arc::new(self.texture_coordinates(spec, shape, mesh)?),
+                    amplitude,
+                }));
+            }
+        };
         Ok(Texture::HeightMap(HeightMapTexture {
-            map: Arc::new(map),
-            tile: spec.tile,
-            amplitude: spec.amplitude,
+            map,
+            tile,
+            amplitude,
         }))
+    }
+
+    /// Of the mesh file that the shape names.
+    fn texture_coordinates(
+        &self,
+        spec: &HeightMapSpec,
+        shape: &Shape,
+        mesh: &Mesh,
+    ) -> Result<TextureCoordinates, FileError> {
+        let Shape::Mesh {
+            path,
+            simplify: None,
+            ..
+        } = shape
+        else {
+            let text = "mapping = \"uv\" needs the texture coordinates of a mesh file, as it is; name one without `simplify`, or use mapping = \"triplanar\"";
+            return Err(spec.at.problem(text).into());
+        };
+        let coordinates = read_texture_coordinates(&self.locate(path, &spec.at)?)?;
+        TextureCoordinates::new(mesh, &coordinates).map_err(|error| {
+            let text = format!("the mesh \"{path}\" has no use for its texture coordinates: {error}; export it again");
+            spec.at.problem(text).into()
+        })
     }
 
     /// Beside the scene, else in a data directory.

@@ -8,10 +8,11 @@ mod shipped;
 mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
-pub use load::Scene;
+pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::pose_of;
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapSpec, LimitSpec,
-    MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, Shape, View,
+    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,
+    HeightMapSpec, LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint,
+    Shape, View,
 };

@@ -11,6 +11,10 @@
 use std::fmt;
 use std::str::FromStr;
 
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use crate::spatial::stack;
+
 /// Second-order impedance of a hand, the same along every axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
@@ -74,6 +78,28 @@ impl Hand {
     pub fn holds(&self) -> bool {
         self.stiffness > 0.0 || self.rotational_stiffness > 0.0
     }
+
+    /// What moves with the grip, about and along every axis: kg, kg m^2.
+    #[must_use]
+    pub fn inertia(&self) -> Matrix6<f64> {
+        Matrix6::from_diagonal(&uniform(self.mass, self.rotational_inertia))
+    }
+
+    /// Damping of all six axes.
+    #[must_use]
+    pub fn damping6(&self) -> Vector6<f64> {
+        uniform(self.damping, self.rotational_damping)
+    }
+
+    /// Stiffness of all six axes.
+    #[must_use]
+    pub fn stiffness6(&self) -> Vector6<f64> {
+        uniform(self.stiffness, self.rotational_stiffness)
+    }
+}
+
+fn uniform(linear: f64, angular: f64) -> Vector6<f64> {
+    stack(&Vector3::repeat(linear), &Vector3::repeat(angular))
 }
 
 /// The named hands of the command line and the workbench file.

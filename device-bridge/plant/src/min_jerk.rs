@@ -10,9 +10,9 @@
 //!
 //! Source: Flash & Hogan 1985, minimum-jerk model of reaching.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector6};
 
-use crate::device::Pose;
+use crate::spatial::{Pose, is_finite, stack};
 
 /// Progress along a minimum-jerk movement and its derivatives in the fraction of its duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,7 +153,7 @@ impl MinJerkPath {
 
     /// The same path with every pose mapped by `map`, such as to another point of the body.
     #[must_use]
-    pub(crate) fn map(mut self, map: impl Fn(&Pose) -> Pose) -> Self {
+    pub fn map(mut self, map: impl Fn(&Pose) -> Pose) -> Self {
         for point in &mut self.via_points {
             point.pose = map(&point.pose);
         }
@@ -202,22 +202,10 @@ fn between(from: &ViaPoint, to: &ViaPoint, time: f64) -> (Pose, Vector6<f64>) {
     (Isometry3::from_parts(position.into(), rotation), velocity)
 }
 
-/// A 6-vector of its linear and its angular part.
-pub(crate) fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(
-        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-    )
-}
-
-/// True when every number of the pose is finite.
-pub(crate) fn is_finite(pose: &Pose) -> bool {
-    pose.translation.vector.iter().all(|x| x.is_finite())
-        && pose.rotation.coords.iter().all(|x| x.is_finite())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     fn pose(x: f64, y: f64, angle: f64) -> Pose {
         Pose::new(Vector3::new(x, y, 0.0), Vector3::z() * angle)

@@ -12,8 +12,9 @@
 //!
 //! Source: Hannaford & Ryu 2002 (time-domain passivity observer), in its position form.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Point3, UnitQuaternion, Vector6};
 
+use super::clamp::join;
 use crate::device::Pose;
 
 /// Sums the work of the wrench at the device port. No allocation.
@@ -21,6 +22,8 @@ use crate::device::Pose;
 pub struct EnergyObserver {
     reference_point: Point3<f64>,
     last: Option<(Point3<f64>, UnitQuaternion<f64>)>,
+    /// Displacement and rotation between the last two poses.
+    travel: Vector6<f64>,
     held: Vector6<f64>,
     delivered: f64,
     injected: f64,
@@ -33,6 +36,7 @@ impl EnergyObserver {
         Self {
             reference_point,
             last: None,
+            travel: Vector6::zeros(),
             held: Vector6::zeros(),
             delivered: 0.0,
             injected: 0.0,
@@ -44,14 +48,23 @@ impl EnergyObserver {
     ///
     /// A sample that is not finite adds nothing and starts the measurement afresh.
     pub fn step(&mut self, pose: &Pose, wrench: &Vector6<f64>) -> f64 {
+        self.measure(pose);
+        self.hold(wrench);
+        self.delivered
+    }
+
+    /// The first half of [`EnergyObserver::step`]: the work of the wrench held so far, up to the new sample, in J.
+    pub(crate) fn measure(&mut self, pose: &Pose) -> f64 {
         let point = pose * self.reference_point;
+        let mut work = 0.0;
+        self.travel = Vector6::zeros();
         if let Some((last_point, last_rotation)) = self.last {
             let travel = point - last_point;
             let turn = (pose.rotation * last_rotation.inverse()).scaled_axis();
-            let force: Vector3<f64> = self.held.fixed_rows::<3>(0).into();
-            let torque: Vector3<f64> = self.held.fixed_rows::<3>(3).into();
-            let work = force.dot(&travel) + torque.dot(&turn);
-            if work.is_finite() {
+            self.travel = join(&travel, &turn);
+            let done = self.held.dot(&self.travel);
+            if done.is_finite() {
+                work = done;
                 self.delivered += work;
                 self.injected = self.injected.max(self.delivered);
             }
@@ -59,8 +72,23 @@ impl EnergyObserver {
         let finite = point.iter().all(|x| x.is_finite())
             && pose.rotation.coords.iter().all(|x| x.is_finite());
         self.last = finite.then_some((point, pose.rotation));
+        work
+    }
+
+    /// The second half: what is written now and held until the next sample.
+    pub(crate) fn hold(&mut self, wrench: &Vector6<f64>) {
         self.held = *wrench;
-        self.delivered
+    }
+
+    /// A sample that may not be trusted: the measurement starts afresh with the next one.
+    pub(crate) fn skip(&mut self) {
+        self.last = None;
+        self.travel = Vector6::zeros();
+    }
+
+    /// Displacement of the reference point and rotation between the last two samples, m and rad.
+    pub(crate) fn travel(&self) -> &Vector6<f64> {
+        &self.travel
     }
 
     /// Net energy given to the user, in J; negative when the user has put energy in.
@@ -79,6 +107,7 @@ impl EnergyObserver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     const STIFFNESS: f64 = 1000.0; // N/m
     const AMPLITUDE: f64 = 5e-3; // m

@@ -1,0 +1,62 @@
+//! `recording.json`: what the files beside it are, and whether they are whole.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the files' form; a reader refuses others.
+pub const FORMAT: u32 = 1;
+
+/// What the files beside it are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// [`FORMAT`] of the program that wrote it.
+    pub format: u32,
+    /// That program and its version.
+    pub program: String,
+    /// Name of the scene, whose text is in `scene.toml`.
+    pub scene: String,
+    /// Where the scene's meshes and traces are.
+    pub origin: SceneOrigin,
+    /// What was set beside the scene's text, in order, as by `--set`.
+    pub overrides: Vec<String>,
+    /// [`identity_of`](crate::identity_of) the bodies, settings and start that the scene gave.
+    pub identity: String,
+    /// The session came to its end and nothing was lost. False while it runs.
+    pub complete: bool,
+    /// Why it is not complete, where that is known.
+    pub reason: Option<String>,
+    /// How many records there are of each kind that can be lost.
+    pub lost: Lost,
+}
+
+/// Where a scene's own files are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneOrigin {
+    /// In the program.
+    Shipped,
+    /// In this directory.
+    Directory(PathBuf),
+}
+
+/// How many records found their queue full, by file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Lost {
+    /// Of `haptics.csv` and `device.csv`.
+    pub haptics: u64,
+    /// Of `updates.csv`.
+    pub updates: u64,
+    /// Of `constraints.csv`.
+    pub constraints: u64,
+    /// Of `forces.csv`.
+    pub forces: u64,
+}
+
+impl Lost {
+    /// Nothing was lost.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}

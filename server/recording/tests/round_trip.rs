@@ -1,0 +1,235 @@
+//! What is pushed by the loops is read back bit by bit, and what is lost is said.
+
+use std::path::Path;
+use std::time::Duration;
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use god_object::constraint::{Feature, FeaturePair, NonPenetrationConstraint, Separation};
+use god_object::nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use god_object::{ConstraintSet, Pose, ShadedAcceleration, Vector6};
+use taut_recording::{
+    EventRecord, FORMAT, ForceRecord, HapticsRecord, Lost, Manifest, Recorder, Recording,
+    RecordingError, SceneOrigin, UpdateRecord,
+};
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+fn manifest() -> Manifest {
+    Manifest {
+        format: FORMAT,
+        program: "taut test".to_owned(),
+        scene: "none".to_owned(),
+        origin: SceneOrigin::Shipped,
+        overrides: Vec::new(),
+        identity: "0".to_owned(),
+        complete: false,
+        reason: None,
+        lost: Lost::default(),
+    }
+}
+
+/// Poses whose numbers have no short decimal form, and are not quite unit.
+fn pose(seed: u32) -> Pose {
+    let x = f64::from(seed) * std::f64::consts::PI;
+    Pose::from_parts(
+        Translation3::new(x.sin() * 1e-7, x.cos() / 3.0, -0.0),
+        UnitQuaternion::new_unchecked(Quaternion::new(
+            x.cos(),
+            x.sin() * (1.0 + 3e-16),
+            1e-300,
+            0.0,
+        )),
+    )
+}
+
+fn update(sequence: u32) -> UpdateRecord {
+    UpdateRecord {
+        sequence: u64::from(sequence),
+        published: Duration::from_nanos(1_000_001 * u64::from(sequence)),
+        device_sequence: u64::from(sequence),
+        device_pose: pose(sequence),
+        obstacle_time: Duration::from_nanos(7),
+        device_ahead: 0.125,
+        shaded: (sequence % 2 == 1).then(|| ShadedAcceleration {
+            sequence: 5,
+            acceleration: Vector6::repeat(1.0 / 3.0),
+        }),
+        pose: pose(sequence + 1),
+        contacts: 3,
+        gap_min: if sequence == 4 { f64::INFINITY } else { 0.1 },
+    }
+}
+
+fn bits(pose: &Pose) -> [u64; 7] {
+    let (at, turn) = (&pose.translation, &pose.rotation);
+    [at.x, at.y, at.z, turn.w, turn.i, turn.j, turn.k].map(f64::to_bits)
+}
+
+fn row() -> NonPenetrationConstraint {
+    NonPenetrationConstraint {
+        features: FeaturePair {
+            obstacle: 0,
+            on_body: Feature::Vertex(3),
+            on_obstacle: Feature::Face(12),
+        },
+        point: Point3::new(0.1, 0.2, 0.3),
+        normal: Vector3::z(),
+        gap: 1e-6,
+        separation: Separation::OfObstacle,
+        came: 0.0,
+        shading_normal: None,
+    }
+}
+
+fn lines(directory: &Path, file: &str) -> Vec<String> {
+    match std::fs::read_to_string(directory.join(file)) {
+        Ok(text) => text.lines().map(str::to_owned).collect(),
+        Err(error) => panic!("{file}: {error}"),
+    }
+}
+
+#[test]
+fn records_come_back_bit_by_bit() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let path = directory.path().join("new");
+    let (mut taps, recorder) = match Recorder::start(&path, manifest(), "name = \"none\"\n") {
+        Ok(started) => started,
+        Err(error) => panic!("{error}"),
+    };
+    let force = ForceRecord {
+        sequence: 1,
+        time: Duration::from_nanos(123_456_789),
+        device_sequence: 9,
+        device_pose: pose(17),
+        constraint_sequence: 8,
+        wrench: Vector6::new(1e-9, 2.0, -0.0, 1.0 / 7.0, 5.0, 6.0),
+    };
+    let tick = |time, faulty| HapticsRecord {
+        sequence: 1,
+        time: Duration::from_millis(time),
+        pose: pose(2),
+        velocity: Vector6::zeros(),
+        buttons: 1,
+        faulty,
+        wrench: Vector6::zeros(),
+    };
+    let mut set = ConstraintSet::with_capacity(2);
+    set.sequence = 4;
+    set.constraints = vec![row(), row()];
+    assert_no_alloc(|| {
+        for sequence in 1..=6 {
+            taps.updates.push(update(sequence));
+        }
+        taps.forces.push(force);
+        taps.constraints.push_set(&set);
+        taps.haptics.push(tick(5, false));
+        taps.haptics.push(tick(5, false));
+        taps.haptics.push(tick(6, true));
+    });
+    recorder.events().send(EventRecord {
+        time: Duration::from_millis(3),
+        kind: "client".to_owned(),
+        text: "front joined, \"udp\"\nas third".to_owned(),
+    });
+    let summary = recorder.finish();
+    assert!(summary.failure.is_none());
+    assert_eq!((summary.updates, summary.ticks), (6, 3));
+
+    let recording = match Recording::open(&path) {
+        Ok(recording) => recording,
+        Err(error) => panic!("{error}"),
+    };
+    assert!(recording.manifest().complete);
+    assert_eq!(recording.scene(), "name = \"none\"\n");
+    let (Ok(mut updates), Ok(mut forces)) = (recording.updates(), recording.forces()) else {
+        panic!("no files");
+    };
+    for sequence in 1..=6 {
+        let Ok(Some(read)) = updates.next_record() else {
+            panic!("update {sequence} is not there");
+        };
+        assert_eq!(read, update(sequence));
+        assert_eq!(bits(&read.device_pose), bits(&pose(sequence)));
+        assert_eq!(bits(&read.pose), bits(&pose(sequence + 1)));
+    }
+    assert!(matches!(updates.next_record(), Ok(None)));
+    assert!(matches!(forces.next_record(), Ok(Some(read)) if read == force));
+    // A device trace has good samples only, and strictly increasing times.
+    assert_eq!(lines(&path, "device.csv").len(), 1 + 1);
+    assert_eq!(lines(&path, "haptics.csv").len(), 1 + 3);
+    assert_eq!(
+        lines(&path, "constraints.csv")[1],
+        "4,0,vertex 3,face 12,0.1,0.2,0.3,0,0,1,0.000001"
+    );
+    assert_eq!(
+        lines(&path, "events.csv")[1],
+        "3000000,client,\"front joined, \"\"udp\"\" as third\""
+    );
+}
+
+#[test]
+fn a_writer_that_falls_behind_makes_the_recording_incomplete() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
+        panic!("an empty directory is good enough");
+    };
+    // Far more than the queue holds, faster than lines can be written.
+    let pushed = 1_000_000;
+    for _ in 0..pushed {
+        taps.updates.push(update(1));
+    }
+    let summary = recorder.finish();
+    assert!(summary.lost.updates > 0);
+    assert_eq!(summary.updates + summary.lost.updates, pushed);
+    let Ok(recording) = Recording::open(directory.path()) else {
+        panic!("an incomplete recording can be read");
+    };
+    assert!(!recording.manifest().complete);
+    assert_eq!(recording.manifest().lost, summary.lost);
+}
+
+#[test]
+fn a_directory_with_something_in_it_is_left_alone() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let kept = directory.path().join("mine.txt");
+    assert!(std::fs::write(&kept, "mine").is_ok());
+    let started = Recorder::start(directory.path(), manifest(), "");
+    assert!(matches!(started, Err(RecordingError::NotEmpty(_))));
+    assert_eq!(lines(directory.path(), "mine.txt"), ["mine"]);
+}
+
+#[test]
+fn a_line_that_was_cut_off_is_named() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
+        panic!("cannot record");
+    };
+    taps.updates.push(update(1));
+    taps.updates.push(update(2));
+    assert!(recorder.finish().failure.is_none());
+    let path = directory.path().join("updates.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        panic!("no updates");
+    };
+    assert!(std::fs::write(&path, &text[..text.len() - 40]).is_ok());
+    let Ok(recording) = Recording::open(directory.path()) else {
+        panic!("cannot open");
+    };
+    let Ok(mut updates) = recording.updates() else {
+        panic!("no updates");
+    };
+    assert!(matches!(updates.next_record(), Ok(Some(_))));
+    match updates.next_record() {
+        Err(error) => assert!(error.to_string().contains("updates.csv, line 3"), "{error}"),
+        other => panic!("{other:?}"),
+    }
+}

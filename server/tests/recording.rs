@@ -1,0 +1,159 @@
+//! A live session that is recorded, and computed again from its files: the same bits.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use taut::config::{Overrides, session_setup};
+use taut::failure::Failure;
+use taut::recorded_session;
+use taut::report::RecordedReport;
+use taut::session::Session;
+use taut::shutdown::Shutdown;
+use taut::terminal::Terminal;
+use taut_link::ClusterKey;
+use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+
+/// How long a session runs: the simulated hand touches before.
+const RUN: Duration = Duration::from_millis(2500);
+/// A busy machine may take longer until the loops have turned that often.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Updates that a recording must hold to be worth something.
+const UPDATES: u64 = 200;
+
+fn record(scene: &str, directory: &Path) {
+    let free_ports = ["network.quic_port=0", "network.udp_port=0"];
+    let workbench = match Workbench::parse_with_overrides(
+        "workbench.toml",
+        SHIPPED_WORKBENCH,
+        Path::new(""),
+        &free_ports,
+    ) {
+        Ok(workbench) => workbench,
+        Err(error) => panic!("{error}"),
+    };
+    let Ok(key) = ClusterKey::generate() else {
+        panic!("no random numbers");
+    };
+    let overrides = Overrides {
+        scene: Some(scene.to_owned()),
+        no_monitor: true,
+        recording: Some(directory.to_path_buf()),
+        ..Overrides::default()
+    };
+    let session = match session_setup(&workbench, key, &overrides).and_then(Session::start) {
+        Ok(session) => session,
+        Err(error) => panic!("{error}"),
+    };
+    let begun = Instant::now();
+    while begun.elapsed() < RUN && !session.is_ending() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(begun.elapsed() < PATIENCE);
+    let (_, failure) = session.stop(&Terminal::standard_error());
+    assert_eq!(failure, None);
+}
+
+fn again(directory: &Path) -> Result<RecordedReport, Failure> {
+    recorded_session::run(directory, None, false, &Shutdown::default())
+}
+
+fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
+    let Ok(text) = std::fs::read_to_string(path) else {
+        panic!("{} is not there", path.display());
+    };
+    assert!(std::fs::write(path, change(text)).is_ok());
+}
+
+#[test]
+fn a_recorded_session_is_computed_again_bit_by_bit() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    for scene in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
+        let recording = directory.path().join(scene);
+        record(scene, &recording);
+        let out = directory.path().join(format!("{scene}.csv"));
+        let report =
+            match recorded_session::run(&recording, Some(&out), false, &Shutdown::default()) {
+                Ok(report) => report,
+                Err(error) => panic!("{error}"),
+            };
+        assert!(report.complete);
+        assert!(
+            report.updates > UPDATES && report.forces > UPDATES,
+            "{report}"
+        );
+        assert_eq!(report.first_difference, None);
+        assert_eq!((report.different_updates, report.different_forces), (0, 0));
+        let rows = std::fs::read_to_string(&out).map_or(0, |text| text.lines().count());
+        assert_eq!(rows as u64, report.forces + 1);
+    }
+}
+
+#[test]
+fn a_recording_that_was_changed_is_found_out() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let path = directory.path().join("session");
+    record("sphere-on-plane", &path);
+
+    // Another answer in the last update.
+    let updates = path.join("updates.csv");
+    let last = std::fs::read_to_string(&updates)
+        .ok()
+        .and_then(|text| Some(text.lines().last()?.split(',').next()?.to_owned()))
+        .unwrap_or_default();
+    replaced(&updates, |text| {
+        let trimmed = text.trim_end();
+        let cut = trimmed.rfind(',').unwrap_or(0);
+        format!("{},0.125\n", &trimmed[..cut])
+    });
+    match again(&path) {
+        Ok(report) => {
+            assert_eq!(report.different_updates, 1);
+            let told = report.first_difference.unwrap_or_default();
+            assert!(
+                told.contains(&format!("update {last}:")) && told.contains("gap 1.25e-1"),
+                "{told}"
+            );
+        }
+        Err(error) => panic!("{error}"),
+    }
+
+    // An update that is missing.
+    replaced(&updates, |text| {
+        text.lines()
+            .enumerate()
+            .filter(|(number, _)| *number != 50)
+            .map(|(_, line)| format!("{line}\n"))
+            .collect()
+    });
+    match again(&path) {
+        Err(error) => assert!(error.to_string().contains("not whole"), "{error}"),
+        Ok(report) => panic!("{report}"),
+    }
+
+    // Another stiffness.
+    replaced(&path.join("scene.toml"), |text| {
+        text.replace("k_h = 2000.0", "k_h = 1000.0")
+    });
+    match again(&path) {
+        Err(error) => assert!(
+            error.to_string().contains("other bodies or settings"),
+            "{error}"
+        ),
+        Ok(report) => panic!("{report}"),
+    }
+}
+
+#[test]
+fn a_recording_is_never_written_over_another() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    record("sphere-on-plane", directory.path());
+    let second = std::panic::catch_unwind(|| record("sphere-on-plane", directory.path()));
+    assert!(second.is_err());
+    assert!(again(directory.path()).is_ok_and(|report| report.first_difference.is_none()));
+}
