@@ -348,10 +348,16 @@ impl DevicePort {
                     Missing::Constraints => (1, EventKind::ConstraintsStale),
                     Missing::NotOnClock => (2, EventKind::CommandNotOnClock),
                 };
+                stale_since = Some(since);
                 if missing == Missing::NotOnClock {
                     taken = None;
+                    // It says nothing, so the last one that said something may have grown too old before.
+                    let too_old = |made: Duration| made.saturating_add(self.settings.hold);
+                    stale_since = Some(
+                        self.last_command
+                            .map_or(since, |made| since.min(too_old(made))),
+                    );
                 }
-                stale_since = Some(since);
                 let begins = self.spells.stale[spell].begins(now, true);
                 if begins && !self.arming.state().is_off() {
                     self.teller.tell(kind, age.as_secs_f64());

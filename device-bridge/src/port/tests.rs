@@ -347,6 +347,21 @@ fn a_driver_that_repeats_itself_has_lost_its_device() {
     assert_eq!(stage.kinds(), [EventKind::DeviceLost]);
 }
 
+#[test]
+fn commands_ahead_of_the_clock_prolong_no_silence() {
+    let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+    let last = stage.now;
+    for age in 1..=200 {
+        let now = stage.now + TICK;
+        let made = if age <= 20 { last } else { now + ms(50) };
+        let felt = stage
+            .tick(Ok(sample(now)), Some(Command::fresh(made, force(10.0))))
+            .wrench[0];
+        assert_eq!(felt == 0.0, age >= 120, "{felt} N at {age} ms");
+    }
+    assert_eq!(stage.kinds(), [EventKind::CommandNotOnClock]);
+}
+
 /// One of the things that go wrong, for some ticks.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
