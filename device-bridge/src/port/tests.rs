@@ -417,6 +417,8 @@ proptest! {
         let (mut good_sample, mut good_command) = (stage.now, stage.now);
         let mut before = *stage.port.rendered();
         let mut last_pose = Some(sample(stage.now).pose);
+        // Ticks for which the pose has been the same.
+        let mut stood = 0_u64;
         let mut after_fault = false;
         for (fault, ticks, newtons) in sequence {
             let begun = stage.now;
@@ -445,14 +447,18 @@ proptest! {
                 if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead | Fault::Disarm) {
                     command_is_good = false;
                 }
+                let pose = answer.map(|sample| sample.pose).ok();
+                stood = if pose == last_pose { stood + 1 } else { 0 };
                 // A device that has stood somewhere else for long enough is there, and one that stands still after another fault rests.
-                let stands = matches!(fault, Fault::Origin | Fault::Jump)
-                    || (matches!(fault, Fault::Frozen) && after_fault);
-                if stands && tick > 100 {
+                let stands = match fault {
+                    Fault::Origin | Fault::Jump => stood > 100,
+                    Fault::Frozen => after_fault && tick > 100,
+                    _ => false,
+                };
+                if stands {
                     sample_is_good = true;
                 }
                 // What stands still froze when it moved last.
-                let pose = answer.map(|sample| sample.pose).ok();
                 if matches!(fault, Fault::Frozen) && pose != last_pose {
                     sample_is_good = true;
                 }
