@@ -289,6 +289,12 @@ impl DevicePort {
     /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
         let felt = self.arming.gain() > 0.0;
+        // A tick that comes early allows little: what a whole period would have allowed is nothing to tell.
+        let period = self.settings.period.as_secs_f64();
+        let (force_step, torque_step) = (
+            self.settings.force_rate * period,
+            self.settings.torque_rate * period,
+        );
         let spells = &mut self.spells;
         let acting = [
             (
@@ -304,12 +310,12 @@ impl DevicePort {
             (
                 &mut spells.force_slew,
                 EventKind::ForceSlewLimited,
-                slewed.force_asked,
+                slewed.force_asked.filter(|asked| *asked > force_step),
             ),
             (
                 &mut spells.torque_slew,
                 EventKind::TorqueSlewLimited,
-                slewed.torque_asked,
+                slewed.torque_asked.filter(|asked| *asked > torque_step),
             ),
             (
                 &mut spells.passivity,

@@ -305,6 +305,24 @@ fn a_stalled_port_drops_the_force_by_the_slew_limit() {
 }
 
 #[test]
+fn a_tick_that_comes_early_limits_without_a_word() {
+    let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+    let mut early = |newtons: f64| {
+        stage.now -= TICK * 19 / 20; // `tick` adds a whole one
+        let now = stage.now + TICK;
+        let felt = stage
+            .tick(Ok(sample(now)), Some(Command::fresh(now, force(newtons))))
+            .wrench[0];
+        (felt, stage.kinds())
+    };
+    let (felt, told) = early(10.2);
+    assert!((felt - 10.025).abs() < 1e-9, "{felt} N");
+    assert_eq!(told, []);
+    let (_, told) = early(12.0);
+    assert_eq!(told, [EventKind::ForceSlewLimited]);
+}
+
+#[test]
 fn limits_that_could_not_fade_in_time_are_lowered() {
     let settings = SafetySettings {
         max_force: 200.0,
