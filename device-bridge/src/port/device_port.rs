@@ -289,6 +289,12 @@ impl DevicePort {
     /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
         let felt = self.arming.gain() > 0.0;
+        // A tick that comes early allows little: what a whole period would have allowed is nothing to tell.
+        let period = self.settings.period.as_secs_f64();
+        let (force_step, torque_step) = (
+            self.settings.force_rate * period,
+            self.settings.torque_rate * period,
+        );
         let spells = &mut self.spells;
         let acting = [
             (
@@ -304,12 +310,12 @@ impl DevicePort {
             (
                 &mut spells.force_slew,
                 EventKind::ForceSlewLimited,
-                slewed.force_asked,
+                slewed.force_asked.filter(|asked| *asked > force_step),
             ),
             (
                 &mut spells.torque_slew,
                 EventKind::TorqueSlewLimited,
-                slewed.torque_asked,
+                slewed.torque_asked.filter(|asked| *asked > torque_step),
             ),
             (
                 &mut spells.passivity,
@@ -348,10 +354,16 @@ impl DevicePort {
                     Missing::Constraints => (1, EventKind::ConstraintsStale),
                     Missing::NotOnClock => (2, EventKind::CommandNotOnClock),
                 };
+                stale_since = Some(since);
                 if missing == Missing::NotOnClock {
                     taken = None;
+                    // It says nothing, so the last one that said something may have grown too old before.
+                    let too_old = |made: Duration| made.saturating_add(self.settings.hold);
+                    stale_since = Some(
+                        self.last_command
+                            .map_or(since, |made| since.min(too_old(made))),
+                    );
                 }
-                stale_since = Some(since);
                 let begins = self.spells.stale[spell].begins(now, true);
                 if begins && !self.arming.state().is_off() {
                     self.teller.tell(kind, age.as_secs_f64());
