@@ -342,7 +342,6 @@ fn build_loop(
                     let made = simulated_spidar(
                         geometry.clone(),
                         turned,
-                        &start,
                         reference_point,
                         hand,
                         path,

@@ -36,7 +36,7 @@ pub enum StringsError {
     Geometry(#[from] GeometryError),
     /// A hand that leaves the frame.
     #[error(
-        "the hand's path leaves the frame of {device} at {time_s:.1} s: {cause}; use a larger device, such as wb, or a smaller path"
+        "the hand's path leaves what {device} can measure at {time_s:.1} s: {cause}; use a path that turns less, or a larger device, such as wb"
     )]
     PathLeaves {
         /// The geometry's name.
@@ -89,21 +89,21 @@ pub struct SimulatedSpidar {
 /// Strings in a hand that follows `path`, which holds poses of the body's own frame in the world.
 ///
 /// The frame's axes are turned by `turned` in the world, and its centre is the middle of the box that G passes through on the path;
-/// the grip is not turned when the body is as in `start`. Lengths are those of the world: nothing is scaled.
+/// the grip is not turned when the body is half-way between the two rotations of the path that lie farthest apart. Lengths are those of
+/// the world: nothing is scaled.
 ///
 /// # Errors
 /// [`StringsError`]: the path leaves the frame.
 pub fn simulated_spidar(
     geometry: Geometry,
     turned: UnitQuaternion<f64>,
-    start: &Pose,
     reference_point: Point3<f64>,
     hand: Hand,
     path: MinJerkPath,
     tremor: Option<Tremor>,
 ) -> Result<SimulatedSpidar, StringsError> {
     let centre = middle(&path, &reference_point);
-    let placement = SpidarPlacement::around(centre, turned, start, reference_point);
+    let placement = SpidarPlacement::around(centre, turned, half_way(&path), reference_point);
     let warning = examine(&geometry, &placement, &path)?;
     let mut hardware = HeldStrings::new(&geometry, StringLosses::default(), placement, hand, path);
     if let Some(tremor) = tremor {
@@ -134,6 +134,26 @@ fn middle(path: &MinJerkPath, reference_point: &Point3<f64>) -> Point3<f64> {
         |(low, high), place| (low.inf(&place), high.sup(&place)),
     );
     nalgebra::center(&low, &high)
+}
+
+/// Half-way between two rotations of the path that lie farthest apart, or nearly: the farthest from the first, and the farthest from
+/// that.
+fn half_way(path: &MinJerkPath) -> UnitQuaternion<f64> {
+    let farthest = |from: UnitQuaternion<f64>| {
+        times(path)
+            .map(|time| path.at(time).0.rotation)
+            .fold(from, |far, other| {
+                if from.angle_to(&other) > from.angle_to(&far) {
+                    other
+                } else {
+                    far
+                }
+            })
+    };
+    let one = farthest(path.at(0.0).0.rotation);
+    let other = farthest(one);
+    // Opposite rotations have no one middle; such a path is refused anyway.
+    one.try_slerp(&other, 0.5, f64::EPSILON).unwrap_or(one)
 }
 
 /// Whether the device can follow the path, and what it cannot hold there.

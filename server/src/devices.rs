@@ -210,7 +210,6 @@ fn made_of_strings(
     let made = simulated_spidar(
         geometry,
         turned,
-        &scene.start,
         scene.reference_point(),
         hand,
         intention,

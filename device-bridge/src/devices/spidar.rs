@@ -57,17 +57,17 @@ impl Default for SpidarPlacement {
 
 impl SpidarPlacement {
     /// The frame stands with its centre at `centre` and its axes turned by `turned`, both in the world. With the grip at the centre, not
-    /// turned, the body is turned as in `start` and its G is at the centre.
+    /// turned, the body is turned by `body` in the world and its G is at the centre.
     #[must_use]
     pub fn around(
         centre: Point3<f64>,
         turned: UnitQuaternion<f64>,
-        start: &Pose,
+        body: UnitQuaternion<f64>,
         reference_point: Point3<f64>,
     ) -> Self {
         let world_from_frame = Isometry3::from_parts(centre.into(), turned);
-        let body = start.rotation * reference_point.coords;
-        let at_rest = Isometry3::from_parts((centre.coords - body).into(), start.rotation);
+        let lever = body * reference_point.coords;
+        let at_rest = Isometry3::from_parts((centre.coords - lever).into(), body);
         Self {
             world_from_frame,
             grip_from_body: world_from_frame.inverse() * at_rest,
