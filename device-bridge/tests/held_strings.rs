@@ -4,10 +4,11 @@ use std::time::Duration;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::{
-    Command, Device, DevicePort, EventKind, Hand, HeldStrings, MinJerkPath, Pose, Rearm,
-    SafetySettings, SpidarDevice, StringsError, ViaPoint, simulated_spidar, string_geometry,
+    Command, Device, DeviceFault, DeviceInfo, DevicePort, DeviceSample, EventKind, Hand,
+    HeldStrings, MinJerkPath, Pose, Rearm, SafetySettings, SpidarDevice, SpidarPlacement,
+    StringsError, ViaPoint, simulated_spidar, string_geometry,
 };
-use taut_spidar::Geometry;
+use taut_spidar::{Encoders, Geometry, Reading, StringFault, StringHardware, StringLosses};
 
 /// G in the body's frame, off the grip's centre on purpose.
 fn reference_point() -> Point3<f64> {
@@ -88,65 +89,59 @@ fn what_the_motors_cannot_give_is_not_said_to_be_felt() {
     assert!(force.yz().norm() < 0.01 * force.x, "the direction is kept");
 }
 
-/// Whether the port told that the device froze, on a movement of 60 mm within `moving` s and a rest of 3 s.
-fn froze(name: &str, hand: Hand, moving: f64, let_go: Option<u64>) -> (bool, f64, u64) {
-    let rest = moving + 3.0;
-    let intention = path(&[
-        (0.0, Vector3::x() * -0.03),
-        (moving, Vector3::x() * 0.03),
-        (rest, Vector3::x() * 0.03),
-    ]);
-    let mut device = held(name, hand, intention);
-    let _ = device.read(Duration::ZERO);
-    let start = device.hardware_mut().true_pose();
-    let settings = SafetySettings {
-        rearm: Rearm::Automatic,
-        ..SafetySettings::default()
-    };
-    let (sender, hand_change) = std::sync::mpsc::channel();
-    let watched = Watched {
-        device,
-        let_go: hand_change,
-    };
-    let mut port = DevicePort::new(Box::new(watched), settings, reference_point(), &start);
-    let (mut told, mut fastest, mut same) = (false, 0.0_f64, 0);
-    let mut last = start;
-    for tick in 1..(rest * 1e3) as u64 {
-        if let_go == Some(tick) {
-            let _ = sender.send(());
-        }
-        let report = port.tick(ms(tick), |_| {
-            Some(Command::fresh(ms(tick), Vector6::zeros()))
-        });
-        told |= report
-            .events
-            .iter()
-            .any(|event| event.kind == EventKind::DeviceFrozen);
-        let sample = report.reading.sample;
-        fastest = fastest.max(sample.velocity.fixed_rows::<3>(0).norm());
-        same += u64::from(sample.pose == last);
-        last = sample.pose;
+/// What happens to a hand that moves.
+#[derive(Clone, Copy, PartialEq)]
+enum Fate {
+    /// It comes to rest.
+    Rests,
+    /// It lets go at this tick.
+    LetsGo(u64),
+    /// From this tick on the counters stand still.
+    CountersStop(u64),
+}
+
+/// A held device to which something happens.
+struct Fated {
+    device: SpidarDevice<Counting>,
+    fate: Fate,
+    tick: u64,
+}
+
+/// Electronics whose counters may stop.
+struct Counting {
+    held: HeldStrings,
+    stopped: Option<[i32; 8]>,
+    stop: bool,
+}
+
+impl StringHardware for Counting {
+    fn read_counts(&mut self, now: Duration) -> Result<Reading, StringFault> {
+        let reading = self.held.read_counts(now)?;
+        let counts = if self.stop {
+            *self.stopped.get_or_insert(reading.counts)
+        } else {
+            reading.counts
+        };
+        Ok(Reading { counts, ..reading })
     }
-    (told, fastest, same)
+
+    fn write_tensions(&mut self, now: Duration, tensions: &[f64; 8]) {
+        self.held.write_tensions(now, tensions);
+    }
 }
 
-/// A held device whose hand can be taken away from outside.
-struct Watched {
-    device: SpidarDevice<HeldStrings>,
-    let_go: std::sync::mpsc::Receiver<()>,
-}
-
-impl Device for Watched {
-    fn info(&self) -> &taut_bridge::DeviceInfo {
+impl Device for Fated {
+    fn info(&self) -> &DeviceInfo {
         self.device.info()
     }
 
-    fn read(
-        &mut self,
-        now: Duration,
-    ) -> Result<taut_bridge::DeviceSample, taut_bridge::DeviceFault> {
-        if self.let_go.try_recv().is_ok() {
-            self.device.hardware_mut().set_hand(Hand::RELEASED);
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        self.tick += 1;
+        let hardware = self.device.hardware_mut();
+        match self.fate {
+            Fate::LetsGo(tick) if tick == self.tick => hardware.held.set_hand(Hand::RELEASED),
+            Fate::CountersStop(tick) => hardware.stop = self.tick >= tick,
+            _ => {}
         }
         self.device.read(now)
     }
@@ -156,18 +151,94 @@ impl Device for Watched {
     }
 }
 
+/// What the port saw of 60 mm within `moving` s and a rest of 3 s: whether it told of a freeze, the largest speed (m/s), and how
+/// many samples were the one before them to the bit.
+fn seen(name: &str, hand: Hand, moving: f64, losses: StringLosses, fate: Fate) -> (bool, f64, u64) {
+    let rest = moving + 3.0;
+    let (from, to) = (Vector3::x() * -0.03, Vector3::x() * 0.03);
+    let intention = path(&[(0.0, from), (moving, to), (rest, to)]);
+    let geometry = string_geometry(name).unwrap_or_else(|error| panic!("{error}"));
+    let (start, _) = intention.at(0.0);
+    let placement = SpidarPlacement::around(
+        Point3::origin(),
+        turned(),
+        start.rotation,
+        reference_point(),
+    );
+    let hardware = Counting {
+        held: HeldStrings::new(&geometry, losses, placement, hand, intention),
+        stopped: None,
+        stop: false,
+    };
+    let encoders = Encoders::calibrated(&geometry, &Pose::identity(), &[0; 8]);
+    let device = Fated {
+        device: SpidarDevice::calibrated(geometry, hardware, placement, encoders),
+        fate,
+        tick: 0,
+    };
+    let settings = SafetySettings {
+        rearm: Rearm::Automatic,
+        ..SafetySettings::default()
+    };
+    let mut port = DevicePort::new(Box::new(device), settings, reference_point(), &start);
+    let (mut told, mut fastest, mut same) = (false, 0.0_f64, 0);
+    let mut last = start;
+    for tick in 1..(rest * 1e3) as u64 {
+        let report = port.tick(ms(tick), |_| {
+            Some(Command::fresh(ms(tick), Vector6::zeros()))
+        });
+        let mut kinds = report.events.iter().map(|event| event.kind);
+        told |= kinds.any(|kind| kind == EventKind::DeviceFrozen);
+        let sample = report.reading.sample;
+        fastest = fastest.max(sample.velocity.fixed_rows::<3>(0).norm());
+        same += u64::from(sample.pose == last);
+        last = sample.pose;
+    }
+    (told, fastest, same)
+}
+
 #[test]
 fn a_hand_that_comes_to_rest_is_no_frozen_device() {
     for name in Geometry::shipped_names() {
         for hand in [Hand::LIGHT, Hand::FIRM, Hand::ARM] {
-            // Peaks from 0.2 to 1.4 m/s.
             for moving in [0.08, 0.15, 0.3, 0.5] {
-                let (frozen, fastest, same) = froze(name, hand, moving, None);
+                let losses = StringLosses::default();
+                let (frozen, fastest, same) = seen(name, hand, moving, losses, Fate::Rests);
                 assert!(fastest > 0.1, "{name}: it moved at {fastest} m/s only");
                 assert!(same > 500, "{name}: equal samples came: {same}");
                 assert!(!frozen, "{name} in {moving} s");
             }
         }
+    }
+}
+
+#[test]
+fn a_grip_that_friction_stops_is_no_frozen_device() {
+    for name in Geometry::shipped_names() {
+        for coulomb in [0.02, 0.05, 0.1, 0.2, 0.4] {
+            let losses = StringLosses {
+                coulomb,
+                loss: 0.02,
+            };
+            // Let go at the fastest of the movement: the strings' friction alone brakes.
+            let fate = Fate::LetsGo(150);
+            let (frozen, fastest, same) = seen(name, Hand::LIGHT, 0.3, losses, fate);
+            assert!(fastest > 0.1, "{name}: it moved at {fastest} m/s only");
+            assert!(
+                !frozen,
+                "{name} with {coulomb} N per string, {same} equal samples"
+            );
+        }
+    }
+}
+
+#[test]
+fn counters_that_stop_in_a_movement_are_a_frozen_device() {
+    for name in Geometry::shipped_names() {
+        let losses = StringLosses::default();
+        let fate = Fate::CountersStop(150);
+        let (frozen, ..) = seen(name, Hand::FIRM, 0.3, losses, fate);
+        assert!(frozen, "{name}");
     }
 }
 

@@ -96,6 +96,9 @@ pub struct SpidarDevice<H> {
     solver: TensionSolver,
     strings: StringMatrix,
     world_from_body: Pose,
+    /// The last counts that gave a pose, and that pose: the same counts are the same pose to the bit, so that a device whose counters
+    /// stopped can be told from one that moves.
+    answered: Option<([i32; STRINGS], PoseAnswer)>,
     consistency: Option<Consistency>,
     tensions: Option<TensionAnswer>,
     /// Samples in a row with a slack string or inconsistent lengths.
@@ -146,6 +149,7 @@ impl<H: StringHardware> SpidarDevice<H> {
             strings: StringMatrix::at(&geometry, &centre),
             world_from_body: placement.world_from_frame * placement.grip_from_body,
             geometry,
+            answered: None,
             consistency: None,
             tensions: None,
             suspicious: 0,
@@ -171,6 +175,7 @@ impl<H: StringHardware> SpidarDevice<H> {
     /// Takes another calibration, such as a corrected one of `taut_spidar::self_calibrate`. The pose may jump: only while disarmed.
     pub fn set_encoders(&mut self, encoders: Encoders) {
         self.encoders = encoders;
+        self.answered = None;
         self.monitor.reset();
         self.rates.reset();
         self.suspicious = 0;
@@ -178,6 +183,7 @@ impl<H: StringHardware> SpidarDevice<H> {
 
     /// Says what a motor does. The string of one that does not work is left out of the pose.
     pub fn set_motor(&mut self, string: usize, state: MotorState) {
+        self.answered = None;
         self.solver.set_motor(string, state);
         self.kinematics
             .use_string(string, state == MotorState::Working);
@@ -214,7 +220,11 @@ impl<H: StringHardware> SpidarDevice<H> {
     fn sample(&mut self, reading: &Reading) -> Result<DeviceSample, StringFault> {
         let lengths = self.encoders.lengths(&reading.counts);
         let rates = self.rates.step(reading.time, &lengths);
-        let answer = self.kinematics.solve(&lengths)?;
+        let answer = match self.answered {
+            Some((counts, answer)) if counts == reading.counts => answer,
+            _ => self.kinematics.solve(&lengths)?,
+        };
+        self.answered = Some((reading.counts, answer));
         self.watch(reading, &answer)?;
         self.strings = answer.strings;
 
