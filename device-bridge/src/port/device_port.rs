@@ -23,7 +23,7 @@ pub struct Reading {
     pub sample: DeviceSample,
     /// Why there is no newer one.
     pub fault: Option<DeviceFault>,
-    /// What the hand feels, where the device is far away and tells.
+    /// What the hand felt at this reading, where the device tells: see [`Device::felt`].
     pub felt: Option<Felt>,
 }
 
@@ -35,6 +35,8 @@ pub struct TickReport {
     pub reading: Reading,
     /// What went out: N, N m.
     pub wrench: Vector6<f64>,
+    /// What the hand feels of it: the same, unless the device knows better.
+    pub felt: Vector6<f64>,
     /// Where the port stands.
     pub state: ArmingState,
     /// What happened.
@@ -148,6 +150,12 @@ impl DevicePort {
         self.fault
     }
 
+    /// CPU time of the device's driver in the last tick, where it is measured.
+    #[must_use]
+    pub fn computing_time(&self) -> Option<Duration> {
+        self.device.computing_time()
+    }
+
     /// The wrench on the hand since the last write, N and N m.
     #[must_use]
     pub fn rendered(&self) -> &Vector6<f64> {
@@ -188,12 +196,13 @@ impl DevicePort {
         let command = command(&reading);
         let wrench = self.render(now, passed, command);
         self.device.write(now, &wrench);
-        // A bridge's own word is what does the work.
-        self.energy
-            .hold(&reading.felt.map_or(wrench, |felt| felt.wrench));
+        // The device's own word is what does the work.
+        let felt = self.device.felt().map_or(wrench, |felt| felt.wrench);
+        self.energy.hold(&felt);
         TickReport {
             reading,
             wrench,
+            felt,
             state: self.arming.state(),
             events: *self.teller.events(),
         }
