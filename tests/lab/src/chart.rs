@@ -28,6 +28,7 @@ const SIZES: [i32; 3] = [7, 5, 3];
 fn colour(method: Method) -> RGBColor {
     match method {
         Method::Ours => RGBColor(0, 90, 170),
+        Method::OursByDefault => RGBColor(110, 170, 225),
         Method::Paper => RGBColor(200, 90, 0),
         Method::PaperAdapted => RGBColor(230, 170, 60),
         Method::VirtualCoupling => RGBColor(0, 130, 80),

@@ -76,7 +76,7 @@ measures! {
     ExcessStep "excess_step" "N/ms",
     /// Most energy that the hand has got out of the contact.
     Energy "energy" "J",
-    /// Largest force across the ideal's direction over that along it.
+    /// Largest force across the ideal's direction over the ideal: on a frictionless surface, residual friction.
     Friction "friction" "-",
     /// Depth of the device when the first force is felt.
     FirstForceDepth "first_force_depth" "m",
@@ -240,7 +240,7 @@ impl ForceErrors {
         let across = (force - ideal * (along / size)).norm();
         if force.norm() > 0.0 {
             self.direction.push(across.atan2(along).to_degrees());
-            self.friction = self.friction.max(across / along.abs());
+            self.friction = self.friction.max(across / size);
         }
     }
 
@@ -301,6 +301,6 @@ mod tests {
         assert_eq!(errors.magnitude, [0.0, 0.0, 0.5]);
         assert_eq!((errors.step, errors.excess_step), (1.0, 1.0));
         assert!((errors.step_jnd - 1.0 / 0.14).abs() < 1e-12);
-        assert!(errors.friction > 1e9);
+        assert_eq!(errors.friction, 1.5);
     }
 }

@@ -1,10 +1,20 @@
 //! What a method has to do to be compared, and which methods there are.
 
+use std::fmt;
 use std::sync::Arc;
 
 use god_object::{Pose, Settings, Vector6, World};
 
 use crate::methods::{Discrete, GodObjectMethod, VirtualCoupling};
+
+/// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
+/// an update is made, and one while it is used.
+const LOOK_AHEAD_PERIODS: f64 = 4.0;
+/// Rest distances that are tried for the paper's method, m: a ball on a convex surface loses a contact that is too tight.
+const TOUCHING: [f64; 2] = [10e-6, 50e-6];
+/// Inertias and damping ratios that are tried for virtual coupling.
+const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
+const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
 
 /// A method on its way through a recipe.
 ///
@@ -33,16 +43,19 @@ pub struct Scene {
     pub start: Pose,
     /// Gains, limits and lengths.
     pub settings: Settings,
+    /// Highest speed of the device, m/s.
+    pub speed: f64,
 }
 
 impl Scene {
-    /// With the default settings for a body of this size, m.
+    /// With the default settings for a body of this size, m, and a device of this speed, m/s.
     #[must_use]
-    pub fn new(world: World, size: f64, start: Pose) -> Self {
+    pub fn new(world: World, size: f64, speed: f64, start: Pose) -> Self {
         Self {
             world: Arc::new(world),
             start,
             settings: Settings::for_size(size),
+            speed,
         }
     }
 
@@ -56,8 +69,10 @@ impl Scene {
 /// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// This project's, with its default settings.
+    /// This project's, its look-ahead limit fitted to the speed of the device and the rate of updates.
     Ours,
+    /// This project's, with its default settings, whose look-ahead limit is fitted to the size of the body alone.
+    OursByDefault,
     /// As published, without the adaptation of constraints: a cone of touching contacts, one projection and one collision
     /// search in an update.
     Paper,
@@ -71,8 +86,9 @@ pub enum Method {
 
 impl Method {
     /// In the order of the tables.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Ours,
+        Self::OursByDefault,
         Self::Paper,
         Self::PaperAdapted,
         Self::VirtualCoupling,
@@ -84,10 +100,32 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Ours => "ours",
+            Self::OursByDefault => "ours by default",
             Self::Paper => "paper",
             Self::PaperAdapted => "paper+adaptation",
             Self::VirtualCoupling => "virtual coupling",
             Self::Discrete => "discrete",
+        }
+    }
+
+    /// The settings among which the best is searched for each recipe and rate; the first is the default.
+    #[must_use]
+    pub fn tunings(self) -> Vec<Tuning> {
+        match self {
+            Self::Ours | Self::OursByDefault | Self::Discrete => vec![Tuning::Default],
+            Self::Paper | Self::PaperAdapted => {
+                let touching = TOUCHING.map(Tuning::Touching);
+                [Tuning::Default].into_iter().chain(touching).collect()
+            }
+            Self::VirtualCoupling => PROXY_SHARES
+                .iter()
+                .flat_map(|share| {
+                    DAMPING_RATIOS.map(|damping_ratio| Tuning::Proxy {
+                        share: *share,
+                        damping_ratio,
+                    })
+                })
+                .collect(),
         }
     }
 
@@ -97,26 +135,76 @@ impl Method {
     ///
     /// Where the scene cannot be started: recipes are made in code.
     #[must_use]
-    pub fn start(self, scene: &Scene, period: f64) -> Box<dyn HapticMethod> {
-        let ours = scene.settings;
-        let paper = Settings {
+    pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
+        let by_default = scene.settings;
+        let mut paper = Settings {
             look_ahead: false,
             max_substeps: 1,
             implicit_rounds: 0,
-            ..ours
+            ..by_default
         };
+        if let Tuning::Touching(rest_distance) = tuning {
+            paper.rest_distance = rest_distance;
+            paper.activation_distance = paper.activation_distance.max(2.0 * rest_distance);
+        }
         match self {
-            Self::Ours => Box::new(GodObjectMethod::new(scene, &ours)),
+            Self::Ours => {
+                let reach = LOOK_AHEAD_PERIODS * scene.speed * period;
+                let fitted = Settings {
+                    look_ahead_limit: by_default.look_ahead_limit.max(reach),
+                    ..by_default
+                };
+                Box::new(GodObjectMethod::new(scene, &fitted))
+            }
+            Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),
             Self::PaperAdapted => Box::new(GodObjectMethod::new(scene, &paper)),
-            Self::Paper => Box::new(GodObjectMethod::new(
-                scene,
-                &Settings {
-                    adaptation: None,
-                    ..paper
-                },
-            )),
-            Self::VirtualCoupling => Box::new(VirtualCoupling::new(scene, period)),
+            Self::Paper => {
+                paper.adaptation = None;
+                Box::new(GodObjectMethod::new(scene, &paper))
+            }
+            Self::VirtualCoupling => {
+                let (share, damping_ratio) = match tuning {
+                    Tuning::Proxy {
+                        share,
+                        damping_ratio,
+                    } => (share, damping_ratio),
+                    _ => (PROXY_SHARES[0], DAMPING_RATIOS[0]),
+                };
+                Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
+            }
             Self::Discrete => Box::new(Discrete::new(scene)),
+        }
+    }
+}
+
+/// What is tuned of a baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tuning {
+    /// Nothing.
+    Default,
+    /// Rest distance of the paper's god-object, m; contacts within two of them touch.
+    Touching(f64),
+    /// The proxy of virtual coupling.
+    Proxy {
+        /// Inertia over that of the body.
+        share: f64,
+        /// Damping over critical damping.
+        damping_ratio: f64,
+    },
+}
+
+impl fmt::Display for Tuning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default => write!(f, "default"),
+            Self::Touching(distance) => write!(f, "rest distance {:.0} um", distance * 1e6),
+            Self::Proxy {
+                share,
+                damping_ratio,
+            } => write!(
+                f,
+                "proxy {share} of the body; damping ratio {damping_ratio}"
+            ),
         }
     }
 }

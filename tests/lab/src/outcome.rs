@@ -5,7 +5,7 @@ use taut_method_tests::checker::PenetrationChecker;
 use crate::clock;
 use crate::cpu_time::quantile;
 use crate::measure::{Measure, Measures};
-use crate::method::Method;
+use crate::method::{Method, Tuning};
 use crate::recipe::{Line, Recipe};
 
 /// What came of it.
@@ -19,6 +19,8 @@ pub struct Outcome {
     pub method: Method,
     /// Updates a second, Hz.
     pub rate: u32,
+    /// With what.
+    pub tuning: Tuning,
     /// One for each start phase.
     pub phases: Vec<Measures>,
     /// What passes, and whether it did.
@@ -37,15 +39,39 @@ pub struct Times {
 }
 
 impl Outcome {
-    /// Runs a recipe.
+    /// Runs a recipe with the best of the method's tunings: that which misses the fewest lines from one start phase, and of these the one with
+    /// the least error felt.
     #[must_use]
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
+        let tunings = method.tunings();
+        let best = match tunings.as_slice() {
+            [only] => Some(*only),
+            several => several
+                .iter()
+                .map(|tuning| {
+                    let trial = Self::from_phases(recipe, method, rate, *tuning, 1);
+                    let missed = trial.lines.iter().filter(|(_, passes)| !passes).count();
+                    (missed, trial.worst(Measure::Felt), *tuning)
+                })
+                .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
+                .map(|(_, _, tuning)| tuning),
+        };
+        Self::tuned(recipe, method, rate, best.unwrap_or(Tuning::Default))
+    }
+
+    /// Runs a recipe with this tuning.
+    #[must_use]
+    pub fn tuned(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning) -> Self {
+        Self::from_phases(recipe, method, rate, tuning, recipe.phases)
+    }
+
+    fn from_phases(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning, count: u32) -> Self {
         let checker = PenetrationChecker::new(&recipe.scene.world);
         let (mut updates, mut forces) = (Vec::new(), Vec::new());
-        let phases: Vec<Measures> = (0..recipe.phases)
+        let phases: Vec<Measures> = (0..count)
             .map(|k| {
-                let phase = (f64::from(k) + 0.5) / f64::from(recipe.phases);
-                let mut started = method.start(&recipe.scene, 1.0 / f64::from(rate));
+                let phase = (f64::from(k) + 0.5) / f64::from(count);
+                let mut started = method.start(&recipe.scene, 1.0 / f64::from(rate), tuning);
                 let run = clock::run(
                     started.as_mut(),
                     &recipe.device,
@@ -63,6 +89,7 @@ impl Outcome {
             case: recipe.case.clone(),
             method,
             rate,
+            tuning,
             phases,
             lines: Vec::new(),
             times: Times {

@@ -38,15 +38,15 @@ pub fn verdict(outcome: &Outcome) -> String {
 /// The table for people: no times, the same in every run.
 #[must_use]
 pub fn table(outcomes: &[Outcome]) -> String {
-    let mut text = String::from("| recipe | case | method | rate | J | verdict |\n");
-    text.push_str("|--------|------|--------|------|---|---------|\n");
+    let mut text = String::from("| recipe | case | method | tuning | rate | J | verdict |\n");
+    text.push_str("|--------|------|--------|--------|------|---|---------|\n");
     for o in outcomes {
         let felt = brief(o.worst(Measure::Felt));
         let (name, verdict) = (o.method.name(), verdict(o));
         let _ = writeln!(
             text,
-            "| {} | {} | {name} | {} Hz | {felt} | {verdict} |",
-            o.recipe, o.case, o.rate
+            "| {} | {} | {name} | {} | {} Hz | {felt} | {verdict} |",
+            o.recipe, o.case, o.tuning, o.rate
         );
     }
     text
@@ -62,14 +62,15 @@ pub fn write(outcomes: &[Outcome], directory: &Path) -> io::Result<()> {
 }
 
 /// The columns that name an outcome.
-pub(crate) const KEYS: &str = "recipe,case,method,rate_hz";
+pub(crate) const KEYS: &str = "recipe,case,method,tuning,rate_hz";
 
 pub(crate) fn keys(outcome: &Outcome) -> String {
     format!(
-        "{},\"{}\",{},{}",
+        "{},\"{}\",{},{},{}",
         outcome.recipe,
         outcome.case,
         outcome.method.name(),
+        outcome.tuning,
         outcome.rate
     )
 }

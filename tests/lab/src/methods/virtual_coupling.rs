@@ -4,7 +4,7 @@
 //! |--------|----------------|-------|----------------------------------------------------------------|
 //! | kappa  | `stiffness`    | 1/s^2 | stiffness of the spring over M: k_h k_s, as the hand is to feel |
 //! | beta   | `damping`      | 1/s   | damping over M                                                 |
-//! | mu     | `PROXY_SHARE`  | –     | inertia of the proxy over M                                    |
+//! | mu     | `share`        | –     | inertia of the proxy over M                                    |
 //! | h      | `period`       | s     | time between updates                                           |
 //!
 //! One update solves `(mu + h beta + h^2 kappa) v' = mu v + h beta v_h + h kappa (x_h - x)`, which is stable for any period, and
@@ -24,11 +24,6 @@ use nalgebra::{Point3, Vector3};
 use super::contacts::{ContactFinder, limited, row};
 use crate::method::{HapticMethod, Scene};
 
-/// Inertia of the proxy over that of the body: light, so that it lags little; the implicit step bears it.
-const PROXY_SHARE: f64 = 0.02;
-/// Damping over critical damping.
-const DAMPING_RATIO: f64 = 1.0;
-
 /// What the force needs of an update.
 #[derive(Clone, Copy, Debug)]
 struct Proxy {
@@ -42,6 +37,7 @@ pub struct VirtualCoupling {
     world: Arc<World>,
     settings: Settings,
     period: f64,
+    share: f64,
     stiffness: f64,
     damping: f64,
     radius: f64,
@@ -57,9 +53,10 @@ pub struct VirtualCoupling {
 }
 
 impl VirtualCoupling {
-    /// At the scene's start, updated every `period` seconds.
+    /// At the scene's start, updated every `period` seconds. `share`: inertia of the proxy over that of the body; `damping_ratio`: damping
+    /// over critical damping.
     #[must_use]
-    pub fn new(scene: &Scene, period: f64) -> Self {
+    pub fn new(scene: &Scene, period: f64, share: f64, damping_ratio: f64) -> Self {
         let settings = scene.settings;
         let stiffness = settings.k_h * settings.k_s;
         let body = &scene.world.body;
@@ -71,8 +68,9 @@ impl VirtualCoupling {
             world: scene.world.clone(),
             settings,
             period,
+            share,
             stiffness,
-            damping: 2.0 * DAMPING_RATIO * (stiffness * PROXY_SHARE).sqrt(),
+            damping: 2.0 * damping_ratio * (stiffness * share).sqrt(),
             radius: body.mesh.radius_about(&body.reference_point),
             proxy,
             published: proxy,
@@ -108,8 +106,8 @@ impl HapticMethod for VirtualCoupling {
         let hand = device_velocity(&mut self.last_update, time, &device);
         let h = self.period;
         let (spring, damper) = (h * self.stiffness, h * self.damping);
-        let wished = (self.proxy.velocity * PROXY_SHARE + hand * damper + difference * spring)
-            / (PROXY_SHARE + damper + h * spring);
+        let wished = (self.proxy.velocity * self.share + hand * damper + difference * spring)
+            / (self.share + damper + h * spring);
         let step = wished * h;
 
         let reach = linear(&step).norm() + self.radius * angular(&step).norm();

@@ -18,8 +18,8 @@ const DEPTH: f64 = 3e-3;
 /// Half the length of the cylinder, m.
 const HALF_LENGTH: f64 = 0.05;
 const FACETS: usize = 256;
-/// Way in from above the surface, m, and its speed, m/s.
-const APPROACH: f64 = 1e-3;
+/// Way in from above the surface, m, long enough for the slowest updates to follow, and its speed, m/s.
+const APPROACH: f64 = 5e-3;
 const APPROACH_SPEED: f64 = 0.05;
 /// How long the device waits before it goes round, s.
 const WAIT: f64 = 0.2;
@@ -59,7 +59,7 @@ fn recipe(radius: f64, speed: f64) -> Recipe {
         let at = out * (radius - depth);
         Pose::translation(at.x, at.y, at.z)
     };
-    let scene = Scene::new(world, 2.0 * TIP, device(0.0));
+    let scene = Scene::new(world, 2.0 * TIP, speed.max(APPROACH_SPEED), device(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     Recipe {
         name: "R12",

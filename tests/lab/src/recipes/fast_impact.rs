@@ -31,7 +31,7 @@ fn recipe(extent: Extent, speed: f64) -> Recipe {
     };
     let at = |z: f64| Vector3::new(1e-3, 2e-3, z);
     let path = Path::from(at(0.25)).to(at(-0.05), speed).hold(WAIT);
-    let scene = Scene::new(world, 2.0 * HALF, path.pose(0.0));
+    let scene = Scene::new(world, 2.0 * HALF, speed, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let rest = path.duration() - AT_REST;

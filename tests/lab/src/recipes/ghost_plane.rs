@@ -30,7 +30,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         .hold(0.1)
         .to(at(0.05, -DEPTH), SPEED)
         .hold(0.1);
-    let scene = Scene::new(world, 2.0 * TIP, path.pose(0.0));
+    let scene = Scene::new(world, 2.0 * TIP, SPEED, path.pose(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let ideal = path.clone();
     let plate = Convex::cuboid(low, high);

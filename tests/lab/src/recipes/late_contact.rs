@@ -34,7 +34,7 @@ fn recipe(speed: f64) -> Recipe {
         .to(height(TURN), speed)
         .to(height(END), speed)
         .hold(0.05);
-    let scene = Scene::new(world, 2.0 * RADIUS, path.pose(0.0));
+    let scene = Scene::new(world, 2.0 * RADIUS, speed, path.pose(0.0));
     let stiffness = scene.stiffness();
     let ideal = path.clone();
     Recipe {

@@ -32,7 +32,12 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
         .to(height(-DEPTH) + slid, SLIDE_SPEED)
         .to(height(-DEPTH) + lifted, SLIDE_SPEED.hypot(LIFT_SPEED))
         .hold(0.1);
-    let scene = Scene::new(world, 2.0 * RADIUS, path.pose(0.0));
+    let scene = Scene::new(
+        world,
+        2.0 * RADIUS,
+        SLIDE_SPEED.hypot(LIFT_SPEED),
+        path.pose(0.0),
+    );
     let stiffness = scene.stiffness();
     let ideal = path.clone();
     vec![Recipe {

@@ -36,7 +36,7 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
         .to(at(REACH, -REACH), SPEED)
         .to(at(-REACH, -REACH), SPEED)
         .to(at(-REACH, REACH), SPEED);
-    let scene = Scene::new(world, 2.0 * HALF, path.pose(0.0));
+    let scene = Scene::new(world, 2.0 * HALF, SPEED, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));

@@ -35,7 +35,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         .hold(extent.choose(2.0, 0.2))
         .to(at(0.045, 0.13), SPEED)
         .hold(0.2);
-    let scene = Scene::new(world, 2.0 * RADIUS, path.pose(0.0));
+    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let device = path.clone();
