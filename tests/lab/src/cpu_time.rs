@@ -1,0 +1,35 @@
+//! CPU time of the calling thread, which other programs on the machine disturb less than a wall clock.
+
+use rustix::time::{ClockId, clock_gettime};
+
+/// CPU time that this thread has used, us.
+#[must_use]
+pub fn thread_us() -> f64 {
+    let time = clock_gettime(ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e6 + time.tv_nsec as f64 * 1e-3
+}
+
+/// The value below which the share `share` of the `values` lies (nearest rank); NaN of none.
+#[must_use]
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted
+        .get(rank.saturating_sub(1))
+        .copied()
+        .unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantile;
+
+    #[test]
+    fn quantiles_are_of_the_nearest_rank() {
+        let values = [3.0, 1.0, 2.0, 4.0];
+        assert_eq!(quantile(&values, 0.5), 2.0);
+        assert_eq!(quantile(&values, 0.99), 4.0);
+        assert!(quantile(&[], 0.5).is_nan());
+    }
+}

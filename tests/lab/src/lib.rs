@@ -1,0 +1,25 @@
+//! The laboratory: recipes for which haptic methods are known to fail, run for several methods and rates on a virtual clock.
+//!
+//! A recipe is a geometry, a motion of the device, the ideal answer where it has a closed form, and pass lines. Every recipe is
+//! run for every method and every rate of updates; the failures of the baselines are shown, since they are the point.
+//!
+//! - [`method`]: what a method has to do, and which there are; [`methods`]: each in a file.
+//! - [`clock`]: the virtual clock, and what it records.
+//! - [`recipe`]: what a recipe is; [`recipes`]: all of them.
+//! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
+//! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
+//! - [`report`]: table and CSV; [`chart`]: error against time.
+//!
+//! Same machine type, same answers: only times differ between runs, and those stand in a file of their own.
+
+pub mod chart;
+pub mod clock;
+pub mod cpu_time;
+pub mod measure;
+pub mod method;
+pub mod methods;
+pub mod outcome;
+pub mod recipe;
+pub mod recipes;
+pub mod report;
+pub mod vertex_depth;

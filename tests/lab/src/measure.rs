@@ -1,0 +1,306 @@
+//! What is measured of a run, against the ideal answer.
+//!
+//! | symbol | name in code              | unit  | meaning                                                           |
+//! |--------|---------------------------|-------|-------------------------------------------------------------------|
+//! | e_dir  | [`Measure::DirectionP95`] | deg   | angle between F and the ideal, where the ideal is above 0.1 N      |
+//! | e_mag  | [`Measure::MagnitudeP95`] | %     | error of the norm of F over the ideal's, there                     |
+//! | e_tau  | [`Measure::TorqueP95`]    | N m   | norm of the difference of torques                                  |
+//! | dF     | [`Measure::Step`]         | N     | largest change of F in a millisecond                               |
+//! | E_inj  | [`Measure::Energy`]       | J     | most that the hand has got out, hold of the samples left out        |
+//! | J      | [`Measure::Felt`]         | –     | the largest of the errors in just-noticeable differences            |
+//!
+//! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006), 7 % for magnitude (Pang, Tan, Durlach 1991), 12.7 % for torque at 60 mN m
+//! (Jandura and Srinivasan 1994), and 7 % of the force or 0.1 N for a step.
+
+use god_object::Vector6;
+use god_object::spatial::{angular, linear};
+use nalgebra::Vector3;
+use taut_method_tests::checker::PenetrationChecker;
+
+use crate::clock::Tick;
+use crate::cpu_time::quantile;
+use crate::recipe::Recipe;
+
+/// Ideal forces below this have no direction to compare with, and smaller errors are not felt, N.
+const FELT_FORCE: f64 = 0.1;
+/// Just-noticeable differences: of direction, degrees; of magnitude and torque, shares.
+const JND_DIRECTION: f64 = 18.4;
+const JND_MAGNITUDE: f64 = 0.07;
+const JND_TORQUE: f64 = 0.127;
+/// The torque at which [`JND_TORQUE`] was measured, N m; smaller ones are compared as if they were this.
+const REFERENCE_TORQUE: f64 = 0.06;
+/// A force is one above this, N: a rest distance away it is less.
+const FIRST_FORCE: f64 = 1e-6;
+
+macro_rules! measures {
+    ($($(#[$doc:meta])* $name:ident $key:literal $unit:literal,)*) => {
+        /// One of the numbers that a run is judged by.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Measure { $($(#[$doc])* $name,)* }
+
+        impl Measure {
+            /// All, in the order of the files.
+            pub const ALL: &[Self] = &[$(Self::$name,)*];
+
+            /// Name in tables and files.
+            #[must_use]
+            pub fn key(self) -> &'static str { match self { $(Self::$name => $key,)* } }
+
+            /// Its unit.
+            #[must_use]
+            pub fn unit(self) -> &'static str { match self { $(Self::$name => $unit,)* } }
+        }
+    };
+}
+
+measures! {
+    /// Largest depth of the body in an obstacle.
+    Penetration "penetration" "m",
+    /// Published poses at which the meshes intersect, by the independent check.
+    Intersections "intersections" "poses",
+    /// Farthest that the body went beyond the side that it belongs to.
+    Astray "astray" "m",
+    /// 95th percentile of the angle to the ideal force; NaN where none is to compare.
+    DirectionP95 "direction_p95" "deg",
+    /// Mean of that angle.
+    DirectionMean "direction_mean" "deg",
+    /// Largest of that angle.
+    DirectionMax "direction_max" "deg",
+    /// 95th percentile of the error of magnitude.
+    MagnitudeP95 "magnitude_p95" "%",
+    /// 95th percentile of the error of torque.
+    TorqueP95 "torque_p95" "N m",
+    /// Largest change of force in a millisecond.
+    Step "step" "N/ms",
+    /// The same, less what the ideal changes then or a millisecond beside.
+    ExcessStep "excess_step" "N/ms",
+    /// Most energy that the hand has got out of the contact.
+    Energy "energy" "J",
+    /// Largest force across the ideal's direction over the ideal: on a frictionless surface, residual friction.
+    Friction "friction" "-",
+    /// Depth of the device when the first force is felt.
+    FirstForceDepth "first_force_depth" "m",
+    /// Time for which the force is off by more than 0.1 N.
+    FalseForce "false_force" "s",
+    /// Forces or poses that are not finite.
+    NotFinite "not_finite" "ticks",
+    /// Error in just-noticeable differences, J.
+    Felt "felt" "JND",
+}
+
+/// All measures of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measures {
+    values: Vec<f64>,
+}
+
+impl Measures {
+    /// Of a run of a recipe.
+    #[must_use]
+    pub fn of(recipe: &Recipe, checker: &PenetrationChecker, ticks: &[Tick]) -> Self {
+        let ideal: Vec<Vector6> = ticks.iter().map(|tick| (recipe.ideal)(tick.time)).collect();
+        let errors = ForceErrors::new(ticks, &ideal);
+        let values = Measure::ALL
+            .iter()
+            .map(|measure| match measure {
+                Measure::Penetration => largest(ticks.iter().map(|t| (recipe.depth)(&t.body))),
+                Measure::Intersections => intersections(checker, ticks),
+                Measure::Astray => largest(ticks.iter().map(|t| (recipe.astray)(t.time, &t.body))),
+                Measure::DirectionP95 => quantile(&errors.direction, 0.95),
+                Measure::DirectionMean => {
+                    errors.direction.iter().sum::<f64>() / errors.direction.len() as f64
+                }
+                Measure::DirectionMax => quantile(&errors.direction, 1.0),
+                Measure::MagnitudeP95 => 100.0 * quantile(&errors.magnitude, 0.95),
+                Measure::TorqueP95 => quantile(&errors.torque, 0.95),
+                Measure::Step => errors.step,
+                Measure::ExcessStep => errors.excess_step,
+                Measure::Energy => energy(ticks),
+                Measure::Friction => errors.friction,
+                Measure::FirstForceDepth => first_force(ticks, &ideal) / recipe.scene.stiffness(),
+                Measure::FalseForce => errors.false_force,
+                Measure::NotFinite => ticks.iter().filter(|tick| !is_finite(tick)).count() as f64,
+                Measure::Felt => errors.felt(),
+            })
+            .collect();
+        Self { values }
+    }
+
+    /// One of them.
+    #[must_use]
+    pub fn get(&self, measure: Measure) -> f64 {
+        self.values[measure as usize]
+    }
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    // f64::max drops NaN: a depth that is none must not.
+    values.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+}
+
+fn is_finite(tick: &Tick) -> bool {
+    let pose = tick.body;
+    tick.wrench.iter().all(|x| x.is_finite())
+        && pose.translation.vector.iter().all(|x| x.is_finite())
+        && pose.rotation.coords.iter().all(|x| x.is_finite())
+}
+
+fn intersections(checker: &PenetrationChecker, ticks: &[Tick]) -> f64 {
+    let mut last = None;
+    let mut count = 0;
+    for tick in ticks {
+        if last != Some(tick.body) {
+            count += u32::from(checker.penetrated(&tick.body).is_some());
+            last = Some(tick.body);
+        }
+    }
+    f64::from(count)
+}
+
+/// Work on the hand by trapezoids, at its most. What holding a force for a tick adds is left out: it is the same for all methods.
+fn energy(ticks: &[Tick]) -> f64 {
+    let (mut work, mut most) = (0.0_f64, 0.0_f64);
+    for pair in ticks.windows(2) {
+        let way = pair[1].device.translation.vector - pair[0].device.translation.vector;
+        work += 0.5 * (linear(&pair[0].wrench) + linear(&pair[1].wrench)).dot(&way);
+        most = most.max(work);
+    }
+    most
+}
+
+/// The ideal's force, N, when the first one is felt.
+fn first_force(ticks: &[Tick], ideal: &[Vector6]) -> f64 {
+    let mut both = ticks.iter().zip(ideal);
+    both.find(|(tick, _)| linear(&tick.wrench).norm() > FIRST_FORCE)
+        .map_or(f64::NAN, |(_, ideal)| linear(ideal).norm())
+}
+
+/// Errors of force, tick by tick where there is an ideal to compare with.
+struct ForceErrors {
+    direction: Vec<f64>,
+    magnitude: Vec<f64>,
+    torque: Vec<f64>,
+    torque_jnd: Vec<f64>,
+    step: f64,
+    excess_step: f64,
+    step_jnd: f64,
+    friction: f64,
+    false_force: f64,
+}
+
+impl ForceErrors {
+    fn new(ticks: &[Tick], ideal: &[Vector6]) -> Self {
+        let force = |i: usize| linear(&ticks[i].wrench);
+        let mut errors = Self {
+            direction: Vec::new(),
+            magnitude: Vec::new(),
+            torque: Vec::new(),
+            torque_jnd: Vec::new(),
+            step: 0.0,
+            excess_step: 0.0,
+            step_jnd: 0.0,
+            friction: 0.0,
+            false_force: 0.0,
+        };
+        let mut wrong = 0_u32;
+        for (i, ideal) in ideal.iter().enumerate() {
+            let (right, torque) = (linear(ideal), angular(ideal));
+            wrong += u32::from((force(i) - right).norm() > FELT_FORCE);
+            let off = (angular(&ticks[i].wrench) - torque).norm();
+            errors.torque.push(off);
+            let felt = JND_TORQUE * torque.norm().max(REFERENCE_TORQUE);
+            errors.torque_jnd.push(off / felt);
+            if right.norm() > FELT_FORCE {
+                errors.compare(&force(i), &right);
+            }
+        }
+        errors.false_force = f64::from(wrong) * crate::clock::TICK;
+
+        let ideal_step: Vec<f64> = ideal
+            .windows(2)
+            .map(|pair| (linear(&pair[1]) - linear(&pair[0])).norm())
+            .collect();
+        for i in 0..ideal_step.len() {
+            let step = (force(i + 1) - force(i)).norm();
+            let beside = i.saturating_sub(1)..(i + 2).min(ideal_step.len());
+            let allowed = ideal_step[beside].iter().copied().fold(0.0, f64::max);
+            let excess = (step - allowed).max(0.0);
+            let felt = (JND_MAGNITUDE * force(i).norm()).max(FELT_FORCE);
+            errors.step = errors.step.max(step);
+            errors.excess_step = errors.excess_step.max(excess);
+            errors.step_jnd = errors.step_jnd.max(excess / felt);
+        }
+        errors
+    }
+
+    fn compare(&mut self, force: &Vector3<f64>, ideal: &Vector3<f64>) {
+        let size = ideal.norm();
+        self.magnitude.push((force.norm() / size - 1.0).abs());
+        let along = force.dot(ideal) / size;
+        let across = (force - ideal * (along / size)).norm();
+        if force.norm() > 0.0 {
+            self.direction.push(across.atan2(along).to_degrees());
+            self.friction = self.friction.max(across / size);
+        }
+    }
+
+    fn felt(&self) -> f64 {
+        [
+            quantile(&self.direction, 0.95) / JND_DIRECTION,
+            quantile(&self.magnitude, 0.95) / JND_MAGNITUDE,
+            quantile(&self.torque_jnd, 0.95),
+            self.step_jnd,
+        ]
+        .into_iter()
+        .fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use god_object::Pose;
+
+    fn ticks(forces: &[(f64, f64)]) -> Vec<Tick> {
+        let at = |(i, (height, force)): (usize, &(f64, f64))| Tick {
+            time: i as f64 * 1e-3,
+            device: Pose::translation(0.0, 0.0, *height),
+            body: Pose::identity(),
+            wrench: Vector6::new(0.0, 0.0, *force, 0.0, 0.0, 0.0),
+        };
+        forces.iter().enumerate().map(at).collect()
+    }
+
+    #[test]
+    fn a_spring_gives_back_what_it_took_and_a_late_one_more() {
+        // 1000 N/m, in 2 mm and out; then the same without force on the way in.
+        let spring = ticks(&[
+            (0.0, 0.0),
+            (-1e-3, 1.0),
+            (-2e-3, 2.0),
+            (-1e-3, 1.0),
+            (0.0, 0.0),
+        ]);
+        assert!(energy(&spring).abs() < 1e-15);
+        let late = ticks(&[
+            (0.0, 0.0),
+            (-2e-3, 0.0),
+            (-2e-3, 2.0),
+            (-1e-3, 1.0),
+            (0.0, 0.0),
+        ]);
+        assert!((energy(&late) - 2e-3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn errors_of_force_are_those_of_their_definitions() {
+        let run = ticks(&[(0.0, 2.0), (0.0, 2.0), (0.0, 3.0)]);
+        let ideal = [Vector6::new(0.0, 2.0, 0.0, 0.0, 0.0, 0.0); 3];
+        let errors = ForceErrors::new(&run, &ideal);
+        assert_eq!(errors.direction, [90.0; 3]);
+        assert_eq!(errors.magnitude, [0.0, 0.0, 0.5]);
+        assert_eq!((errors.step, errors.excess_step), (1.0, 1.0));
+        assert!((errors.step_jnd - 1.0 / 0.14).abs() < 1e-12);
+        assert_eq!(errors.friction, 1.5);
+    }
+}

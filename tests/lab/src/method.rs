@@ -1,0 +1,229 @@
+//! What a method has to do to be compared, and which methods there are.
+
+use std::fmt;
+use std::sync::Arc;
+
+use god_object::{Pose, Settings, Vector6, World};
+
+use crate::methods::{Discrete, GodObjectMethod, VirtualCoupling};
+
+/// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
+/// an update is made, and one while it is used.
+const LOOK_AHEAD_PERIODS: f64 = 4.0;
+/// Rest distances that are tried for the paper's method, m: a ball on a convex surface loses a contact that is too tight.
+const TOUCHING: [f64; 2] = [10e-6, 50e-6];
+/// Inertias and damping ratios that are tried for virtual coupling.
+const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
+const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
+
+/// A method on its way through a recipe.
+///
+/// Time is an argument, in seconds; nothing here reads a clock. An update that starts at one time is
+/// published at a later one, and forces between the two are those of the update before.
+pub trait HapticMethod {
+    /// One update of the simulation, begun at `time` with the device where it is then.
+    fn update(&mut self, time: f64, device: &Pose);
+
+    /// The last update is done: poses and forces are its from now on.
+    fn publish(&mut self);
+
+    /// Force and torque on the hand at the body's reference point, N and N m, world axes.
+    fn force(&mut self, time: f64, device: &Pose) -> Vector6;
+
+    /// World from body, as published.
+    fn pose(&self) -> Pose;
+}
+
+/// A body, its obstacles, a free start, and the settings that every method takes its gains and limits from.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Body and obstacles.
+    pub world: Arc<World>,
+    /// World from body at the start.
+    pub start: Pose,
+    /// Gains, limits and lengths.
+    pub settings: Settings,
+    /// Highest speed of the device, m/s.
+    pub speed: f64,
+}
+
+impl Scene {
+    /// With the default settings for a body of this size, m, and a device of this speed, m/s.
+    #[must_use]
+    pub fn new(world: World, size: f64, speed: f64, start: Pose) -> Self {
+        Self {
+            world: Arc::new(world),
+            start,
+            settings: Settings::for_size(size),
+            speed,
+        }
+    }
+
+    /// Translational stiffness that the hand is to feel, N/m.
+    #[must_use]
+    pub fn stiffness(&self) -> f64 {
+        self.settings.stiffness(self.world.body.mass)
+    }
+}
+
+/// The methods that are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// This project's, its look-ahead limit fitted to the speed of the device and the rate of updates.
+    Ours,
+    /// This project's, with its default settings, whose look-ahead limit is fitted to the size of the body alone.
+    OursByDefault,
+    /// As published, without the adaptation of constraints: a cone of touching contacts, one projection and one collision
+    /// search in an update.
+    Paper,
+    /// As published, with the adaptation of constraints.
+    PaperAdapted,
+    /// Spring and damper to a dynamic proxy that contacts hold.
+    VirtualCoupling,
+    /// A god-object that looks for collisions only where a step ends.
+    Discrete,
+}
+
+impl Method {
+    /// In the order of the tables.
+    pub const ALL: [Self; 6] = [
+        Self::Ours,
+        Self::OursByDefault,
+        Self::Paper,
+        Self::PaperAdapted,
+        Self::VirtualCoupling,
+        Self::Discrete,
+    ];
+
+    /// Name in tables and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ours => "ours",
+            Self::OursByDefault => "ours by default",
+            Self::Paper => "paper",
+            Self::PaperAdapted => "paper+adaptation",
+            Self::VirtualCoupling => "virtual coupling",
+            Self::Discrete => "discrete",
+        }
+    }
+
+    /// The settings among which the best is searched for each recipe and rate; the first is the default.
+    #[must_use]
+    pub fn tunings(self) -> Vec<Tuning> {
+        match self {
+            Self::Ours | Self::OursByDefault | Self::Discrete => vec![Tuning::Default],
+            Self::Paper | Self::PaperAdapted => {
+                let touching = TOUCHING.map(Tuning::Touching);
+                [Tuning::Default].into_iter().chain(touching).collect()
+            }
+            Self::VirtualCoupling => PROXY_SHARES
+                .iter()
+                .flat_map(|share| {
+                    DAMPING_RATIOS.map(|damping_ratio| Tuning::Proxy {
+                        share: *share,
+                        damping_ratio,
+                    })
+                })
+                .collect(),
+        }
+    }
+
+    /// The method at the start of a scene, updated every `period` seconds.
+    ///
+    /// # Panics
+    ///
+    /// Where the scene cannot be started: recipes are made in code.
+    #[must_use]
+    pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
+        let by_default = scene.settings;
+        let mut paper = Settings {
+            look_ahead: false,
+            max_substeps: 1,
+            implicit_rounds: 0,
+            ..by_default
+        };
+        if let Tuning::Touching(rest_distance) = tuning {
+            paper.rest_distance = rest_distance;
+            paper.activation_distance = paper.activation_distance.max(2.0 * rest_distance);
+        }
+        match self {
+            Self::Ours => {
+                let reach = LOOK_AHEAD_PERIODS * scene.speed * period;
+                let fitted = Settings {
+                    look_ahead_limit: by_default.look_ahead_limit.max(reach),
+                    ..by_default
+                };
+                Box::new(GodObjectMethod::new(scene, &fitted))
+            }
+            Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),
+            Self::PaperAdapted => Box::new(GodObjectMethod::new(scene, &paper)),
+            Self::Paper => {
+                paper.adaptation = None;
+                Box::new(GodObjectMethod::new(scene, &paper))
+            }
+            Self::VirtualCoupling => {
+                let (share, damping_ratio) = match tuning {
+                    Tuning::Proxy {
+                        share,
+                        damping_ratio,
+                    } => (share, damping_ratio),
+                    _ => (PROXY_SHARES[0], DAMPING_RATIOS[0]),
+                };
+                Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
+            }
+            Self::Discrete => Box::new(Discrete::new(scene)),
+        }
+    }
+}
+
+/// What is tuned of a baseline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tuning {
+    /// Nothing.
+    Default,
+    /// Rest distance of the paper's god-object, m; contacts within two of them touch.
+    Touching(f64),
+    /// The proxy of virtual coupling.
+    Proxy {
+        /// Inertia over that of the body.
+        share: f64,
+        /// Damping over critical damping.
+        damping_ratio: f64,
+    },
+}
+
+impl fmt::Display for Tuning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default => write!(f, "default"),
+            Self::Touching(distance) => write!(f, "rest distance {:.0} um", distance * 1e6),
+            Self::Proxy {
+                share,
+                damping_ratio,
+            } => write!(
+                f,
+                "proxy {share} of the body; damping ratio {damping_ratio}"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_of_a_scene_is_the_paper_of_the_settings() {
+        let size = 0.1;
+        let ours = Settings::for_size(size);
+        let paper = Settings {
+            look_ahead: false,
+            max_substeps: 1,
+            implicit_rounds: 0,
+            ..ours
+        };
+        assert_eq!(paper, Settings::paper(size));
+        assert_eq!(paper.k_s, 0.5);
+    }
+}

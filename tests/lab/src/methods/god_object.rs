@@ -1,0 +1,56 @@
+//! The god-object method of this project, with whatever settings: its defaults, or as published.
+
+use god_object::spatial::{angular, linear, pose_difference};
+use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, Vector6};
+use nalgebra::Vector3;
+
+use crate::method::{HapticMethod, Scene};
+
+/// Simulation and coupling, and the constraint set between them.
+#[derive(Debug)]
+pub struct GodObjectMethod {
+    simulation: GodObject,
+    coupling: Coupling,
+    published: ConstraintSet,
+    last_device: Pose,
+}
+
+impl GodObjectMethod {
+    /// # Panics
+    ///
+    /// Where the start is not free.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: &Settings) -> Self {
+        let simulation = GodObject::new(scene.world.clone(), *settings, scene.start)
+            .unwrap_or_else(|error| panic!("{error}"));
+        Self {
+            coupling: Coupling::new(&scene.world, settings),
+            published: simulation.constraint_set().clone(),
+            simulation,
+            last_device: scene.start,
+        }
+    }
+}
+
+impl HapticMethod for GodObjectMethod {
+    fn update(&mut self, _time: f64, device: &Pose) {
+        // A set is used from one period after its device pose to two: the device goes on as it came.
+        let moved = pose_difference(device, &self.last_device, &Vector3::zeros());
+        self.last_device = *device;
+        let ahead = linear(&moved).norm() + self.simulation.radius() * angular(&moved).norm();
+        self.simulation.set_device_ahead(ahead);
+        let _ = self.simulation.step(device, None);
+    }
+
+    fn publish(&mut self) {
+        self.published.clone_from(self.simulation.constraint_set());
+    }
+
+    fn force(&mut self, time: f64, device: &Pose) -> Vector6 {
+        self.coupling.step(time, device, &self.published).wrench
+    }
+
+    fn pose(&self) -> Pose {
+        self.published.god_object_pose
+    }
+}

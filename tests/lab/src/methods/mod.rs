@@ -1,0 +1,10 @@
+//! The methods, each in a file; the baselines live here alone.
+
+mod contacts;
+mod discrete;
+mod god_object;
+mod virtual_coupling;
+
+pub use discrete::Discrete;
+pub use god_object::GodObjectMethod;
+pub use virtual_coupling::VirtualCoupling;

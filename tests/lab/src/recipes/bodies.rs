@@ -1,0 +1,134 @@
+//! Bodies, obstacles, motions and lines that several recipes share.
+
+use god_object::{Body, Mesh, Obstacle, Pose, Primitive, Vector6};
+use nalgebra::{Point3, Vector3};
+use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_scene::shapes::{cuboid, sphere};
+
+use crate::measure::Measure;
+use crate::recipe::Line;
+
+/// Deepest penetration that passes, m.
+const PENETRATION: f64 = 1e-6;
+/// A millisecond, s.
+const TICK: f64 = crate::clock::TICK;
+/// The force of a device that moves at a speed may change this much faster than that of a spring.
+const STEP_SLACK: f64 = 1.5;
+
+/// An exact sphere of 1 kg.
+pub(super) fn ball(radius: f64) -> Body {
+    Body {
+        primitive: Some(Primitive::Sphere {
+            center: Point3::origin(),
+            radius,
+        }),
+        ..body(mesh(sphere(radius, 2)))
+    }
+}
+
+/// A cube of 1 kg.
+pub(super) fn cube(half: f64) -> Body {
+    body(cube_mesh(half))
+}
+
+/// Its mesh.
+pub(super) fn cube_mesh(half: f64) -> Mesh {
+    mesh(cuboid([half; 3]))
+}
+
+/// A box along the axes between two corners.
+pub(super) fn block(name: &str, low: Point3<f64>, high: Point3<f64>) -> Obstacle {
+    let (half, middle) = ((high - low) * 0.5, nalgebra::center(&low, &high));
+    let pose = Pose::translation(middle.x, middle.y, middle.z);
+    obstacle(name, mesh(cuboid([half.x, half.y, half.z])), pose)
+}
+
+/// A large block whose upper face is z = 0.
+pub(super) fn ground() -> Obstacle {
+    block(
+        "ground",
+        Point3::new(-0.3, -0.3, -0.1),
+        Point3::new(0.3, 0.3, 0.0),
+    )
+}
+
+/// A force alone, N.
+pub(super) fn force(x: f64, y: f64, z: f64) -> Vector6 {
+    Vector6::new(x, y, z, 0.0, 0.0, 0.0)
+}
+
+/// What every recipe asks: no penetration, nothing that is not a number.
+pub(super) fn sound() -> Vec<Line> {
+    vec![
+        Line::at_most(Measure::Penetration, PENETRATION),
+        Line::at_most(Measure::Intersections, 0.0),
+        Line::at_most(Measure::NotFinite, 0.0),
+    ]
+}
+
+/// Where the ideal does not jump, the force does not: the device moves at `speed`, m/s.
+pub(super) fn smooth(stiffness: f64, speed: f64) -> Line {
+    Line::at_most(Measure::Step, STEP_SLACK * stiffness * speed * TICK)
+}
+
+/// For how long after a contact has ended the planes of the last set may still push, s: two updates on their way and one that is used.
+pub(super) fn ghost_time(k_s: f64, rate: u32) -> f64 {
+    (1.0 / k_s + 1.0) / f64::from(rate)
+}
+
+/// From place to place, each leg at its speed.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    /// Time of arrival, s, and place, m.
+    stops: Vec<(f64, Vector3<f64>)>,
+}
+
+impl Path {
+    pub(super) fn from(place: Vector3<f64>) -> Self {
+        Self {
+            stops: vec![(0.0, place)],
+        }
+    }
+
+    fn last(&self) -> (f64, Vector3<f64>) {
+        self.stops[self.stops.len() - 1]
+    }
+
+    /// In a straight line, m/s.
+    pub(super) fn to(mut self, place: Vector3<f64>, speed: f64) -> Self {
+        let (time, from) = self.last();
+        self.stops
+            .push((time + (place - from).norm() / speed, place));
+        self
+    }
+
+    /// Stays, s.
+    pub(super) fn hold(mut self, duration: f64) -> Self {
+        let (time, place) = self.last();
+        self.stops.push((time + duration, place));
+        self
+    }
+
+    /// s.
+    pub(super) fn duration(&self) -> f64 {
+        self.last().0
+    }
+
+    /// Where it is, m.
+    pub(super) fn at(&self, time: f64) -> Vector3<f64> {
+        for leg in self.stops.windows(2) {
+            let ((begin, from), (end, to)) = (leg[0], leg[1]);
+            if time < end {
+                let share = ((time - begin) / (end - begin)).clamp(0.0, 1.0);
+                return from + (to - from) * share;
+            }
+        }
+        self.last().1
+    }
+
+    /// As a pose.
+    pub(super) fn pose(&self, time: f64) -> Pose {
+        let place = self.at(time);
+        Pose::translation(place.x, place.y, place.z)
+    }
+}

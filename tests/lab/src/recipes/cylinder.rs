@@ -1,0 +1,91 @@
+//! R12: a small ball goes round a cylinder, pressed in by 3 mm. Planes that are some updates old point beside the radius.
+
+use god_object::{Pose, Primitive, World};
+use nalgebra::{Point3, Vector3};
+use taut_method_tests::solids::{mesh, obstacle};
+use taut_scene::shapes::{Axis, cylinder};
+
+use super::Extent;
+use super::bodies::{ball, force, ghost_time, smooth, sound};
+use crate::clock::TICK;
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Line, Recipe};
+
+/// Of the ball, m: the point that it stands for goes round at the cylinder's radius and this.
+const TIP: f64 = 1e-3;
+const DEPTH: f64 = 3e-3;
+/// Half the length of the cylinder, m.
+const HALF_LENGTH: f64 = 0.05;
+const FACETS: usize = 256;
+/// Way in from above the surface, m, long enough for the slowest updates to follow, and its speed, m/s.
+const APPROACH: f64 = 5e-3;
+const APPROACH_SPEED: f64 = 0.05;
+/// How long the device waits before it goes round, s.
+const WAIT: f64 = 0.2;
+
+pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
+    [(0.02, 0.05), (0.02, 0.2), (0.05, 0.05), (0.05, 0.2)]
+        .map(|(radius, speed)| recipe(radius, speed))
+        .into()
+}
+
+/// `radius`: of the way of the ball's centre on the cylinder, m.
+fn recipe(radius: f64, speed: f64) -> Recipe {
+    let solid = radius - TIP;
+    let mut round = obstacle(
+        "cylinder",
+        mesh(cylinder(solid, HALF_LENGTH, FACETS, Axis::Y)),
+        Pose::identity(),
+    );
+    round.primitive = Some(Primitive::Cylinder {
+        ends: [-HALF_LENGTH, HALF_LENGTH].map(|y| Point3::new(0.0, y, 0.0)),
+        radius: solid,
+    });
+    let world = World {
+        body: ball(TIP),
+        obstacles: vec![round],
+    };
+    let arrived = (APPROACH + DEPTH) / APPROACH_SPEED;
+    let begin = arrived + WAIT;
+    // Depth, and angle from the z axis towards the x axis.
+    let place = move |time: f64| {
+        let depth = (time * APPROACH_SPEED).min(APPROACH + DEPTH) - APPROACH;
+        let angle = (time - begin).max(0.0) * speed / radius;
+        (depth, Vector3::new(angle.sin(), 0.0, angle.cos()))
+    };
+    let device = move |time: f64| {
+        let (depth, out) = place(time);
+        let at = out * (radius - depth);
+        Pose::translation(at.x, at.y, at.z)
+    };
+    let scene = Scene::new(world, 2.0 * TIP, speed.max(APPROACH_SPEED), device(0.0));
+    let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
+    Recipe {
+        name: "R12",
+        case: format!("radius {} mm, {speed} m/s", radius * 1e3),
+        about: "sliding on a cylinder: stale normals",
+        duration: begin + std::f64::consts::PI * radius / speed,
+        scene,
+        device: Box::new(device),
+        ideal: Box::new(move |time| {
+            let (depth, out) = place(time);
+            let pushed = out * (stiffness * depth.max(0.0));
+            force(pushed.x, pushed.y, pushed.z)
+        }),
+        depth: Box::new(move |body| {
+            let place = body.translation;
+            (radius - place.x.hypot(place.z)).max(0.0)
+        }),
+        astray: Box::new(|_, _| 0.0),
+        phases: 1,
+        lines: Box::new(move |rate| {
+            // As far as the ball goes round while a set is made and used.
+            let stale = speed / radius * (ghost_time(k_s, rate) + TICK);
+            let mut lines = sound();
+            lines.push(smooth(stiffness, speed));
+            lines.push(Line::at_most(Measure::DirectionMax, stale.to_degrees()));
+            lines
+        }),
+    }
+}

@@ -1,0 +1,67 @@
+//! R10a: a cube of a millimetre is thrown at a plate of a tenth of one: up to 71 mm between updates.
+
+use god_object::World;
+use nalgebra::{Point3, Vector3};
+
+use super::Extent;
+use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Line, Recipe};
+use crate::vertex_depth::Convex;
+
+const HALF: f64 = 0.5e-3;
+const THICKNESS: f64 = 1e-4;
+/// Farthest from the plate that the cube may come to rest, m.
+const REST_ERROR: f64 = 1e-5;
+/// How long the device waits below the plate, s; the cube has come to rest for the last share.
+const WAIT: f64 = 0.5;
+const AT_REST: f64 = 0.1;
+
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    [0.5, 2.0, 5.0].map(|speed| recipe(extent, speed)).into()
+}
+
+fn recipe(extent: Extent, speed: f64) -> Recipe {
+    let low = Point3::new(-0.1, -0.1, -THICKNESS);
+    let high = Point3::new(0.1, 0.1, 0.0);
+    let world = World {
+        body: cube(HALF),
+        obstacles: vec![block("plate", low, high)],
+    };
+    let at = |z: f64| Vector3::new(1e-3, 2e-3, z);
+    let path = Path::from(at(0.25)).to(at(-0.05), speed).hold(WAIT);
+    let scene = Scene::new(world, 2.0 * HALF, speed, path.pose(0.0));
+    let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
+    let ideal = path.clone();
+    let rest = path.duration() - AT_REST;
+    let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));
+    Recipe {
+        name: "R10a",
+        case: format!("{speed} m/s"),
+        about: "fast impact: stops at first contact",
+        duration: path.duration(),
+        scene,
+        device: Box::new(move |time| path.pose(time)),
+        ideal: Box::new(move |time| {
+            let depth = (HALF - ideal.at(time).z).max(0.0);
+            force(0.0, 0.0, (stiffness * depth).min(limit))
+        }),
+        depth: Box::new(move |pose| plate.deepest(&body, pose)),
+        astray: Box::new(move |time, body| {
+            let above = body.translation.z - HALF;
+            if time < rest {
+                (-above).max(0.0)
+            } else {
+                above.abs()
+            }
+        }),
+        phases: extent.choose(20, 4),
+        lines: Box::new(move |_| {
+            let mut lines = sound();
+            lines.push(smooth(stiffness, speed));
+            lines.push(Line::at_most(Measure::Astray, REST_ERROR));
+            lines
+        }),
+    }
+}

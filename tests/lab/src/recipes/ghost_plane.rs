@@ -1,0 +1,73 @@
+//! R13: a small ball slides off the end of a plate. Planes that are some updates old reach past the end and push on.
+
+use god_object::World;
+use nalgebra::{Point3, Vector3};
+
+use super::Extent;
+use super::bodies::{Path, ball, block, force, ghost_time, sound};
+use crate::clock::TICK;
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Line, Recipe};
+use crate::vertex_depth::Convex;
+
+const TIP: f64 = 1e-3;
+const DEPTH: f64 = 5e-3;
+const SPEED: f64 = 0.2;
+/// Ticks that sampling may add at either end of a push.
+const TICKS: f64 = 2.0;
+
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    let low = Point3::new(-0.2, -0.1, -0.02);
+    let high = Point3::new(0.0, 0.1, 0.0);
+    let world = World {
+        body: ball(TIP),
+        obstacles: vec![block("plate", low, high)],
+    };
+    let at = |x: f64, z: f64| Vector3::new(x, 0.0, TIP + z);
+    let path = Path::from(at(-0.05, 1e-3))
+        .to(at(-0.05, -DEPTH), 0.05)
+        .hold(0.1)
+        .to(at(0.05, -DEPTH), SPEED)
+        .hold(0.1);
+    let scene = Scene::new(world, 2.0 * TIP, SPEED, path.pose(0.0));
+    let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
+    let ideal = path.clone();
+    let plate = Convex::cuboid(low, high);
+    vec![Recipe {
+        name: "R13",
+        case: "end of a plate".into(),
+        about: "ghost plane: no force past the end",
+        duration: path.duration(),
+        scene,
+        device: Box::new(move |time| path.pose(time)),
+        ideal: Box::new(move |time| {
+            // Past the end the ball falls to the side of the plate, which holds its centre one radius away.
+            let place = ideal.at(time);
+            if place.x < 0.0 {
+                force(0.0, 0.0, stiffness * (TIP - place.z).max(0.0))
+            } else {
+                force(stiffness * (TIP - place.x).max(0.0), 0.0, 0.0)
+            }
+        }),
+        depth: Box::new(move |body| {
+            // Of the ball's centre in the plate grown by its radius, by the distance to the nearest point.
+            let centre = Point3::from(body.translation.vector);
+            let nearest = Point3::from(centre.coords.sup(&low.coords).inf(&high.coords));
+            let apart = (centre - nearest).norm();
+            if apart > 0.0 {
+                (TIP - apart).max(0.0)
+            } else {
+                TIP + plate.depth(&centre)
+            }
+        }),
+        astray: Box::new(|_, _| 0.0),
+        phases: extent.choose(20, 4),
+        lines: Box::new(move |rate| {
+            let mut lines = sound();
+            let push = ghost_time(k_s, rate) + TICKS * TICK;
+            lines.push(Line::at_most(Measure::FalseForce, push));
+            lines
+        }),
+    }]
+}

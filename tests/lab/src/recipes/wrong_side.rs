@@ -1,0 +1,83 @@
+//! R28: a ball in a U with walls of a millimetre. The device goes through a wall, stays there, then walks round the open end.
+
+use god_object::{Pose, World};
+use nalgebra::{Point3, Vector3};
+use taut_method_tests::solids::{cells, mesh, obstacle};
+
+use super::Extent;
+use super::bodies::{Path, ball, force, sound};
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Line, Recipe};
+
+const RADIUS: f64 = 4e-3;
+/// Inner and outer face of the walls, and their upper end, m.
+const INNER: f64 = 0.020;
+const OUTER: f64 = 0.021;
+const RIM: f64 = 0.1;
+const SPEED: f64 = 0.1;
+/// How far beyond the wall's face the ball may be, m: as for penetration.
+const ASTRAY: f64 = 1e-6;
+
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    let planes_x = [-OUTER, -INNER, INNER, OUTER];
+    let u_shape = cells(
+        [&planes_x, &[-0.05, 0.05], &[-0.001, 0.0, RIM]],
+        |[i, _, k]| k == 0 || i != 1,
+    );
+    let world = World {
+        body: ball(RADIUS),
+        obstacles: vec![obstacle("u", mesh(u_shape), Pose::identity())],
+    };
+    let at = |x: f64, z: f64| Vector3::new(x, 0.0, z);
+    let path = Path::from(at(0.0, 0.03))
+        .to(at(0.045, 0.03), SPEED)
+        .hold(extent.choose(2.0, 0.2))
+        .to(at(0.045, 0.13), SPEED)
+        .hold(0.2);
+    let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
+    let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
+    let ideal = path.clone();
+    let device = path.clone();
+    vec![Recipe {
+        name: "R28",
+        case: "wall of a U".into(),
+        about: "wrong side: the body stays on its side until the way is free",
+        duration: path.duration(),
+        scene,
+        device: Box::new(move |time| path.pose(time)),
+        ideal: Box::new(move |time| {
+            // The ball slides up the wall and, once its centre is above the rim, round it.
+            let place = ideal.at(time);
+            let depth = (place.x - (INNER - RADIUS)).max(0.0);
+            let held = if place.z <= RIM { depth } else { 0.0 };
+            force(-(stiffness * held).min(limit), 0.0, 0.0)
+        }),
+        depth: Box::new(|body| {
+            let centre = Point3::from(body.translation.vector);
+            let wall = |low: f64, high: f64| {
+                let nearest = Point3::new(
+                    centre.x.clamp(low, high),
+                    centre.y.clamp(-0.05, 0.05),
+                    centre.z.clamp(-0.001, RIM),
+                );
+                (RADIUS - (centre - nearest).norm()).max(0.0)
+            };
+            let floor = (RADIUS - centre.z).max(0.0);
+            let inside = centre.x.abs() < INNER && centre.z < RIM;
+            let floor = if inside { floor } else { 0.0 };
+            wall(INNER, OUTER).max(wall(-OUTER, -INNER)).max(floor)
+        }),
+        astray: Box::new(move |time, body| {
+            let held = device.at(time).z <= RIM;
+            let beyond = (body.translation.x - (INNER - RADIUS)).max(0.0);
+            if held { beyond } else { 0.0 }
+        }),
+        phases: extent.choose(20, 4),
+        lines: Box::new(|_| {
+            let mut lines = sound();
+            lines.push(Line::at_most(Measure::Astray, ASTRAY));
+            lines
+        }),
+    }]
+}
