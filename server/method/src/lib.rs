@@ -34,6 +34,7 @@ mod god_object;
 mod implicit;
 mod known_rows;
 mod obstacle_work;
+mod prepared_rows;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;

@@ -238,13 +238,12 @@ impl Bridge {
                 PartTaken::Waiting | PartTaken::Overtaken => {}
                 PartTaken::Refused => panic!("a part contradicts another one"),
             },
-            Payload::Wrench(command) => {
+            Payload::Wrench(command)
                 if self
                     .command
-                    .is_none_or(|last| last.time_ns < command.time_ns)
-                {
-                    self.command = Some(command);
-                }
+                    .is_none_or(|last| last.time_ns < command.time_ns) =>
+            {
+                self.command = Some(command);
             }
             _ => {}
         });

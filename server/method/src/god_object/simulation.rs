@@ -93,6 +93,9 @@ impl GodObject {
         let work = &mut Work::default();
         god_object.collect(settings.activation_distance, work);
         god_object.choose(&Vector6::zeros(), settings.activation_distance, work);
+        god_object
+            .set
+            .prepare(&god_object.world.body, &settings, None);
         Ok(god_object)
     }
 
@@ -176,6 +179,8 @@ impl GodObject {
             .turn
             .difference(&device, &self.pose_at_reference_point());
         self.publish(&difference, &update, &mut report);
+        self.set
+            .prepare(&self.world.body, &self.settings, Some(device_pose));
         self.describe_set(&mut report);
         report
     }

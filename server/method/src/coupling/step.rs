@@ -9,19 +9,23 @@
 //!
 //! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
 //!
-//! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides is prepared once
-//! when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
+//! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides comes with it or is prepared
+//! once when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
 //! Source: Ortega et al. 2007, Section 5; force shading Section 6.1.3; the bound beyond the paper.
 
 use nalgebra::{Point3, Vector3};
 
+use super::{Arrival, CouplingOutput};
 use crate::adaptation::AdaptationState;
-use crate::constraint::{ConstraintSet, contact_jacobian};
+use crate::constraint::ConstraintSet;
 use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
 use crate::obstacle_work::ObstacleWork;
-use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector};
+use crate::prepared_rows::{PreparedRows, RowBasis};
+use crate::quasi_statics::{
+    HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus, Projector,
+};
 use crate::settings::Settings;
 use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
@@ -36,16 +40,18 @@ use crate::world::World;
 #[derive(Debug)]
 pub struct Coupling {
     settings: Settings,
-    body: CoupledBody,
+    basis: RowBasis,
     /// `None` when no obstacle has a texture.
     textures: Option<Textures>,
-    prepared: PreparedSet,
+    present: PresentSet,
+    /// For sets that come without rows made ready.
+    own: PreparedRows,
     projector: Projector,
     /// `None` when every obstacle is frictionless.
     friction: Option<Friction>,
     anchor: StickAnchor,
     /// The rows with the bounds in force, where there is friction.
-    rows_in_force: Vec<HalfSpace>,
+    rough_rows: Vec<HalfSpace>,
     /// `None` unless passivity is enforced.
     energy: Option<EnergyObserver>,
     /// `None` where nothing is damped.
@@ -54,21 +60,21 @@ pub struct Coupling {
     implicit: ImplicitRounds,
     arrival: Arrival,
     known: KnownRows,
-    /// The bounds in force now: those of `rows`, lower where a row is on its way in.
+    /// Where the rows belong now.
+    targets: Vec<f64>,
+    /// The bounds in force now: those, lower where a row is on its way in.
     bounds: Vec<f64>,
     adaptation: Option<AdaptationState>,
-    /// The rows of the present set, with the bounds where they belong.
-    rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     turn: TurnMemory,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
 }
 
-/// What depends on the constraint set alone: made once when it arrives, used for every device sample until the next one.
-/// The rows themselves are in `Coupling::rows` and, made ready, in its projector.
+/// What depends on the constraint set alone: taken from it when it arrives, used for every device sample until the next one.
+/// The rows themselves are in the projector.
 #[derive(Debug)]
-struct PreparedSet {
+struct PresentSet {
     /// Sequence and pose of the set; `None` before the first.
     of: Option<(u64, Pose, usize)>,
     /// Pose of the reference point.
@@ -80,63 +86,12 @@ struct PreparedSet {
     moving: bool,
 }
 
-impl PreparedSet {
+impl PresentSet {
     #[inline]
-    fn serves(&self, set: &ConstraintSet) -> bool {
+    fn is(&self, set: &ConstraintSet) -> bool {
         let of = (set.sequence, set.god_object_pose, set.constraints.len());
         self.of == Some(of) // false for a pose that is not finite
     }
-}
-
-/// What the coupling needs to know of the body: no surface.
-#[derive(Debug)]
-struct CoupledBody {
-    mass: f64,
-    inertia: nalgebra::Matrix3<f64>,
-    reference_point: Point3<f64>,
-}
-
-/// When sets arrive: rows of obstacles that move go on with them until the next.
-#[derive(Clone, Copy, Debug, Default)]
-struct Arrival {
-    /// When the present set was first seen, s.
-    time: f64,
-    /// Time between the present set and the one before, s.
-    period: f64,
-}
-
-impl Arrival {
-    fn observe(&mut self, time: f64) {
-        *self = Self {
-            time,
-            period: time - self.time,
-        };
-    }
-
-    /// How much of an update's time has passed since the set came, in [0, 1]: 0 where it cannot be known.
-    fn share_of_an_update(&self, time: f64) -> f64 {
-        let share = (time - self.time) / self.period;
-        let known = self.period > 0.0 && share > 0.0; // false for NaN
-        if known { share.min(1.0) } else { 0.0 }
-    }
-}
-
-/// The answer of one coupling step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CouplingOutput {
-    /// Force and torque on the hand at the reference point, N and N m, world axes; within the limits.
-    pub wrench: Vector6,
-    /// First pass of force shading, for the god-object loop; `None` when no contact is shaded.
-    pub shaded: Option<ShadedAcceleration>,
-    /// Rows in the active set.
-    pub active: usize,
-    /// Relative KKT residual of the force's projection.
-    pub kkt: f64,
-    /// How the projection ended. Anything but `Solved` comes with a zero wrench, but for `Infeasible` between obstacles that
-    /// move: there it is the force as if they stood.
-    pub status: ProjectionStatus,
-    /// The norm clamp of force or torque was at work.
-    pub saturated: bool,
 }
 
 impl Coupling {
@@ -146,13 +101,10 @@ impl Coupling {
         let friction = Friction::of(world, settings);
         Self {
             settings: *settings,
-            body: CoupledBody {
-                mass: world.body.mass,
-                inertia: world.body.inertia,
-                reference_point: world.body.reference_point,
-            },
+            basis: RowBasis::of(&world.body, settings),
             textures: Textures::of(world),
-            prepared: PreparedSet {
+            own: PreparedRows::with_capacity(capacity),
+            present: PresentSet {
                 of: None,
                 god_object: Pose::identity(),
                 metric: None,
@@ -160,7 +112,7 @@ impl Coupling {
                 moving: false,
             },
             projector: Projector::new(settings.solver, capacity),
-            rows_in_force: Vec::with_capacity(if friction.is_some() { capacity } else { 0 }),
+            rough_rows: Vec::with_capacity(if friction.is_some() { capacity } else { 0 }),
             friction,
             anchor: StickAnchor::default(),
             energy: settings.passive.then(EnergyObserver::new),
@@ -175,11 +127,11 @@ impl Coupling {
                 capacity,
             ),
             known: KnownRows::new(capacity),
+            targets: Vec::with_capacity(capacity),
             bounds: Vec::with_capacity(capacity),
             adaptation: settings
                 .adaptation
                 .map(|a| AdaptationState::new(a, capacity)),
-            rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
             turn: TurnMemory::default(),
             correction: Vector6::zeros(),
@@ -194,31 +146,36 @@ impl Coupling {
         if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
             return self.without_force(ProjectionStatus::NotFinite);
         }
-        let arrived = !self.prepared.serves(set);
+        let arrived = !self.present.is(set);
         if arrived {
-            self.prepare(set);
+            self.take(set);
             self.arrival.observe(time);
         }
-        if self.prepared.moving {
+        if self.present.moving {
             self.carry_rows(time, set);
         }
-        let device = at_reference_point(device_pose, &self.body.reference_point);
+        let device = at_reference_point(device_pose, &self.basis.reference_point);
         if let Some(damping) = &mut self.damping {
             damping.observe(time, &device);
         }
-        let difference = self.turn.difference(&device, &self.prepared.god_object);
+        let difference = self.turn.difference(&device, &self.present.god_object);
         let unconstrained = difference * self.settings.k_s;
-        let Some(metric) = &self.prepared.metric else {
+        let Some(metric) = self.present.metric else {
             return self.without_force(ProjectionStatus::NotFinite);
         };
 
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
         let reached = unconstrained + std::mem::replace(&mut self.correction, Vector6::zeros());
         if let Some(adaptation) = self.adaptation.as_mut().filter(|state| !state.is_idle()) {
+            let center = Point3::from(self.present.god_object.translation.vector);
+            let jacobian = |row: usize| {
+                let row = self.basis.half_space(&set.constraints[row], &center);
+                row.jacobian
+            };
             adaptation.step(
                 time,
-                |row| self.rows[row].bound,
-                |row| self.rows[row].jacobian.dot(&reached),
+                |row| self.targets[row],
+                |row| jacobian(row).dot(&reached),
                 |row, bound| {
                     self.projector.set_bound(row, bound);
                     self.bounds[row] = bound;
@@ -229,35 +186,11 @@ impl Coupling {
             .projector
             .project_prepared(&unconstrained, &self.warm_start);
         self.warm_start.clear();
-        if let Some(friction) = &mut self.friction {
-            let k_s = self.settings.k_s;
-            let god_object = &self.prepared.god_object;
-            self.rows_in_force.clear();
-            let in_force = self.rows.iter().zip(&self.bounds);
-            self.rows_in_force
-                .extend(in_force.map(|(row, bound)| HalfSpace {
-                    bound: *bound,
-                    ..*row
-                }));
-            let problem = FrictionProblem {
-                metric,
-                unconstrained: &unconstrained,
-                stuck_at: &self.anchor.acceleration(god_object, &unconstrained, k_s),
-                reference_point: &Point3::from(god_object.translation.vector),
-                rows: &self.rows_in_force,
-                constraints: &set.constraints,
-            };
-            projection = friction.hold(
-                &problem,
-                |a_u, warm| self.projector.project_prepared(a_u, warm),
-                projection,
-            );
-            let reached = &projection.acceleration;
-            self.anchor
-                .follow(god_object, reached, k_s, friction.slid());
+        if self.friction.is_some() {
+            projection = self.grip(&metric, &unconstrained, set, projection);
         }
         // Where obstacles close in on each other from both sides, nothing is pushed but nothing gives way.
-        let squeezed = self.prepared.moving
+        let squeezed = self.present.moving
             && projection.status == ProjectionStatus::Infeasible
             && projection.kkt_residual <= KKT_TOLERANCE;
         if projection.status != ProjectionStatus::Solved && !squeezed {
@@ -269,20 +202,21 @@ impl Coupling {
         // F_c = k_h M (a_c - a_u)
         let mut held = metric.mass_matrix_times(&(projection.acceleration - unconstrained));
         let damped = self.damping.as_mut().map(|damping| {
+            let center = Point3::from(self.present.god_object.translation.vector);
             let in_force = |row: usize| HalfSpace {
                 bound: self.bounds[row],
-                ..self.rows[row]
+                ..self.basis.half_space(&set.constraints[row], &center)
             };
             let k_s = self.settings.k_s;
-            damping.held(metric, &unconstrained, k_s, &projection, in_force)
+            damping.held(&metric, &unconstrained, k_s, &projection, in_force)
         });
         let given = LinearAnswer {
-            constraints: &set.constraints[..self.rows.len()],
-            start: &self.prepared.god_object,
+            constraints: &set.constraints[..self.bounds.len()],
+            start: &self.present.god_object,
             goal: &device,
             branch: self.turn.branch(),
             scale: self.settings.k_s,
-            shaded: self.prepared.shaded,
+            shaded: self.present.shaded,
             projection: &projection,
         };
         // Friction is on the linear rows.
@@ -293,7 +227,7 @@ impl Coupling {
             self.implicit.solve(
                 &given,
                 |row| self.bounds[row],
-                |pose| self.body.metric(&self.settings, pose),
+                |pose| self.basis.metric(pose),
             )
         };
         if let Some(answer) = implicit {
@@ -301,7 +235,7 @@ impl Coupling {
             held = answer.metric.mass_matrix_times(&change);
             // What follows counts from x_s.
             let nearest = angular(&projection.acceleration) / self.settings.k_s;
-            let moved = pose_difference(&answer.reached, &self.prepared.god_object, &nearest);
+            let moved = pose_difference(&answer.reached, &self.present.god_object, &nearest);
             projection = answer.projection;
             projection.acceleration = moved * self.settings.k_s;
         }
@@ -323,12 +257,12 @@ impl Coupling {
                     contact.normal,
                 ))
             });
-            wrench = textures.tilt(&wrench, &self.prepared.god_object, &moved, touched);
+            wrench = textures.tilt(&wrench, &self.present.god_object, &moved, touched);
         }
         let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
         if arrived {
-            let along = self.prepared.moving.then(|| {
+            let along = self.present.moving.then(|| {
                 let rows = projection.active.iter();
                 let done = rows.filter_map(|row| {
                     let came = set.constraints.get(row.row as usize)?.came;
@@ -346,14 +280,14 @@ impl Coupling {
         if let Some(mut energy) = self.energy {
             energy.grant(self.obstacle_work.work());
             energy.arrive(&device);
-            let (bounded, clamped) = self.limited(&energy.within_reserve(metric, &wrench));
+            let (bounded, clamped) = self.limited(&energy.within_reserve(&metric, &wrench));
             energy.hold(&device, &bounded);
             (wrench, saturated) = (bounded, saturated || clamped);
             self.energy = Some(energy);
         }
         CouplingOutput {
             wrench,
-            shaded: self.prepared.shaded.then_some(ShadedAcceleration {
+            shaded: self.present.shaded.then_some(ShadedAcceleration {
                 sequence: set.sequence,
                 acceleration: projection.acceleration,
             }),
@@ -393,61 +327,101 @@ impl Coupling {
         CouplingOutput::without_force(status)
     }
 
-    /// Everything that the set decides, whatever the device does: rows, metric, and which rows are new.
-    fn prepare(&mut self, set: &ConstraintSet) {
-        let constraints =
-            &set.constraints[..set.constraints.len().min(self.settings.max_constraints)];
-        let god_object = at_reference_point(&set.god_object_pose, &self.body.reference_point);
-        let center = Point3::from(god_object.translation.vector);
-        self.rows.clear();
-        let mut shaded = false;
-        for constraint in constraints {
-            let normal = constraint.shading_normal.unwrap_or(constraint.normal);
-            shaded |= constraint.shading_normal.is_some();
-            self.rows.push(HalfSpace {
-                jacobian: contact_jacobian(&normal, &constraint.point, &center),
-                bound: self.settings.coupling_bound(constraint.gap),
-            });
-        }
-        self.bounds.clear();
-        self.bounds.extend(self.rows.iter().map(|row| row.bound));
-        let metric = self.body.metric(&self.settings, &god_object);
-        if let Some(metric) = &metric {
-            self.projector.prepare(metric, &self.rows);
+    /// Takes a new set in: its rows, which its publisher has made ready or which are made ready here, and which of them are new.
+    fn take(&mut self, set: &ConstraintSet) {
+        let prepared = if set.prepared.serve(set, &self.basis) {
+            debug_assert!(
+                set.prepared.hold(set),
+                "rows were changed after they were made ready"
+            );
+            &set.prepared
+        } else {
+            self.own.prepare(set, &self.basis);
+            &self.own
+        };
+        self.projector.copy_from(&prepared.projector);
+        self.targets.clone_from(&prepared.bounds);
+        self.bounds.clone_from(&prepared.bounds);
+        if self.friction.is_some() {
+            let center = Point3::from(prepared.god_object.translation.vector);
+            let rows = set.constraints.iter().take(self.bounds.len());
+            self.rough_rows.clear();
+            self.rough_rows
+                .extend(rows.map(|row| self.basis.half_space(row, &center)));
         }
 
-        // Rows are known by their features: those that held the body last time are looked for where they are now.
-        self.known.replace(constraints);
+        // Rows are known by their features. Those that held the body last time are looked for where they are now, unless the publisher has
+        // done it, for a device pose of a moment ago.
+        self.known.replace(&prepared.names);
         if let Some(adaptation) = &mut self.adaptation {
             adaptation.observe(&self.known);
         }
-        let known = &self.known;
-        self.warm_start.retain_mut(|row| {
-            let place = known.place_of(*row);
-            *row = place.unwrap_or(*row);
-            place.is_some()
-        });
-        self.prepared = PreparedSet {
+        if prepared.likely.is_empty() {
+            let known = &self.known;
+            self.warm_start.retain_mut(|row| {
+                let place = known.place_of(*row);
+                *row = place.unwrap_or(*row);
+                place.is_some()
+            });
+        } else {
+            self.warm_start.clear();
+            self.warm_start.extend(&prepared.likely);
+        }
+        self.present = PresentSet {
             of: Some((set.sequence, set.god_object_pose, set.constraints.len())),
-            god_object,
-            metric,
-            shaded,
-            moving: constraints.iter().any(|row| row.came != 0.0),
+            god_object: prepared.god_object,
+            metric: prepared.metric,
+            shaded: prepared.shaded,
+            moving: prepared.moving,
         };
     }
 
     /// Rows of obstacles that move, where those will be by now.
     fn carry_rows(&mut self, time: f64, set: &ConstraintSet) {
         let arrival = self.arrival.share_of_an_update(time);
-        for (row, constraint) in set.constraints.iter().take(self.rows.len()).enumerate() {
+        for (row, constraint) in set.constraints.iter().take(self.bounds.len()).enumerate() {
             if constraint.came != 0.0 {
-                let bound = self.settings.coupling_bound(constraint.gap)
+                let bound = self.basis.bound(constraint.gap)
                     + self.settings.k_s * constraint.came * arrival;
-                self.rows[row].bound = bound;
+                self.targets[row] = bound;
                 self.bounds[row] = bound;
                 self.projector.set_bound(row, bound);
             }
         }
+    }
+
+    /// The frictionless answer with friction, where an obstacle has some.
+    fn grip(
+        &mut self,
+        metric: &Metric,
+        unconstrained: &Vector6,
+        set: &ConstraintSet,
+        frictionless: Projection,
+    ) -> Projection {
+        let Some(friction) = &mut self.friction else {
+            return frictionless;
+        };
+        let k_s = self.settings.k_s;
+        let god_object = &self.present.god_object;
+        for (row, bound) in self.rough_rows.iter_mut().zip(&self.bounds) {
+            row.bound = *bound;
+        }
+        let problem = FrictionProblem {
+            metric,
+            unconstrained,
+            stuck_at: &self.anchor.acceleration(god_object, unconstrained, k_s),
+            reference_point: &Point3::from(god_object.translation.vector),
+            rows: &self.rough_rows,
+            constraints: &set.constraints,
+        };
+        let held = friction.hold(
+            &problem,
+            |a_u, warm| self.projector.project_prepared(a_u, warm),
+            frictionless,
+        );
+        self.anchor
+            .follow(god_object, &held.acceleration, k_s, friction.slid());
+        held
     }
 
     /// Force and torque clamped by norm, each with its direction kept.
@@ -463,24 +437,5 @@ impl Coupling {
         let (force, force_clamped) = clamp(linear(wrench), self.settings.force_limit);
         let (torque, torque_clamped) = clamp(angular(wrench), self.settings.torque_limit);
         (six(&force, &torque), force_clamped || torque_clamped)
-    }
-}
-
-impl CoupledBody {
-    fn metric(&self, settings: &Settings, pose: &Pose) -> Option<Metric> {
-        crate::world::metric_at(self.mass, &self.inertia, settings.rotation_metric, pose)
-    }
-}
-
-impl CouplingOutput {
-    fn without_force(status: ProjectionStatus) -> Self {
-        Self {
-            wrench: Vector6::zeros(),
-            shaded: None,
-            active: 0,
-            kkt: f64::INFINITY,
-            status,
-            saturated: false,
-        }
     }
 }
