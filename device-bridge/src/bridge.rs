@@ -235,7 +235,7 @@ enum Motion {
     /// A simulated hand; without a path it sways.
     Held {
         path: Option<MinJerkPath>,
-        strings: Option<Geometry>,
+        strings: Option<Box<Geometry>>,
     },
     Trace(PathBuf, Trace),
     Input(InputChoice),
@@ -291,7 +291,11 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
             });
             Motion::Held {
                 path: path.transpose()?,
-                strings: strings.as_deref().map(string_geometry).transpose()?,
+                strings: strings
+                    .as_deref()
+                    .map(string_geometry)
+                    .transpose()?
+                    .map(Box::new),
             }
         }
     };
@@ -340,7 +344,7 @@ fn build_loop(
                     let origin = scene.scene_origin.to_isometry();
                     let turned = origin.ok_or(BridgeError::NoStartPose)?.rotation.inverse();
                     let made = simulated_spidar(
-                        geometry.clone(),
+                        Geometry::clone(geometry),
                         turned,
                         reference_point,
                         hand,
