@@ -35,8 +35,8 @@ fn loops_two_and_three_allocate_nothing() {
         ("sphere-on-plane", None),
         ("peg-in-a-hole", None),
         ("moving-plate", None),
-        ("sphere-on-plane", Some("wb")),
-        ("peg-in-a-hole", Some("g6x3r")),
+        ("sphere-on-plane", Some("g6x3r")),
+        ("peg-in-a-hole", Some("wb")),
     ] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
