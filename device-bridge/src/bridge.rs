@@ -344,7 +344,7 @@ fn build_loop(
                     let origin = scene.scene_origin.to_isometry();
                     let turned = origin.ok_or(BridgeError::NoStartPose)?.rotation.inverse();
                     let made = simulated_spidar(
-                        geometry.as_ref().clone(),
+                        Geometry::clone(geometry),
                         turned,
                         reference_point,
                         hand,

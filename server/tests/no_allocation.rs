@@ -8,7 +8,7 @@ use god_object::{GodObject, Pose};
 use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
 use taut::setup::DeviceSource;
-use taut_bridge::SafetySettings;
+use taut_bridge::{EventKind, SafetySettings};
 use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
 use taut_scene::{Device, Scene};
 
@@ -31,7 +31,13 @@ fn manifest() -> Manifest {
 
 #[test]
 fn loops_two_and_three_allocate_nothing() {
-    for name in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
+    for (name, strings) in [
+        ("sphere-on-plane", None),
+        ("peg-in-a-hole", None),
+        ("moving-plate", None),
+        ("sphere-on-plane", Some("g6x3r")),
+        ("peg-in-a-hole", Some("wb")),
+    ] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
             Err(error) => panic!("{error}"),
@@ -41,7 +47,7 @@ fn loops_two_and_three_allocate_nothing() {
             path: None,
             tremor: 5e-5,
             seed: 1,
-            strings: None,
+            strings: strings.map(str::to_owned),
         };
         let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
             panic!("no simulated device");
@@ -86,5 +92,17 @@ fn loops_two_and_three_allocate_nothing() {
             );
         }
         assert!(most_contacts > 0, "{name}: nothing was touched");
+        let faults = loops
+            .statistics
+            .haptics
+            .incidents
+            .of(EventKind::DeviceStrings);
+        assert_eq!(faults, 0, "{name} with {strings:?}");
+        let tensions = loops.statistics.report(Duration::from_secs(4)).tension_us;
+        assert_eq!(
+            tensions.map(|times| times.count),
+            strings.map(|_| 4000),
+            "pose and tensions of every tick are timed"
+        );
     }
 }

@@ -105,3 +105,22 @@ fn faults_name_the_key_and_the_way_out() {
         assert!(error.contains(part), "{keys}: {error}");
     }
 }
+
+#[test]
+fn a_simulated_device_may_be_made_of_strings() {
+    let strings = |keys: &str| {
+        let text = format!("kind = \"simulated\"\n{keys}");
+        match with_device(&text).expect("valid").device {
+            Device::Simulated { strings, .. } => strings,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(strings(""), None);
+    assert_eq!(strings("strings = \"wb\""), Some("wb".to_owned()));
+    assert_eq!(
+        strings("strings = \"mine.toml\""),
+        Some("mine.toml".to_owned())
+    );
+    let error = with_device("kind = \"trace\"\npath = \"a.csv\"\nstrings = \"wb\"");
+    assert!(error.is_err_and(|text| text.contains("strings")));
+}
