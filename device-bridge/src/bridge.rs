@@ -21,6 +21,7 @@ use nalgebra::Point3;
 use taut_link::proto::control::LogLevel;
 use taut_link::proto::{CouplingOffer, SceneDescription};
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
+use taut_spidar::Geometry;
 
 use crate::arm_switch::{self, ArmSwitch};
 use crate::bridge_loop::BridgeLoop;
@@ -36,6 +37,7 @@ use crate::placement::Placement;
 use crate::port::{DevicePort, SafetyEvent, SafetySettings};
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
+use crate::simulated_strings::{StringsError, simulated_spidar, string_geometry};
 use crate::trace_file::{TraceFileError, read_trace, via_points};
 
 /// How often the watching thread looks.
@@ -94,6 +96,9 @@ pub enum BridgeError {
     /// An input device cannot be read.
     #[error(transparent)]
     Input(#[from] InputError),
+    /// A simulated string-driven device cannot be made.
+    #[error(transparent)]
+    Strings(#[from] StringsError),
     /// The mouse is none of a bridge's.
     #[error("the mouse belongs to a render window: use `taut render --hold` instead of a bridge")]
     Mouse,
@@ -227,8 +232,11 @@ fn run_loop(
 
 /// What moves the device: read and checked before anything is started.
 enum Motion {
-    Sway,
-    Path(MinJerkPath),
+    /// A simulated hand; without a path it sways.
+    Held {
+        path: Option<MinJerkPath>,
+        strings: Option<Box<Geometry>>,
+    },
     Trace(PathBuf, Trace),
     Input(InputChoice),
 }
@@ -273,13 +281,22 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
         (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
         (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
-        (DeviceChoice::Simulated, None) => Motion::Sway,
-        (DeviceChoice::Simulated, Some(file)) => {
-            let path = MinJerkPath::new(via_points(&read_trace(file)?), args.looping);
-            Motion::Path(path.map_err(|cause| BridgeError::Path {
-                path: file.clone(),
-                cause,
-            })?)
+        (DeviceChoice::Simulated { strings }, file) => {
+            let path = file.as_ref().map(|file| {
+                let path = MinJerkPath::new(via_points(&read_trace(file)?), args.looping);
+                path.map_err(|cause| BridgeError::Path {
+                    path: file.clone(),
+                    cause,
+                })
+            });
+            Motion::Held {
+                path: path.transpose()?,
+                strings: strings
+                    .as_deref()
+                    .map(string_geometry)
+                    .transpose()?
+                    .map(Box::new),
+            }
         }
     };
 
@@ -310,13 +327,37 @@ fn build_loop(
         .to_isometry()
         .ok_or(BridgeError::NoStartPose)?;
     let reference_point = Point3::from(scene.reference_point);
-    let held = |path| {
-        SimulatedDevice::new(Grip::workbench(), args.hand.into(), path, reference_point)
-            .with_tremor(Tremor::new(Tremor::TYPICAL_RMS, args.seed))
-    };
+    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.seed);
     let device: Box<dyn Device> = match motion {
-        Motion::Sway => Box::new(held(MinJerkPath::sway(start, SWAY.0, SWAY.1))),
-        Motion::Path(path) => Box::new(held(path.clone())),
+        Motion::Held { path, strings } => {
+            let path = match path {
+                Some(path) => path.clone(),
+                None => MinJerkPath::sway(start, SWAY.0, SWAY.1),
+            };
+            let hand = args.hand.into();
+            match strings {
+                None => Box::new(
+                    SimulatedDevice::new(Grip::workbench(), hand, path, reference_point)
+                        .with_tremor(tremor),
+                ),
+                Some(geometry) => {
+                    let origin = scene.scene_origin.to_isometry();
+                    let turned = origin.ok_or(BridgeError::NoStartPose)?.rotation.inverse();
+                    let made = simulated_spidar(
+                        geometry.as_ref().clone(),
+                        turned,
+                        reference_point,
+                        hand,
+                        path,
+                        Some(tremor),
+                    )?;
+                    if let Some(warning) = made.warning {
+                        tracing::warn!("{warning}");
+                    }
+                    Box::new(made.device)
+                }
+            }
+        }
         Motion::Input(input) => {
             input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
         }
@@ -343,7 +384,7 @@ fn behind_port(
     reference_point: Point3<f64>,
     start: &Pose,
 ) -> BridgeLoop {
-    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated)
+    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated { .. })
         || device.info().actuated_degrees_of_freedom == 0;
     let safety = args.safety.settings(args.rate, nobody_is_hurt);
     BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))

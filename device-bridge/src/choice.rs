@@ -1,6 +1,6 @@
 //! Which device: one word on the command line, with options after commas.
 //!
-//! `simulated`, `trace:FILE`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
+//! `simulated,strings=wb`, `trace:FILE`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -33,8 +33,8 @@ pub struct Driver {
 pub const DRIVERS: [Driver; 5] = [
     Driver {
         name: "simulated",
-        form: "simulated",
-        what: "a simulated device in a simulated hand: pose and force",
+        form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
+        what: "a simulated device in a simulated hand, made of strings on request: pose and force",
     },
     Driver {
         name: "trace",
@@ -61,8 +61,11 @@ pub const DRIVERS: [Driver; 5] = [
 /// Which device is read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DeviceChoice {
-    /// [`crate::SimulatedDevice`].
-    Simulated,
+    /// [`crate::SimulatedDevice`], or [`crate::SpidarDevice`] with [`crate::HeldStrings`].
+    Simulated {
+        /// A shipped geometry's name or a geometry file, for [`crate::string_geometry`]; `None` is without strings.
+        strings: Option<String>,
+    },
     /// [`crate::RecordedDevice`] of a trace file.
     Trace(PathBuf),
     /// An input device of this machine or network.
@@ -182,7 +185,9 @@ impl FromStr for DeviceChoice {
             form: driver.form,
         };
         match (driver.name, rest.strip_prefix(':')) {
-            ("simulated", None) if rest.is_empty() => Ok(Self::Simulated),
+            ("simulated", None) => Ok(Self::Simulated {
+                strings: strings_option(rest.trim_start_matches(','))?,
+            }),
             ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
             ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
             ("space-mouse", None) => {
@@ -195,6 +200,21 @@ impl FromStr for DeviceChoice {
             _ => Err(incomplete),
         }
     }
+}
+
+fn strings_option(options: &str) -> Result<Option<String>, UnknownDevice> {
+    let mut strings = None;
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("simulated", option);
+        if let Some(named) = option.asked("strings") {
+            if named.is_empty() {
+                return Err(option.wrong("strings", "g6x3r, g6x5r, wb or a geometry file"));
+            }
+            strings = Some(named.to_owned());
+        }
+        option.finish()?;
+    }
+    Ok(strings)
 }
 
 fn cap_settings(options: &str) -> Result<CapSettings, UnknownDevice> {
@@ -437,7 +457,9 @@ mod tests {
             ("phantom", "use simulated, trace:FILE, space-mouse"),
             ("trace:", "write trace:FILE"),
             ("trace", "write trace:FILE"),
-            ("simulated,hand=firm", "write simulated"),
+            ("simulated,hand=firm", "it has strings"),
+            ("simulated,strings", "must be g6x3r, g6x5r, wb or"),
+            ("simulated:wb", "write simulated"),
             ("vrpn", "write vrpn:TRACKER@HOST"),
             ("vrpn:Tracker0", "DEVICE@HOST:PORT"),
             ("vrpn:T@h,sensors=1", "did you mean `sensor`?"),

@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn a_server_alone_is_enough() {
         let args = parse(&["--server", "pc:4857"]).expect("valid");
-        assert_eq!(args.device, DeviceChoice::Simulated);
+        assert_eq!(args.device, DeviceChoice::Simulated { strings: None });
         assert_eq!(args.hand, HandPreset::Light);
         assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
         assert_eq!(args.coupling, None);

@@ -30,19 +30,26 @@ pub trait Device: Send {
     /// The one caller is [`crate::DevicePort`], which has made the wrench safe; a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
 
-    /// What the hand feels as of the last reading, where the device is far away and tells; `None` where that is what
-    /// [`Device::write`] says.
+    /// What the hand feels as far as the device knows, where that may differ from what [`Device::write`] was given: what a device at
+    /// the far end of a network told with its last reading, or what the motors here can render of the last write. `None` where
+    /// there is nothing to tell.
     fn felt(&self) -> Option<Felt> {
+        None
+    }
+
+    /// Thread CPU time of the driver's own arithmetic in the last [`Device::read`] and [`Device::write`] together, its hardware left
+    /// out; `None` where nobody measures it.
+    fn computing_time(&self) -> Option<Duration> {
         None
     }
 }
 
-/// What a device at the far end of a network renders.
+/// What a device renders, where that is not simply what it was told.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Felt {
     /// Force then torque on the hand at the reference point, N and N m, world axes.
     pub wrench: Vector6<f64>,
-    /// It is computed there, from constraint sets.
+    /// It is computed at the far end of a network, from constraint sets.
     pub at_edge: bool,
 }
 

@@ -3,6 +3,7 @@
 //! Used by the server's haptics loop and by `taut bridge` (here the thin binary `taut-bridge`).
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
+//! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -23,6 +24,7 @@ mod placement;
 mod port;
 pub mod realtime;
 mod report;
+mod simulated_strings;
 mod trace_file;
 mod vrpn;
 
@@ -39,10 +41,10 @@ pub use devices::{
     VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
-    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
-    SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
-    min_jerk,
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HeldStrings, MAX_EDGE_DELAY,
+    MinJerkPath, Motors, PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
+    SpidarDevice, SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand,
+    ViaPoint, min_jerk, string_grip,
 };
 pub use placement::Placement;
 pub use port::{
@@ -51,5 +53,6 @@ pub use port::{
     UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
 };
 pub use report::{BridgeReport, Quantiles};
+pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};
 pub use trace_file::{TraceFileError, read_trace, via_points};
 pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

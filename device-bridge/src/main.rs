@@ -1,5 +1,6 @@
 //! `taut-bridge`: the device side alone, for a machine that needs nothing else of taut.
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -19,6 +20,7 @@ fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .init();
     taut_bridge::execute(&cli.bridge)
 }

@@ -79,6 +79,17 @@ struct Seen {
     good: u64,
     lowest_z: f64,
     first_z: Option<f64>,
+    /// Heights of the hand, m, one per reading.
+    heights: Vec<f64>,
+}
+
+impl Seen {
+    /// The middle one of the heights in the last third of the readings, m.
+    fn rest(&self) -> f64 {
+        let mut last = self.heights[self.heights.len() * 2 / 3..].to_vec();
+        last.sort_by(f64::total_cmp);
+        last[last.len() / 2]
+    }
 }
 
 /// A server with a haptics loop that renders the wall.
@@ -207,6 +218,7 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
                 seen.good += 1;
                 seen.first_z.get_or_insert(z);
                 seen.lowest_z = seen.lowest_z.min(z);
+                seen.heights.push(z);
                 wrench.z = STIFFNESS * (-z).max(0.0);
             }
             device.write(now, &wrench);
@@ -232,13 +244,12 @@ fn poses_arrive_and_the_wall_pushes_the_far_hand_back() {
     let seen = workbench.finish();
     assert!(seen.good > 200, "{} readings", seen.good);
     assert!(seen.first_z.is_some_and(|z| z > 0.04), "{:?}", seen.first_z);
-    // Firm hand against the wall: 500 (0.02 - d) = 500 d, so 10 mm and 5 N, less a little while the force ramps in,
-    // and on a machine so busy that the force fades now and then the hand swings past its intention of 20 mm.
-    assert!(
-        seen.lowest_z < -0.008 && seen.lowest_z > -0.03,
-        "{} m",
-        seen.lowest_z
-    );
+    // Firm hand against the wall: 500 (0.02 - d) = 500 d, so 10 mm and 5 N. Where no force arrives it rests at 20 mm.
+    let rest = seen.rest();
+    assert!(rest < -0.0095 && rest > -0.0105, "{rest} m, {report}");
+    // On a machine so busy that commands stop for 20 ms the force fades. Let go at once, the hand (with the grip 0.8 kg, 12 N s/m)
+    // swings past its intention by 0.37 of the 10 mm.
+    assert!(seen.lowest_z > -0.0245, "{} m, {report}", seen.lowest_z);
     assert!(
         report.max_force_n > 3.0 && report.max_force_n < 12.0,
         "{report}"

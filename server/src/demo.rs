@@ -72,6 +72,14 @@ pub fn run(
             path: path.clone(),
             repeat: true,
         };
+    } else if let (
+        DeviceChoice::Simulated {
+            strings: Some(named),
+        },
+        Device::Simulated { strings, .. },
+    ) = (&choice, &mut workbench.device)
+    {
+        *strings = Some(named.clone());
     }
     let overrides = Overrides {
         scene: Some(scene),

@@ -4,16 +4,17 @@ use std::path::Path;
 
 use std::time::Duration;
 
-use god_object::nalgebra::{Point3, Similarity3};
+use god_object::nalgebra::{Point3, Similarity3, UnitQuaternion};
 use god_object::spatial::Pose;
 use taut_bridge::{
-    Anchor, AtEnd, CapMode, CapSettings, DeviceLimits, Grip, Hand, InputChoice, MinJerkPath,
-    Placement, RecordedDevice, SimulatedDevice, TraceRow, Tremor, ViaPoint, VrpnMode, VrpnSettings,
-    VrpnSource,
+    Anchor, AtEnd, CapMode, CapSettings, Device, DeviceLimits, Grip, Hand, HeldStrings,
+    InputChoice, MinJerkPath, Placement, RecordedDevice, SimulatedDevice, SpidarDevice, TraceRow,
+    Tremor, ViaPoint, VrpnMode, VrpnSettings, VrpnSource, simulated_spidar, string_geometry,
 };
 use taut_scene::{BuiltScene, DeviceTrace, HandPreset, VrpnSensor};
 
 use crate::failure::Failure;
+use crate::realtime::thread_cpu_time;
 use crate::setup::DeviceSource;
 
 /// A hand without a path sways this far to either side, in a cycle of this time: m, s.
@@ -52,8 +53,22 @@ pub fn device(
             path,
             tremor,
             seed,
-        } => simulated(scene, *hand, path.as_deref(), *tremor, *seed)
-            .map(|device| DeviceSource::Local(Box::new(device))),
+            strings,
+        } => {
+            let (hand, intention) = hand_and_intention(scene, *hand, path.as_deref())?;
+            let tremor = (*tremor > 0.0).then(|| Tremor::new(*tremor, *seed));
+            let device: Box<dyn Device> = match strings {
+                None => Box::new(simulated(scene, hand, intention, tremor)),
+                Some(named) => {
+                    // Its axes are those of the workbench, around which it stands.
+                    let turned = workbench_from_scene.rotation.inverse();
+                    Box::new(made_of_strings(
+                        named, scene, turned, hand, intention, tremor,
+                    )?)
+                }
+            };
+            Ok(DeviceSource::Local(device))
+        }
         taut_scene::Device::Trace { path, repeat } => {
             recorded(path, *repeat, &scene.reference_point())
                 .map(|device| DeviceSource::Local(Box::new(device)))
@@ -139,14 +154,12 @@ fn cap_settings(device: &taut_scene::Device) -> CapSettings {
     }
 }
 
-/// A simulated device in a simulated hand; path and hand are the workbench's, else the scene's.
-fn simulated(
+/// The simulated hand and what it intends; path and hand are the workbench's, else the scene's.
+fn hand_and_intention(
     scene: &BuiltScene,
     hand: Option<HandPreset>,
     path: Option<&Path>,
-    tremor: f64,
-    seed: u64,
-) -> Result<SimulatedDevice, Failure> {
+) -> Result<(Hand, MinJerkPath), Failure> {
     let scene_hand = scene.hand.as_ref();
     let preset = hand
         .or(scene_hand.map(|hand| hand.preset))
@@ -169,17 +182,44 @@ fn simulated(
             .map_err(|error| Failure::BadInput(format!("{named}: {error}")))?,
         None => MinJerkPath::sway(scene.start, SWAY.0, SWAY.1),
     };
-    let device = SimulatedDevice::new(
-        Grip::workbench(),
-        impedance(preset),
-        intention,
+    Ok((impedance(preset), intention))
+}
+
+fn simulated(
+    scene: &BuiltScene,
+    hand: Hand,
+    intention: MinJerkPath,
+    tremor: Option<Tremor>,
+) -> SimulatedDevice {
+    let device = SimulatedDevice::new(Grip::workbench(), hand, intention, scene.reference_point());
+    match tremor {
+        Some(tremor) => device.with_tremor(tremor),
+        None => device,
+    }
+}
+
+fn made_of_strings(
+    named: &str,
+    scene: &BuiltScene,
+    turned: UnitQuaternion<f64>,
+    hand: Hand,
+    intention: MinJerkPath,
+    tremor: Option<Tremor>,
+) -> Result<SpidarDevice<HeldStrings>, Failure> {
+    let geometry = string_geometry(named).map_err(Failure::bad_input)?;
+    let made = simulated_spidar(
+        geometry,
+        turned,
         scene.reference_point(),
-    );
-    Ok(if tremor > 0.0 {
-        device.with_tremor(Tremor::new(tremor, seed))
-    } else {
-        device
-    })
+        hand,
+        intention,
+        tremor,
+    )
+    .map_err(|error| Failure::BadInput(format!("scene \"{}\": {error}", scene.name)))?;
+    if let Some(warning) = made.warning {
+        tracing::warn!("scene \"{}\": {warning}", scene.name);
+    }
+    Ok(made.device.with_clock(thread_cpu_time))
 }
 
 fn recorded(

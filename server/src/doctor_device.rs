@@ -4,7 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use taut_spidar::{Extreme, Geometry, picture, summary, workspace_map};
+use taut_bridge::string_geometry;
+use taut_spidar::{Extreme, picture, summary, workspace_map};
 
 use crate::failure::Failure;
 
@@ -61,7 +62,7 @@ pub struct Pretension {
 /// # Errors
 /// A file that cannot be read, is no geometry, or a picture that cannot be written.
 pub fn examine(named: &str, out: Option<&Path>) -> Result<DeviceReport, Failure> {
-    let geometry = load(named)?;
+    let geometry = string_geometry(named).map_err(Failure::bad_input)?;
     let default = PathBuf::from(format!("{}-workspace.svg", file_name_of(&geometry.name)));
     let path = out.map_or(default, Path::to_owned);
     let summary = summary(&geometry);
@@ -95,20 +96,6 @@ pub fn examine(named: &str, out: Option<&Path>) -> Result<DeviceReport, Failure>
         },
         picture: path,
     })
-}
-
-fn load(named: &str) -> Result<Geometry, Failure> {
-    if let Some(geometry) = Geometry::shipped(named) {
-        return Ok(geometry);
-    }
-    let text = std::fs::read_to_string(named).map_err(|error| {
-        let names: Vec<&str> = Geometry::shipped_names().collect();
-        Failure::bad_input(format!(
-            "{named}: cannot be read: {error}; give a geometry file, or one of the shipped devices: {}",
-            names.join(", ")
-        ))
-    })?;
-    Geometry::parse(named, &text).map_err(Failure::bad_input)
 }
 
 /// A device's name as part of a file name.

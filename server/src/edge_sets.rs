@@ -1,10 +1,10 @@
 //! Constraint sets to a bridge that couples by itself: the newest one at a fixed rate, so that what is lost costs one period.
 //!
-//! On the broadcaster's thread. A set of up to some twenty rows is one datagram, the fullest 94; at most [`DATAGRAMS_PER_TICK`] leave in one
+//! On the broadcaster's thread. A set of up to some twenty rows is one datagram, the fullest 94; at most `DATAGRAMS_PER_TICK` leave in one
 //! tick, so that a large set takes several and the next one is then the newest. A set of many datagrams would seldom arrive whole
-//! on a network that loses one in twenty: from [`REPEATED_FROM`] on, all are sent twice, in turn.
+//! on a network that loses one in twenty: from `REPEATED_FROM` on, all are sent twice, in turn.
 //!
-//! **None is sent** when the god-object loop has not renewed it for [`OLDEST`], or when the hand is not heard: then the bridge
+//! **None is sent** when the god-object loop has not renewed it for `OLDEST`, or when the hand is not heard: then the bridge
 //! hears nothing and lets its force fade, as it does when the network breaks.
 
 use std::time::Duration;

@@ -27,6 +27,8 @@ pub struct SessionReport {
     pub god_object_hz: f64,
     /// Thread CPU time of one force.
     pub force_us: Distribution,
+    /// Thread CPU time of pose and tensions of one tick of a string-driven device; `null` without one.
+    pub tension_us: Option<Distribution>,
     /// Age of the constraint set that a force rests on.
     pub constraint_age_us: Distribution,
     /// Rows in the constraint set, over the updates.
@@ -203,6 +205,13 @@ impl fmt::Display for SessionReport {
             "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
             force.p50, force.p99, force.max, age.p99
         )?;
+        if let Some(tension) = &self.tension_us {
+            writeln!(
+                f,
+                "pose and tensions   p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
+                tension.p50, tension.p99, tension.p999, tension.max
+            )?;
+        }
         writeln!(
             f,
             "contacts            p50 {:.0}, max {:.0}",
@@ -380,6 +389,7 @@ mod tests {
                 "deadline_misses",
                 "god_object_update_us",
                 "force_us",
+                "tension_us",
                 "constraint_age_us",
                 "contacts",
                 "penetrations",

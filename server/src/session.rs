@@ -526,7 +526,7 @@ impl Session {
                 terminal.say(&format!("taut: the recording is not whole: {error}"));
             } else if !summary.lost.is_none() {
                 terminal.say(&format!(
-                    "taut: the recording is not whole, the disk was too slow: {:?}",
+                    "taut: the recording is not whole: the disk was too slow, and records were lost ({})",
                     summary.lost
                 ));
             }

@@ -11,9 +11,10 @@
 
 use god_object::{Body, RotationMetric, Settings};
 use nalgebra::SymmetricEigen;
-use taut_bridge::{Grip, Hand};
+use taut_bridge::{Grip, Hand, SpidarPlacement, string_geometry, string_grip};
 use taut_plant::stability::{DeclaredAxis, SampledLoop};
 use taut_scene::{Device, DeviceDynamics, HandPreset};
+use taut_spidar::Geometry;
 
 use crate::devices::impedance;
 use crate::failure::Failure;
@@ -31,6 +32,17 @@ pub fn declared(
         (Device::Simulated { .. }, Some(_)) => Err(Failure::bad_input(
             "the workbench file has [dynamics], which declares a real device, and a simulated device, which has its own; leave one out",
         )),
+        (
+            Device::Simulated {
+                hand,
+                strings: Some(strings),
+                ..
+            },
+            None,
+        ) => {
+            let geometry = string_geometry(strings).map_err(Failure::bad_input)?;
+            Ok(Some(of_strings(&geometry, hand.or(scene_hand))))
+        }
         (Device::Simulated { hand, .. }, None) => {
             let grip = Grip::workbench();
             Ok(Some(DeviceDynamics {
@@ -50,6 +62,33 @@ pub fn declared(
         // They feel nothing.
         (Device::Trace { .. } | Device::Vrpn { .. } | Device::SpaceMouse { .. }, _) => Ok(None),
         (_, dynamics) => Ok(dynamics.copied()),
+    }
+}
+
+/// What a string-driven device is along and about its weakest axis, with the grip at the centre.
+fn of_strings(geometry: &Geometry, hand: Option<HandPreset>) -> DeviceDynamics {
+    let grip = string_grip(geometry, &SpidarPlacement::default());
+    let inertia = grip.inertia();
+    let least = |axes: std::ops::Range<usize>| {
+        axes.map(|axis| inertia[(axis, axis)])
+            .fold(f64::INFINITY, f64::min)
+    };
+    let count = geometry
+        .metres_per_count
+        .iter()
+        .fold(0.0_f64, |most, count| most.max(count.abs()));
+    DeviceDynamics {
+        mass: least(0..3),
+        damping: grip.damping.min(),
+        friction: grip.coulomb_force.min(),
+        resolution: count,
+        inertia: least(3..6),
+        rotational_damping: grip.rotational_damping.min(),
+        rotational_friction: grip.coulomb_torque.min(),
+        angular_resolution: count / geometry.arm(),
+        delay: 0.0,
+        motor_lag: geometry.motor_time_constant,
+        hand: hand.unwrap_or_default(),
     }
 }
 
@@ -158,6 +197,7 @@ mod tests {
             path: None,
             tremor: 0.0,
             seed: 0,
+            strings: None,
         };
         declared(&simulated, None, None)
             .ok()

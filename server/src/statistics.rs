@@ -49,6 +49,8 @@ impl Statistics {
             deadline_misses: self.haptics.deadline_misses.load(Ordering::Relaxed),
             god_object_hz: per_second(god_object_update_us.count),
             god_object_update_us,
+            tension_us: Some(self.haptics.tension.distribution_us())
+                .filter(|times| times.count > 0),
             force_us: self.coupling.force.distribution_us(),
             constraint_age_us: self.coupling.constraint_age.distribution_us(),
             contacts: self.god_object.contacts.distribution(),

@@ -41,6 +41,7 @@ fn loops_two_and_three_allocate_nothing() {
             path: None,
             tremor: 5e-5,
             seed: 1,
+            strings: None,
         };
         let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
             panic!("no simulated device");

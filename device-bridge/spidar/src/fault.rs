@@ -50,6 +50,24 @@ pub enum StringFault {
     Hardware,
 }
 
+impl StringFault {
+    /// The string to look at, from 0, where the fault is that of one.
+    #[must_use]
+    pub fn string(&self) -> Option<usize> {
+        match *self {
+            Self::NotFinite(string)
+            | Self::NearMotor { string, .. }
+            | Self::Slack { string, .. } => Some(string),
+            Self::Inconsistent { suspect, .. } => suspect,
+            Self::TooFewStrings(_)
+            | Self::NotConverged
+            | Self::Singular
+            | Self::TurnedTooFar { .. }
+            | Self::Hardware => None,
+        }
+    }
+}
+
 fn named(suspect: Option<usize>) -> String {
     suspect.map_or_else(String::new, |string| {
         format!(", most likely string {}", string + 1)

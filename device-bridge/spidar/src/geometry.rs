@@ -108,6 +108,20 @@ impl Geometry {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// How far a point (frame axes, m) lies beyond the box that the motors span, along the worst axis; not above zero inside.
+    #[must_use]
+    pub fn beyond_box(&self, point: &Point3<f64>) -> f64 {
+        (0..3)
+            .map(|axis| {
+                let along = self.motors.iter().map(|motor| motor[axis]);
+                let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+                    (a.min(x), b.max(x))
+                });
+                (low - point[axis]).max(point[axis] - high)
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Mass that one motor adds along its string, `J / r^2`, kg.
     #[must_use]
     pub fn string_mass(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
 pub(crate) mod glide;
+pub(crate) mod held_strings;
 pub(crate) mod led;
 pub(crate) mod rate_control;
 pub(crate) mod recorded;
@@ -11,6 +12,7 @@ pub(crate) mod spidar;
 pub(crate) mod vrpn;
 
 pub use glide::Glide;
+pub use held_strings::{HeldStrings, string_grip};
 pub use led::{LedDevice, Target};
 pub use rate_control::{CapMode, CapSettings, RateControl};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};

@@ -8,19 +8,21 @@
 //! | body  | the held body's own                                            |
 //!
 //! The model is `taut-spidar`; the electronics are a [`StringHardware`]. No vendor's motor controller or its protocol was at hand, so
-//! that the only implementation here is the simulated one: a laboratory with a device writes two functions, counts
-//! in and tensions out.
+//! that the only implementations here are simulated ones ([`HeldStrings`] has a hand): a laboratory with a device writes two
+//! functions, counts in and tensions out.
+//!
+//! [`HeldStrings`]: crate::HeldStrings
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 use taut_spidar::{
     Consistency, Encoders, ForwardKinematics, Geometry, LengthRates, MotorState, PoseAnswer,
     Reading, ResidualMonitor, STRINGS, StringFault, StringHardware, StringMatrix, TensionAnswer,
     TensionSettings, TensionSolver, capability,
 };
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 
 /// Rate of the published controllers, Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -53,6 +55,33 @@ impl Default for SpidarPlacement {
     }
 }
 
+impl SpidarPlacement {
+    /// The frame stands with its centre at `centre` and its axes turned by `turned`, both in the world. With the grip at the centre, not
+    /// turned, the body is turned by `body` in the world and its G is at the centre.
+    #[must_use]
+    pub fn around(
+        centre: Point3<f64>,
+        turned: UnitQuaternion<f64>,
+        body: UnitQuaternion<f64>,
+        reference_point: Point3<f64>,
+    ) -> Self {
+        let world_from_frame = Isometry3::from_parts(centre.into(), turned);
+        let lever = body * reference_point.coords;
+        let at_rest = Isometry3::from_parts((centre.coords - lever).into(), body);
+        Self {
+            world_from_frame,
+            grip_from_body: world_from_frame.inverse() * at_rest,
+            reference_point,
+        }
+    }
+
+    /// Where the grip is in the frame when the body is at `world_from_body`.
+    #[must_use]
+    pub fn frame_from_grip(&self, world_from_body: &Pose) -> Pose {
+        self.world_from_frame.inverse() * world_from_body * self.grip_from_body.inverse()
+    }
+}
+
 /// A [`Device`] made of strings.
 #[derive(Debug)]
 pub struct SpidarDevice<H> {
@@ -67,11 +96,18 @@ pub struct SpidarDevice<H> {
     solver: TensionSolver,
     strings: StringMatrix,
     world_from_body: Pose,
+    /// The last counts that gave a pose, and that pose: the same counts are the same pose to the bit, so that a device whose counters
+    /// stopped can be told from one that moves.
+    answered: Option<([i32; STRINGS], PoseAnswer)>,
     consistency: Option<Consistency>,
     tensions: Option<TensionAnswer>,
     /// Samples in a row with a slack string or inconsistent lengths.
     suspicious: u32,
     fault: Option<StringFault>,
+    /// Thread CPU time, where somebody measures.
+    clock: Option<fn() -> Duration>,
+    /// CPU time of the last read, and of it with the last write.
+    spent: (Duration, Duration),
 }
 
 impl<H: StringHardware> SpidarDevice<H> {
@@ -87,10 +123,21 @@ impl<H: StringHardware> SpidarDevice<H> {
         now: Duration,
     ) -> Result<Self, StringFault> {
         let reading = hardware.read_counts(now)?;
+        let encoders = Encoders::calibrated(&geometry, &Pose::identity(), &reading.counts);
+        Ok(Self::calibrated(geometry, hardware, placement, encoders))
+    }
+
+    /// A device whose calibration is known.
+    #[must_use]
+    pub fn calibrated(
+        geometry: Geometry,
+        hardware: H,
+        placement: SpidarPlacement,
+        encoders: Encoders,
+    ) -> Self {
         let centre = Pose::identity();
-        let encoders = Encoders::calibrated(&geometry, &centre, &reading.counts);
         let solver = TensionSolver::new(&geometry, TensionSettings::default());
-        Ok(Self {
+        Self {
             info: info(&geometry),
             hardware,
             placement,
@@ -102,11 +149,21 @@ impl<H: StringHardware> SpidarDevice<H> {
             strings: StringMatrix::at(&geometry, &centre),
             world_from_body: placement.world_from_frame * placement.grip_from_body,
             geometry,
+            answered: None,
             consistency: None,
             tensions: None,
             suspicious: 0,
             fault: None,
-        })
+            clock: None,
+            spent: (Duration::ZERO, Duration::ZERO),
+        }
+    }
+
+    /// Measures the CPU time of pose and tensions by `clock`, the calling thread's: [`Device::computing_time`].
+    #[must_use]
+    pub fn with_clock(mut self, clock: fn() -> Duration) -> Self {
+        self.clock = Some(clock);
+        self
     }
 
     /// Counts to lengths as calibrated now.
@@ -118,6 +175,7 @@ impl<H: StringHardware> SpidarDevice<H> {
     /// Takes another calibration, such as a corrected one of `taut_spidar::self_calibrate`. The pose may jump: only while disarmed.
     pub fn set_encoders(&mut self, encoders: Encoders) {
         self.encoders = encoders;
+        self.answered = None;
         self.monitor.reset();
         self.rates.reset();
         self.suspicious = 0;
@@ -125,6 +183,7 @@ impl<H: StringHardware> SpidarDevice<H> {
 
     /// Says what a motor does. The string of one that does not work is left out of the pose.
     pub fn set_motor(&mut self, string: usize, state: MotorState) {
+        self.answered = None;
         self.solver.set_motor(string, state);
         self.kinematics
             .use_string(string, state == MotorState::Working);
@@ -153,12 +212,20 @@ impl<H: StringHardware> SpidarDevice<H> {
         &mut self.hardware
     }
 
-    fn sample(&mut self, now: Duration) -> Result<DeviceSample, StringFault> {
-        let reading = self.hardware.read_counts(now)?;
+    /// Time on the clock, if there is one.
+    fn clocked(&self) -> Duration {
+        self.clock.map_or(Duration::ZERO, |clock| clock())
+    }
+
+    fn sample(&mut self, reading: &Reading) -> Result<DeviceSample, StringFault> {
         let lengths = self.encoders.lengths(&reading.counts);
         let rates = self.rates.step(reading.time, &lengths);
-        let answer = self.kinematics.solve(&lengths)?;
-        self.watch(&reading, &answer)?;
+        let answer = match self.answered {
+            Some((counts, answer)) if counts == reading.counts => answer,
+            _ => self.kinematics.solve(&lengths)?,
+        };
+        self.answered = Some((reading.counts, answer));
+        self.watch(reading, &answer)?;
         self.strings = answer.strings;
 
         let world_from_grip = self.placement.world_from_frame * answer.frame_from_grip;
@@ -218,15 +285,19 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
-        let sample = self.sample(now);
+        let reading = self.hardware.read_counts(now);
+        let before = self.clocked();
+        let sample = reading.and_then(|reading| self.sample(&reading));
         self.fault = sample.as_ref().err().copied();
         if self.fault.is_some() {
             self.rates.reset();
         }
+        self.spent.0 = self.clocked().saturating_sub(before);
         sample.map_err(DeviceFault::Strings)
     }
 
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
+        let before = self.clocked();
         // At a fault the strings stay taut and render nothing.
         let wanted = if self.fault.is_some() {
             Vector6::zeros()
@@ -241,7 +312,25 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
         // A wrench that is not finite gets the least tensions.
         let answer = self.solver.distribute(&self.strings, &at_grip);
         self.tensions = Some(answer);
+        self.spent.1 = self.spent.0 + self.clocked().saturating_sub(before);
         self.hardware.write_tensions(now, &answer.tensions);
+    }
+
+    /// What the last tensions render at the last pose, bounds of the motors and all; not their lag.
+    fn felt(&self) -> Option<Felt> {
+        let (force, torque) = halves(&self.tensions?.wrench);
+        let turn = self.placement.world_from_frame.rotation;
+        let (force, torque) = (turn * force, turn * torque);
+        // About G instead of the grip's centre.
+        let torque = torque - self.lever().cross(&force);
+        Some(Felt {
+            wrench: stack(&force, &torque),
+            at_edge: false,
+        })
+    }
+
+    fn computing_time(&self) -> Option<Duration> {
+        self.clock.map(|_| self.spent.1)
     }
 }
 

@@ -23,7 +23,7 @@ pub struct Reading {
     pub sample: DeviceSample,
     /// Why there is no newer one.
     pub fault: Option<DeviceFault>,
-    /// What the hand feels, where the device is far away and tells.
+    /// What the hand felt at this reading, where the device tells: see [`Device::felt`].
     pub felt: Option<Felt>,
 }
 
@@ -35,6 +35,8 @@ pub struct TickReport {
     pub reading: Reading,
     /// What went out: N, N m.
     pub wrench: Vector6<f64>,
+    /// What the hand feels of it: the same, unless the device knows better.
+    pub felt: Vector6<f64>,
     /// Where the port stands.
     pub state: ArmingState,
     /// What happened.
@@ -148,6 +150,12 @@ impl DevicePort {
         self.fault
     }
 
+    /// CPU time of the device's driver in the last tick, where it is measured.
+    #[must_use]
+    pub fn computing_time(&self) -> Option<Duration> {
+        self.device.computing_time()
+    }
+
     /// The wrench on the hand since the last write, N and N m.
     #[must_use]
     pub fn rendered(&self) -> &Vector6<f64> {
@@ -188,12 +196,13 @@ impl DevicePort {
         let command = command(&reading);
         let wrench = self.render(now, passed, command);
         self.device.write(now, &wrench);
-        // A bridge's own word is what does the work.
-        self.energy
-            .hold(&reading.felt.map_or(wrench, |felt| felt.wrench));
+        // The device's own word is what does the work.
+        let felt = self.device.felt().map_or(wrench, |felt| felt.wrench);
+        self.energy.hold(&felt);
         TickReport {
             reading,
             wrench,
+            felt,
             state: self.arming.state(),
             events: *self.teller.events(),
         }
@@ -289,6 +298,12 @@ impl DevicePort {
     /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
         let felt = self.arming.gain() > 0.0;
+        // A tick that comes early allows little: what a whole period would have allowed is nothing to tell.
+        let period = self.settings.period.as_secs_f64();
+        let (force_step, torque_step) = (
+            self.settings.force_rate * period,
+            self.settings.torque_rate * period,
+        );
         let spells = &mut self.spells;
         let acting = [
             (
@@ -304,12 +319,12 @@ impl DevicePort {
             (
                 &mut spells.force_slew,
                 EventKind::ForceSlewLimited,
-                slewed.force_asked,
+                slewed.force_asked.filter(|asked| *asked > force_step),
             ),
             (
                 &mut spells.torque_slew,
                 EventKind::TorqueSlewLimited,
-                slewed.torque_asked,
+                slewed.torque_asked.filter(|asked| *asked > torque_step),
             ),
             (
                 &mut spells.passivity,
@@ -348,10 +363,16 @@ impl DevicePort {
                     Missing::Constraints => (1, EventKind::ConstraintsStale),
                     Missing::NotOnClock => (2, EventKind::CommandNotOnClock),
                 };
+                stale_since = Some(since);
                 if missing == Missing::NotOnClock {
                     taken = None;
+                    // It says nothing, so the last one that said something may have grown too old before.
+                    let too_old = |made: Duration| made.saturating_add(self.settings.hold);
+                    stale_since = Some(
+                        self.last_command
+                            .map_or(since, |made| since.min(too_old(made))),
+                    );
                 }
-                stale_since = Some(since);
                 let begins = self.spells.stale[spell].begins(now, true);
                 if begins && !self.arming.state().is_off() {
                     self.teller.tell(kind, age.as_secs_f64());

@@ -70,11 +70,14 @@ pub enum EventKind {
     DeviceTimeWentBack,
     /// The device gives good samples again.
     DeviceBack,
+    /// A string-driven device has no pose that may be trusted: strings, encoders or grip. Number of the string, from 1; 0 where
+    /// none is to blame alone.
+    DeviceStrings,
 }
 
 impl EventKind {
     /// All kinds, each at the place that its number says.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Self::Arming,
         Self::Armed,
         Self::Disarmed,
@@ -103,6 +106,7 @@ impl EventKind {
         Self::DeviceFrozen,
         Self::DeviceTimeWentBack,
         Self::DeviceBack,
+        Self::DeviceStrings,
     ];
 
     /// The kind of this number, as on the wire.
@@ -151,6 +155,9 @@ impl EventKind {
             Self::DeviceFrozen => "device: it froze in the middle of a movement, the force fades",
             Self::DeviceTimeWentBack => "device: its time stamps went back, the force fades",
             Self::DeviceBack => "device: good samples come",
+            Self::DeviceStrings => {
+                "device: its strings or encoders give no pose to be trusted, the force fades"
+            }
         }
     }
 
@@ -170,6 +177,7 @@ impl EventKind {
             Self::PassivityActs => "J",
             Self::DeviceTeleported => "m/s",
             Self::DeviceSpun => "rad/s",
+            Self::DeviceStrings => "string",
             _ => "",
         }
     }
@@ -209,6 +217,8 @@ impl fmt::Display for SafetyEvent {
         write!(out, "{}", self.kind.sentence())?;
         match self.kind.unit() {
             "" => Ok(()),
+            "string" if self.value == 0.0 => Ok(()),
+            "string" => write!(out, " (string {:.0})", self.value),
             unit => write!(out, " ({:.3} {unit})", self.value),
         }
     }
@@ -222,8 +232,10 @@ pub fn kind_of_fault(fault: &DeviceFault) -> (EventKind, f64) {
         DeviceFault::Lost { age } => (EventKind::DeviceLost, age.as_secs_f64()),
         DeviceFault::NotFinite => (EventKind::DeviceNotFinite, 0.0),
         DeviceFault::TimeNotOnClock => (EventKind::DeviceNotOnClock, 0.0),
-        DeviceFault::ReportedFault | DeviceFault::Strings(_) => {
-            (EventKind::DeviceReportedFault, 0.0)
+        DeviceFault::ReportedFault => (EventKind::DeviceReportedFault, 0.0),
+        DeviceFault::Strings(fault) => {
+            let string = fault.string().map_or(0.0, |string| (string + 1) as f64);
+            (EventKind::DeviceStrings, string)
         }
         DeviceFault::Reconnected => (EventKind::DeviceReconnected, 0.0),
         DeviceFault::Ended => (EventKind::DeviceEnded, 0.0),
@@ -324,6 +336,33 @@ mod tests {
             assert_eq!(EventKind::from_number(kind as u8), Some(kind));
         }
         assert_eq!(EventKind::from_number(EventKind::ALL.len() as u8), None);
+    }
+
+    #[test]
+    fn a_string_fault_is_its_own_kind_and_names_the_string() {
+        use taut_spidar::StringFault;
+        let told = |fault| {
+            let (kind, value) = kind_of_fault(&DeviceFault::Strings(fault));
+            assert_eq!(kind, EventKind::DeviceStrings);
+            assert!(kind.is_fault() && !kind.is_good_news());
+            let event = SafetyEvent {
+                number: 1,
+                time: Duration::ZERO,
+                kind,
+                value,
+            };
+            event.to_string()
+        };
+        let slack = told(StringFault::Slack {
+            string: 4,
+            tension: 0.01,
+        });
+        assert!(slack.ends_with("the force fades (string 5)"), "{slack}");
+        let nobody = told(StringFault::NotConverged);
+        assert!(nobody.ends_with("the force fades"), "{nobody}");
+        assert!(!slack.contains("far end"));
+        let far = kind_of_fault(&DeviceFault::ReportedFault);
+        assert_eq!(far, (EventKind::DeviceReportedFault, 0.0));
     }
 
     #[test]

@@ -305,6 +305,24 @@ fn a_stalled_port_drops_the_force_by_the_slew_limit() {
 }
 
 #[test]
+fn a_tick_that_comes_early_limits_without_a_word() {
+    let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+    let mut early = |newtons: f64| {
+        stage.now -= TICK * 19 / 20; // `tick` adds a whole one
+        let now = stage.now + TICK;
+        let felt = stage
+            .tick(Ok(sample(now)), Some(Command::fresh(now, force(newtons))))
+            .wrench[0];
+        (felt, stage.kinds())
+    };
+    let (felt, told) = early(10.2);
+    assert!((felt - 10.025).abs() < 1e-9, "{felt} N");
+    assert_eq!(told, []);
+    let (_, told) = early(12.0);
+    assert_eq!(told, [EventKind::ForceSlewLimited]);
+}
+
+#[test]
 fn limits_that_could_not_fade_in_time_are_lowered() {
     let settings = SafetySettings {
         max_force: 200.0,
@@ -345,6 +363,21 @@ fn a_driver_that_repeats_itself_has_lost_its_device() {
         assert_eq!(felt == 0.0, age >= 120, "{felt} N at {age} ms");
     }
     assert_eq!(stage.kinds(), [EventKind::DeviceLost]);
+}
+
+#[test]
+fn commands_ahead_of_the_clock_prolong_no_silence() {
+    let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+    let last = stage.now;
+    for age in 1..=200 {
+        let now = stage.now + TICK;
+        let made = if age <= 20 { last } else { now + ms(50) };
+        let felt = stage
+            .tick(Ok(sample(now)), Some(Command::fresh(made, force(10.0))))
+            .wrench[0];
+        assert_eq!(felt == 0.0, age >= 120, "{felt} N at {age} ms");
+    }
+    assert_eq!(stage.kinds(), [EventKind::CommandNotOnClock]);
 }
 
 /// One of the things that go wrong, for some ticks.
@@ -402,6 +435,8 @@ proptest! {
         let (mut good_sample, mut good_command) = (stage.now, stage.now);
         let mut before = *stage.port.rendered();
         let mut last_pose = Some(sample(stage.now).pose);
+        // Ticks for which the pose has been the same.
+        let mut stood = 0_u64;
         let mut after_fault = false;
         for (fault, ticks, newtons) in sequence {
             let begun = stage.now;
@@ -430,14 +465,18 @@ proptest! {
                 if matches!(fault, Fault::WrenchNan | Fault::CommandsStop | Fault::CommandsAhead | Fault::Disarm) {
                     command_is_good = false;
                 }
+                let pose = answer.map(|sample| sample.pose).ok();
+                stood = if pose == last_pose { stood + 1 } else { 0 };
                 // A device that has stood somewhere else for long enough is there, and one that stands still after another fault rests.
-                let stands = matches!(fault, Fault::Origin | Fault::Jump)
-                    || (matches!(fault, Fault::Frozen) && after_fault);
-                if stands && tick > 100 {
+                let stands = match fault {
+                    Fault::Origin | Fault::Jump => stood > 100,
+                    Fault::Frozen => after_fault && tick > 100,
+                    _ => false,
+                };
+                if stands {
                     sample_is_good = true;
                 }
                 // What stands still froze when it moved last.
-                let pose = answer.map(|sample| sample.pose).ok();
                 if matches!(fault, Fault::Frozen) && pose != last_pose {
                     sample_is_good = true;
                 }

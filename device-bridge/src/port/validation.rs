@@ -13,7 +13,8 @@
 //!
 //! **Frozen.** A device at rest gives the same counts again and again, so equal samples alone prove nothing. But a hand does
 //! not stop within one sample: if the pose moved faster than `frozen_speed` and from the next sample on is the same to the bit
-//! for `frozen_after`, the samples have stopped, not the hand. (A grip that is slammed against a hard end stop looks the same;
+//! for `frozen_after`, the samples have stopped, not the hand. What brakes within milliseconds, such as the friction of strings on a
+//! grip that was let go, still slows down from sample to sample: the last change before a freeze must have been fast, too. (A grip that is slammed against a hard end stop looks the same;
 //! it comes back as soon as it is moved.)
 //!
 //! **Coming back.** After a fault every sample is compared with the one before it, good or bad; the device is good again once they
@@ -27,6 +28,10 @@ use crate::device::{DeviceFault, DeviceSample, Pose};
 
 /// Time over which the speed before a freeze is averaged: one count of an encoder is no movement.
 const SPEED_WINDOW: Duration = Duration::from_millis(10);
+
+/// Share of `frozen_speed` that the very last change before a freeze must have had: half of it, since steps of encoders make single
+/// changes uneven. What friction brakes is slower than that in its last sample, however fast it was just before.
+const LAST_CHANGE: f64 = 0.5;
 
 /// How far the norm of a quaternion may be from one: rounding of single precision.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
@@ -94,6 +99,8 @@ pub(super) struct SampleCheck {
 #[derive(Clone, Copy, Debug, Default)]
 struct Freeze {
     speed: f64,
+    /// Of the last change alone.
+    last_speed: f64,
     /// Time of the sample that brought the last change.
     changed: Duration,
     /// The newest sample is the same as the one before it, out of a movement.
@@ -218,13 +225,15 @@ impl SampleCheck {
             let weight = (passed.as_secs_f64() / SPEED_WINDOW.as_secs_f64()).min(1.0);
             self.freeze = Freeze {
                 speed: self.freeze.speed + weight * (speed - self.freeze.speed),
+                last_speed: speed,
                 changed: sample.time,
                 suspect: false,
             };
             return Ok(());
         }
         let after = self.settings.frozen_after;
-        let moved = self.freeze.speed > self.settings.frozen_speed;
+        let limit = self.settings.frozen_speed;
+        let moved = self.freeze.speed > limit && self.freeze.last_speed > LAST_CHANGE * limit;
         self.freeze.suspect = moved && !after.is_zero();
         let time = sample.time.saturating_sub(self.freeze.changed);
         if self.freeze.suspect && time >= after {

@@ -328,6 +328,22 @@ async fn clients_hear_that_the_server_stops() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_that_has_stopped_has_freed_its_port() {
+    let mut quic = ServerOptions::loopback(key('a')).quic;
+    for _ in 0..40 {
+        let options = ServerOptions {
+            quic,
+            idle_timeout: FORGIVING,
+            ..ServerOptions::loopback(key('a'))
+        };
+        let server = server_with(options).await;
+        quic = server.quic_addr();
+        let _client = client(&server, Role::Render, "left").await;
+        server.shutdown().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_mesh_that_the_server_lacks_is_an_error_and_the_link_lives_on() {
     let server = server().await;
     let client = client(&server, Role::Render, "left").await;

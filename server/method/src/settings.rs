@@ -82,8 +82,8 @@ pub struct Settings {
     pub activation_distance: f64,
     /// Most that look-ahead adds to the activation distance, m.
     pub look_ahead_limit: f64,
-    /// Triangle pairs with features to look at that one collection may cost. One that costs more shortens the next: late updates must not make
-    /// later ones still later.
+    /// Pairs of triangles, and of their features, that one collection may look at. It looks nearest first: one that would cost more reaches less
+    /// far. Late updates must not make later ones still later.
     pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less than this is none, m.
     pub motion_tolerance: f64,
@@ -124,7 +124,7 @@ impl Settings {
             gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
             activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
             look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
-            look_ahead_pairs: 1000,
+            look_ahead_pairs: 1400,
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,

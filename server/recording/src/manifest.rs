@@ -1,5 +1,6 @@
 //! `recording.json`: what the files beside it are, and whether they are whole.
 
+use std::fmt;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -58,5 +59,39 @@ impl Lost {
     #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
+    }
+}
+
+impl fmt::Display for Lost {
+    /// Such as `3 of updates.csv, 12 of forces.csv`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let files = [
+            (self.haptics, "haptics.csv and device.csv"),
+            (self.updates, "updates.csv"),
+            (self.constraints, "constraints.csv"),
+            (self.forces, "forces.csv"),
+        ];
+        let lost: Vec<String> = files
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, file)| format!("{count} of {file}"))
+            .collect();
+        f.write_str(&lost.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_lost_is_told_by_file() {
+        let lost = Lost {
+            updates: 3,
+            forces: 12,
+            ..Lost::default()
+        };
+        assert!(!lost.is_none());
+        assert_eq!(lost.to_string(), "3 of updates.csv, 12 of forces.csv");
     }
 }

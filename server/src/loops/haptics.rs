@@ -37,6 +37,8 @@ pub struct HapticsLoop {
 pub struct HapticsStatistics {
     /// Time between the starts of two ticks.
     pub period: Histogram,
+    /// Thread CPU time of a string-driven device's pose and tensions in one tick; empty for other devices.
+    pub tension: Histogram,
     /// Deadlines that passed without a tick in their period.
     pub deadline_misses: AtomicU64,
     /// Times at which the port changed the force or lost the device.
@@ -162,11 +164,10 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        if let Some(time) = self.port.computing_time() {
+            statistics.tension.record_time(time);
+        }
         self.tell_obstacle_work();
-        let felt = report
-            .reading
-            .felt
-            .map_or(report.wrench, |felt| felt.wrench);
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
@@ -175,7 +176,7 @@ impl HapticsLoop {
                 velocity: self.state.velocity,
                 buttons: self.state.buttons,
                 faulty: self.state.faulty,
-                wrench: felt,
+                wrench: report.felt,
             });
         }
     }

@@ -46,5 +46,8 @@ pub const RECIPES: &[Recipe] = &[
     Recipe { name: "R21", about: "wind-up of two turns", run: recipes::wind_up::run },
     Recipe { name: "R22", about: "bad samples of the device", run: recipes::bad_samples::run },
     Recipe { name: "R23", about: "saturation and ordinary contact", run: recipes::saturation::run },
+    Recipe { name: "R35", about: "loops that stall", run: recipes::stalls::run },
+    Recipe { name: "R36", about: "faults of a string-driven device", run: recipes::string_faults::run },
+    Recipe { name: "EDGE", about: "coupling beside the device against shipped forces, 20 ms and 5 % loss", run: recipes::edge_coupling::run },
     Recipe { name: "PC", about: "passivity control of a wall that is too stiff", run: recipes::passivity::run },
 ];

@@ -1,4 +1,4 @@
-//! Coupling at the edge stays stable and true where shipping forces does not.
+//! Coupling at the edge without delay, its determinism, and the wire's single precision. At 20 ms it is a recipe.
 
 use std::time::Duration;
 
@@ -9,23 +9,6 @@ use taut_control_tests::edge::{Mode, god_object, run};
 use taut_control_tests::edge_network::{Impairment, through_the_codec};
 use taut_control_tests::edge_scenes::Task;
 use taut_proto::{Assembler, Division, Payload};
-
-#[test]
-fn at_20_ms_and_5_percent_loss_the_edge_is_within_one_jnd_where_shipping_is_unstable() {
-    for task in Task::all() {
-        let network = Impairment::new(20.0, 5.0);
-        let edge = run(&task, Mode::Edge, network, 1);
-        assert!(edge.stable, "{}: {edge:?}", task.name);
-        assert!(edge.error.max <= 1.0, "{}: {edge:?}", task.name);
-        let shipped = run(&task, Mode::Shipped, network, 1);
-        assert!(!shipped.stable, "{}: {shipped:?}", task.name);
-        assert!(shipped.error.p50 > 1.0, "{}: {shipped:?}", task.name);
-        assert!(
-            shipped.injected > 10.0 * edge.injected,
-            "{edge:?} {shipped:?}"
-        );
-    }
-}
 
 #[test]
 fn without_delay_both_are_stable_and_the_edge_is_the_truer_one() {

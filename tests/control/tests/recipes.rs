@@ -49,6 +49,21 @@ fn r23_limits_keep_directions_and_ordinary_contact_is_untouched() {
 }
 
 #[test]
+fn r35_a_loop_that_stalls_neither_stops_the_others_nor_makes_the_force_step() {
+    passes("R35");
+}
+
+#[test]
+fn r36_faults_of_strings_are_found_and_flagged() {
+    passes("R36");
+}
+
+#[test]
+fn at_20_ms_and_5_percent_loss_the_edge_is_within_one_jnd_where_shipping_is_unstable() {
+    passes("EDGE");
+}
+
+#[test]
 fn passivity_control_calms_a_wall_that_is_too_stiff() {
     passes("PC");
 }

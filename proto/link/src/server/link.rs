@@ -24,12 +24,14 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
 const MAX_EVENTS: usize = 1024;
 /// Time for the clients to hear that the server stops.
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
+/// How often a stopped server looks whether its port is free.
+const FREE_CHECK: Duration = Duration::from_millis(1);
 
 /// A running server. Dropping it stops it at once; [`ServerLink::shutdown`] also waits until the clients have heard.
 pub struct ServerLink {
@@ -142,7 +144,8 @@ impl ServerLink {
         self.shared.counters.read()
     }
 
-    /// Tells the clients that the server stops, and stops it.
+    /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
+    /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
     pub async fn shutdown(self) {
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
@@ -160,6 +163,20 @@ impl ServerLink {
                 tracing::error!("the state thread panicked");
             }
         }
+        let address = self.quic_address;
+        drop(self);
+        if timeout(STOP_TIMEOUT, freed(address)).await.is_err() {
+            tracing::debug!("{address} is not free yet");
+        }
+    }
+}
+
+/// Waits until nobody listens at `address`: the tasks of QUIC hold its socket a moment longer than the endpoint lives.
+async fn freed(address: SocketAddr) {
+    let taken =
+        || UdpSocket::bind(address).is_err_and(|error| error.kind() == io::ErrorKind::AddrInUse);
+    while taken() {
+        sleep(FREE_CHECK).await;
     }
 }
 

@@ -29,7 +29,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
-use crate::geometry::lanes::LANES;
+use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::volume::Volume;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideNode, WideTree};
 
@@ -247,13 +247,14 @@ impl FacingVolumes {
 }
 
 impl Against {
-    /// Which of the eight may come within the margin of this volume, facing it: a bit each. All that NaN is in.
+    /// By how much more than the margin each of the eight is apart from this volume at least, m: infinite where they do not face, not above
+    /// zero where they may come near. NaN is passed over: what has no other bound is near.
     ///
     /// One loop over the lanes, without branches: the compiler makes vectors of it.
     #[inline]
-    pub(crate) fn facing<const MOVES: bool>(&self, node: &WideNode) -> u32 {
+    fn beyond<const MOVES: bool>(&self, node: &WideNode) -> Lanes {
         let (n, q) = (node, self);
-        let mut mask = 0;
+        let mut beyond = Lanes::splat(0.0);
         for k in 0..LANES {
             let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
             let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
@@ -276,28 +277,45 @@ impl Against {
                     + chord * (q.turning + turning);
             }
             // Along the sides of the boxes.
-            let off_x = d[0].abs() > n.half[0].0[k] + q.half[0] + s[0].abs() + stray_x;
-            let off_y = d[1].abs() > n.half[1].0[k] + q.half[1] + s[1].abs() + stray_x;
-            let off_z = d[2].abs() > n.half[2].0[k] + q.half[2] + s[2].abs() + stray_x;
+            let off_x = d[0].abs() - (n.half[0].0[k] + q.half[0] + s[0].abs() + stray_x);
+            let off_y = d[1].abs() - (n.half[1].0[k] + q.half[1] + s[1].abs() + stray_x);
+            let off_z = d[2].abs() - (n.half[2].0[k] + q.half[2] + s[2].abs() + stray_x);
             // Along the axes of the eight, and along that of the one.
             let slant = cosine.abs();
             let height = dot(&a, &d) + cosine * q.middle - middle;
             let sides = dot(&a, &q.sides[0]).abs() + dot(&a, &q.sides[1]).abs();
             let extent = slab + slant * q.slab + sides + dot(&a, &s).abs() + stray_a;
-            let off_a = height.abs() > extent;
+            let off_a = height.abs() - extent;
             let height = dot(&q.axis, &d) + q.middle - cosine * middle;
             let sides = dot(&q.axis, &t).abs() * along + dot(&q.axis, &b).abs() * across;
             let extent = q.slab + slant * slab + sides + dot(&q.axis, &s).abs() + stray_a;
-            let off_b = height.abs() > extent;
+            let off_b = height.abs() - extent;
             // Cones: the sum of two angles is above pi where its sine is not above zero.
             let [cos, sin] = [n.cosine.0[k], n.sine.0[k]];
             let narrow = sin * q.cosine + cos * q.sine > 0.0;
             let away = cosine < cos * q.cosine - sin * q.sine - COSINE_ROUNDING;
-            let off = off_x | off_y | off_z | off_a | off_b | (narrow & away);
-            mask |= u32::from(!off) << k;
+            let off = larger(larger(off_x, off_y), larger(off_z, larger(off_a, off_b)));
+            beyond.0[k] = if narrow & away { f32::INFINITY } else { off };
         }
-        mask
+        beyond
     }
+}
+
+/// Which lanes are not beyond the margin: a bit each.
+#[inline(always)]
+fn near(beyond: &Lanes) -> u32 {
+    let mut mask = 0;
+    for (k, lane) in beyond.0.iter().enumerate() {
+        let off = *lane > 0.0; // false for NaN
+        mask |= u32::from(!off) << k;
+    }
+    mask
+}
+
+/// The larger of two; the second if the first is NaN.
+#[inline(always)]
+fn larger(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
 }
 
 /// What the points of a volume stray by from its centre along its axis while they turn, the turn in the mesh's axes.
@@ -336,41 +354,48 @@ pub(crate) fn for_facing_triangle_pairs(
     }
 }
 
-/// Opens the larger of two volumes that are not both triangles, and hands on its children that face the other.
+/// Opens the thicker of two volumes that are not both triangles, and hands on its children that face the other.
 #[inline]
 pub(crate) fn open_pair<const MOVES: bool>(
+    trees: (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    pair: (Child, Child),
+    mut found: impl FnMut((Child, Child)),
+) {
+    open_pair_with::<MOVES>(trees, volumes, pair, |pair, _| found(pair));
+}
+
+/// The same; each child comes with how much farther than the margin it is apart at least, m: not above zero.
+#[inline]
+pub(super) fn open_pair_with<const MOVES: bool>(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     (a, b): (Child, Child),
-    mut found: impl FnMut((Child, Child)),
+    mut found: impl FnMut((Child, Child), f32),
 ) {
     match (body.below(a), obstacle.below(b)) {
         (Below::Node(node), below)
             if matches!(below, Below::Triangle(_)) || body.thickness(a) > obstacle.thickness(b) =>
         {
             let against = volumes.of_obstacle(obstacle.volume(b));
-            for_each_child(node, against.facing::<MOVES>(body.node(node)), |child| {
-                found((child, b));
-            });
+            let beyond = against.beyond::<MOVES>(body.node(node));
+            for_each_child(node, &beyond, |child, beyond| found((child, b), beyond));
         }
         (_, Below::Node(node)) => {
             let against = volumes.of_body(body.volume(a));
-            for_each_child(
-                node,
-                against.facing::<MOVES>(obstacle.node(node)),
-                |child| {
-                    found((a, child));
-                },
-            );
+            let beyond = against.beyond::<MOVES>(obstacle.node(node));
+            for_each_child(node, &beyond, |child, beyond| found((a, child), beyond));
         }
-        (_, Below::Triangle(_)) => found((a, b)),
+        (_, Below::Triangle(_)) => found((a, b), 0.0),
     }
 }
 
 #[inline(always)]
-fn for_each_child(node: u32, mut mask: u32, mut each: impl FnMut(Child)) {
+fn for_each_child(node: u32, beyond: &Lanes, mut each: impl FnMut(Child, f32)) {
+    let mut mask = near(beyond);
     while mask != 0 {
-        each(node * LANES as u32 + mask.trailing_zeros());
+        let lane = mask.trailing_zeros();
+        each(node * LANES as u32 + lane, beyond.0[lane as usize]);
         mask &= mask - 1;
     }
 }

@@ -46,7 +46,7 @@ impl GodObject {
         }
     }
 
-    /// Takes note of what a collection within `distance` (m) cost, in triangle pairs.
+    /// Takes note of what a collection within `distance` (m) cost, in pairs of triangles and of features.
     pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
         if pairs > self.settings.look_ahead_pairs {
             let beyond = (distance - self.settings.activation_distance).max(0.0);

@@ -66,6 +66,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         path: None,
         tremor: 0.0,
         seed: 0,
+        strings: None,
     };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
     let dynamics = table(&root, "dynamics", dynamics).flatten();
@@ -121,6 +122,15 @@ struct Files<'d> {
 impl Files<'_> {
     fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
         section.text(key).map(|text| self.directory.join(text))
+    }
+
+    /// A name of something shipped as it is, a file relative to the workbench's: one that has an ending or a folder.
+    fn named(&self, text: &str) -> String {
+        if text.contains(['.', '/', '\\']) {
+            self.directory.join(text).display().to_string()
+        } else {
+            text.to_owned()
+        }
     }
 }
 
@@ -328,7 +338,7 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     ];
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
-        for key in ["hand", "path", "tremor", "seed", "loop"]
+        for key in ["hand", "path", "tremor", "seed", "strings", "loop"]
             .iter()
             .chain(&["server", "sensor", "mode", "axes", "scale", "max_age"])
             .chain(&[
@@ -354,6 +364,7 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
                 .integer("seed", 0, i64::MAX)
                 .unwrap_or(0)
                 .unsigned_abs(),
+            strings: section.text("strings").map(|named| files.named(named)),
         }),
         Kind::Trace => {
             section.required_text("path", "path = \"trace.csv\"")?;

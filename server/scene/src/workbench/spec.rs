@@ -132,6 +132,8 @@ pub enum Device {
         tremor: f64,
         /// Of the tremor.
         seed: u64,
+        /// Made of strings: a shipped geometry's name, or a geometry file. `None` is a device without any.
+        strings: Option<String>,
     },
     /// A recorded trace; forces go nowhere.
     Trace {

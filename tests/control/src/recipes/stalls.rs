@@ -1,0 +1,227 @@
+//! R35: one of the three loops stalls while a hand rests on a plane; the session's own loops, ticked in the order of their threads.
+//!
+//! The others go on; no force steps; the god-object's absence is told as the age of the constraints, which stay planes; the
+//! coupling's absence is held for 20 ms and then fades; the haptics loop's absence is the port's own gap.
+
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use god_object::spatial::linear;
+use god_object::{GodObject, Pose, Vector6};
+use nalgebra::Vector3;
+use taut::loops::wiring::WiredLoops;
+use taut_bridge::{
+    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings,
+    SimulatedDevice, ViaPoint,
+};
+use taut_scene::{BuiltScene, Scene};
+
+use crate::Row;
+use crate::closed_loop::PERIOD;
+
+/// Largest change of the force in a tick, N, with rounding.
+const LARGEST_STEP: f64 = 0.5 + 1e-9;
+/// Ticks before the stall, in which the hand comes to press.
+const BEFORE: u32 = 1500;
+/// Ticks from the begin of the stall on.
+const AFTER: u32 = 400;
+/// How long each stall lasts, ms.
+const LENGTHS: [u32; 3] = [5, 20, 100];
+
+/// Which loop stalls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stalled {
+    GodObject,
+    Coupling,
+    Haptics,
+}
+
+/// What a stall did to the force.
+#[derive(Debug)]
+struct Seen {
+    /// Largest change of the force in one tick, N.
+    largest_step: f64,
+    /// Smallest force from the stall's begin on, and the force before it, N.
+    lowest: f64,
+    before: f64,
+    /// Oldest constraints that the coupling told of, ms.
+    oldest_ms: u32,
+    /// Ticks of the haptics loop from the stall's begin on.
+    haptics_ticks: u64,
+}
+
+/// A simulated device that tells what was written to it.
+struct Told {
+    device: SimulatedDevice,
+    written: Arc<Mutex<Vector3<f64>>>,
+}
+
+impl Device for Told {
+    fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        self.device.read(now)
+    }
+
+    fn write(&mut self, now: Duration, wrench: &Vector6) {
+        if let Ok(mut written) = self.written.lock() {
+            *written = linear(wrench);
+        }
+        self.device.write(now, wrench);
+    }
+}
+
+/// Every loop, every length.
+#[must_use]
+pub fn run() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for stalled in [Stalled::GodObject, Stalled::Coupling, Stalled::Haptics] {
+        for milliseconds in LENGTHS {
+            match stall(stalled, milliseconds) {
+                Some(seen) => rows.extend(judge(stalled, milliseconds, &seen)),
+                None => rows.push(Row::holds("sphere-on-plane", "not built", "built", false)),
+            }
+        }
+    }
+    rows
+}
+
+fn judge(stalled: Stalled, milliseconds: u32, seen: &Seen) -> Vec<Row> {
+    let case = format!("{stalled:?} for {milliseconds} ms");
+    let kept = seen.lowest / seen.before;
+    let missed = match stalled {
+        Stalled::Haptics => u64::from(milliseconds),
+        _ => 0,
+    };
+    let ticks = u64::from(AFTER) - missed;
+    let share = format!("{:.0} % of {:.2} N", 100.0 * kept, seen.before);
+    let mut rows = vec![
+        Row::at_most(
+            format!("{case}: largest step"),
+            seen.largest_step,
+            LARGEST_STEP,
+            "N/ms",
+        ),
+        Row::holds(
+            format!("{case}: ticks of the haptics loop in 400 ms"),
+            seen.haptics_ticks,
+            ticks,
+            seen.haptics_ticks == ticks,
+        ),
+    ];
+    let held = Row::holds(
+        format!("{case}: force held"),
+        &share,
+        "> 90 % of more than 2 N",
+        kept > 0.9 && seen.before > 2.0,
+    );
+    match stalled {
+        Stalled::GodObject => {
+            rows.push(held);
+            rows.push(Row::holds(
+                format!("{case}: age of the constraints told"),
+                format!("{} ms", seen.oldest_ms),
+                format!(">= {milliseconds} ms"),
+                seen.oldest_ms >= milliseconds,
+            ));
+        }
+        // 20 ms are held; of 100 ms, 80 have faded.
+        Stalled::Coupling if milliseconds > 20 => rows.push(Row::holds(
+            format!("{case}: force fades"),
+            &share,
+            "< 25 % of more than 2 N",
+            kept < 0.25 && seen.before > 2.0,
+        )),
+        Stalled::Coupling => rows.push(held),
+        // Held by the device until the port is called again; a longer gap than its hold, the port has to tell and ramp in.
+        Stalled::Haptics if milliseconds < 20 => rows.push(held),
+        Stalled::Haptics => {}
+    }
+    rows
+}
+
+/// `None` where the shipped scene cannot be built.
+fn stall(stalled: Stalled, milliseconds: u32) -> Option<Seen> {
+    let scene = Scene::named_or_file("sphere-on-plane").ok()?.build().ok()?;
+    let written = Arc::<Mutex<Vector3<f64>>>::default();
+    let device = Told {
+        device: pressing_hand(&scene)?,
+        written: Arc::clone(&written),
+    };
+    let felt = || written.lock().map(|force| *force).unwrap_or_default();
+    let mut loops = wired(&scene, device)?;
+    let mut now = Duration::ZERO;
+    for _ in 0..BEFORE {
+        now += PERIOD;
+        loops.haptics.tick(now);
+        loops.coupling.tick(now);
+        loops.god_object.tick(|| now);
+    }
+    let ticked = |loops: &WiredLoops| loops.statistics.haptics.period.distribution().count;
+    let ticked_before = ticked(&loops);
+    let mut last = felt();
+    let mut seen = Seen {
+        largest_step: 0.0,
+        lowest: last.norm(),
+        before: last.norm(),
+        oldest_ms: 0,
+        haptics_ticks: 0,
+    };
+    for tick in 0..AFTER {
+        now += PERIOD;
+        let stands = |this: Stalled| this == stalled && tick < milliseconds;
+        if !stands(Stalled::Haptics) {
+            loops.haptics.tick(now);
+        }
+        if !stands(Stalled::Coupling) {
+            loops.coupling.tick(now);
+        }
+        if !stands(Stalled::GodObject) {
+            loops.god_object.tick(|| now);
+        }
+        seen.largest_step = seen.largest_step.max((felt() - last).norm());
+        last = felt();
+        seen.lowest = seen.lowest.min(last.norm());
+        let age = loops.observers.monitor.wrench.newest().constraint_age;
+        seen.oldest_ms = seen.oldest_ms.max(age.as_millis() as u32);
+    }
+    seen.haptics_ticks = ticked(&loops) - ticked_before;
+    Some(seen)
+}
+
+fn wired(scene: &BuiltScene, device: Told) -> Option<WiredLoops> {
+    let world = Arc::new(scene.world.clone());
+    let start = Pose::translation(0.0, 0.0, 0.04);
+    let god_object = GodObject::new(world.clone(), scene.settings, start).ok()?;
+    let safety = SafetySettings {
+        ramp_in: Duration::from_millis(10),
+        ..SafetySettings::default()
+    };
+    Some(WiredLoops::new(
+        &world,
+        &scene.settings,
+        god_object,
+        Box::new(device),
+        safety,
+        None,
+    ))
+}
+
+/// The hand goes down to 10 mm below the plane's surface within a second and stays there.
+fn pressing_hand(scene: &BuiltScene) -> Option<SimulatedDevice> {
+    let at = |time_s, height: f64| ViaPoint {
+        time_s,
+        pose: Pose::translation(0.0, 0.0, height),
+    };
+    let points = vec![at(0.0, 0.04), at(1.0, 0.01), at(2.0, 0.01)];
+    let path = MinJerkPath::new(points, false).ok()?;
+    let reference_point = scene.reference_point();
+    Some(SimulatedDevice::new(
+        Grip::workbench(),
+        Hand::FIRM,
+        path,
+        reference_point,
+    ))
+}
