@@ -1,6 +1,6 @@
 //! Error against time: J over the 99th percentile of an update, a panel for each recipe, with the Pareto front.
 //!
-//! J below [`FLOOR`] is drawn there: nobody feels the difference. Every point is a row of `chart.csv`.
+//! J below 0.001 is drawn there: nobody feels the difference. Every point is a row of `chart.csv`.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -32,6 +32,7 @@ fn colour(method: Method) -> RGBColor {
         Method::Paper => RGBColor(200, 90, 0),
         Method::PaperAdapted => RGBColor(230, 170, 60),
         Method::VirtualCoupling => RGBColor(0, 130, 80),
+        Method::Penalty => RGBColor(110, 110, 60),
         Method::Discrete => RGBColor(140, 60, 150),
     }
 }
@@ -115,13 +116,13 @@ fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn 
     for method in Method::ALL {
         area.draw(&Circle::new((x, 16), 6, colour(method).filled()))?;
         area.draw(&Text::new(method.name(), (x + 12, 9), ("sans-serif", 16)))?;
-        x += 170;
+        x += 145;
     }
     for (rate, size) in RATES.iter().zip(SIZES) {
         area.draw(&Circle::new((x, 16), size, BLACK))?;
         let label = format!("{rate} Hz");
         area.draw(&Text::new(label, (x + 12, 9), ("sans-serif", 16)))?;
-        x += 90;
+        x += 80;
     }
     let note = "grey: J = 1 and 1 ms; black: Pareto front; cross: a pass line is missed; J below 0.001 is drawn at 0.001";
     area.draw(&Text::new(note, (24, 32), ("sans-serif", 14)))?;

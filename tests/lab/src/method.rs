@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use god_object::{Pose, Settings, Vector6, World};
 
-use crate::methods::{Discrete, GodObjectMethod, VirtualCoupling};
+use crate::methods::{Discrete, GodObjectMethod, Penalty, VirtualCoupling};
 
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
 /// an update is made, and one while it is used.
@@ -82,17 +82,20 @@ pub enum Method {
     VirtualCoupling,
     /// A god-object that looks for collisions only where a step ends.
     Discrete,
+    /// Points of the body pushed out of the obstacles.
+    Penalty,
 }
 
 impl Method {
     /// In the order of the tables.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Ours,
         Self::OursByDefault,
         Self::Paper,
         Self::PaperAdapted,
         Self::VirtualCoupling,
         Self::Discrete,
+        Self::Penalty,
     ];
 
     /// Name in tables and files.
@@ -105,6 +108,7 @@ impl Method {
             Self::PaperAdapted => "paper+adaptation",
             Self::VirtualCoupling => "virtual coupling",
             Self::Discrete => "discrete",
+            Self::Penalty => "penalty",
         }
     }
 
@@ -117,6 +121,9 @@ impl Method {
                 let touching = TOUCHING.map(Tuning::Touching);
                 [Tuning::Default].into_iter().chain(touching).collect()
             }
+            Self::Penalty => [ShellForce::Deepest, ShellForce::Mean, ShellForce::Sum]
+                .map(Tuning::Shell)
+                .into(),
             Self::VirtualCoupling => PROXY_SHARES
                 .iter()
                 .flat_map(|share| {
@@ -173,6 +180,13 @@ impl Method {
                 Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
             }
             Self::Discrete => Box::new(Discrete::new(scene)),
+            Self::Penalty => {
+                let shell_force = match tuning {
+                    Tuning::Shell(shell_force) => shell_force,
+                    _ => ShellForce::Deepest,
+                };
+                Box::new(Penalty::new(scene, shell_force))
+            }
         }
     }
 }
@@ -191,12 +205,28 @@ pub enum Tuning {
         /// Damping over critical damping.
         damping_ratio: f64,
     },
+    /// What the points of the penalty method add up to.
+    Shell(ShellForce),
+}
+
+/// What the forces of all points in an obstacle add up to; each is the stiffness times its depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShellForce {
+    /// Their sum.
+    Sum,
+    /// Their mean.
+    Mean,
+    /// The deepest alone.
+    Deepest,
 }
 
 impl fmt::Display for Tuning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Default => write!(f, "default"),
+            Self::Shell(ShellForce::Sum) => write!(f, "sum of the points"),
+            Self::Shell(ShellForce::Mean) => write!(f, "mean of the points"),
+            Self::Shell(ShellForce::Deepest) => write!(f, "deepest point"),
             Self::Touching(distance) => write!(f, "rest distance {:.0} um", distance * 1e6),
             Self::Proxy {
                 share,

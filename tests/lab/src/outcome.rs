@@ -39,8 +39,8 @@ pub struct Times {
 }
 
 impl Outcome {
-    /// Runs a recipe with the best of the method's tunings: that which misses the fewest lines from one start phase, and of these the one with
-    /// the least error felt.
+    /// Runs a recipe with the best of the method's tunings: that which is felt least from one start phase, and of these the one that
+    /// misses the fewest lines.
     #[must_use]
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
         let tunings = method.tunings();
@@ -53,7 +53,7 @@ impl Outcome {
                     let missed = trial.lines.iter().filter(|(_, passes)| !passes).count();
                     (missed, trial.worst(Measure::Felt), *tuning)
                 })
-                .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))
+                .min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
                 .map(|(_, _, tuning)| tuning),
         };
         Self::tuned(recipe, method, rate, best.unwrap_or(Tuning::Default))

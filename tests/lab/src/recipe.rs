@@ -22,6 +22,9 @@ impl Line {
     }
 }
 
+/// A length at a time, s, of a body at a pose.
+pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64>;
+
 /// A scene, a motion, the right answer and what passes.
 pub struct Recipe {
     /// Short name, such as `R11`.
@@ -41,7 +44,7 @@ pub struct Recipe {
     /// How deep the body at a pose is in an obstacle, m; 0 where it is free.
     pub depth: Box<dyn Fn(&Pose) -> f64>,
     /// How far the body at a time and a pose is beyond the side that it belongs to, m; 0 where it is on it.
-    pub astray: Box<dyn Fn(f64, &Pose) -> f64>,
+    pub astray: OverTime,
     /// How many start phases of the updates are run, evenly over a period.
     pub phases: u32,
     /// What passes at a rate of updates, Hz.

@@ -134,7 +134,7 @@ pub(crate) fn brief(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         "0".into()
-    } else if size >= 1000.0 || size < 1e-2 {
+    } else if !(1e-2..1000.0).contains(&size) {
         format!("{value:.2e}")
     } else if size >= 10.0 {
         format!("{value:.1}")

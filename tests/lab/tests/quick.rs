@@ -81,6 +81,28 @@ fn r28_ours_stays_on_its_side() {
     ours_passes("R28");
 }
 
+/// The method's default look-ahead limit is a quarter of the body's size: 0.25 mm for a cube of 1 mm, where two updates and a device at
+/// 0.1 m/s need 0.4 mm at 1 kHz.
+#[test]
+#[ignore = "the default look-ahead limit is too short for small bodies: steps of 0.30 N in R09, 1.5 N in R10a at 0.5 m/s, and a millimetre late in R11 at 1 m/s"]
+fn ours_passes_by_default() {
+    let failures: Vec<_> = ["R02", "R09", "R10a", "R11", "R12", "R13", "R28"]
+        .iter()
+        .flat_map(|name| failures(name, Method::OursByDefault, OWN_RATE))
+        .collect();
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn r09_penalty_is_pushed_out_on_the_far_side() {
+    let recipe = recipe("R09", "plate of 1 mm");
+    for rate in RATES {
+        let outcome = Outcome::of(&recipe, Method::Penalty, rate);
+        assert!(outcome.worst(Measure::Astray) > 0.01, "{rate} Hz");
+        assert!(outcome.worst(Measure::DirectionMax) > 90.0, "{rate} Hz");
+    }
+}
+
 /// Depth in m, by the delay of two periods and a half and half a tick, at 0.3 m/s.
 #[test]
 fn r11_the_paper_is_late_by_what_its_delays_add_up_to() {
