@@ -5,6 +5,7 @@
 //! | caller's | watches: link, signals, duration; tells what happens |
 //! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines |
 //! | `taut-bridge-net` | the link's sockets (tokio) |
+//! | `console` | what is typed, where standard input is a terminal: `arm`, `off` |
 //!
 //! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
 //! has the force at zero 120 ms later, whatever else goes on.
@@ -17,20 +18,24 @@ use std::thread;
 use std::time::Duration;
 
 use nalgebra::Point3;
-use taut_link::proto::SceneDescription;
 use taut_link::proto::control::LogLevel;
+use taut_link::proto::{CouplingOffer, SceneDescription};
 use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
 
-use crate::bridge_loop::{BridgeLoop, Notice};
-use crate::cli::{BridgeArgs, DeviceChoice};
-use crate::device::{Device, DeviceFault};
+use crate::arm_switch::{self, ArmSwitch};
+use crate::bridge_loop::BridgeLoop;
+use crate::choice::{DeviceChoice, InputChoice, InputError};
+use crate::cli::{BridgeArgs, CouplingChoice};
+use crate::device::{Device, DeviceFault, Pose};
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::devices::{
     AtEnd, Grip, MinJerkPath, PathError, RecordedDevice, SimulatedDevice, Trace, TraceError, Tremor,
 };
+use crate::edge::{EdgeCoupler, OfferError};
+use crate::placement::Placement;
+use crate::port::{DevicePort, SafetyEvent, SafetySettings};
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
-use crate::safety::{Safety, SafetySettings};
 use crate::trace_file::{TraceFileError, read_trace, via_points};
 
 /// How often the watching thread looks.
@@ -86,6 +91,12 @@ pub enum BridgeError {
         /// Why.
         cause: TraceError,
     },
+    /// An input device cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The mouse is none of a bridge's.
+    #[error("the mouse belongs to a render window: use `taut render --hold` instead of a bridge")]
+    Mouse,
     /// The server cannot be joined.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -94,6 +105,17 @@ pub enum BridgeError {
         "the server's scene has a start pose that is no pose; check the scene with `taut check`"
     )]
     NoStartPose,
+    /// The server does not let the bridge couple.
+    #[error(
+        "the server couples by itself ({reason}): leave out `--coupling edge`, and keep the network short"
+    )]
+    NoEdge {
+        /// What it says.
+        reason: String,
+    },
+    /// The server's offer makes no coupling.
+    #[error(transparent)]
+    Offer(#[from] OfferError),
     /// A thread cannot be started.
     #[error("cannot start a thread for {what}: {cause}; end other programs or raise the limit")]
     Thread {
@@ -136,6 +158,45 @@ impl BridgeError {
 /// [`BridgeError`]: bad input is found before anything is started.
 pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let (options, motion) = prepare(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let wishes = Arc::default();
+    arm_switch::listen_at_console(&wishes);
+    run_loop(args, options, stop, wishes, |scene| {
+        build_loop(args, &motion, scene)
+    })
+}
+
+/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
+/// `--device`, `--hand` and `--path` of `args` are not looked at.
+///
+/// # Errors
+/// [`BridgeError`].
+pub fn run_device(
+    args: &BridgeArgs,
+    stop: Arc<AtomicBool>,
+    make: impl FnOnce(Placement) -> Box<dyn Device>,
+) -> Result<BridgeReport, BridgeError> {
+    let options = client_options(args)?;
+    // The console is the caller's.
+    run_loop(args, options, stop, Arc::default(), |scene| {
+        let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
+        let device = make(placement);
+        Ok(behind_port(
+            args,
+            device,
+            placement.reference_point,
+            &placement.start,
+        ))
+    })
+}
+
+fn run_loop(
+    args: &BridgeArgs,
+    options: ClientOptions,
+    stop: Arc<AtomicBool>,
+    wishes: Arc<ArmSwitch>,
+    build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
+) -> Result<BridgeReport, BridgeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .thread_name("taut-bridge-net")
@@ -145,12 +206,13 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
             what: "the network",
             cause,
         })?;
-    let stop = Arc::new(AtomicBool::new(false));
     runtime.spawn(stop_on_signal(Arc::clone(&stop)));
 
     let first = runtime.block_on(connect(options.clone()))?;
-    let bridge = build_loop(args, &motion, first.description())?;
+    let bridge = build(first.description())?;
     let mut run = Run {
+        safety: *bridge.port().settings(),
+        wishes,
         args,
         options,
         runtime,
@@ -168,6 +230,7 @@ enum Motion {
     Sway,
     Path(MinJerkPath),
     Trace(PathBuf, Trace),
+    Input(InputChoice),
 }
 
 fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
@@ -188,12 +251,27 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         RATES_HZ.contains(&args.rate),
         "1 to 10000 Hz",
     )?;
+    for (option, value) in [
+        ("--max-force", args.safety.max_force),
+        ("--max-torque", args.safety.max_torque),
+        ("--force-slew", args.safety.force_slew),
+        ("--torque-slew", args.safety.torque_slew),
+    ] {
+        in_range(
+            option,
+            value,
+            value > 0.0 && value <= 1e3,
+            "a number above 0, at most 1000",
+        )?;
+    }
     if let Some(seconds) = args.duration {
         let valid = (0.0..=1e9).contains(&seconds);
         in_range("--duration", seconds, valid, "0 to 1e9 s")?;
     }
 
     let motion = match (&args.device, &args.path) {
+        (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
+        (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
         (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
         (DeviceChoice::Simulated, None) => Motion::Sway,
         (DeviceChoice::Simulated, Some(file)) => {
@@ -205,6 +283,10 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         }
     };
 
+    Ok((client_options(args)?, motion))
+}
+
+fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
     let key_file = args
         .key
         .clone()
@@ -214,7 +296,7 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;
-    Ok((options, motion))
+    Ok(options)
 }
 
 fn build_loop(
@@ -235,6 +317,9 @@ fn build_loop(
     let device: Box<dyn Device> = match motion {
         Motion::Sway => Box::new(held(MinJerkPath::sway(start, SWAY.0, SWAY.1))),
         Motion::Path(path) => Box::new(held(path.clone())),
+        Motion::Input(input) => {
+            input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
+        }
         Motion::Trace(path, trace) => {
             let at_end = if args.looping {
                 AtEnd::Loop
@@ -248,13 +333,43 @@ fn build_loop(
             })?)
         }
     };
-    let limits = device.info().limits;
-    let safety = Safety::new(SafetySettings {
-        max_force: limits.max_force,
-        max_torque: limits.max_torque,
-        ..SafetySettings::default()
-    });
-    Ok(BridgeLoop::new(device, safety, reference_point))
+    Ok(behind_port(args, device, reference_point, &start))
+}
+
+/// The device behind the port that makes every force safe. What has no motors, or no hand at them, arms by itself.
+fn behind_port(
+    args: &BridgeArgs,
+    device: Box<dyn Device>,
+    reference_point: Point3<f64>,
+    start: &Pose,
+) -> BridgeLoop {
+    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated)
+        || device.info().actuated_degrees_of_freedom == 0;
+    let safety = args.safety.settings(args.rate, nobody_is_hurt);
+    BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
+}
+
+/// The coupling of a session, if it is to be here.
+fn edge_coupler(
+    choice: Option<CouplingChoice>,
+    offer: Option<&CouplingOffer>,
+) -> Result<Option<EdgeCoupler>, BridgeError> {
+    match (choice, offer) {
+        (Some(CouplingChoice::Server), _) | (None, None) => Ok(None),
+        (_, Some(CouplingOffer::AtEdge(offer))) => Ok(Some(EdgeCoupler::new(offer)?)),
+        (None, Some(CouplingOffer::AtServer { reason })) => {
+            tracing::info!("the server computes the force: {reason}");
+            Ok(None)
+        }
+        (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
+            Err(BridgeError::NoEdge {
+                reason: reason.clone(),
+            })
+        }
+        (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {
+            reason: "it says nothing of another way".to_owned(),
+        }),
+    }
 }
 
 async fn stop_on_signal(stop: Arc<AtomicBool>) {
@@ -293,6 +408,8 @@ struct Run<'a> {
     stop: Arc<AtomicBool>,
     /// On the monotonic clock.
     deadline: Option<Duration>,
+    safety: SafetySettings,
+    wishes: Arc<ArmSwitch>,
     totals: Totals,
 }
 
@@ -376,13 +493,14 @@ impl Run<'_> {
         let mut device_loop = DeviceLoop {
             link: Arc::clone(&link),
             end: Arc::clone(&end_loop),
+            wishes: Arc::clone(&self.wishes),
             notices: sender,
             period: Duration::from_secs_f64(1.0 / self.args.rate),
             priority: self.args.priority,
             core: self.args.core,
             totals: std::mem::replace(&mut self.totals, Totals::new()),
         };
-        bridge.begin_session();
+        bridge.begin_session(edge_coupler(self.args.coupling, link.coupling())?);
         let thread = thread::Builder::new()
             .name("taut-bridge-dev".to_owned())
             .spawn(move || {
@@ -404,7 +522,7 @@ impl Run<'_> {
             Some(SessionEnd::ServerStopped | SessionEnd::ServerLost(_))
         ) {
             // Let the force fade as on any silence, rather than cut it.
-            let settings = SafetySettings::default();
+            let settings = self.safety;
             thread::sleep(settings.hold + settings.ramp_out);
         }
         end_loop.store(true, Ordering::Relaxed);
@@ -426,7 +544,11 @@ impl Run<'_> {
         Ok((bridge, end))
     }
 
-    fn session_end(&self, link: &ClientLink, notices: &Receiver<Notice>) -> Option<SessionEnd> {
+    fn session_end(
+        &self,
+        link: &ClientLink,
+        notices: &Receiver<SafetyEvent>,
+    ) -> Option<SessionEnd> {
         tell(link, notices);
         if self.stop.load(Ordering::Relaxed) {
             Some(SessionEnd::Signal)
@@ -447,21 +569,25 @@ impl Run<'_> {
         let (totals, stats) = (&self.totals, bridge.stats());
         let start = totals.first_tick.unwrap_or(totals.last_tick);
         BridgeReport {
-            device: bridge.device().info().name.clone(),
+            device: bridge.port().info().name.clone(),
             server: self.args.server.clone(),
             ended: ended.to_owned(),
             duration_s: totals.last_tick.saturating_sub(start).as_secs_f64(),
             ticks: stats.ticks,
             missed_periods: totals.missed,
             period_us: totals.period.summary(),
+            coupling: if bridge.couples() { "edge" } else { "server" }.to_owned(),
+            sets: stats.sets,
+            broken_sets: stats.broken_sets,
+            set_age_us: stats.set_age.summary(),
             wrenches: stats.wrenches,
             wrench_age_us: stats.wrench_age.summary(),
             round_trip_us: stats.round_trip.summary(),
             packets_sent: totals.packets.packets_sent,
             packets_received: totals.packets.packets_received,
             packets_lost: totals.packets.lost,
-            energy_injected_j: bridge.energy().injected(),
-            energy_delivered_j: bridge.energy().delivered(),
+            energy_injected_j: bridge.port().energy().injected(),
+            energy_delivered_j: bridge.port().energy().delivered(),
             max_force_n: stats.max_force,
             max_torque_n_m: stats.max_torque,
             safety_events: stats.safety_events,
@@ -473,13 +599,15 @@ impl Run<'_> {
 }
 
 /// Logs what the device loop noticed, here and at the server.
-fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
-    for notice in notices.try_iter() {
-        let text = match notice {
-            Notice::Safety(event) => format!("safety of the device: {event:?}"),
-            Notice::Fault(fault) => fault.to_string(),
+fn tell(link: &ClientLink, notices: &Receiver<SafetyEvent>) {
+    for event in notices.try_iter() {
+        let level = if event.kind.is_good_news() {
+            tracing::info!("{event}");
+            LogLevel::Info
+        } else {
+            tracing::warn!("{event}");
+            LogLevel::Warning
         };
-        tracing::warn!("{text}");
-        link.post_log(LogLevel::Warning, text);
+        link.post_log(level, event.to_string());
     }
 }

@@ -1,29 +1,23 @@
-//! One tick of the bridge: newest wrench in, through the safety stage to the device, newest pose out.
+//! One tick of the bridge: newest wrench in, through the port to the device, newest pose out.
 //!
 //! No sockets, threads or clocks: times are arguments, so a tick runs in real time and under a virtual clock.
 //! No allocation after `new`.
 
 use std::time::Duration;
 
-use nalgebra::{Point3, Vector6};
-use taut_link::proto::input::INPUT_FAULT;
+use nalgebra::Vector6;
+use taut_link::proto::constraints::ConstraintSet;
+use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
 use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
 
-use crate::device::{Device, DeviceFault, Pose};
-use crate::energy::EnergyObserver;
+use crate::device::DeviceFault;
+use crate::edge::EdgeCoupler;
+use crate::port::{Command, DevicePort, Events};
 use crate::report::Durations;
-use crate::safety::{Safety, SafetyEvent};
 
 /// How many ticks a round trip may take to be measured: 1 s at 1 kHz.
 const REMEMBERED_TICKS: usize = 1024;
-
-/// What is worth telling a person, as it begins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Notice {
-    Safety(SafetyEvent),
-    Fault(DeviceFault),
-}
 
 /// A command and when it arrived here.
 #[derive(Clone, Copy, Debug)]
@@ -38,13 +32,18 @@ pub(crate) struct TickOutput {
     /// To be sent.
     pub(crate) input: InputSample,
     /// To be told.
-    pub(crate) notice: Option<Notice>,
+    pub(crate) events: Events,
 }
 
 /// What the ticks have seen.
 pub(crate) struct TickStats {
     pub(crate) ticks: u64,
     pub(crate) wrenches: u64,
+    /// Constraint sets taken, and those that were none.
+    pub(crate) sets: u64,
+    pub(crate) broken_sets: u64,
+    /// Session time now minus that of the set's making, at its first use.
+    pub(crate) set_age: Durations,
     pub(crate) safety_events: u64,
     pub(crate) faulty_ticks: u64,
     /// Session time now minus session time of the command, at arrival.
@@ -57,32 +56,27 @@ pub(crate) struct TickStats {
 
 /// The device side of a session.
 pub(crate) struct BridgeLoop {
-    device: Box<dyn Device>,
-    safety: Safety,
-    energy: EnergyObserver,
+    port: DevicePort,
     stats: TickStats,
     /// Number of the next reading; the first is 1, because 0 answers none.
     next_index: u64,
     /// When reading i was taken, at i modulo the length.
     sent: [Duration; REMEMBERED_TICKS],
     newest: Option<Arrival>,
-    last_pose: Pose,
-    fault: Option<DeviceFault>,
+    /// The coupling, where it is here and not at the server.
+    edge: Option<Box<EdgeCoupler>>,
 }
 
 impl BridgeLoop {
-    pub(crate) fn new(
-        device: Box<dyn Device>,
-        safety: Safety,
-        reference_point: Point3<f64>,
-    ) -> Self {
+    pub(crate) fn new(port: DevicePort) -> Self {
         Self {
-            device,
-            safety,
-            energy: EnergyObserver::new(reference_point),
+            port,
             stats: TickStats {
                 ticks: 0,
                 wrenches: 0,
+                sets: 0,
+                broken_sets: 0,
+                set_age: Durations::new(),
                 safety_events: 0,
                 faulty_ticks: 0,
                 wrench_age: Durations::new(),
@@ -93,38 +87,59 @@ impl BridgeLoop {
             next_index: 1,
             sent: [Duration::ZERO; REMEMBERED_TICKS],
             newest: None,
-            last_pose: Pose::identity(),
-            fault: None,
+            edge: None,
         }
     }
 
-    pub(crate) fn device(&self) -> &dyn Device {
-        self.device.as_ref()
+    /// What stands between this loop and the device.
+    pub(crate) fn port(&self) -> &DevicePort {
+        &self.port
+    }
+
+    pub(crate) fn port_mut(&mut self) -> &mut DevicePort {
+        &mut self.port
     }
 
     pub(crate) fn stats(&self) -> &TickStats {
         &self.stats
     }
 
-    pub(crate) fn energy(&self) -> &EnergyObserver {
-        &self.energy
-    }
-
     /// The fault that the device is in.
     pub(crate) fn fault(&self) -> Option<DeviceFault> {
-        self.fault
+        self.port.fault()
     }
 
-    /// Forgets the last session: no force until a command of the new one, which ramps in.
-    pub(crate) fn begin_session(&mut self) {
+    /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
+    /// is computed here.
+    pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
         self.newest = None;
-        self.safety.reset();
+        self.edge = edge.map(Box::new);
+        self.port.restart();
     }
 
-    /// No force from now on.
-    pub(crate) fn stop(&mut self, now: Duration) {
-        self.safety.reset();
-        self.device.write(now, &Vector6::zeros());
+    /// Whether constraint sets are wanted.
+    pub(crate) fn couples(&self) -> bool {
+        self.edge.is_some()
+    }
+
+    /// Takes the newest constraint set, that was completed or confirmed at `received`; once or again. `session_ns` is
+    /// session time, 0 while unknown.
+    pub(crate) fn take_set(&mut self, set: &ConstraintSet, received: Duration, session_ns: u64) {
+        let Some(edge) = &mut self.edge else {
+            return;
+        };
+        let new = edge.sequence() != Some(set.head.sequence);
+        match edge.take(set, received) {
+            Ok(()) if new => {
+                self.stats.sets += 1;
+                if session_ns > 0 {
+                    let age = session_ns.saturating_sub(set.head.made_ns);
+                    self.stats.set_age.record(Duration::from_nanos(age));
+                }
+            }
+            Ok(()) => {}
+            Err(_) => self.stats.broken_sets += 1,
+        }
     }
 
     /// One tick at `now`. `session_ns` is session time, 0 while unknown; `arrival` is the newest command,
@@ -141,49 +156,48 @@ impl BridgeLoop {
         let index = self.next_index;
         self.next_index += 1;
         self.sent[index as usize % REMEMBERED_TICKS] = now;
-        let reading = self.device.read(now);
-        let (wrench, event) = match reading {
-            Ok(_) => self.safe_wrench(now),
-            // Where the hand is, nobody knows: no force, and a ramp when it is back.
-            Err(_) => {
-                self.safety.reset();
-                (Vector6::zeros(), None)
-            }
-        };
-        self.device.write(now, &wrench);
+        let (newest, edge) = (self.newest, &mut self.edge);
+        let report = self.port.tick(now, |reading| match edge {
+            Some(edge) => edge
+                .step(now, &reading.sample.pose)
+                .map(|felt| Command::fresh(felt.received, felt.wrench)),
+            None => newest.map(|arrival| command(&arrival)),
+        });
+
+        let wrench = &report.wrench;
         self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
         self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
-        self.stats.safety_events += u64::from(event.is_some());
-
-        let mut input = InputSample {
-            sample_time_ns: session_ns,
-            index,
-            pose: PoseF64::from_isometry(&self.last_pose),
-            velocity: [0.0; 6],
-            buttons: 0,
-            flags: INPUT_FAULT,
+        self.stats.safety_events += report
+            .events
+            .iter()
+            .filter(|event| !event.kind.is_good_news())
+            .count() as u64;
+        let reading = &report.reading;
+        self.stats.faulty_ticks += u64::from(reading.fault.is_some());
+        let sample = &reading.sample;
+        let age = match reading.fault {
+            None => now.saturating_sub(sample.time).as_nanos() as u64,
+            Some(_) => 0,
         };
-        let mut notice = event.map(Notice::Safety);
-        match reading {
-            Ok(sample) => {
-                self.energy.step(&sample.pose, &wrench);
-                self.last_pose = sample.pose;
-                self.fault = None;
-                let age = now.saturating_sub(sample.time).as_nanos() as u64;
-                input.sample_time_ns = session_ns.saturating_sub(age);
-                input.pose = PoseF64::from_isometry(&sample.pose);
-                input.velocity = sample.velocity.into();
-                input.buttons = sample.buttons;
-                input.flags = 0;
-            }
-            Err(fault) => {
-                self.stats.faulty_ticks += 1;
-                if self.fault.replace(fault).is_none() {
-                    notice = Some(Notice::Fault(fault));
-                }
-            }
+        let faulty = reading.fault.map_or(0, |_| INPUT_FAULT);
+        let at_edge = self.edge.as_ref().map_or(0, |_| INPUT_AT_EDGE);
+        TickOutput {
+            input: InputSample {
+                sample_time_ns: session_ns.saturating_sub(age),
+                index,
+                pose: PoseF64::from_isometry(&sample.pose),
+                velocity: sample.velocity.into(),
+                buttons: sample.buttons,
+                flags: faulty | at_edge,
+                rendered: report.wrench.into(),
+                set_sequence: self
+                    .edge
+                    .as_ref()
+                    .and_then(|edge| edge.sequence())
+                    .unwrap_or(0),
+            },
+            events: report.events,
         }
-        TickOutput { input, notice }
     }
 
     /// Takes a command that is newer than the last one.
@@ -207,37 +221,39 @@ impl BridgeLoop {
             self.stats.round_trip.record(now.saturating_sub(taken));
         }
     }
+}
 
-    /// The newest command as the device may render it.
-    fn safe_wrench(&mut self, now: Duration) -> (Vector6<f64>, Option<SafetyEvent>) {
-        let Some(Arrival { command, received }) = self.newest else {
-            return (Vector6::zeros(), None);
-        };
-        let commanded = if command.flags & WRENCH_PAUSED == 0 {
-            Vector6::from(command.wrench)
-        } else {
-            Vector6::zeros()
-        };
-        let safe = self.safety.step(now, &commanded, received);
-        (safe.wrench, safe.event)
-    }
+/// The command that arrived, for the port.
+fn command(arrival: &Arrival) -> Command {
+    let wrench = if arrival.command.flags & WRENCH_PAUSED == 0 {
+        Vector6::from(arrival.command.wrench)
+    } else {
+        Vector6::zeros()
+    };
+    Command::fresh(arrival.received, wrench)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::{Device, Pose};
     use crate::devices::{
         AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
     };
-    use crate::safety::SafetySettings;
+    use crate::port::{EventKind, SafetySettings};
+    use nalgebra::Point3;
 
     fn ms(time: u64) -> Duration {
         Duration::from_millis(time)
     }
 
     fn bridge(device: impl Device + 'static) -> BridgeLoop {
-        let safety = Safety::new(SafetySettings::default());
-        BridgeLoop::new(Box::new(device), safety, Point3::origin())
+        BridgeLoop::new(DevicePort::new(
+            Box::new(device),
+            SafetySettings::default(),
+            Point3::origin(),
+            &Pose::identity(),
+        ))
     }
 
     fn simulated() -> SimulatedDevice {
@@ -284,11 +300,12 @@ mod tests {
         let mut told = Vec::new();
         for tick in 1001..=1300 {
             let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
-            told.extend(output.notice);
-            let felt = bridge.safe_wrench(ms(tick)).0.norm();
+            told.extend(output.events.iter().copied());
+            let felt = bridge.port().rendered().norm();
             assert_eq!(felt == 0.0, tick >= 1120, "{felt} N at {tick} ms");
         }
-        assert_eq!(told, [Notice::Safety(SafetyEvent::Stale { age: ms(21) })]);
+        let told: Vec<_> = told.iter().map(|e| (e.kind, e.time, e.value)).collect();
+        assert_eq!(told, [(EventKind::ForceStale, ms(1021), 0.021)]);
     }
 
     #[test]
@@ -304,7 +321,7 @@ mod tests {
             };
             let _ = bridge.tick(ms(tick), 0, Some(repeated));
         }
-        assert_eq!(bridge.safe_wrench(ms(1200)).0, Vector6::zeros());
+        assert_eq!(*bridge.port().rendered(), Vector6::zeros());
         assert_eq!(bridge.stats().wrenches, 1000);
     }
 
@@ -337,8 +354,11 @@ mod tests {
                 .iter()
                 .all(|output| output.input.flags == INPUT_FAULT)
         );
-        let notices: Vec<_> = outputs.iter().filter_map(|output| output.notice).collect();
-        assert_eq!(notices, [Notice::Fault(DeviceFault::Ended)]);
+        let told: Vec<_> = outputs
+            .iter()
+            .flat_map(|output| output.events.iter().map(|event| event.kind))
+            .collect();
+        assert_eq!(told, [EventKind::DeviceEnded]);
         assert_eq!(bridge.fault(), Some(DeviceFault::Ended));
         // The last good pose goes on being sent, flagged.
         assert_eq!(outputs[19].input.pose.position[2], 0.01);
@@ -350,14 +370,20 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
         }
-        bridge.begin_session();
-        // The new server's clock starts at zero: its commands count although their time is smaller.
-        let first = Arrival {
-            received: ms(1001),
-            ..push(1, 5.0, 0)
-        };
-        let _ = bridge.tick(ms(1001), 0, Some(first));
-        assert_eq!(bridge.safe_wrench(ms(1001)).0, Vector6::zeros());
-        assert_eq!(bridge.stats().wrenches, 1001);
+        bridge.begin_session(None);
+        // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
+        // limit, and what comes ramps in.
+        let mut lowest = f64::INFINITY;
+        for tick in 1001..=1100 {
+            let first = Arrival {
+                received: ms(tick),
+                ..push(tick - 1000, 5.0, 0)
+            };
+            let _ = bridge.tick(ms(tick), 0, Some(first));
+            lowest = lowest.min(bridge.port().rendered().norm());
+        }
+        assert!(lowest < 0.2, "{lowest} N");
+        assert!(bridge.port().rendered().norm() < 1.01);
+        assert_eq!(bridge.stats().wrenches, 1100);
     }
 }

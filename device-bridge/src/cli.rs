@@ -2,17 +2,19 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
+use std::time::Duration;
 
 use taut_link::Transport;
 
 use crate::bridge::{BridgeError, run};
+use crate::choice::{DeviceChoice, drivers_help};
 use crate::devices::HandPreset;
+use crate::port::{Passivity, PassivitySettings, Rearm, SafetySettings};
 
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = "Example: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.
@@ -27,7 +29,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "NAME", default_value = "bridge")]
     pub node: String,
 
-    /// Device: `simulated`, or `trace:FILE` to replay a recorded one.
+    /// Device: `simulated`, `trace:FILE`, `space-mouse`, `vrpn:TRACKER@HOST`; options below.
     #[arg(long, value_name = "D", default_value = "simulated")]
     pub device: DeviceChoice,
 
@@ -60,11 +62,16 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "T", default_value = "udp", value_parser = parse_transport)]
     pub transport: Transport,
 
+    /// Where the force is computed: `edge`, beside the device, so that it never waits for the network; or `server`. Without it, edge
+    /// where the server offers that.
+    #[arg(long, value_name = "WHERE", value_enum)]
+    pub coupling: Option<CouplingChoice>,
+
     /// When the server is lost, try again until --duration is over instead of ending.
     #[arg(long)]
     pub reconnect: bool,
 
-    /// Real-time priority of the device loop, 1 to 99; 0 asks for none.
+    /// Real-time priority of the device loop, 1 to 99; 0 asks for no real time at all.
     #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]
     pub priority: u8,
 
@@ -72,34 +79,115 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
 
+    /// Limits of the force.
+    #[command(flatten)]
+    pub safety: SafetyArgs,
+
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
 }
 
-/// Which device a bridge reads.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum DeviceChoice {
-    /// [`crate::SimulatedDevice`].
-    Simulated,
-    /// [`crate::RecordedDevice`] of a trace file.
-    Trace(PathBuf),
+/// Where the force is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum CouplingChoice {
+    /// Beside the device, from constraint sets.
+    Edge,
+    /// At the server; the force travels.
+    Server,
 }
 
-/// A word that names no device.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no device `{0}`; use simulated or trace:FILE")]
-pub struct UnknownDevice(String);
+/// What no force may pass: docs/safety.md.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Safety")]
+pub struct SafetyArgs {
+    /// Largest norm of the force, in N; the device's own limit holds too.
+    #[arg(long, value_name = "N", default_value_t = 20.0)]
+    pub max_force: f64,
 
-impl FromStr for DeviceChoice {
-    type Err = UnknownDevice;
+    /// Largest norm of the torque, in N m; the device's own limit holds too.
+    #[arg(long, value_name = "NM", default_value_t = 0.5)]
+    pub max_torque: f64,
 
-    fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        match text.split_once(':') {
-            None if text == "simulated" => Ok(Self::Simulated),
-            Some(("trace", file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
-            _ => Err(UnknownDevice(text.to_owned())),
+    /// Fastest change of the force, in N per ms.
+    #[arg(long, value_name = "N/MS", default_value_t = SafetySettings::FORCE_RATE * 1e-3)]
+    pub force_slew: f64,
+
+    /// Fastest change of the torque, in N m per ms.
+    #[arg(long, value_name = "NM/MS", default_value_t = SafetySettings::TORQUE_RATE * 1e-3)]
+    pub torque_slew: f64,
+
+    /// Who arms at the start and after a fault: automatic or manual (console, button). Without it a simulated hand and a trace arm by
+    /// themselves, and any other device waits for a person.
+    #[arg(long, value_name = "WHO", value_parser = parse_rearm)]
+    pub rearm: Option<Rearm>,
+
+    /// Button, counted from 0, that must be held for any force.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..16))]
+    pub dead_man: Option<u8>,
+
+    /// Button, counted from 0, whose press arms.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..16))]
+    pub arm_button: Option<u8>,
+
+    /// Damp away energy that comes out of the device.
+    #[arg(long)]
+    pub passivity_control: bool,
+}
+
+impl SafetyArgs {
+    /// As the port takes them. `nobody_is_hurt` by the device if it arms by itself.
+    pub(crate) fn settings(&self, rate_hz: f64, nobody_is_hurt: bool) -> SafetySettings {
+        let default = SafetySettings::default();
+        SafetySettings {
+            max_force: self.max_force,
+            max_torque: self.max_torque,
+            force_rate: self.force_slew * 1e3,
+            torque_rate: self.torque_slew * 1e3,
+            period: Duration::from_secs_f64(rate_hz.recip()),
+            rearm: self.rearm.unwrap_or(if nobody_is_hurt {
+                Rearm::Automatic
+            } else {
+                Rearm::Manual
+            }),
+            dead_man: self.dead_man,
+            arm_button: self.arm_button,
+            passivity: PassivitySettings {
+                mode: if self.passivity_control {
+                    Passivity::Control
+                } else {
+                    Passivity::Observe
+                },
+                ..default.passivity
+            },
+            ..default
         }
+    }
+}
+
+fn parse_rearm(text: &str) -> Result<Rearm, String> {
+    match text {
+        "automatic" => Ok(Rearm::Automatic),
+        "manual" => Ok(Rearm::Manual),
+        _ => Err(format!(
+            "nobody called `{text}` arms; use automatic or manual"
+        )),
+    }
+}
+
+impl BridgeArgs {
+    /// The arguments of `taut bridge --server SERVER --node NODE`, all others as when they are left out.
+    #[must_use]
+    pub fn joining(server: &str, node: &str) -> Option<Self> {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            args: BridgeArgs,
+        }
+        let server = format!("--server={server}");
+        let node = format!("--node={node}");
+        let line = <Line as clap::Parser>::try_parse_from(["taut-bridge", &server, &node]);
+        line.ok().map(|line| line.args)
     }
 }
 
@@ -161,6 +249,19 @@ mod tests {
         assert_eq!(args.device, DeviceChoice::Simulated);
         assert_eq!(args.hand, HandPreset::Light);
         assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
+        assert_eq!(args.coupling, None);
+        let args = parse(&["--server", "pc:1", "--coupling", "edge"]).expect("valid");
+        assert_eq!(args.coupling, Some(CouplingChoice::Edge));
+    }
+
+    #[test]
+    fn arguments_can_be_made_without_a_command_line() {
+        let args = BridgeArgs::joining("pc:4857", "wall-hand").expect("valid");
+        assert_eq!(
+            (args.server.as_str(), args.node.as_str()),
+            ("pc:4857", "wall-hand")
+        );
+        assert_eq!(args.rate, 1000.0);
     }
 
     #[test]
@@ -186,10 +287,11 @@ mod tests {
     #[test]
     fn a_wrong_word_is_answered_with_the_right_ones() {
         for (words, part) in [
-            (["--device", "spidar"], "use simulated or trace:FILE"),
-            (["--device", "trace:"], "use simulated or trace:FILE"),
+            (["--device", "simulator"], "did you mean `simulated`?"),
+            (["--device", "trace:"], "write trace:FILE"),
             (["--hand", "fist"], "use released, light, firm or arm"),
             (["--transport", "tcp"], "use udp or quic"),
+            (["--rearm", "never"], "use automatic or manual"),
         ] {
             let words = ["--server", "pc:1", words[0], words[1]];
             let error = parse(&words).expect_err("a wrong word").to_string();

@@ -7,10 +7,9 @@
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::Vector6;
 
-/// An element of SE(3), world from body: m and unit quaternion.
-pub type Pose = Isometry3<f64>;
+pub use taut_plant::Pose;
 
 /// A source of device poses that can be pushed with a wrench.
 ///
@@ -28,8 +27,23 @@ pub trait Device: Send {
 
     /// Renders `wrench` on the user's hand from `now` until the next call (zero-order hold).
     ///
-    /// The caller has made the wrench safe ([`crate::Safety`]); a driver still refuses what is not finite.
+    /// The one caller is [`crate::DevicePort`], which has made the wrench safe; a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
+
+    /// What the hand feels as of the last reading, where the device is far away and tells; `None` where that is what
+    /// [`Device::write`] says.
+    fn felt(&self) -> Option<Felt> {
+        None
+    }
+}
+
+/// What a device at the far end of a network renders.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Force then torque on the hand at the reference point, N and N m, world axes.
+    pub wrench: Vector6<f64>,
+    /// It is computed there, from constraint sets.
+    pub at_edge: bool,
 }
 
 /// What a device is: its name and its limits.
@@ -112,7 +126,41 @@ pub enum DeviceFault {
     /// Another bridge, or the same one anew, has taken over: the pose may have jumped.
     #[error("the device bridge has just reconnected; the force ramps in again")]
     Reconnected,
+    /// A string-driven device has no pose that may be trusted.
+    #[error("{0}")]
+    Strings(taut_spidar::StringFault),
     /// A recorded trace came to its end.
     #[error("the recorded trace ended; loop it or hold its last pose to go on")]
     Ended,
+    /// The pose jumped faster than a hand moves.
+    #[error(
+        "the device jumped at {speed:.1} m/s, faster than a hand moves; check its sensors and calibrate it"
+    )]
+    Teleported {
+        /// Distance over time since the sample before, m/s.
+        speed: f64,
+    },
+    /// The pose turned faster than a hand turns.
+    #[error(
+        "the device turned at {rate:.1} rad/s, faster than a hand turns; check its sensors and calibrate it"
+    )]
+    SpunTooFast {
+        /// Angle over time since the sample before, rad/s.
+        rate: f64,
+    },
+    /// Out of a movement, the same pose to the bit again and again.
+    #[error(
+        "the device froze {} ms ago in the middle of a movement; check its cable, or move it if it stands at an end stop",
+        time.as_millis()
+    )]
+    Frozen {
+        /// Since the last change of the pose.
+        time: Duration,
+    },
+    /// A sample is older than the one before it.
+    #[error("the device's time stamps went back by {:.1} ms; restart the device", by.as_secs_f64() * 1e3)]
+    TimeWentBack {
+        /// By how much.
+        by: Duration,
+    },
 }

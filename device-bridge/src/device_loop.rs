@@ -9,10 +9,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
+use taut_link::proto::ConstraintSet;
 use taut_link::{ClientCounters, ClientLink};
 
-use crate::bridge_loop::{Arrival, BridgeLoop, Notice};
+use crate::arm_switch::{ArmSwitch, ArmWish};
+use crate::bridge_loop::{Arrival, BridgeLoop};
 use crate::device::DeviceFault;
+use crate::port::SafetyEvent;
 use crate::realtime::{self, RealtimeGrant, Ticker, monotonic_now};
 use crate::report::Durations;
 
@@ -20,7 +23,8 @@ use crate::report::Durations;
 pub(crate) struct DeviceLoop {
     pub(crate) link: Arc<ClientLink>,
     pub(crate) end: Arc<AtomicBool>,
-    pub(crate) notices: SyncSender<Notice>,
+    pub(crate) wishes: Arc<ArmSwitch>,
+    pub(crate) notices: SyncSender<SafetyEvent>,
     pub(crate) period: Duration,
     pub(crate) priority: u8,
     pub(crate) core: Option<usize>,
@@ -32,6 +36,7 @@ impl DeviceLoop {
         self.request_realtime();
         let mut ticker = Ticker::new(self.period);
         let mut last = None;
+        let mut set = ConstraintSet::new();
         while !self.end.load(Ordering::Relaxed) {
             self.totals.missed += ticker.wait();
             let now = monotonic_now();
@@ -46,22 +51,37 @@ impl DeviceLoop {
                 command: wrench.command,
                 received: now.saturating_sub(wrench.received.elapsed()),
             });
+            if bridge.couples()
+                && let Some(confirmed) = self.link.newest_set(&mut set)
+            {
+                let received = now.saturating_sub(confirmed.elapsed());
+                bridge.take_set(&set, received, session_ns);
+            }
+            match self.wishes.take() {
+                Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
+                Some(ArmWish::Disarm) => bridge.port_mut().ask_to_disarm(),
+                None => {}
+            }
             let output = bridge.tick(now, session_ns, arrival);
             self.link.send_input(&output.input);
-            if let Some(notice) = output.notice {
-                let _ = self.notices.try_send(notice); // full: dropped, and counted in the report
+            for event in output.events.iter() {
+                let _ = self.notices.try_send(*event); // full: dropped, and counted in the report
             }
             if bridge.fault() == Some(DeviceFault::Ended) {
                 break;
             }
         }
-        bridge.stop(monotonic_now());
+        // Nothing is left on the hand, and nothing drops at once.
+        while !bridge.port_mut().release_step(monotonic_now()) {
+            self.totals.missed += ticker.wait();
+        }
     }
 
     /// Asks for this thread; what was granted is told in the report, and what not also in the log.
     fn request_realtime(&mut self) {
-        let mut grants = vec![realtime::sharpen_timers(), realtime::lock_memory()];
+        let mut grants = vec![realtime::sharpen_timers()];
         if self.priority > 0 {
+            grants.push(realtime::lock_memory());
             grants.push(realtime::request_fifo(self.priority));
         }
         grants.extend(self.core.map(realtime::pin_to_core));

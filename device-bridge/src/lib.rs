@@ -3,32 +3,53 @@
 //! Used by the server's haptics loop and by `taut bridge` (here the thin binary `taut-bridge`).
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
-//! - [`Safety`]: what every wrench passes before a motor.
+//! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
+//! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
+//! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
 
+mod arm_switch;
 mod bridge;
 mod bridge_loop;
+mod choice;
 mod cli;
 mod device;
 mod device_loop;
 mod devices;
-mod energy;
+pub mod edge;
+mod placement;
+mod port;
 pub mod realtime;
 mod report;
-mod safety;
 mod trace_file;
+mod vrpn;
 
-pub use bridge::{BridgeError, run};
-pub use cli::{BridgeArgs, DeviceChoice, UnknownDevice, execute};
-pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
-pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Grip, Hand, HandPreset, MinJerkPath, PathError, Progress,
-    RecordedDevice, RemoteDevice, SimulatedDevice, Trace, TraceError, TraceRow, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, min_jerk,
+pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
+pub use bridge::{BridgeError, run, run_device};
+pub use choice::{
+    DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
 };
-pub use energy::EnergyObserver;
+pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
+pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
+pub use devices::{
+    Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
+    Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,
+    VrpnDevice, VrpnSettings,
+};
+pub use devices::{
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, MAX_EDGE_DELAY, MinJerkPath, Motors,
+    PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
+    SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
+    min_jerk,
+};
+pub use placement::Placement;
+pub use port::{
+    ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,
+    Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings, TickReport,
+    UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
+};
 pub use report::{BridgeReport, Quantiles};
-pub use safety::{SafeWrench, Safety, SafetyEvent, SafetySettings};
 pub use trace_file::{TraceFileError, read_trace, via_points};
+pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

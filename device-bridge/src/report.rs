@@ -69,6 +69,14 @@ pub struct BridgeReport {
     pub missed_periods: u64,
     /// From tick to tick; None before the second tick.
     pub period_us: Option<Quantiles>,
+    /// Where the force was computed in the last session: edge or server.
+    pub coupling: String,
+    /// Constraint sets taken.
+    pub sets: u64,
+    /// Constraint sets that made no sense.
+    pub broken_sets: u64,
+    /// Session time from making a constraint set to its first use; None while the clocks were not locked.
+    pub set_age_us: Option<Quantiles>,
     /// Commands received and taken.
     pub wrenches: u64,
     /// Session time from making a command to its use; None while the clocks were not locked.
@@ -104,11 +112,13 @@ impl fmt::Display for BridgeReport {
         writeln!(out, "{} at {}: {}", self.device, self.server, self.ended)?;
         writeln!(
             out,
-            "{} ticks in {:.1} s, {} missed; {} wrenches; {} packets out, {} in, {} lost; {} session(s)",
+            "{} ticks in {:.1} s, {} missed; force from the {}, {} wrenches, {} constraint sets; {} packets out, {} in, {} lost; {} session(s)",
             self.ticks,
             self.duration_s,
             self.missed_periods,
+            self.coupling,
             self.wrenches,
+            self.sets,
             self.packets_sent,
             self.packets_received,
             self.packets_lost,
@@ -118,6 +128,7 @@ impl fmt::Display for BridgeReport {
             ("period", &self.period_us),
             ("wrench age", &self.wrench_age_us),
             ("round trip", &self.round_trip_us),
+            ("constraint set age", &self.set_age_us),
         ] {
             if let Some(q) = quantiles {
                 writeln!(

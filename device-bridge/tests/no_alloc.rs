@@ -4,68 +4,80 @@ use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
+use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
-    AtEnd, DEFAULT_MAX_AGE, Device, DeviceLimits, EnergyObserver, Grip, Hand, MinJerkPath, Pose,
-    RecordedDevice, RemoteDevice, Safety, SafetySettings, SimulatedDevice, TraceRow, Tremor,
+    AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, Grip, Hand, MinJerkPath,
+    Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
+    SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
-use taut_link::proto::{InputSample, PoseF64};
+use taut_link::proto::constraints::ConstraintRow;
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSolver, EdgeSurface};
+use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
 
 #[global_allocator]
 static HEAP: AllocDisabler = AllocDisabler;
 
-/// Two seconds of reading, safety, energy and writing, with a silence in the middle.
-fn drive(device: &mut dyn Device, before_read: &mut dyn FnMut(u64)) {
-    let mut safety = Safety::new(SafetySettings::default());
-    let mut energy = EnergyObserver::new(Point3::origin());
-    let mut good = 0;
+/// Two seconds of ticks, with a silence in the middle, damping on, and events on the way.
+fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {
+    let settings = SafetySettings {
+        passivity: PassivitySettings {
+            mode: Passivity::Control,
+            ..PassivitySettings::default()
+        },
+        ..SafetySettings::default()
+    };
+    let start = Pose::identity();
+    let mut port = DevicePort::new(Box::new(device), settings, Point3::origin(), &start);
+    let (mut good, mut felt, mut told) = (0, 0, 0);
     assert_no_alloc(|| {
         for tick in 0..2000 {
             let now = Duration::from_millis(tick);
-            before_read(tick);
-            if let Ok(sample) = device.read(now) {
-                good += 1;
-                let command = Vector6::repeat(sample.pose.translation.vector.z * 1e3);
-                let made = if (500..900).contains(&tick) {
-                    Duration::ZERO
-                } else {
-                    now
-                };
-                let safe = safety.step(now, &command, made);
-                device.write(now, &safe.wrench);
-                energy.step(&sample.pose, &safe.wrench);
-            }
+            before_tick(tick);
+            let report = port.tick(now, |reading| {
+                let wrench = Vector6::repeat(reading.sample.pose.translation.vector.z * 1e3 + 1.0);
+                let mut command = Command::fresh(now, wrench);
+                if (500..900).contains(&tick) {
+                    command.made = Duration::ZERO;
+                }
+                Some(command)
+            });
+            good += u32::from(report.reading.fault.is_none());
+            felt += u32::from(report.wrench != Vector6::zeros());
+            told += report.events.iter().count();
         }
     });
-    assert!(good > 1000);
+    assert!(
+        good > 1000 && felt > 500 && told > 2,
+        "{good}, {felt}, {told}"
+    );
 }
 
 #[test]
 fn a_simulated_device_does_not_allocate() {
     let path = MinJerkPath::sway(Pose::translation(0.0, 0.1, 0.02), 0.03, 0.7);
-    let mut device = SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, path, Point3::origin())
+    let device = SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, path, Point3::origin())
         .with_tremor(Tremor::new(Tremor::TYPICAL_RMS, 4));
-    drive(&mut device, &mut |_| {});
+    drive(device, &mut |_| {});
 }
 
 #[test]
 fn a_recorded_device_does_not_allocate() {
     let row = |index: u32| TraceRow {
         time_s: f64::from(index) * 0.013,
-        pose: Pose::translation(0.0, 0.0, f64::from(index % 7)),
+        pose: Pose::translation(0.0, 0.0, 1e-2 * f64::from(index % 3)),
         buttons: 0,
     };
     let trace = (0..100).map(row).collect();
     let device = RecordedDevice::new(trace, AtEnd::Loop, Point3::origin());
-    drive(&mut device.expect("a valid trace"), &mut |_| {});
+    drive(device.expect("a valid trace"), &mut |_| {});
 }
 
 #[test]
 fn a_remote_device_does_not_allocate() {
     let (mut inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
-    let (mut device, _commands) =
-        RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
-    drive(&mut device, &mut |tick| {
+    let (device, _commands) = RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
+    drive(device, &mut |tick| {
         inputs.write(Some(DeviceInput {
             sample: InputSample {
                 sample_time_ns: 0,
@@ -74,9 +86,73 @@ fn a_remote_device_does_not_allocate() {
                 velocity: [0.0; 6],
                 buttons: 0,
                 flags: 0,
+                rendered: [0.0; 6],
+                set_sequence: 0,
             },
             received_ns: tick * 1_000_000,
             session: 1,
         }));
     });
+}
+
+#[test]
+fn coupling_at_the_edge_does_not_allocate() {
+    let surface = |friction| EdgeSurface {
+        pose: PoseF64::IDENTITY,
+        friction,
+        sine: None,
+    };
+    let offer = EdgeCoupling {
+        mass: 1.0,
+        inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
+        reference_point: [0.0; 3],
+        radius: 0.02,
+        k_s: 0.5,
+        k_h: 2000.0,
+        radius_of_gyration: None,
+        adaptation: Some(EdgeAdaptation {
+            duration: 0.02,
+            threshold: -1e-3,
+        }),
+        look_ahead: true,
+        passive: true,
+        force_limit: 20.0,
+        torque_limit: 0.5,
+        rest_distance: 4e-6,
+        motion_tolerance: 2e-8,
+        max_constraints: 1024,
+        implicit_rounds: 2,
+        solver: EdgeSolver::ActiveSet,
+        set_rate_hz: 1000.0,
+        obstacles: vec![surface(0.0), surface(0.3)],
+    };
+    let mut coupler = EdgeCoupler::new(&offer).expect("an offer");
+    // Rows come and go, up to the capacity; half of them are rough.
+    let sets: Vec<ConstraintSet> = (0..200_u16)
+        .map(|k| {
+            let mut set = ConstraintSet::new();
+            set.head.sequence = u64::from(k);
+            let rows = if k == 100 { 1024 } else { k % 40 };
+            set.rows.extend((0..rows).map(|row| ConstraintRow {
+                obstacle: row % 2,
+                arm: [f32::from(row % 7) * 1e-3, 0.0, -0.02],
+                normal: [0.0, 0.0, 1.0],
+                ..ConstraintRow::default()
+            }));
+            set.rows.sort_by_key(|row| row.obstacle);
+            set
+        })
+        .collect();
+    let mut forces = 0;
+    assert_no_alloc(|| {
+        for (tick, set) in (0..).zip(&sets) {
+            let now = Duration::from_millis(tick);
+            let pose = Pose::translation(0.0, 1e-5 * tick as f64, -1e-3);
+            let taken = coupler.take(set, now);
+            let felt = coupler.step(now, &pose);
+            let pushes = felt.is_some_and(|felt| felt.wrench[2] > 0.0);
+            forces += u32::from(taken.is_ok() && pushes);
+        }
+    });
+    assert!(forces > 100, "{forces}");
 }

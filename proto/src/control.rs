@@ -11,12 +11,14 @@
 //! | 7      | tag     | 1     | which message                        |
 //! | 8      | body    |       | its fields                           |
 //!
-//! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, or `Refused`. There is no challenge:
+//! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, to a device bridge also `Coupling`, or
+//! `Refused`. There is no challenge:
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
 //! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
 
 use crate::{
-    ClientStats, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION, SceneDescription,
+    ClientStats, CouplingOffer, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION,
+    SceneDescription,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
     version::MAGIC,
 };
@@ -149,6 +151,13 @@ pub struct LogEvent {
     pub text: String,
 }
 
+/// An operator wants force at the device, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArmRequest {
+    /// Force, or none.
+    pub arm: bool,
+}
+
 /// Last words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
@@ -168,11 +177,13 @@ pub enum ControlMessage {
     Hello(Hello),
     Welcome(Welcome),
     Scene(SceneDescription),
+    Coupling(CouplingOffer),
     MeshRequest(MeshRequest),
     MeshHeader(MeshHeader),
     Stats(ClientStats),
     Log(LogEvent),
     Bye(Bye),
+    Arm(ArmRequest),
 }
 
 impl ControlMessage {
@@ -183,11 +194,13 @@ impl ControlMessage {
             ControlMessage::Hello(_) => "Hello",
             ControlMessage::Welcome(_) => "Welcome",
             ControlMessage::Scene(_) => "Scene",
+            ControlMessage::Coupling(_) => "Coupling",
             ControlMessage::MeshRequest(_) => "MeshRequest",
             ControlMessage::MeshHeader(_) => "MeshHeader",
             ControlMessage::Stats(_) => "Stats",
             ControlMessage::Log(_) => "Log",
             ControlMessage::Bye(_) => "Bye",
+            ControlMessage::Arm(_) => "Arm",
         }
     }
 
@@ -260,6 +273,7 @@ macro_rules! wire_messages {
 wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10,
 }
 
 wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
@@ -289,3 +303,4 @@ wire_struct!(MeshRequest { hash });
 wire_struct!(MeshHeader { hash, length });
 wire_struct!(LogEvent { level, text });
 wire_struct!(Bye { reason });
+wire_struct!(ArmRequest { arm });

@@ -1,7 +1,7 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
+    ConstraintPart, DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
     codec::{decode, encode_into},
     time::{TimeRequest, TimeResponse},
 };
@@ -25,6 +25,8 @@ pub enum Payload {
     Input(InputSample),
     /// Command to the device.
     Wrench(WrenchCommand),
+    /// Part of a constraint set.
+    Constraints(ConstraintPart),
 }
 
 impl Payload {
@@ -37,6 +39,7 @@ impl Payload {
             Payload::Heartbeat => Kind::Heartbeat,
             Payload::Input(_) => Kind::Input,
             Payload::Wrench(_) => Kind::Wrench,
+            Payload::Constraints(_) => Kind::Constraints,
         }
     }
 
@@ -49,6 +52,7 @@ impl Payload {
             Payload::Heartbeat => Ok(0),
             Payload::Input(value) => encode_into(value, buffer),
             Payload::Wrench(value) => encode_into(value, buffer),
+            Payload::Constraints(value) => encode_into(value, buffer),
         }
     }
 
@@ -62,6 +66,7 @@ impl Payload {
             Kind::Heartbeat => return Err(DecodeError::TrailingBytes { left: bytes.len() }),
             Kind::Input => Payload::Input(decode(bytes)?),
             Kind::Wrench => Payload::Wrench(decode(bytes)?),
+            Kind::Constraints => Payload::Constraints(decode(bytes)?),
         })
     }
 }

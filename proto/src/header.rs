@@ -38,6 +38,8 @@ pub enum Kind {
     Input,
     /// [`crate::WrenchCommand`], server to device bridge.
     Wrench,
+    /// [`crate::ConstraintPart`], server to device bridge.
+    Constraints,
 }
 
 impl Kind {
@@ -49,6 +51,7 @@ impl Kind {
             Kind::Heartbeat => 7,
             Kind::Input => 8,
             Kind::Wrench => 9,
+            Kind::Constraints => 10,
         }
     }
 
@@ -60,6 +63,7 @@ impl Kind {
             7 => Ok(Kind::Heartbeat),
             8 => Ok(Kind::Input),
             9 => Ok(Kind::Wrench),
+            10 => Ok(Kind::Constraints),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

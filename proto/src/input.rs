@@ -15,12 +15,18 @@ pub struct InputSample {
     pub velocity: [f64; 6],
     /// Buttons, bit 0 the first.
     pub buttons: u16,
-    /// Bit 0: the device reports a fault.
+    /// [`INPUT_FAULT`], [`INPUT_AT_EDGE`].
     pub flags: u16,
+    /// What the device renders from this reading on: force then torque at the reference point, N and N m, scene axes.
+    pub rendered: [f64; 6],
+    /// Constraint set that `rendered` rests on; 0 where the bridge does not couple.
+    pub set_sequence: u64,
 }
 
 /// [`InputSample::flags`]: the device reports a fault.
 pub const INPUT_FAULT: u16 = 1;
+/// [`InputSample::flags`]: the bridge couples by itself and wants constraint sets instead of wrenches.
+pub const INPUT_AT_EDGE: u16 = 2;
 
 wire_struct!(InputSample {
     sample_time_ns,
@@ -28,5 +34,7 @@ wire_struct!(InputSample {
     pose,
     velocity,
     buttons,
-    flags
+    flags,
+    rendered,
+    set_sequence
 });

@@ -3,7 +3,7 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Every byte goes through [`codec`]: little-endian, fixed size integers, explicit limits, no number that is not finite.
@@ -12,7 +12,10 @@
 
 pub mod clock;
 pub mod codec;
+pub mod constraint_parts;
+pub mod constraints;
 pub mod control;
+pub mod coupling;
 pub mod datagram;
 pub mod header;
 pub mod input;
@@ -32,7 +35,10 @@ pub mod wrench;
 pub use arrayvec::ArrayVec;
 pub use clock::{ClockFilter, SessionTime};
 pub use codec::{DecodeError, EncodeError};
+pub use constraint_parts::{Assembler, Division, PartTaken};
+pub use constraints::{ConstraintPart, ConstraintSet};
 pub use control::{ControlMessage, Refusal, Role, Transport};
+pub use coupling::{CouplingOffer, EdgeCoupling};
 pub use datagram::Payload;
 pub use header::{Header, Kind};
 pub use input::InputSample;

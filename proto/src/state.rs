@@ -155,6 +155,28 @@ pub mod event_code {
     pub const FAULT: u32 = 5;
     /// Forces are given again.
     pub const RESUMED: u32 = 6;
+    /// Events of the device port: this plus their number (`taut_bridge::EventKind`), below [`SAFETY_END`]; the upper 16 bits hold how
+    /// much, in thousandths of the kind's unit, at most 65535 of them.
+    pub const SAFETY: u32 = 0x100;
+    /// One above the codes of the device port.
+    pub const SAFETY_END: u32 = 0x200;
+    /// Where the amount of a device port's event begins, as the number of a button does.
+    pub const VALUE_SHIFT: u32 = 16;
+
+    /// The code of an event of the device port.
+    pub fn safety(kind: u8, value: f64) -> u32 {
+        // `as` saturates, and takes NaN for zero.
+        let thousandths = (value.abs() * 1e3).round() as u16;
+        (SAFETY + u32::from(kind)) | u32::from(thousandths) << VALUE_SHIFT
+    }
+
+    /// Kind and amount of an event of the device port, if the code is that of one.
+    pub fn safety_of(code: u32) -> Option<(u8, f64)> {
+        let low = code & 0xffff;
+        let kind = (SAFETY..SAFETY_END).contains(&low).then(|| low - SAFETY)?;
+        let value = f64::from(code >> VALUE_SHIFT) * 1e-3;
+        u8::try_from(kind).ok().map(|kind| (kind, value))
+    }
 }
 
 /// [`HeadState::flags`]: the head is tracked.

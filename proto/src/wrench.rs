@@ -11,12 +11,14 @@ pub struct WrenchCommand {
     pub input_index: u64,
     /// Force then torque on the user's hand at the reference point, N and N m, scene axes, limited already.
     pub wrench: [f64; 6],
-    /// Bit 0: paused, the wrench is zero.
+    /// [`WRENCH_PAUSED`], [`WRENCH_AT_EDGE`].
     pub flags: u16,
 }
 
 /// [`WrenchCommand::flags`]: paused.
 pub const WRENCH_PAUSED: u16 = 1;
+/// [`WrenchCommand::flags`]: the bridge couples by itself; what goes to it is constraint sets, not this.
+pub const WRENCH_AT_EDGE: u16 = 2;
 
 wire_struct!(WrenchCommand {
     time_ns,

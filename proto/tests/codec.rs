@@ -298,7 +298,7 @@ proptest! {
 
     #[test]
     fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
-        for kind in [Kind::Hot, Kind::TimeRequest, Kind::TimeResponse, Kind::Heartbeat, Kind::Input, Kind::Wrench] {
+        for kind in [Kind::Hot, Kind::TimeRequest, Kind::TimeResponse, Kind::Heartbeat, Kind::Input, Kind::Wrench, Kind::Constraints] {
             // What can be read must be writable again, to the same bytes: no two encodings of one value, but for rounded normals.
             if let Ok(payload) = Payload::decode(kind, &bytes) && kind != Kind::Hot {
                 prop_assert_eq!(bytes_of(&payload), bytes.clone());
@@ -309,7 +309,7 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bodies_under_a_good_prefix_never_panic(tag in 0_u8..10, body in prop::collection::vec(any::<u8>(), 0..600)) {
+    fn arbitrary_bodies_under_a_good_prefix_never_panic(tag in 0_u8..12, body in prop::collection::vec(any::<u8>(), 0..600)) {
         let mut frame = vec![0x57, 0x48, PROTOCOL_VERSION, tag];
         frame.extend(&body);
         if let Ok(message) = ControlMessage::from_frame_body(&frame) {
@@ -318,7 +318,7 @@ proptest! {
     }
 
     #[test]
-    fn bent_samples_never_panic(which in 0_usize..9, at in any::<prop::sample::Index>(), byte in any::<u8>()) {
+    fn bent_samples_never_panic(which in 0_usize..12, at in any::<prop::sample::Index>(), byte in any::<u8>()) {
         let (_, message) = messages().swap_remove(which);
         let mut body = frame_of(&message).split_off(LENGTH_BYTES);
         let at = at.index(body.len());

@@ -42,6 +42,8 @@ fn input(index: u64) -> Payload {
         velocity: [0.5; 6],
         buttons: 1,
         flags: 0,
+        rendered: [0.0; 6],
+        set_sequence: 0,
     })
 }
 

@@ -9,6 +9,7 @@ use taut_link::{ClientOptions, Role, Transport, read_key_file};
 use crate::canvas::Canvas;
 use crate::description::Overrides;
 use crate::error::RenderError;
+use crate::hand::Hand;
 use crate::renderer::Gpu;
 use crate::session::Session;
 use crate::stage::Show;
@@ -51,6 +52,10 @@ pub struct RenderArgs {
     /// End after this many frames.
     #[arg(long, value_name = "N")]
     pub frames: Option<u64>,
+    /// Hold the body with mouse and keys of the windows: this node is the device as well (the server's device must be
+    /// remote).
+    #[arg(long, conflicts_with = "headless")]
+    pub hold: bool,
     /// Write every frame to PNG files in this folder (with --headless).
     #[arg(long, value_name = "DIR", requires = "headless")]
     pub out: Option<PathBuf>,
@@ -194,7 +199,19 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             monitor: args.monitor,
             show,
         };
-        window::run(&mut session, stage, &mut timeline, &mut statistics, plan)
+        let hand = if args.hold {
+            Some(Hand::join(&args, &stage)?)
+        } else {
+            None
+        };
+        window::run(
+            &mut session,
+            stage,
+            &mut timeline,
+            &mut statistics,
+            plan,
+            hand,
+        )
     };
 
     if let Some(stats) = statistics.report(true) {

@@ -261,6 +261,21 @@ mod tests {
     }
 
     #[test]
+    fn a_body_that_moves_is_drawn_between_its_known_poses_as_the_god_object_is() {
+        let mut timeline = Timeline::new(2 * MS);
+        for (tick, x) in [(10, 0.0), (11, 1.0)] {
+            let mut known = state(tick * MS, x);
+            known.bodies.push((3, known.god_object));
+            timeline.push(known);
+        }
+        let between = timeline.latch(12 * MS + MS / 4).expect("a state").state;
+        assert_eq!(between.bodies, vec![(3, between.god_object)]);
+        assert!((between.god_object.translation.x - 0.25).abs() < 1e-12);
+        let turned = between.bodies[0].1.rotation;
+        assert!((turned.angle() - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
     fn the_newest_head_is_used_without_waiting_for_the_delay() {
         let mut timeline = Timeline::new(2 * MS);
         timeline.push(state(10 * MS, 0.0));

@@ -140,6 +140,21 @@ impl Screen {
         self.height
     }
 
+    /// Unit vector to the viewer's right, along the lower edge.
+    pub fn right(&self) -> Vector3<f64> {
+        self.right
+    }
+
+    /// Unit vector up, along the left edge.
+    pub fn up(&self) -> Vector3<f64> {
+        self.up
+    }
+
+    /// Unit vector towards the viewer.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.normal
+    }
+
     /// The point of the screen at fractions of its width (from the left) and height (from below).
     pub fn point(&self, across: f64, upward: f64) -> Point3<f64> {
         self.lower_left + self.right * (across * self.width) + self.up * (upward * self.height)

@@ -1,11 +1,13 @@
 //! Draws in windows: one for each picture of each screen of the node.
 //!
 //! All windows of a frame show the same state and are submitted together. Keys: Esc ends, F covers
-//! the monitor, G, C and V show or hide the device ghost, the contacts and the force.
+//! the monitor, G, C and V show or hide the device ghost, the contacts and the force. A window that
+//! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use nalgebra::Isometry3;
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, WindowEvent};
@@ -15,12 +17,15 @@ use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::canvas::eyes_of;
 use crate::error::RenderError;
+use crate::hand::Hand;
+use crate::mouse::{self, Mouse, Pointed};
 use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
 use crate::session::{Ending, Session};
 use crate::stage::{Show, Stage};
 use crate::statistics::{Ended, Statistics};
 use crate::stereo::Picture;
 use crate::timeline::Timeline;
+use crate::view::Eyes;
 
 /// When to end and how fast to draw.
 #[derive(Clone, Debug)]
@@ -43,6 +48,7 @@ pub(crate) fn run(
     timeline: &mut Timeline,
     statistics: &mut Statistics,
     plan: Plan,
+    hand: Option<Hand>,
 ) -> Result<(Ended, String), RenderError> {
     let no_display = |error: winit::error::EventLoopError| RenderError::NoDisplay {
         reason: error.to_string(),
@@ -54,6 +60,10 @@ pub(crate) fn run(
         statistics,
         show: plan.show,
         plan,
+        hand,
+        mouse: Mouse::default(),
+        eyes: Eyes::of_head(&stage.head, stage.eye_separation),
+        god_object: stage.god_object.pose,
         stage,
         screen: None,
         start: Instant::now(),
@@ -79,6 +89,12 @@ struct App<'a> {
     plan: Plan,
     stage: Stage,
     show: Show,
+    hand: Option<Hand>,
+    mouse: Mouse,
+    /// As drawn last.
+    eyes: Eyes,
+    /// As drawn last, world from body.
+    god_object: Isometry3<f64>,
     screen: Option<Display>,
     start: Instant,
     next_frame: Instant,
@@ -111,7 +127,7 @@ impl ApplicationHandler for App<'_> {
         if self.screen.is_some() {
             return;
         }
-        match Display::open(events, &self.stage, &self.plan) {
+        match Display::open(events, &self.stage, &self.plan, self.hand.is_some()) {
             Ok(screen) => {
                 if screen.gpu.is_software() {
                     let slower = self.plan.software_frame_time;
@@ -124,6 +140,7 @@ impl ApplicationHandler for App<'_> {
     }
 
     fn window_event(&mut self, events: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        self.move_hand(id, &event);
         match event {
             WindowEvent::CloseRequested => self.end(events, Ok(Ended::Closed)),
             WindowEvent::KeyboardInput { event, .. }
@@ -173,9 +190,44 @@ impl App<'_> {
             KeyCode::KeyG => self.show.ghost = !self.show.ghost,
             KeyCode::KeyC => self.show.contacts = !self.show.contacts,
             KeyCode::KeyV => self.show.force = !self.show.force,
+            KeyCode::KeyP | KeyCode::KeyR => self.let_go_or_return(code),
             _ => {}
         }
         self.last_drawn = None;
+    }
+
+    /// Moves the held body by an event of the window `id`.
+    fn move_hand(&mut self, id: WindowId, event: &WindowEvent) {
+        let (Some(hand), Some(display)) = (&mut self.hand, &self.screen) else {
+            return;
+        };
+        if let WindowEvent::ModifiersChanged(modifiers) = event {
+            self.mouse.modifiers(modifiers.state());
+        }
+        let Some(pane) = display.panes.iter().find(|pane| pane.window.id() == id) else {
+            return;
+        };
+        let pointed = Pointed {
+            screen: &self.stage.screens[pane.screen].screen,
+            picture: &pane.picture,
+            size: (pane.config.width.into(), pane.config.height.into()),
+            eyes: &self.eyes,
+        };
+        if self.mouse.event(event, &pointed, &mut hand.hold) {
+            hand.lead(self.mouse.buttons());
+        }
+    }
+
+    fn let_go_or_return(&mut self, code: KeyCode) {
+        let Some(hand) = &mut self.hand else {
+            return;
+        };
+        if code == KeyCode::KeyP {
+            hand.hold.toggle(&self.god_object);
+        } else {
+            hand.hold.reset();
+        }
+        hand.lead(self.mouse.buttons());
     }
 
     /// Draws a frame if one is due; says if this was the last.
@@ -222,6 +274,8 @@ impl App<'_> {
         } = screen;
         renderer.set_state(gpu, &self.stage, &latched, self.show);
         let eyes = eyes_of(&self.stage, &latched);
+        self.eyes = eyes;
+        self.god_object = latched.state.god_object;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.draw_shadow(&mut encoder);
         let mut textures = Vec::with_capacity(panes.len());
@@ -258,7 +312,17 @@ impl App<'_> {
 }
 
 impl Display {
-    fn open(events: &ActiveEventLoop, stage: &Stage, plan: &Plan) -> Result<Self, RenderError> {
+    fn open(
+        events: &ActiveEventLoop,
+        stage: &Stage,
+        plan: &Plan,
+        holds: bool,
+    ) -> Result<Self, RenderError> {
+        let help = if holds {
+            format!(" ({})", mouse::HELP)
+        } else {
+            String::new()
+        };
         let no_display = |error: &dyn std::fmt::Display| RenderError::NoDisplay {
             reason: error.to_string(),
         };
@@ -272,7 +336,7 @@ impl Display {
                 let monitor = events.available_monitors().nth(plan.monitor + opened.len());
                 let cover = || Fullscreen::Borderless(monitor);
                 let attributes = Window::default_attributes()
-                    .with_title(format!("taut: {}{}", screen.name, picture.suffix))
+                    .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
                     .with_inner_size(PhysicalSize::new(width, height))
                     .with_position(PhysicalPosition::new(0, below))
                     .with_fullscreen(plan.fullscreen.then(cover));

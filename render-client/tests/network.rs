@@ -157,6 +157,7 @@ impl Server {
             key: self.folder.path().join("key"),
             transport: TransportArg::Udp,
             headless: true,
+            hold: false,
             frames: None,
             out: None,
             duration: Some(20.0), // so that a failure ends

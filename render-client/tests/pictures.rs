@@ -91,6 +91,36 @@ fn a_body_above_is_drawn_above_and_one_to_the_right_is_drawn_to_the_right() {
 }
 
 #[test]
+fn an_obstacle_is_drawn_where_the_state_has_it_and_else_where_it_stood() {
+    let stood = Isometry3::translation(0.0, 0.1, 0.3);
+    let moved = Isometry3::translation(0.2, 0.1, 0.9);
+    for (bodies, pose) in [
+        (vec![], stood),
+        (vec![(4, moved)], moved),
+        // Another obstacle's number.
+        (vec![(3, moved)], stood),
+    ] {
+        let mut stage = one_body(shapes::sphere(0.1, 32));
+        // The only orange body is the obstacle; what is in the hand is out of sight.
+        stage.obstacles = vec![StageBody {
+            id: 4,
+            pose: stood,
+            ..stage.god_object
+        }];
+        let mut latched = state(Isometry3::translation(0.0, -5.0, 0.0));
+        latched.state.bodies = bodies;
+        let place = Point3::from(pose.translation.vector);
+        let expected = pixel_of(&stage, 0, Eye::Middle, place);
+        let Some(pictures) = draw(stage, &latched, Show::default()) else {
+            return;
+        };
+        let (across, down, count) = orange(&pictures[0]);
+        assert!(count > 100, "{count} orange pixels");
+        assert!((across - expected.0).abs() < 5.0 && (down - expected.1).abs() < 5.0);
+    }
+}
+
+#[test]
 fn a_nearer_body_looks_bigger_by_the_ratio_of_the_distances() {
     let ball = shapes::sphere(0.08, 48);
     let size = |y: f64| {

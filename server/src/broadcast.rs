@@ -8,19 +8,21 @@ use std::time::Duration;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
 use god_object::{ConstraintSet, NonPenetrationConstraint};
+use taut_bridge::ArmingState;
 use taut_link::Broadcaster;
 use taut_proto::state::{
-    ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS, RunState,
-    TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
+    BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS,
+    RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
 };
 use taut_proto::wrench::WRENCH_PAUSED;
 use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 
 use crate::clock::{SessionClock, nanoseconds};
+use crate::edge_sets::EdgeSets;
 use crate::head::Head;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
-use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::device_state::DeviceState;
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shutdown::Shutdown;
@@ -30,8 +32,14 @@ const BUTTONS: u32 = u16::BITS;
 /// The number of a button in an event's code.
 const BUTTON_SHIFT: u32 = 16;
 
-/// The wrenches for a remote device, newest wins.
-pub type BridgeCommands = triple_buffer::Output<WireWrench>;
+/// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
+#[derive(Debug)]
+pub struct BridgeCommands {
+    /// From the haptics loop.
+    pub wrenches: triple_buffer::Output<WireWrench>,
+    /// For a bridge that couples by itself.
+    pub sets: EdgeSets,
+}
 
 /// Sends states, and the wrenches of a remote device, until the end is asked for.
 pub fn run(
@@ -45,17 +53,22 @@ pub fn run(
     // A state that comes late is followed by the next one; nothing is owed to anybody.
     let late = AtomicU64::new(0);
     run_at_deadlines(clock, period, shutdown, &late, |now| {
-        if let Some(commands) = &mut bridge_commands
-            && commands.update()
-        {
-            broadcaster.send_wrench(commands.output_buffer());
+        if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
+            let fresh = wrenches.update();
+            let command = wrenches.output_buffer();
+            let armed = states.is_armed();
+            let at_edge = sets.tick(now, command, armed, states.contacts(), &mut broadcaster);
+            if fresh && !at_edge {
+                broadcaster.send_wrench(command);
+            }
         }
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
             let _ = broadcaster.send(state);
         }
     });
-    if bridge_commands.is_some() {
+    if let Some(commands) = &mut bridge_commands {
+        commands.sets.pause(&mut broadcaster);
         broadcaster.send_wrench(&WireWrench {
             time_ns: nanoseconds(clock.now()),
             input_index: 0,
@@ -96,6 +109,16 @@ impl StateWriter {
         }
     }
 
+    /// Whether the haptics loop's port gives force, as of the last state.
+    pub fn is_armed(&self) -> bool {
+        !self.shared.device.held().safety.arming.is_off()
+    }
+
+    /// The newest of the god-object loop.
+    pub fn contacts(&mut self) -> &ContactSnapshot {
+        self.shared.contacts.newest()
+    }
+
     /// The state now; `None` while the device has not been sampled since the last one.
     pub fn newest(&mut self, now: Duration) -> Option<&HotState> {
         if !self.shared.device.refresh() {
@@ -111,25 +134,33 @@ impl StateWriter {
         state.sample_time_ns = nanoseconds(device.time);
         state.tick = device.sequence;
         state.scene_revision = self.scene_revision;
-        state.run = if device.faulty {
-            RunState::Fault
-        } else {
-            RunState::Running
-        };
+        state.run = run_state(device);
         state.constraint_age_us =
             u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
-        state.head = head_state(&self.head, now, device.time);
+        state.head = head_state(&mut self.head, now, device.time);
         state.tools.clear();
         state
             .tools
             .push(tool_state(device, contacts, wrench, &self.motion.velocity));
+        state.bodies.clear();
+        state.bodies.extend(contacts.moving.iter().map(body_state));
         nearest_contacts(&contacts.set, &mut state.contacts);
         state.events.clone_from(&self.events.recent);
         Some(&self.state)
     }
 }
 
-fn head_state(head: &Head, now: Duration, sampled: Duration) -> HeadState {
+/// Whether there are forces.
+fn run_state(device: &DeviceState) -> RunState {
+    match device.safety.arming {
+        _ if device.faulty => RunState::Fault,
+        ArmingState::Faulted => RunState::Fault,
+        ArmingState::Disarmed => RunState::Paused,
+        _ => RunState::Running,
+    }
+}
+
+fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
     let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
     HeadState {
         pose: PoseF32::from_isometry(&head.pose(now)),
@@ -151,16 +182,26 @@ fn tool_state(
         0
     };
     let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
+    // What a bridge says that it renders is the truth; what was computed here answers a pose that is older.
+    let felt = device.felt.map_or(wrench.wrench, |felt| felt.wrench);
     ToolState {
         god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
         device: PoseF32::from_isometry(&device.pose),
         linear_velocity: single(&linear(velocity)),
         angular_velocity: single(&angular(velocity)),
-        force: single(&linear(&wrench.wrench)),
-        torque: single(&angular(&wrench.wrench)),
+        force: single(&linear(&felt)),
+        torque: single(&angular(&felt)),
         buttons: device.buttons,
         flags: limited | silent,
         id: 0,
+    }
+}
+
+fn body_state(moving: &MovingObstacle) -> BodyState {
+    BodyState {
+        id: moving.obstacle,
+        flags: 0,
+        pose: PoseF32::from_isometry(&moving.pose),
     }
 }
 
@@ -229,6 +270,8 @@ struct EventTrail {
     touching: bool,
     buttons: u16,
     faulty: bool,
+    /// Number of the newest event of the port that was taken.
+    safety: u64,
 }
 
 impl EventTrail {
@@ -261,6 +304,10 @@ impl EventTrail {
             };
             self.push(tick, code);
         }
+        for event in device.safety.after(self.safety) {
+            self.push(tick, event_code::safety(event.kind as u8, event.value));
+            self.safety = event.number;
+        }
         (self.touching, self.buttons, self.faulty) = (touching, device.buttons, device.faulty);
     }
 
@@ -280,8 +327,10 @@ impl EventTrail {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shared::device_state::SafetyState;
     use crate::shared::{contact_snapshot, device_state, wrench_command};
     use god_object::constraint::{Feature, FeaturePair};
+    use taut_bridge::{EventKind, SafetyEvent};
 
     fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
         NonPenetrationConstraint {
@@ -299,17 +348,33 @@ mod tests {
         }
     }
 
+    /// A port in full force that has just limited one.
+    fn armed_after_a_limit() -> SafetyState {
+        let mut safety = SafetyState {
+            arming: ArmingState::Armed,
+            ..SafetyState::default()
+        };
+        safety.events[1] = Some(SafetyEvent {
+            number: 1,
+            time: Duration::from_millis(4),
+            kind: EventKind::ForceLimited,
+            value: 23.5,
+        });
+        safety
+    }
+
     #[test]
     fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
         let start = Pose::translation(0.0, 0.0, 0.1);
         let (mut states, state_readers) = device_state::channel(&start);
         let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
         let (mut wrenches, wrench_readers) = wrench_command::channel();
-        let head = Head {
+        let source = crate::head::HeadSource {
             rest: Pose::translation(0.0, -1.0, 1.0),
             eye_separation: 0.064,
-            sway: None,
+            motion: crate::head::HeadMotion::Still,
         };
+        let [head] = source.start().expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,
@@ -323,6 +388,7 @@ mod tests {
             time: Duration::from_millis(5),
             pose: Pose::translation(0.0, 0.0, 0.05),
             buttons: 0b10,
+            safety: armed_after_a_limit(),
             ..DeviceState::at_start(&start)
         };
         states.publish(&device);
@@ -333,6 +399,10 @@ mod tests {
             .extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
         snapshot.published = Duration::from_millis(6);
         snapshot.report.active = 1;
+        snapshot.moving.push(MovingObstacle {
+            obstacle: 3,
+            pose: Pose::translation(0.0, 0.25, 0.0),
+        });
         contacts.publish(&snapshot);
         let wrench = WrenchCommand {
             wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
@@ -368,12 +438,20 @@ mod tests {
             .map(|contact| contact.pair[1])
             .collect();
         assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
+        let bodies: Vec<_> = state
+            .bodies
+            .iter()
+            .map(|body| (body.id, body.pose))
+            .collect();
+        let plate = PoseF32::from_isometry(&Pose::translation(0.0, 0.25, 0.0));
+        assert_eq!(bodies, [(3, plate)], "by the obstacle's number");
         let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
         assert_eq!(
             codes,
             [
                 event_code::CONTACT_ON,
-                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT
+                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT,
+                event_code::safety(EventKind::ForceLimited as u8, 23.5)
             ]
         );
         assert_eq!(state.head.age_us, -2000);
@@ -395,6 +473,7 @@ mod tests {
             panic!("a sample was published");
         };
         assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
+        assert_eq!(state.bodies.len(), 1, "told again, not added");
         assert_eq!(state.run, RunState::Fault);
         assert_eq!(
             state.tools[0].flags & TOOL_DEVICE_SILENT,

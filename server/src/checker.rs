@@ -1,6 +1,6 @@
 //! Does the god-object really never penetrate? Asked by code that shares nothing with the method.
 //!
-//! Published poses are sampled on a thread of low priority; every pair of triangles whose boxes overlap is tested by parry: does a
+//! Published poses, of the god-object and of the obstacles that move, are sampled on a thread of low priority; every pair of triangles whose boxes overlap is tested by parry: does a
 //! side of one pass through the other? A pose that fails is counted, and told once.
 
 use std::sync::OnceLock;
@@ -15,7 +15,7 @@ use parry3d_f64::partitioning::BvhNode;
 use parry3d_f64::query::{Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, Triangle};
 
-use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::fanout::Subscriber;
 use crate::shutdown::Shutdown;
 
@@ -82,15 +82,26 @@ impl PenetrationChecker {
         })
     }
 
-    /// The name of an obstacle that the body intersects at `world_from_body`, if there is one.
-    pub fn penetrated_obstacle(&self, world_from_body: &Pose) -> Option<&str> {
+    /// The name of an obstacle that the body intersects at `world_from_body`, if there is one. Obstacles that are not among the
+    /// `moving` are where the world has them.
+    pub fn penetrated_obstacle(
+        &self,
+        world_from_body: &Pose,
+        moving: &[MovingObstacle],
+    ) -> Option<&str> {
+        let place_of = |index: usize, stands_at: &Pose| {
+            let moved = moving.iter().find(|m| usize::from(m.obstacle) == index);
+            moved.map_or(*stands_at, |m| m.pose)
+        };
         self.obstacles
             .iter()
-            .find(|obstacle| {
-                let body_from_obstacle = world_from_body.inverse() * obstacle.world_from_obstacle;
+            .enumerate()
+            .find(|(index, obstacle)| {
+                let world_from_obstacle = place_of(*index, &obstacle.world_from_obstacle);
+                let body_from_obstacle = world_from_body.inverse() * world_from_obstacle;
                 intersects(&self.body, &obstacle.mesh, &parry_pose(&body_from_obstacle))
             })
-            .map(|obstacle| obstacle.name.as_str())
+            .map(|(_, obstacle)| obstacle.name.as_str())
     }
 
     /// Checks the newest published pose, if there is a new one; the obstacle's name when it is penetrated.
@@ -102,7 +113,8 @@ impl PenetrationChecker {
         if !contacts.refresh() {
             return None;
         }
-        let penetrated = self.penetrated_obstacle(&contacts.held().set.god_object_pose);
+        let newest = contacts.held();
+        let penetrated = self.penetrated_obstacle(&newest.set.god_object_pose, &newest.moving);
         counts.checks.fetch_add(1, Ordering::Relaxed);
         if let Some(obstacle) = penetrated {
             // Told before it is counted: who sees the count finds the name.
@@ -185,12 +197,12 @@ mod tests {
                 Pose::translation(offset.x, 0.01, offset.z)
             };
             assert_eq!(
-                checker.penetrated_obstacle(&aside(0.00049)),
+                checker.penetrated_obstacle(&aside(0.00049), &[]),
                 None,
                 "turn {turn}"
             );
             assert_eq!(
-                checker.penetrated_obstacle(&aside(0.00055)),
+                checker.penetrated_obstacle(&aside(0.00055), &[]),
                 Some("box"),
                 "turn {turn}"
             );
@@ -204,15 +216,39 @@ mod tests {
         let upright = Vector3::x() * std::f64::consts::FRAC_PI_2;
         for (gap, penetrated) in [(1e-6, None), (1e-5, None), (-1e-6, Some("box"))] {
             let pose = Pose::new(Vector3::new(0.0, 0.012, 0.06 + gap), upright);
-            assert_eq!(checker.penetrated_obstacle(&pose), penetrated, "gap {gap}");
+            assert_eq!(
+                checker.penetrated_obstacle(&pose, &[]),
+                penetrated,
+                "gap {gap}"
+            );
         }
     }
 
     #[test]
     fn a_body_far_away_intersects_nothing() {
         assert_eq!(
-            checker().penetrated_obstacle(&Pose::translation(0.0, 0.0, 1.0)),
+            checker().penetrated_obstacle(&Pose::translation(0.0, 0.0, 1.0), &[]),
             None
         );
+    }
+
+    #[test]
+    fn an_obstacle_that_moves_is_checked_where_it_is() {
+        let checker = checker();
+        let far = Pose::translation(0.0, 0.0, 1.0);
+        let box_at = |z: f64| MovingObstacle {
+            obstacle: 0,
+            pose: Pose::translation(0.0, 0.0, z),
+        };
+        assert_eq!(checker.penetrated_obstacle(&far, &[box_at(0.9)]), None);
+        assert_eq!(
+            checker.penetrated_obstacle(&far, &[box_at(0.975)]),
+            Some("box")
+        );
+        let other = MovingObstacle {
+            obstacle: 1,
+            ..box_at(0.975)
+        };
+        assert_eq!(checker.penetrated_obstacle(&far, &[other]), None);
     }
 }

@@ -37,9 +37,11 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Takes a live session's device trace, to be replayed
     Record(RecordArgs),
+    /// Asks for force at the device of a session, or for none
+    Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
-    /// Says what this machine lacks for real time and for rendering
+    /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Makes a cluster key, the secret that all machines of a workbench share
     Keys(KeysArgs),
@@ -47,7 +49,7 @@ pub enum Command {
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = "Example: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_bridge::drivers_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
@@ -61,7 +63,11 @@ pub struct DemoArgs {
     /// How poses reach the render clients
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// Put the simulated device in a process of its own
+    /// What moves the god-object: `simulated`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
+    /// (default: the scene's simulated hand)
+    #[arg(long, value_name = "D", value_parser = device_text)]
+    pub device: Option<String>,
+    /// Put the device in a process of its own
     #[arg(long)]
     pub bridge: bool,
     /// Also write what the monitor shows to this file
@@ -79,6 +85,9 @@ pub struct DemoArgs {
     /// Where the render clients write their pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -115,6 +124,9 @@ pub struct ServeArgs {
     /// Do without the monitor, whatever the workbench file says
     #[arg(long)]
     pub no_monitor: bool,
+    /// Start although the scene is stiffer than the device bears
+    #[arg(long)]
+    pub allow_unstable: bool,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -188,6 +200,21 @@ pub struct RecordArgs {
     pub duration: Option<f64>,
 }
 
+/// `taut arm`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key cluster.key")]
+pub struct ArmArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// The cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// No force instead: it fades, and stays away until somebody arms
+    #[arg(long)]
+    pub off: bool,
+}
+
 /// `taut check`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Example: taut check workbench.toml scene.toml part.ply hand.csv")]
@@ -202,8 +229,16 @@ pub struct CheckArgs {
 
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut doctor --json")]
+#[command(
+    after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
+)]
 pub struct DoctorArgs {
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub device: Option<String>,
+    /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
+    #[arg(long, value_name = "FILE.svg", requires = "device")]
+    pub out: Option<PathBuf>,
     /// Print the findings as JSON on standard output
     #[arg(long)]
     pub json: bool,
@@ -282,6 +317,12 @@ pub enum MethodChoice {
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
+
+/// The text of a device, as it is, if it names one.
+fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
+    text.parse::<taut_bridge::DeviceChoice>()
+        .map(|_| text.to_owned())
+}
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
     positive(text, MAX_SECONDS, "seconds")

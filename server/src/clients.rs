@@ -83,6 +83,8 @@ impl ClientLedger {
                 None
             }
             LinkEvent::Log { node, event } => Some(format!("{node}: {}", event.text)),
+            LinkEvent::Arm { node, arm: true } => Some(format!("{node} asks for force")),
+            LinkEvent::Arm { node, arm: false } => Some(format!("{node} asks for no force")),
         }
     }
 

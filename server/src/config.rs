@@ -5,18 +5,25 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_bridge::SafetySettings;
+use taut_bridge::{
+    InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
+    ValidationSettings,
+};
 use taut_link::ClusterKey;
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
-use taut_scene::{BuiltScene, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench};
+use taut_scene::{
+    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench,
+};
 
 use crate::content::content;
-use crate::devices::device;
+use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
-use crate::head::{Head, Sway};
+use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
+use crate::shared::contact_snapshot::MAX_MOVING;
+use crate::stability::{declared, judge};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -37,10 +44,14 @@ pub struct Overrides {
     pub quic: Option<SocketAddr>,
     /// Address of the state plane.
     pub udp: Option<SocketAddr>,
+    /// Start although the scene is stiffer than the device bears.
+    pub allow_unstable: bool,
     /// Without monitor.
     pub no_monitor: bool,
     /// Where the monitor records.
     pub record: Option<PathBuf>,
+    /// An input device instead of the workbench's.
+    pub input: Option<InputChoice>,
     /// Where the session is recorded.
     pub recording: Option<PathBuf>,
 }
@@ -56,13 +67,22 @@ pub fn session_setup(
         None => workbench.load_scene()?,
     };
     let built = scene.build()?;
-    if let Some(motion) = built.motions.first() {
+    if built.motions.len() > MAX_MOVING {
         return Err(Failure::BadInput(format!(
-            "the obstacle \"{}\" has a motion, which only `taut replay` can follow: a session's checker and screens know obstacles at rest only; leave out `motion`",
-            built.world.obstacles[motion.obstacle].name
+            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+            built.name,
+            built.motions.len()
         )));
     }
-    let content = content(&built, workbench, &workbench.workbench_from_scene(&scene))?;
+    let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
+    if let Some(dynamics) = declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)? {
+        let body = &built.world.body;
+        for warning in judge(&dynamics, &built.settings, body, overrides.allow_unstable)? {
+            tracing::warn!("{warning}");
+        }
+    }
+    let workbench_from_scene = workbench.workbench_from_scene(&scene);
+    let content = content(&built, workbench, &workbench_from_scene)?;
     let network = &workbench.network;
     let link = LinkSettings {
         quic: overrides
@@ -71,21 +91,22 @@ pub fn session_setup(
         udp: overrides
             .udp
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        announced_udp_port: None,
         key,
         max_clients: network.max_clients,
     };
-    let safety = SafetySettings {
-        max_force: built.settings.force_limit,
-        max_torque: built.settings.torque_limit,
-        ..SafetySettings::default()
-    };
+    let safety = safety(workbench, &built.settings);
     let recording = overrides
         .recording
         .as_ref()
         .map(|directory| recording(directory.clone(), &scene, &built));
     Ok(SessionSetup {
         recording,
-        device: device(&workbench.device, &built)?,
+        device: match &overrides.input {
+            Some(choice) => input(choice, &built, &workbench_from_scene)?,
+            None => device(&workbench.device, &built, &workbench_from_scene)?,
+        },
+        motions: built.motions,
         settings: built.settings,
         start: built.start,
         world: Arc::new(built.world),
@@ -120,14 +141,75 @@ fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> Recording
     }
 }
 
-fn head(viewer: &Viewer) -> Head {
-    Head {
+fn head(viewer: &Viewer) -> HeadSource {
+    HeadSource {
         rest: viewer.head,
         eye_separation: viewer.eye_separation,
-        sway: match viewer.tracking {
-            HeadTracking::Fixed => None,
-            HeadTracking::Sway { amplitude, period } => Some(Sway { amplitude, period }),
+        motion: match &viewer.tracking {
+            HeadTracking::Fixed => HeadMotion::Still,
+            HeadTracking::Sway { amplitude, period } => HeadMotion::Sway(Sway {
+                amplitude: *amplitude,
+                period: *period,
+            }),
+            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
+                source: vrpn_source(sensor),
+                mapping: sensor.mapping,
+            })),
         },
+    }
+}
+
+/// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
+fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings {
+    let wanted = &workbench.safety;
+    let nobody_is_hurt = matches!(
+        workbench.device,
+        Device::Simulated { .. }
+            | Device::Trace { .. }
+            | Device::Vrpn { .. }
+            | Device::SpaceMouse { .. }
+            | Device::Remote
+    );
+    let rearm = match wanted.rearm {
+        Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
+        Some(taut_scene::Rearm::Manual) => Rearm::Manual,
+        // Behind a bridge the bridge decides.
+        None if nobody_is_hurt => Rearm::Automatic,
+        None => Rearm::Manual,
+    };
+    // What comes over a network is stamped there and may be late; the device drops what is too late, which for a bridge that couples
+    // by itself is much later.
+    let time_slack = match workbench.device {
+        Device::Remote => MAX_EDGE_DELAY,
+        _ => Duration::ZERO,
+    };
+    let default = ValidationSettings::default();
+    let within = |wanted: Option<f64>, scene: f64| wanted.map_or(scene, |wanted| wanted.min(scene));
+    SafetySettings {
+        max_force: within(wanted.max_force, scene.force_limit),
+        max_torque: within(wanted.max_torque, scene.torque_limit),
+        force_rate: wanted.force_slew * 1e3,
+        torque_rate: wanted.torque_slew * 1e3,
+        ramp_in: Duration::from_secs_f64(wanted.ramp_in),
+        period: HAPTICS_PERIOD,
+        rearm,
+        dead_man: wanted.dead_man,
+        arm_button: wanted.arm_button,
+        validation: ValidationSettings {
+            max_speed: wanted.max_speed,
+            max_turn_rate: wanted.max_turn_rate,
+            max_age: default.max_age + time_slack,
+            time_slack,
+            ..default
+        },
+        passivity: PassivitySettings {
+            mode: match wanted.passivity {
+                taut_scene::Passivity::Observe => Passivity::Observe,
+                taut_scene::Passivity::Control => Passivity::Control,
+            },
+            ..PassivitySettings::default()
+        },
+        ..SafetySettings::default()
     }
 }
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use taut_scene::{Device, Scene, Workbench};
+use taut_bridge::DeviceChoice;
+use taut_scene::{Device, HeadTracking, Scene, Workbench};
 
 use crate::children::{NamedChild, wait_or_kill};
 use crate::cli::DemoArgs;
@@ -19,7 +20,7 @@ use crate::rendering;
 use crate::report::SessionReport;
 use crate::serve::{announce, watch};
 use crate::session::Session;
-use crate::setup::SessionSetup;
+use crate::setup::{DeviceSource, SessionSetup};
 use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
@@ -27,6 +28,10 @@ use crate::terminal::Terminal;
 const GRACE: Duration = Duration::from_secs(3);
 /// Sets what a process logs.
 const LOG_VARIABLE: &str = "TAUT_LOG";
+/// Silence after which the mouse counts as lost.
+const MOUSE_MAX_AGE: Duration = Duration::from_millis(200);
+/// How the mouse holds the body.
+const HELP_MOUSE: &str = "mouse in the first window: left button moves the body along the screen, right button or wheel to and fro, middle button (or Shift + left) turns it; P lets go or takes hold, R goes back to the start, arrow and page keys move in small steps; more in docs/devices.md";
 /// What the bridge is called.
 const BRIDGE_NODE: &str = "bridge";
 
@@ -43,16 +48,40 @@ pub fn run(
         .scene
         .clone()
         .unwrap_or_else(|| workbench.scene.clone());
+    let device = args.device.as_deref().unwrap_or("simulated");
+    let choice: DeviceChoice = device.parse().map_err(Failure::bad_input)?;
+    let hold = choice == DeviceChoice::Mouse;
+    if hold && (args.bridge || !rendering::BUILT_IN || !has_windows(args)) {
+        return Err(Failure::BadInput(
+            "the mouse moves the god-object in a window: leave out --bridge, --headless and --out, and start where there is a display".into(),
+        ));
+    }
     let hand_path = if args.bridge {
-        workbench.device = Device::Remote;
         write_hand_path(&scene, directory.path())?
     } else {
         None
     };
+    if hold {
+        // A picture that sways under the mouse is no help.
+        workbench.viewer.tracking = HeadTracking::Fixed;
+    }
+    if args.bridge || hold {
+        workbench.device = Device::Remote;
+    } else if let DeviceChoice::Trace(path) = &choice {
+        workbench.device = Device::Trace {
+            path: path.clone(),
+            repeat: true,
+        };
+    }
     let overrides = Overrides {
         scene: Some(scene),
+        allow_unstable: args.allow_unstable,
         no_monitor: args.no_monitor || !MonitorFeed::BUILT_IN,
         record: args.record.clone(),
+        input: match choice {
+            DeviceChoice::Input(input) if !args.bridge => Some(input),
+            _ => None,
+        },
         recording: args.recording.clone(),
         ..Overrides::default()
     };
@@ -60,6 +89,10 @@ pub fn run(
     // A scene that is refused gets its one sentence and nothing else, so other lines come after this.
     if !MonitorFeed::BUILT_IN {
         terminal.say("this program was built without the monitor; the demo goes on without it");
+    }
+    if let (true, DeviceSource::Remote { max_age, .. }) = (hold, &mut setup.device) {
+        // Drawing shares the processor with the mouse; a pose that is late harms nobody who feels no force.
+        *max_age = MOUSE_MAX_AGE;
     }
     take_free_ports(&mut setup, terminal);
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
@@ -69,11 +102,16 @@ pub fn run(
     let mut children = Vec::new();
     let launcher = Launcher::new(&session, &directory, args)?;
     if args.bridge {
-        children.push(launcher.bridge(hand_path.as_ref(), terminal)?);
+        children.push(launcher.bridge(device, hand_path.as_ref(), terminal)?);
     }
     if rendering::BUILT_IN {
-        for node in &workbench.nodes {
-            children.push(launcher.render_node(&node.name, terminal)?);
+        for (place, node) in workbench.nodes.iter().enumerate() {
+            // One window holds the body; the others look on.
+            let hold = hold && place == 0;
+            children.push(launcher.render_node(&node.name, hold, terminal)?);
+        }
+        if hold {
+            terminal.say(HELP_MOUSE);
         }
     } else {
         terminal.say("this program was built without drawing; the demo goes on without it");
@@ -179,16 +217,12 @@ impl<'a> Launcher<'a> {
         let server = session.quic_address().ok_or_else(|| {
             Failure::failed("the server has no address: this is a fault of the program")
         })?;
-        let has_display = ["DISPLAY", "WAYLAND_DISPLAY"]
-            .iter()
-            .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
-        let headless = args.headless || args.out.is_some() || !has_display;
         Ok(Self {
             program,
             server,
             directory,
             args,
-            headless,
+            headless: !has_windows(args),
         })
     }
 
@@ -202,8 +236,24 @@ impl<'a> Launcher<'a> {
         command
     }
 
-    fn render_node(&self, node: &str, terminal: &Terminal) -> Result<NamedChild, Failure> {
+    fn render_node(
+        &self,
+        node: &str,
+        hold: bool,
+        terminal: &Terminal,
+    ) -> Result<NamedChild, Failure> {
         let mut command = self.role("render", node);
+        if self.args.device.as_deref() == Some("mouse") {
+            // Who looks at a desk's screen has no glasses on, and sees the force that nobody feels.
+            command.args(["--stereo", "mono", "--show", "force"]);
+        }
+        if hold {
+            command.arg("--hold");
+            if std::env::var_os(LOG_VARIABLE).is_none() {
+                // A force that comes late is felt by nobody: no word of it.
+                command.env(LOG_VARIABLE, "warn,taut_bridge=error");
+            }
+        }
         // Drawing in software takes every core that it gets; the loops come first.
         after_parent(&mut command);
         if self.headless {
@@ -224,9 +274,14 @@ impl<'a> Launcher<'a> {
         start(node, command, terminal)
     }
 
-    fn bridge(&self, hand: Option<&HandPath>, terminal: &Terminal) -> Result<NamedChild, Failure> {
+    fn bridge(
+        &self,
+        device: &str,
+        hand: Option<&HandPath>,
+        terminal: &Terminal,
+    ) -> Result<NamedChild, Failure> {
         let mut command = self.role("bridge", BRIDGE_NODE);
-        command.args(["--device", "simulated"]);
+        command.args(["--device", device]);
         if std::env::var_os(LOG_VARIABLE).is_none() {
             // Its events come over the network as well.
             command.env(LOG_VARIABLE, "error");
@@ -242,6 +297,14 @@ impl<'a> Launcher<'a> {
         }
         start(BRIDGE_NODE, command, terminal)
     }
+}
+
+/// Whether the render nodes open windows.
+fn has_windows(args: &DemoArgs) -> bool {
+    let has_display = ["DISPLAY", "WAYLAND_DISPLAY"]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+    has_display && !args.headless && args.out.is_none()
 }
 
 fn start(name: &str, command: Command, terminal: &Terminal) -> Result<NamedChild, Failure> {

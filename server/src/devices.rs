@@ -2,12 +2,16 @@
 
 use std::path::Path;
 
-use god_object::nalgebra::Point3;
+use std::time::Duration;
+
+use god_object::nalgebra::{Point3, Similarity3};
+use god_object::spatial::Pose;
 use taut_bridge::{
-    AtEnd, DeviceLimits, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
-    Tremor, ViaPoint,
+    Anchor, AtEnd, CapMode, CapSettings, DeviceLimits, Grip, Hand, InputChoice, MinJerkPath,
+    Placement, RecordedDevice, SimulatedDevice, TraceRow, Tremor, ViaPoint, VrpnMode, VrpnSettings,
+    VrpnSource,
 };
-use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
+use taut_scene::{BuiltScene, DeviceTrace, HandPreset, VrpnSensor};
 
 use crate::failure::Failure;
 use crate::setup::DeviceSource;
@@ -16,8 +20,33 @@ use crate::setup::DeviceSource;
 const SWAY: (f64, f64) = (0.02, 8.0);
 
 /// Makes the device that the workbench names. A remote one is found once the network is up.
-pub fn device(wanted: &taut_scene::Device, scene: &BuiltScene) -> Result<DeviceSource, Failure> {
+///
+/// `workbench_from_scene` says where the scene stands, without its display scale.
+pub fn device(
+    wanted: &taut_scene::Device,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+) -> Result<DeviceSource, Failure> {
     match wanted {
+        taut_scene::Device::Vrpn {
+            sensor,
+            on_workbench,
+        } => {
+            let settings = vrpn_settings(sensor, *on_workbench);
+            input(
+                &InputChoice::Vrpn(Box::new(settings)),
+                scene,
+                workbench_from_scene,
+            )
+        }
+        taut_scene::Device::SpaceMouse { .. } => {
+            let settings = cap_settings(wanted);
+            input(
+                &InputChoice::SpaceMouse(settings),
+                scene,
+                workbench_from_scene,
+            )
+        }
         taut_scene::Device::Simulated {
             hand,
             path,
@@ -33,6 +62,80 @@ pub fn device(wanted: &taut_scene::Device, scene: &BuiltScene) -> Result<DeviceS
             limits: DeviceLimits::UNLIMITED,
             max_age: taut_bridge::DEFAULT_MAX_AGE,
         }),
+    }
+}
+
+/// Opens an input device without force.
+pub fn input(
+    choice: &InputChoice,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+) -> Result<DeviceSource, Failure> {
+    let scale = scene.view.display_scale;
+    let placement = Placement {
+        start: scene.start,
+        reference_point: scene.reference_point(),
+        workbench_from_world: Similarity3::from_isometry(*workbench_from_scene, scale),
+    };
+    let device = choice.open(placement).map_err(Failure::bad_input)?;
+    Ok(DeviceSource::Local(device))
+}
+
+/// The sensor of a workbench file as the driver takes it.
+pub fn vrpn_source(sensor: &VrpnSensor) -> VrpnSource {
+    VrpnSource {
+        address: sensor.address.clone(),
+        sensor: sensor.sensor,
+        mode: if sensor.udp {
+            VrpnMode::Udp
+        } else {
+            VrpnMode::Tcp
+        },
+    }
+}
+
+fn vrpn_settings(sensor: &VrpnSensor, on_workbench: bool) -> VrpnSettings {
+    VrpnSettings {
+        source: vrpn_source(sensor),
+        mapping: sensor.mapping,
+        anchor: if on_workbench {
+            Anchor::Workbench
+        } else {
+            Anchor::Start
+        },
+        max_age: Duration::from_secs_f64(sensor.max_age),
+    }
+}
+
+/// The gains of a workbench file, the driver's own where it names none.
+fn cap_settings(device: &taut_scene::Device) -> CapSettings {
+    let standard = CapSettings::default();
+    let taut_scene::Device::SpaceMouse {
+        position,
+        dead_zone,
+        speed,
+        turn_rate,
+        reach,
+        tilt,
+        yield_force,
+        yield_torque,
+    } = *device
+    else {
+        return standard;
+    };
+    CapSettings {
+        mode: if position {
+            CapMode::Position
+        } else {
+            CapMode::Rate
+        },
+        dead_zone: dead_zone.unwrap_or(standard.dead_zone),
+        speed: speed.unwrap_or(standard.speed),
+        turn_rate: turn_rate.unwrap_or(standard.turn_rate),
+        reach: reach.unwrap_or(standard.reach),
+        tilt: tilt.unwrap_or(standard.tilt),
+        yield_force: yield_force.unwrap_or(standard.yield_force),
+        yield_torque: yield_torque.unwrap_or(standard.yield_torque),
     }
 }
 
@@ -104,7 +207,8 @@ fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
     trace.samples().iter().map(point).collect()
 }
 
-fn impedance(preset: HandPreset) -> Hand {
+/// The hand of this name.
+pub(crate) fn impedance(preset: HandPreset) -> Hand {
     match preset {
         HandPreset::Released => Hand::RELEASED,
         HandPreset::Light => Hand::LIGHT,

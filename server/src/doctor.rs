@@ -7,6 +7,7 @@ use serde::Serialize;
 use taut_bridge::realtime::{
     RealtimeGrant, monotonic_now, request_fifo, sharpen_timers, sleep_until,
 };
+use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
 
 use crate::timing::{Distribution, Histogram};
 
@@ -99,6 +100,7 @@ pub fn examine() -> std::io::Result<DoctorReport> {
         socket_buffer("send buffer of sockets", "net.core.wmem_max"),
     ];
     findings.extend(rendering());
+    findings.extend(devices());
     Ok(DoctorReport {
         findings,
         timer_lateness_us: lateness,
@@ -128,6 +130,24 @@ fn measure_timers() -> std::io::Result<(RealtimeGrant, Distribution)> {
     thread
         .join()
         .map_err(|_| std::io::Error::other("the measurement of the timers broke down"))
+}
+
+/// The drivers, and the input device that is plugged in. None of it is needed.
+fn devices() -> [Finding; 2] {
+    let forms: Vec<&str> = DRIVERS.iter().map(|driver| driver.name).collect();
+    let space_mouse = match HidPort.open() {
+        Ok(source) => Finding::good("SpaceMouse", format!("{} can be read", source.name())),
+        Err(error @ SourceError::NotOpened { .. }) => Finding::lacking(
+            "SpaceMouse",
+            "one is plugged in but cannot be opened",
+            error.to_string(),
+        ),
+        Err(error) => Finding::good("SpaceMouse", error.to_string()),
+    };
+    [
+        Finding::good("device drivers", forms.join(", ")),
+        space_mouse,
+    ]
 }
 
 fn scheduling(grant: &RealtimeGrant) -> Finding {

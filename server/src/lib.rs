@@ -12,6 +12,7 @@
 //!
 //! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
 
+pub mod arm;
 pub mod broadcast;
 pub mod checker;
 pub mod children;
@@ -24,6 +25,8 @@ pub mod demo;
 pub mod demo_directory;
 pub mod devices;
 pub mod doctor;
+pub mod doctor_device;
+pub mod edge_sets;
 pub mod failure;
 pub mod finished_file;
 pub mod head;
@@ -42,6 +45,7 @@ pub mod setup;
 pub mod shared;
 pub mod shutdown;
 pub mod signals;
+pub mod stability;
 pub mod statistics;
 pub mod terminal;
 pub mod timing;

@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::Parser;
 use serde::Serialize;
-use taut::cli::{CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs};
+use taut::cli::{ArmArgs, CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs};
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
 use taut::signals::BlockingEndSignal;
 use taut::terminal::Terminal;
-use taut::{demo, doctor, record, recorded_session, rendering, replay, serve};
+use taut::{arm, demo, doctor, doctor_device, record, recorded_session, rendering, replay, serve};
 use tracing_subscriber::EnvFilter;
 
 /// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
@@ -50,6 +50,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Bridge(args) => Ok(taut_bridge::execute(&args)),
         Command::Replay(args) => replay_command(&args),
         Command::Record(args) => record_command(&args),
+        Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
         Command::Doctor(args) => doctor_command(&args),
         Command::Keys(args) => keys_command(&args),
@@ -113,6 +114,16 @@ fn record_command(args: &RecordArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+fn arm_command(args: &ArmArgs) -> Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .context("the network's threads cannot be started")?;
+    println!("{}", runtime.block_on(arm::run(args))?);
+    Ok(ExitCode::SUCCESS)
+}
+
 fn check_command(args: &CheckArgs) -> Result<ExitCode> {
     let reports = taut_scene::check(&args.files);
     if args.json {
@@ -131,6 +142,15 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
+    if let Some(device) = &args.device {
+        let report = doctor_device::examine(device, args.out.as_deref())?;
+        if args.json {
+            print_json(&report)?;
+        } else {
+            println!("{report}");
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;

@@ -1,6 +1,6 @@
 //! `taut replay --recording`: a recorded session computed again, update by update and force by force, and compared bit by bit.
 //!
-//! The god-object is given the very device poses and shaded accelerations that it was given then; the coupling the very times, device poses and
+//! The god-object is given the very device poses, shaded accelerations and obstacle poses that it was given then; the coupling the very times, device poses and
 //! constraint sets. Nothing else goes into either, so both must come to the same bits, on any machine and in any build of the same method.
 
 use std::io;
@@ -12,7 +12,7 @@ use god_object::{Coupling, GodObject};
 use taut_recording::{
     ForceRecord, RecordReader, Recording, SceneOrigin, UpdateRecord, identity_of,
 };
-use taut_scene::{ReplayRow, ReplayWriter, Scene, SceneSource};
+use taut_scene::{BuiltMotion, ReplayRow, ReplayWriter, Scene, SceneSource};
 
 use crate::failure::Failure;
 use crate::finished_file::FinishedFile;
@@ -73,6 +73,7 @@ pub fn run(
 struct RecordedSession {
     god_object: GodObject,
     coupling: Coupling,
+    motions: Vec<BuiltMotion>,
     updates: RecordReader<UpdateRecord>,
     forces: RecordReader<ForceRecord>,
     /// When the newest constraint set was published, s.
@@ -115,6 +116,7 @@ impl RecordedSession {
         let reader = |error| Failure::bad_input(error);
         Ok(Self {
             coupling: Coupling::new(&world, &built.settings),
+            motions: built.motions,
             god_object: GodObject::new(world, built.settings, built.start)?,
             updates: recording.updates().map_err(reader)?,
             forces: recording.forces().map_err(reader)?,
@@ -138,6 +140,11 @@ impl RecordedSession {
                         force.sequence, force.constraint_sequence
                     )));
                 }
+            }
+        }
+        for motion in &self.motions {
+            if let Some(pose) = self.god_object.obstacle_poses().nth(motion.obstacle) {
+                self.coupling.place_obstacle(motion.obstacle, pose);
             }
         }
         let time = force.time.as_secs_f64();
@@ -183,6 +190,11 @@ impl RecordedSession {
         let Some(update) = self.updates.next_record().map_err(Failure::bad_input)? else {
             return Ok(None);
         };
+        self.god_object.set_device_ahead(update.device_ahead);
+        for motion in &self.motions {
+            let there = motion.pose_at(update.obstacle_time.as_secs_f64());
+            self.god_object.move_obstacle(motion.obstacle, &there);
+        }
         let before = thread_cpu_time();
         let _ = self
             .god_object

@@ -13,13 +13,13 @@ use std::io::{self, IsTerminal};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use god_object::nalgebra::Vector3;
-use god_object::spatial::{Pose, linear};
+use god_object::nalgebra::{Point3, Vector3};
+use god_object::spatial::{Pose, at_reference_point, linear};
+use god_object::surface::EnergyObserver;
 use god_object::{
     Coupling, GodObject, Settings, ShadedAcceleration, StartError, StepReport, World,
 };
 use indicatif::ProgressBar;
-use taut_bridge::EnergyObserver;
 use taut_scene::{BuiltMotion, DeviceTrace, ReplayRow, ReplayWriter, Scene};
 
 use crate::cli::{MethodChoice, ReplayArgs};
@@ -123,6 +123,7 @@ pub struct Replay {
     /// Virtual time of the first row, at which the obstacles' traces begin, s.
     began: Option<f64>,
     shaded: Option<ShadedAcceleration>,
+    reference_point: Point3<f64>,
     energy: EnergyObserver,
     last_force: Option<Vector3<f64>>,
     seen: Seen,
@@ -160,7 +161,7 @@ impl Replay {
         god_object_rate: Option<f64>,
     ) -> Result<Self, StartError> {
         let coupling = Coupling::new(&world, &settings);
-        let energy = EnergyObserver::new(world.body.reference_point);
+        let reference_point = world.body.reference_point;
         Ok(Self {
             god_object: GodObject::new(world, settings, start)?,
             coupling,
@@ -173,7 +174,8 @@ impl Replay {
             motions: Vec::new(),
             began: None,
             shaded: None,
-            energy,
+            reference_point,
+            energy: EnergyObserver::new(),
             last_force: None,
             seen: Seen {
                 gap_min: f64::INFINITY,
@@ -206,6 +208,11 @@ impl Replay {
             self.clock.updated(time);
         }
 
+        for motion in &self.motions {
+            if let Some(pose) = self.god_object.obstacle_poses().nth(motion.obstacle) {
+                self.coupling.place_obstacle(motion.obstacle, pose);
+            }
+        }
         let set = self.god_object.constraint_set();
         let before = thread_cpu_time();
         let output = self.coupling.step(time, device_pose, set);
@@ -224,7 +231,10 @@ impl Replay {
             stale: time - self.clock.last,
             timings_us: (microseconds(update_time), microseconds(force_time)),
         };
-        self.energy.step(device_pose, &output.wrench);
+        let device = at_reference_point(device_pose, &self.reference_point);
+        self.energy.grant(self.coupling.obstacle_work());
+        self.energy.arrive(&device);
+        self.energy.hold(&device, &output.wrench);
         self.observe(&answer);
         answer
     }
@@ -252,7 +262,9 @@ impl Replay {
             contacts: distribution_of(&self.seen.contacts),
             active: distribution_of(&self.seen.active),
             gap_min_m: self.seen.gap_min.is_finite().then_some(self.seen.gap_min),
-            energy_injected_j: self.energy.injected(),
+            energy_injected_j: self.energy.highest(),
+            energy_from_obstacles_j: self.coupling.obstacle_work(),
+            energy_generated_j: self.energy.generated(),
             ..self.seen.report.clone()
         }
     }
@@ -279,6 +291,7 @@ impl Seen {
     fn update(&mut self, step: &StepReport, took: Duration) {
         self.update_us.push(microseconds(took));
         self.report.solver_fallbacks += u64::from(step.solver_fallbacks);
+        self.report.obstacle_blocked_updates += u64::from(step.obstacles_blocked > 0);
         let work = &mut self.report.work;
         *work = WorkReport {
             node_pairs: work.node_pairs + step.work.node_pairs,

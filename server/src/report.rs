@@ -43,8 +43,14 @@ pub struct SessionReport {
     pub packets_refused: u64,
     /// Times at which the safety stage or a device fault changed the force.
     pub safety_events: u64,
-    /// Energy given to the hand beyond what it had put in, J.
+    /// Energy given to the hand beyond what it had put in, J; obstacles that move may truly give some.
     pub energy_injected_j: f64,
+    /// Net work that obstacles that move did on the hand, J; negative where they gave way under it.
+    pub energy_from_obstacles_j: f64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J: the coupling made it.
+    pub energy_generated_j: f64,
+    /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
+    pub obstacle_blocked_updates: u64,
     /// Projections that the chosen solver did not certify and another one answered.
     pub solver_fallbacks: u64,
     /// Samples that the monitor had no room for.
@@ -106,8 +112,14 @@ pub struct ReplayReport {
     pub kkt_max: f64,
     /// Projections that the chosen solver did not certify and another one answered.
     pub solver_fallbacks: u64,
-    /// Energy given to the hand beyond what it had put in, J.
+    /// Energy given to the hand beyond what it had put in, J; obstacles that move may truly give some.
     pub energy_injected_j: f64,
+    /// Net work that obstacles that move did on the hand, J; negative where they gave way under it.
+    pub energy_from_obstacles_j: f64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J: the coupling made it.
+    pub energy_generated_j: f64,
+    /// Updates in which an obstacle did not get to where its trace is, because the body was squeezed or the budget spent.
+    pub obstacle_blocked_updates: u64,
     /// Largest change of the force from one row to the next, N.
     pub max_force_step_n: f64,
     /// Largest force, N.
@@ -206,6 +218,12 @@ impl fmt::Display for SessionReport {
             "safety events       {}, energy injected {:.2e} J",
             self.safety_events, self.energy_injected_j
         )?;
+        write_obstacles(
+            f,
+            self.energy_from_obstacles_j,
+            self.energy_generated_j,
+            self.obstacle_blocked_updates,
+        )?;
         write!(
             f,
             "datagrams           {} sent, {} refused",
@@ -287,6 +305,12 @@ impl fmt::Display for ReplayReport {
             "contacts            p50 {:.0}, max {:.0}; active max {:.0}",
             self.contacts.p50, self.contacts.max, self.active.max
         )?;
+        write_obstacles(
+            f,
+            self.energy_from_obstacles_j,
+            self.energy_generated_j,
+            self.obstacle_blocked_updates,
+        )?;
         match self.gap_min_m {
             Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
             None => writeln!(f, "smallest gap        never near")?,
@@ -302,6 +326,22 @@ impl fmt::Display for ReplayReport {
             self.kkt_max, self.solver_fallbacks, self.energy_injected_j
         )
     }
+}
+
+/// A line on moving obstacles, where some did work or were held up.
+fn write_obstacles(
+    f: &mut fmt::Formatter<'_>,
+    work: f64,
+    generated: f64,
+    blocked: u64,
+) -> fmt::Result {
+    if work == 0.0 && blocked == 0 {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "moving obstacles    gave the hand {work:.2e} J, held up in {blocked} updates; the coupling itself made {generated:.2e} J"
+    )
 }
 
 #[cfg(test)]
@@ -348,6 +388,9 @@ mod tests {
                 "packets_sent",
                 "safety_events",
                 "energy_injected_j",
+                "energy_from_obstacles_j",
+                "energy_generated_j",
+                "obstacle_blocked_updates",
                 "clients",
                 "observers",
             ],
@@ -388,6 +431,9 @@ mod tests {
                 "kkt_max",
                 "solver_fallbacks",
                 "energy_injected_j",
+                "energy_from_obstacles_j",
+                "energy_generated_j",
+                "obstacle_blocked_updates",
                 "max_force_step_n",
                 "work",
             ],

@@ -27,15 +27,18 @@ pub fn run(
     let key = workbench_key(args.key.as_deref(), &workbench)?;
     let overrides = Overrides {
         scene: args.scene.clone(),
+        allow_unstable: args.allow_unstable,
         quic: args.quic,
         udp: args.udp,
         no_monitor: args.no_monitor,
         record: args.record.clone(),
+        input: None,
         recording: args.recording.clone(),
     };
     let setup = session_setup(&workbench, key, &overrides)?;
     let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
+    taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
     watch(&mut session, &mut signal, args.duration, terminal, |_| {});
     terminal.end_status();

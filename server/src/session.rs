@@ -12,9 +12,11 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use god_object::spatial::linear;
-use god_object::{GodObject, Pose};
-use taut_bridge::realtime::{lock_memory, pin_to_core};
-use taut_bridge::{Device, RemoteDevice};
+use god_object::{GodObject, Pose, Settings};
+use taut_bridge::edge::offer_of;
+use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
+use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
+use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
 use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
@@ -23,10 +25,12 @@ use crate::broadcast::{self, BridgeCommands, StateWriter};
 use crate::checker::{self, PenetrationChecker};
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
+use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
+use crate::loops::incidents::{self, IncidentNews};
 use crate::loops::shell::{Waker, run_at_deadlines, spawn};
 use crate::loops::wiring::WiredLoops;
 use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, NetworkCounts, Severity};
@@ -55,6 +59,8 @@ pub struct Session {
     ledger: RealtimeLedger,
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
+    arm_switch: Arc<ArmSwitch>,
+    incidents: IncidentNews,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -83,15 +89,30 @@ impl Session {
         let picture = picture(&setup);
         let opening = opening(&setup);
         let scene_revision = setup.content.description.revision;
+        let coupling = match &setup.device {
+            DeviceSource::Remote { .. } => offer_of(
+                &setup.world,
+                &setup.settings,
+                setup.realtime.broadcast_period.as_secs_f64().recip(),
+            ),
+            DeviceSource::Local(_) => CouplingOffer::AtServer {
+                reason: "its workbench has a device of its own".to_owned(),
+            },
+        };
         let options = ServerOptions {
+            coupling,
             quic: setup.link.quic,
             udp: setup.link.udp,
+            announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
-        let (device, bridge_commands) = connect_device(setup.device, &link)?;
+        let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
+        let [head, watched_head] = setup.head.start().map_err(|error| {
+            Failure::failed(format!("the head tracker cannot be listened to ({error})"))
+        })?;
 
         let (taps, recorder) = match &setup.recording {
             Some(wanted) => {
@@ -111,7 +132,8 @@ impl Session {
             device,
             setup.safety,
             taps,
-        );
+        )
+        .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
         let mut session = Self {
             clock,
@@ -120,6 +142,8 @@ impl Session {
             ledger,
             statistics: loops.statistics.clone(),
             wrench: loops.observers.status,
+            arm_switch: loops.arm_switch.clone(),
+            incidents: IncidentNews::default(),
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -132,6 +156,7 @@ impl Session {
         // From here on a failure drops the session, which ends what was started.
         if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
+                head: watched_head,
                 shared: loops.observers.monitor,
                 statistics: loops.statistics.clone(),
                 clock,
@@ -150,7 +175,7 @@ impl Session {
         }
         let states = StateWriter::new(
             loops.observers.broadcast,
-            setup.head,
+            head,
             &setup.world.body.reference_point,
             scene_revision,
         );
@@ -297,9 +322,13 @@ impl Session {
                         |now| haptics.tick(now),
                     );
                 }));
-                // Whatever ended the loop: no force is left on the hand.
-                haptics.release(clock.now());
-                if let Err(cause) = ticked {
+                // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
+                let released = catch_unwind(AssertUnwindSafe(|| {
+                    while !haptics.release_step(clock.now()) {
+                        sleep_until(clock.monotonic(clock.now() + period));
+                    }
+                }));
+                if let Err(cause) = ticked.and(released) {
                     resume_unwind(cause);
                 }
             },
@@ -358,6 +387,11 @@ impl Session {
         self.ledger.report()
     }
 
+    /// Asks for force at the device, or for none.
+    pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
+        &self.arm_switch
+    }
+
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
@@ -371,11 +405,16 @@ impl Session {
     /// Tells what happened on the network since the last time: errors here, everything to monitor and log. Call it a few times a
     /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
+        self.tell_incidents();
         let Some(link) = &self.link else {
             return;
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
+            if let LinkEvent::Arm { arm, .. } = event {
+                self.arm_switch
+                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            }
             lines.extend(
                 self.clients
                     .follow(&event)
@@ -411,6 +450,26 @@ impl Session {
             u32::try_from(clients.len()).unwrap_or(u32::MAX),
             Ordering::Relaxed,
         );
+    }
+
+    /// Tells of the device port's events, to the log and the recording; the monitor looks by itself.
+    fn tell_incidents(&mut self) {
+        let counts = &self.statistics.haptics.incidents;
+        for (event, times) in self.incidents.since_last(counts) {
+            let text = incidents::line(&event, times);
+            if event.kind.is_good_news() {
+                tracing::info!("{text}");
+            } else {
+                tracing::warn!("{text}");
+            }
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: event.time,
+                    kind: "safety".to_owned(),
+                    text,
+                });
+            }
+        }
     }
 
     /// One line of what goes on.
@@ -520,6 +579,7 @@ fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Fai
 fn connect_device(
     source: DeviceSource,
     link: &ServerLink,
+    settings: &Settings,
 ) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
     match source {
         DeviceSource::Local(device) => Ok((device, None)),
@@ -527,8 +587,9 @@ fn connect_device(
             let inputs = link.device_inputs().ok_or_else(|| {
                 Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
             })?;
-            let (device, commands) = RemoteDevice::new(inputs, limits, max_age);
-            Ok((Box::new(device), Some(commands)))
+            let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
+            let sets = EdgeSets::new(settings);
+            Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
         }
     }
 }
@@ -551,6 +612,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
     MonitorPicture {
         name: description.name.clone(),
         world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,
         screens: description.screens.clone(),
         workbench_from_scene: description
@@ -558,7 +620,7 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
             .to_isometry()
             .unwrap_or_else(Pose::identity),
         display_scale: description.display_scale,
-        head: setup.head,
+        head: setup.head.rest,
         rest_distance: setup.settings.rest_distance,
     }
 }
@@ -566,7 +628,10 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
-        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Stats { .. } => Severity::Info,
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {

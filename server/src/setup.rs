@@ -9,8 +9,9 @@ use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::{ClusterKey, Content};
 use taut_recording::Manifest;
+use taut_scene::BuiltMotion;
 
-use crate::head::Head;
+use crate::head::HeadSource;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -18,6 +19,9 @@ use crate::realtime::RealtimePolicy;
 pub struct SessionSetup {
     /// Bodies.
     pub world: Arc<World>,
+    /// How obstacles move; nothing for those that stand still. At most
+    /// [`MAX_MOVING`](crate::shared::contact_snapshot::MAX_MOVING).
+    pub motions: Vec<BuiltMotion>,
     /// Of the method.
     pub settings: Settings,
     /// Where god-object and device start.
@@ -27,7 +31,7 @@ pub struct SessionSetup {
     /// Limits and times of the force.
     pub safety: SafetySettings,
     /// The viewer.
-    pub head: Head,
+    pub head: HeadSource,
     /// What clients fetch at join.
     pub content: Content,
     /// Addresses, key and limits of the network.
@@ -71,6 +75,8 @@ pub struct LinkSettings {
     pub quic: SocketAddr,
     /// Of the state plane.
     pub udp: SocketAddr,
+    /// Port of the state plane that clients are told, where a router or relay forwards to `udp`; `None`: its own.
+    pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
     /// Most clients at a time.

@@ -56,6 +56,9 @@ impl Statistics {
             penetration_checks: self.checks.checks.load(Ordering::Relaxed),
             safety_events: self.haptics.safety_events.load(Ordering::Relaxed),
             energy_injected_j: self.haptics.energy_injected(),
+            energy_from_obstacles_j: self.haptics.obstacle_work(),
+            energy_generated_j: self.haptics.energy_generated(),
+            obstacle_blocked_updates: self.god_object.blocked_updates.load(Ordering::Relaxed),
             solver_fallbacks: self.god_object.solver_fallbacks.load(Ordering::Relaxed),
             ..SessionReport::default()
         }

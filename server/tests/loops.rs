@@ -9,8 +9,8 @@ use god_object::{GodObject, Pose};
 use taut::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
-    Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, SafetySettings,
-    SimulatedDevice, ViaPoint,
+    ArmWish, Device, DeviceFault, DeviceInfo, DeviceSample, EventKind, Grip, Hand, MinJerkPath,
+    SafetySettings, SimulatedDevice, ViaPoint,
 };
 use taut_scene::{BuiltScene, Scene};
 
@@ -62,7 +62,8 @@ impl VirtualSession {
             ..SafetySettings::default()
         };
         Self {
-            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None),
+            loops: WiredLoops::new(&world, &scene.settings, god_object, device, safety, None)
+                .with_motions(scene.motions.clone()),
             now: Duration::ZERO,
         }
     }
@@ -92,20 +93,14 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
         let mut largest: f64 = 0.0;
         for _ in 0..3500 {
             session.tick(god_object_ticks);
-            let pose = session
-                .loops
-                .observers
-                .monitor
-                .contacts
-                .newest()
-                .set
-                .god_object_pose;
+            let contacts = session.loops.observers.monitor.contacts.newest();
+            let pose = contacts.set.god_object_pose;
             assert!(
                 pose.translation.z >= 0.019,
                 "centre at {}",
                 pose.translation.z
             );
-            assert_eq!(checker.penetrated_obstacle(&pose), None);
+            assert_eq!(checker.penetrated_obstacle(&pose, &contacts.moving), None);
             let force = linear(&session.loops.observers.monitor.wrench.newest().wrench);
             // Frictionless, so nothing but along the normal.
             assert!(force.xy().norm() < 1e-3 * force.norm().max(1.0), "{force}");
@@ -189,23 +184,22 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
         session.tick(1);
     }
     assert!(felt() > 2.0);
-    let before = session
-        .loops
-        .haptics
-        .statistics()
-        .safety_events
-        .load(std::sync::atomic::Ordering::Relaxed);
-    session.tick(1);
-    assert_eq!(felt(), 0.0, "dropped at once");
-    session.tick(1);
+    let count =
+        |session: &VirtualSession, kind| session.loops.haptics.statistics().incidents.of(kind);
+    assert_eq!(count(&session, EventKind::DeviceLost), 0);
+    let mut before = felt();
+    for age in 1..=200 {
+        session.tick(1);
+        assert!(before - felt() <= 0.5, "no step of {} N", before - felt());
+        assert_eq!(felt() == 0.0, age >= 120, "{} N after {age} ms", felt());
+        before = felt();
+    }
     assert!(session.loops.observers.monitor.device.newest().faulty);
-    let after = session
-        .loops
-        .haptics
-        .statistics()
-        .safety_events
-        .load(std::sync::atomic::Ordering::Relaxed);
-    assert_eq!(after, before + 1, "one event, not one per tick");
+    assert_eq!(
+        count(&session, EventKind::DeviceLost),
+        1,
+        "one event, not one per tick"
+    );
 }
 
 #[test]
@@ -258,4 +252,141 @@ fn constraints_older_than_a_tenth_of_a_second_let_the_force_fade() {
     assert!(felt() > 2.0, "held at first: {}", felt());
     hang(160);
     assert_eq!(felt(), 0.0);
+}
+
+/// Which loop stalls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stalled {
+    GodObject,
+    Coupling,
+    Haptics,
+}
+
+/// What a stall of one loop did to the force, in a hand that rests on the plane.
+#[derive(Debug)]
+struct StallSeen {
+    /// Largest change of the force in one tick, N.
+    largest_step: f64,
+    /// Smallest force from the stall's begin on, and the force before it, N.
+    lowest: f64,
+    before: f64,
+    /// Oldest constraints that the coupling told of, ms.
+    oldest_ms: u128,
+    /// Ticks of the haptics loop.
+    haptics_ticks: u64,
+}
+
+fn stall(loop_: Stalled, milliseconds: u32) -> StallSeen {
+    let scene = sphere_on_plane();
+    let written = Arc::default();
+    let device = Unplugged {
+        device: pressing_hand(&scene),
+        at: Duration::MAX,
+        written: Arc::clone(&written),
+    };
+    let mut session =
+        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    for _ in 0..1500 {
+        session.tick(1);
+    }
+    let felt = || written.lock().map(|force| *force).unwrap_or_default();
+    let ticked = session
+        .loops
+        .haptics
+        .statistics()
+        .period
+        .distribution()
+        .count;
+    let mut last = felt();
+    let mut seen = StallSeen {
+        largest_step: 0.0,
+        lowest: last.norm(),
+        before: last.norm(),
+        oldest_ms: 0,
+        haptics_ticks: 0,
+    };
+    for tick in 0..400 {
+        session.now += TICK;
+        let now = session.now;
+        let stalls = |this: Stalled| this == loop_ && tick < milliseconds;
+        if !stalls(Stalled::Haptics) {
+            session.loops.haptics.tick(now);
+        }
+        if !stalls(Stalled::Coupling) {
+            session.loops.coupling.tick(now);
+        }
+        if !stalls(Stalled::GodObject) {
+            session.loops.god_object.tick(|| now);
+        }
+        seen.largest_step = seen.largest_step.max((felt() - last).norm());
+        last = felt();
+        seen.lowest = seen.lowest.min(last.norm());
+        let command = session.loops.observers.monitor.wrench.newest();
+        seen.oldest_ms = seen.oldest_ms.max(command.constraint_age.as_millis());
+    }
+    seen.haptics_ticks = session
+        .loops
+        .haptics
+        .statistics()
+        .period
+        .distribution()
+        .count
+        - ticked;
+    seen
+}
+
+#[test]
+fn a_loop_that_stalls_neither_stops_the_others_nor_makes_the_force_step() {
+    for loop_ in [Stalled::GodObject, Stalled::Coupling, Stalled::Haptics] {
+        for milliseconds in [5, 20, 100] {
+            let seen = stall(loop_, milliseconds);
+            let case = format!("{loop_:?} for {milliseconds} ms: {seen:?}");
+            assert!(seen.before > 2.0, "{case}");
+            assert!(seen.largest_step <= 0.5 + 1e-9, "{case}");
+            let ticks = match loop_ {
+                Stalled::Haptics => 400 - u64::from(milliseconds),
+                _ => 400,
+            };
+            assert_eq!(seen.haptics_ticks, ticks, "{case}");
+            match loop_ {
+                // The constraints stay planes, and their age is told.
+                Stalled::GodObject => {
+                    assert!(seen.oldest_ms >= u128::from(milliseconds), "{case}");
+                    assert!(seen.lowest > 0.9 * seen.before, "{case}");
+                }
+                // 20 ms are held; of 100 ms, 80 have faded.
+                Stalled::Coupling if milliseconds <= 20 => {
+                    assert!(seen.lowest > 0.9 * seen.before, "{case}");
+                }
+                Stalled::Coupling => assert!(seen.lowest < 0.25 * seen.before, "{case}"),
+                Stalled::Haptics if milliseconds < 20 => {
+                    assert!(seen.lowest > 0.9 * seen.before, "{case}");
+                }
+                Stalled::Haptics => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn who_asks_for_no_force_gets_none_until_somebody_arms() {
+    let scene = sphere_on_plane();
+    let device = pressing_hand(&scene);
+    let mut session =
+        VirtualSession::new(&scene, Box::new(device), &Pose::translation(0.0, 0.0, 0.04));
+    for _ in 0..1500 {
+        session.tick(1);
+    }
+    let felt = |session: &VirtualSession| linear(session.loops.haptics.port().rendered()).norm();
+    assert!(felt(&session) > 2.0);
+    session.loops.arm_switch.wish(ArmWish::Disarm);
+    for _ in 0..150 {
+        session.tick(1);
+    }
+    assert_eq!(felt(&session), 0.0);
+    session.loops.arm_switch.wish(ArmWish::Arm);
+    for _ in 0..150 {
+        session.tick(1);
+    }
+    assert!(felt(&session) > 2.0);
 }

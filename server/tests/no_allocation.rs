@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use god_object::GodObject;
+use god_object::{GodObject, Pose};
 use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
 use taut::setup::DeviceSource;
@@ -31,7 +31,7 @@ fn manifest() -> Manifest {
 
 #[test]
 fn loops_two_and_three_allocate_nothing() {
-    for name in ["sphere-on-plane", "peg-in-a-hole"] {
+    for name in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let scene = match Scene::named_or_file(name).and_then(|scene| scene.build()) {
             Ok(scene) => scene,
             Err(error) => panic!("{error}"),
@@ -42,7 +42,7 @@ fn loops_two_and_three_allocate_nothing() {
             tremor: 5e-5,
             seed: 1,
         };
-        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene) else {
+        let Ok(DeviceSource::Local(device)) = device(&wanted, &scene, &Pose::identity()) else {
             panic!("no simulated device");
         };
         let world = Arc::new(scene.world);
@@ -63,7 +63,8 @@ fn loops_two_and_three_allocate_nothing() {
             device,
             SafetySettings::default(),
             Some(taps),
-        );
+        )
+        .with_motions(scene.motions);
         let mut most_contacts = 0;
         for tick in 1..=4000_u64 {
             let now = Duration::from_millis(tick);

@@ -69,7 +69,7 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
     let Ok(directory) = tempfile::tempdir() else {
         panic!("no temporary directory");
     };
-    for scene in ["sphere-on-plane", "peg-in-a-hole"] {
+    for scene in ["sphere-on-plane", "peg-in-a-hole", "moving-plate"] {
         let recording = directory.path().join(scene);
         record(scene, &recording);
         let out = directory.path().join(format!("{scene}.csv"));

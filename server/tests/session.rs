@@ -4,24 +4,29 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use god_object::Vector6;
+use god_object::nalgebra::Point3;
+use god_object::{Pose, Vector6};
 use taut::config::{Overrides, session_setup};
 use taut::session::Session;
 use taut::setup::{DeviceSource, SessionSetup};
 use taut::terminal::Terminal;
 use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceSample};
-use taut_link::ClusterKey;
+use taut_link::{ClientOptions, ClusterKey, ReceivedState, Role, connect};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 /// Much longer than a session takes to notice; the machine may be busy.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn setup() -> SessionSetup {
-    let free_ports = [
-        "network.quic_port=0",
-        "network.udp_port=0",
-        "scene=\"sphere-on-plane\"",
-    ];
+    let Ok(key) = ClusterKey::generate() else {
+        panic!("no random numbers");
+    };
+    setup_of("sphere-on-plane", key)
+}
+
+fn setup_of(scene: &str, key: ClusterKey) -> SessionSetup {
+    let scene = format!("scene=\"{scene}\"");
+    let free_ports = ["network.quic_port=0", "network.udp_port=0", scene.as_str()];
     let workbench = match Workbench::parse_with_overrides(
         "workbench.toml",
         SHIPPED_WORKBENCH,
@@ -30,9 +35,6 @@ fn setup() -> SessionSetup {
     ) {
         Ok(workbench) => workbench,
         Err(error) => panic!("{error}"),
-    };
-    let Ok(key) = ClusterKey::generate() else {
-        panic!("no random numbers");
     };
     match session_setup(
         &workbench,
@@ -127,4 +129,100 @@ fn a_session_that_is_dropped_gives_its_ports_back() {
             "{address} is still in use"
         );
     }
+}
+
+/// What an operator's client receives of a session until its god-object loop has run for `session_s`.
+fn received(session: &Session, key: ClusterKey, session_s: f64) -> Vec<ReceivedState> {
+    let Some(server) = session.quic_address() else {
+        panic!("no address");
+    };
+    let runtime = match tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+    {
+        Ok(runtime) => runtime,
+        Err(error) => panic!("{error}"),
+    };
+    let mut states = Vec::new();
+    runtime.block_on(async {
+        let options = ClientOptions::new(server.to_string(), key, Role::Operator, "onlooker");
+        let link = match connect(options).await {
+            Ok(link) => link,
+            Err(error) => panic!("{error}"),
+        };
+        let plate = &link.description().obstacles[1];
+        assert_eq!(
+            (plate.name.as_str(), plate.pose.position[2]),
+            ("plate", -0.005)
+        );
+        let begun = Instant::now();
+        while session.age().as_secs_f64() < session_s && begun.elapsed() < PATIENCE {
+            tokio::time::sleep(Duration::from_millis(20)).await;
+            link.drain_states(&mut states);
+        }
+        link.close().await;
+    });
+    states
+}
+
+#[test]
+fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
+    let Ok(key) = ClusterKey::generate() else {
+        panic!("no random numbers");
+    };
+    let Ok(session) = Session::start(setup_of("moving-plate", key.clone())) else {
+        panic!("the session does not start");
+    };
+    let states = received(&session, key, 3.2);
+    let (report, failure) = session.stop(&Terminal::standard_error());
+    assert!(failure.is_none());
+
+    let mut offsets = Vec::new();
+    let mut highest: f64 = 0.0;
+    for received in &states {
+        let state = &received.state;
+        let (Some(tool), [body]) = (state.tools.first(), state.bodies.as_slice()) else {
+            panic!("one tool and one body that moves: {state:?}");
+        };
+        assert_eq!(body.id, 1, "the plate is the second obstacle");
+        let (Some(plate), Some(god_object)) =
+            (body.pose.to_isometry(), tool.god_object.to_isometry())
+        else {
+            panic!("poses are rigid");
+        };
+        // Both are of one instant: every corner of the body is over the plate's face, but for single precision.
+        let plate_from_body: Pose = plate.inverse() * god_object;
+        for corner in 0..8_u8 {
+            let sign = |bit: u8| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let at = Point3::new(0.02 * sign(0), 0.02 * sign(1), 0.01 * sign(2));
+            assert!((plate_from_body * at).z > 0.005 - 1e-6, "{state:?}");
+        }
+        let z = plate.translation.z;
+        assert!(plate.translation.vector.xy().norm() == 0.0);
+        assert!((-0.005 - 1e-8..0.030 + 1e-8).contains(&z), "at {z}");
+        highest = highest.max(god_object.translation.z);
+        let rises = z > -0.0049 && z < 0.0299;
+        if rises {
+            // The trace is there 1 s after its beginning, and 10 s later for each metre.
+            let trace_s = 1.0 + (z + 0.005) / 0.1;
+            offsets.push(state.sample_time_ns as f64 * 1e-9 - trace_s);
+        }
+    }
+    assert!(
+        states.len() > 200 && offsets.len() > 20,
+        "{} states",
+        states.len()
+    );
+    assert!(highest > 0.040, "the body was lifted to {highest} m only");
+    // All at the same distance in time from the trace, but for what a busy machine makes of it.
+    offsets.sort_by(f64::total_cmp);
+    let spread = offsets[offsets.len() / 2] - offsets[0];
+    assert!(
+        spread < 0.1,
+        "half of the poses are more than {spread} s late"
+    );
+
+    assert!(report.penetration_checks > 20);
+    assert_eq!(report.penetrations, 0);
+    assert!(report.energy_from_obstacles_j > 0.0, "the plate did work");
 }

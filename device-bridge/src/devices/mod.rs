@@ -1,17 +1,28 @@
-//! The devices: simulated, recorded, at the other end of the network. One file per driver.
+//! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
-pub(crate) mod grip;
-pub(crate) mod hand;
-pub(crate) mod min_jerk;
+pub(crate) mod glide;
+pub(crate) mod led;
+pub(crate) mod rate_control;
 pub(crate) mod recorded;
 pub(crate) mod remote;
 pub(crate) mod simulated;
-pub(crate) mod tremor;
+pub(crate) mod space_mouse;
+pub(crate) mod spidar;
+pub(crate) mod vrpn;
 
-pub use grip::Grip;
-pub use hand::{Hand, HandPreset, UnknownHand};
-pub use min_jerk::{MinJerkPath, PathError, Progress, ViaPoint, min_jerk};
+pub use glide::Glide;
+pub use led::{LedDevice, Target};
+pub use rate_control::{CapMode, CapSettings, RateControl};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};
-pub use remote::{DEFAULT_MAX_AGE, RemoteDevice};
+pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
 pub use simulated::SimulatedDevice;
-pub use tremor::{Tremor, TremorMotion};
+pub use space_mouse::{
+    CapState, HidPort, MODELS, Model, Report, ReportPort, ReportSource, ShortReport, SourceError,
+    SpaceMouse,
+};
+pub use spidar::{SpidarDevice, SpidarPlacement};
+pub use taut_plant::{
+    Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError, Progress, Tremor,
+    TremorMotion, UnknownHand, ViaPoint, min_jerk,
+};
+pub use vrpn::{Anchor, TrackerReader, VrpnDevice, VrpnSettings};

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector6};
 
-use super::min_jerk::{is_finite, stack};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use taut_plant::{is_finite, stack};
 
 /// One row of a trace.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,12 +11,17 @@ use std::time::Duration;
 use nalgebra::Vector6;
 use taut_link::DeviceInput;
 use taut_link::proto::WrenchCommand;
-use taut_link::proto::input::INPUT_FAULT;
+use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
+use taut_link::proto::wrench::WRENCH_AT_EDGE;
 
-use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt};
 
 /// Age of the newest reading from which on the device counts as lost.
 pub const DEFAULT_MAX_AGE: Duration = Duration::from_millis(20);
+
+/// Age up to which a reading counts that came on time from a bridge which couples by itself: a slow network delays it, and
+/// no force waits for it.
+pub const MAX_EDGE_DELAY: Duration = Duration::from_millis(250);
 
 /// The command that says "no force".
 const NO_FORCE: WrenchCommand = WrenchCommand {
@@ -37,6 +42,8 @@ pub struct RemoteDevice {
     /// Index of the newest reading: what a command answers.
     index: u64,
     faulty: bool,
+    /// What the bridge says that it renders.
+    felt: Option<Felt>,
 }
 
 impl RemoteDevice {
@@ -66,6 +73,7 @@ impl RemoteDevice {
             session: None,
             index: 0,
             faulty: true,
+            felt: None,
         };
         (device, to_send)
     }
@@ -80,6 +88,11 @@ impl RemoteDevice {
             return Err(DeviceFault::Reconnected);
         }
 
+        let at_edge = input.sample.flags & INPUT_AT_EDGE != 0;
+        let wrench = Vector6::from(input.sample.rendered);
+        let finite = wrench.iter().all(|x| x.is_finite());
+        self.felt = finite.then_some(Felt { wrench, at_edge });
+
         let received = Duration::from_nanos(input.received_ns);
         // The bridge's own stamp is the better one, once its clock is locked.
         let measured = match input.sample.sample_time_ns {
@@ -91,7 +104,13 @@ impl RemoteDevice {
         }
         // Too old by either clock is too old: a full queue delivers old readings on time.
         let age = now.saturating_sub(measured.min(received));
-        if age > self.max_age {
+        let silence = now.saturating_sub(received);
+        let allowed = if at_edge {
+            MAX_EDGE_DELAY
+        } else {
+            self.max_age
+        };
+        if age > allowed || silence > self.max_age {
             return Err(DeviceFault::Lost { age });
         }
         if input.sample.flags & INPUT_FAULT != 0 {
@@ -116,8 +135,12 @@ impl Device for RemoteDevice {
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        self.felt = None;
         let sample = self.newest(now);
         self.faulty = sample.is_err();
+        if self.faulty {
+            self.felt = None;
+        }
         sample
     }
 
@@ -133,8 +156,17 @@ impl Device for RemoteDevice {
             time_ns: u64::try_from(now.as_nanos()).unwrap_or(u64::MAX),
             input_index: self.index,
             wrench,
-            flags: 0,
+            // A bridge that is faulty gets no sets: their silence lets its force fade.
+            flags: if self.felt.is_some_and(|felt| felt.at_edge) {
+                WRENCH_AT_EDGE
+            } else {
+                0
+            },
         });
+    }
+
+    fn felt(&self) -> Option<Felt> {
+        self.felt
     }
 }
 
@@ -169,6 +201,8 @@ mod tests {
                 velocity: [0.0, 0.0, -0.5, 0.0, 0.0, 0.0],
                 buttons: 5,
                 flags: 0,
+                rendered: [0.0; 6],
+                set_sequence: 0,
             },
             received_ns: received_ms * 1_000_000,
             session: 7,
@@ -214,6 +248,32 @@ mod tests {
             device.read(ms(1000)),
             Err(DeviceFault::Lost { age: ms(100) })
         );
+    }
+
+    #[test]
+    fn a_bridge_that_couples_by_itself_may_be_far_away_but_not_silent() {
+        let (mut inputs, mut device, mut commands) = device();
+        let mut edge = input(900, 1000);
+        edge.sample.flags = INPUT_AT_EDGE;
+        edge.sample.rendered = [0.0, 0.0, 3.0, 0.0, 0.1, 0.0];
+        inputs.write(Some(edge));
+        assert!(device.read(ms(1000)).is_ok(), "100 ms on the way");
+        let wrench = Vector6::from(edge.sample.rendered);
+        assert_eq!(
+            device.felt(),
+            Some(Felt {
+                wrench,
+                at_edge: true
+            })
+        );
+        device.write(ms(1000), &Vector6::repeat(1.0));
+        assert_eq!(commands.read().flags, WRENCH_AT_EDGE);
+        assert!(device.read(ms(1021)).is_err(), "21 ms of silence");
+        device.write(ms(1021), &Vector6::repeat(1.0));
+        assert_eq!(commands.read().flags, 0, "no sets for a lost bridge");
+        edge.sample.sample_time_ns = 1;
+        inputs.write(Some(edge));
+        assert!(device.read(ms(1000)).is_err(), "a second on the way");
     }
 
     #[test]

@@ -1,46 +1,41 @@
 //! A simulated six-degree-of-freedom impedance device in a simulated hand: a closed loop without hardware.
 //!
 //! The hand follows its scripted intention and trembles; the wrench written to the device pushes it back.
-//! The simulation advances on a fixed grid of 0.1 ms from the first call on, so a sample lies less than
+//! The simulation ([`taut_plant::Plant`]) advances on a fixed grid of 0.1 ms from the first call on, so a sample lies less than
 //! one step before `now`, and the same sequence of calls gives the same bytes.
 
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use nalgebra::{Isometry3, Point3, Vector6};
+use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant, Tremor};
 
-use super::grip::{Drive, Grip, GripInHand, STEP};
-use super::hand::Hand;
-use super::min_jerk::MinJerkPath;
-use super::tremor::Tremor;
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+
+/// Grid of the simulation: a tenth of a 1 kHz tick.
+const STEP: Duration = Duration::from_micros(100);
 
 /// Sample rate of the simulated device.
 const RATE_HZ: f64 = 1000.0;
 
-/// Delay of the force assumed for the stated stability limits: one tick, as in a loop that computes the
+/// Delay of the force by the loop itself, assumed for the stated stability limits: one tick, as in a loop that computes the
 /// force of a sample while the previous force is rendered.
-const DELAY_S: f64 = 1.0 / RATE_HZ;
+const LOOP_DELAY_S: f64 = 1.0 / RATE_HZ;
 
-/// Most internal steps in one call (1 s). After a longer silence the hand's time has stood still.
-const MAX_STEPS: u64 = 10_000;
+/// Most that is simulated in one call. After a longer silence the hand's time has stood still.
+const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 
 /// A grip in a hand, moved by an intention and a wrench.
 #[derive(Clone, Debug)]
 pub struct SimulatedDevice {
     info: DeviceInfo,
     grip: Grip,
-    state: GripInHand,
-    /// Intention of G.
-    path: MinJerkPath,
-    tremor: Option<Tremor>,
+    motors: Motors,
+    plant: Plant,
     reference_point: Point3<f64>,
-    wrench: Vector6<f64>,
     /// Time of the first call.
     epoch: Option<Duration>,
-    /// Grid steps since `epoch`, simulated or skipped.
-    elapsed: u64,
-    /// Grid steps simulated.
-    simulated: u64,
+    /// Time since `epoch` on the grid, simulated or skipped.
+    elapsed: Duration,
 }
 
 impl SimulatedDevice {
@@ -49,32 +44,21 @@ impl SimulatedDevice {
     #[must_use]
     pub fn new(grip: Grip, hand: Hand, path: MinJerkPath, reference_point: Point3<f64>) -> Self {
         let path = path.map(|pose| at_reference_point(pose, &reference_point));
-        let (start, _) = path.at(0.0);
-        let (max_stiffness, max_rotational_stiffness) =
-            grip.critical_stiffness(1.0 / RATE_HZ, DELAY_S);
-        let info = DeviceInfo {
-            name: "simulated".to_owned(),
-            sensed_degrees_of_freedom: 6,
-            actuated_degrees_of_freedom: 6,
-            limits: DeviceLimits {
-                max_stiffness,
-                max_rotational_stiffness,
-                max_force: grip.max_force,
-                max_torque: grip.max_torque,
-            },
-            rate_hz: RATE_HZ,
-        };
+        let motors = Motors::default();
         Self {
-            info,
+            info: DeviceInfo {
+                name: "simulated".to_owned(),
+                sensed_degrees_of_freedom: 6,
+                actuated_degrees_of_freedom: 6,
+                limits: limits(&grip, &motors),
+                rate_hz: RATE_HZ,
+            },
             grip,
-            state: GripInHand::new(grip, hand, start),
-            path,
-            tremor: None,
+            motors,
+            plant: Plant::new(grip, hand, path),
             reference_point,
-            wrench: Vector6::zeros(),
             epoch: None,
-            elapsed: 0,
-            simulated: 0,
+            elapsed: Duration::ZERO,
         }
     }
 
@@ -82,51 +66,46 @@ impl SimulatedDevice {
     /// holds the grip trembles.
     #[must_use]
     pub fn with_tremor(mut self, tremor: Tremor) -> Self {
-        self.tremor = self.state.is_held().then_some(tremor);
+        self.plant = self.plant.with_tremor(tremor);
+        self
+    }
+
+    /// Motors that are late.
+    #[must_use]
+    pub fn with_motors(mut self, motors: Motors) -> Self {
+        self.motors = motors;
+        self.info.limits = limits(&self.grip, &motors);
+        self.plant = self.plant.with_motors(motors);
+        self
+    }
+
+    /// An encoder that counts.
+    #[must_use]
+    pub fn with_encoder(mut self, encoder: Encoder) -> Self {
+        self.plant = self.plant.with_encoder(encoder);
         self
     }
 
     /// Replaces the hand, such as by [`Hand::RELEASED`]; pose and velocity go on.
     pub fn set_hand(&mut self, hand: Hand) {
-        self.state.set_hand(hand);
-        if !self.state.is_held() {
-            self.tremor = None;
-        }
+        self.plant.set_hand(hand);
     }
 
-    /// The wrench that the motors render now: the last one written, saturated.
+    /// The wrench that the motors render now: the last one written, delayed, lagging and saturated as the motors are.
     #[must_use]
     pub fn rendered_wrench(&self) -> &Vector6<f64> {
-        &self.wrench
+        self.plant.rendered_wrench()
     }
 
     /// Simulates the whole steps that fit before `now`.
     fn advance(&mut self, now: Duration) {
         let epoch = *self.epoch.get_or_insert(now);
-        let target = (now.saturating_sub(epoch).as_nanos() / STEP.as_nanos()) as u64;
-        let due = target.saturating_sub(self.elapsed);
-        for _ in 0..due.min(MAX_STEPS) {
-            self.step();
-        }
+        let passed = now.saturating_sub(epoch).as_nanos();
+        let grid = Duration::from_nanos((passed - passed % STEP.as_nanos()) as u64);
+        let due = grid.saturating_sub(self.elapsed);
+        self.plant
+            .advance(self.plant.time() + due.min(LONGEST_SILENCE));
         self.elapsed += due;
-    }
-
-    fn step(&mut self) {
-        // The intention at the middle of the step stands for the whole step: second-order accurate.
-        let time_s = (self.simulated as f64 + 0.5) * STEP.as_secs_f64();
-        let (intended_pose, intended_velocity) = self.path.at(time_s);
-        let tremor_force = self.tremor.as_ref().map_or(Vector3::zeros(), |tremor| {
-            let motion = tremor.at(time_s);
-            self.state
-                .force_for(&motion.displacement, &motion.velocity, &motion.acceleration)
-        });
-        self.state.step(&Drive {
-            wrench: self.wrench,
-            intended_pose,
-            intended_velocity,
-            tremor_force,
-        });
-        self.simulated += 1;
     }
 }
 
@@ -137,18 +116,29 @@ impl Device for SimulatedDevice {
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
         self.advance(now);
-        let grid = Duration::from_nanos(self.elapsed * STEP.as_nanos() as u64);
         Ok(DeviceSample {
-            time: self.epoch.unwrap_or(now) + grid,
-            pose: from_reference_point(&self.state.pose, &self.reference_point),
-            velocity: self.state.velocity,
+            time: self.epoch.unwrap_or(now) + self.elapsed,
+            pose: from_reference_point(&self.plant.measured_pose(), &self.reference_point),
+            velocity: *self.plant.velocity(),
             buttons: 0,
         })
     }
 
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
         self.advance(now);
-        self.wrench = self.grip.saturated(wrench);
+        self.plant.command(wrench);
+    }
+}
+
+/// What the device renders faithfully with nobody to hold it: the largest stable stiffnesses of the loop and the motors' limits.
+fn limits(grip: &Grip, motors: &Motors) -> DeviceLimits {
+    let delay = LOOP_DELAY_S + motors.delay.as_secs_f64() + motors.lag.as_secs_f64();
+    let (max_stiffness, max_rotational_stiffness) = grip.critical_stiffness(1.0 / RATE_HZ, delay);
+    DeviceLimits {
+        max_stiffness,
+        max_rotational_stiffness,
+        max_force: grip.max_force,
+        max_torque: grip.max_torque,
     }
 }
 

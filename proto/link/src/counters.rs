@@ -105,6 +105,8 @@ counters! {
         wrong_version,
         /// Datagrams whose seal is broken.
         forged,
+        /// Constraint sets that became whole.
+        sets,
         /// Datagrams sent.
         packets_sent,
         /// Datagrams that the system did not take.

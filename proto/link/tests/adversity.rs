@@ -120,6 +120,7 @@ async fn a_bad_network_costs_states_but_never_order_or_truth() {
         doubled: 50,
         swapped: 50,
         damaged: 50,
+        delay_us: 0,
     };
     let (server, relay) = behind_relay(impairment, 2).await;
     let client = client(&server, Role::Render, "left").await;

@@ -365,3 +365,57 @@ async fn content_without_its_meshes_is_not_served() {
         Ok(_) => panic!("served without a mesh"),
     }
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bridge_is_told_how_to_couple_and_gets_whole_constraint_sets() {
+    use taut_proto::constraints::{ConstraintRow, SET_PAUSED, SetHead};
+    use taut_proto::{ConstraintSet, CouplingOffer, Division};
+
+    let offer = CouplingOffer::AtServer {
+        reason: "as this test says".to_owned(),
+    };
+    let server = server_with(ServerOptions {
+        coupling: offer.clone(),
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let bridge = client(&server, Role::Device, "bridge").await;
+    let watcher = client(&server, Role::Observer, "watcher").await;
+    assert_eq!(bridge.coupling(), Some(&offer));
+    assert_eq!(watcher.coupling(), None);
+
+    let mut set = ConstraintSet::new();
+    set.head = SetHead {
+        sequence: 1,
+        ..SetHead::default()
+    };
+    set.rows.resize(60, ConstraintRow::default());
+    let mut broadcaster = server.broadcaster();
+    let mut send = |set: &ConstraintSet| {
+        let division = Division::of(set);
+        for part in 0..division.parts() {
+            broadcaster.send_constraints(division.part(set, part));
+        }
+    };
+    let (mut here, mut nothing) = (ConstraintSet::new(), ConstraintSet::new());
+    let mut confirmed = None;
+    wait_until("a set", || {
+        send(&set); // until the bridge's path is open
+        confirmed = bridge.newest_set(&mut here);
+        confirmed.is_some()
+    })
+    .await;
+    assert_eq!(here, set);
+    assert_eq!(watcher.newest_set(&mut nothing), None);
+
+    // The same set again confirms it, and may say more.
+    set.head.flags = SET_PAUSED;
+    wait_until("a repeat", || {
+        send(&set);
+        bridge.newest_set(&mut here) > confirmed && here.head.flags == SET_PAUSED
+    })
+    .await;
+    assert_eq!(here.rows.len(), 60);
+    assert_eq!(bridge.counters().sets, 1);
+    assert_eq!(bridge.counters().garbage, 0);
+}

@@ -7,9 +7,16 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, ClientStats, ControlMessage, HotState, InputSample, MeshHash, Payload, PoseF32,
-    PoseF64, Refusal, Role, SceneDescription, Transport, WrenchCommand,
-    control::{Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome},
+    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, HotState,
+    InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role, SceneDescription, Transport,
+    WrenchCommand,
+    constraints::{
+        ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
+    },
+    control::{
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
+    },
+    coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
@@ -79,7 +86,9 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         },
         velocity: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
         buttons: 1,
-        flags: 0,
+        flags: 2,
+        rendered: [0.0, 0.0, 1.5, 0.0, 0.25, 0.0],
+        set_sequence: 40,
     };
     let wrench = WrenchCommand {
         time_ns: 1_000_000_500,
@@ -102,7 +111,90 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("heartbeat", Payload::Heartbeat),
         ("input", Payload::Input(input)),
         ("wrench", Payload::Wrench(wrench)),
+        ("constraints", Payload::Constraints(part())),
     ]
+}
+
+/// A part with a row of every kind.
+pub fn part() -> ConstraintPart {
+    let plain = ConstraintRow {
+        obstacle: 2,
+        on_body: RowFeature { kind: 0, index: 7 },
+        on_obstacle: RowFeature { kind: 2, index: 9 },
+        arm: [0.5, 0.25, -0.125],
+        normal: [0.0, 0.0, 1.0],
+        gap: 0.000_976_562_5,
+        ..ConstraintRow::default()
+    };
+    let along = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let of = |separation| ConstraintRow {
+        separation,
+        ..plain
+    };
+    ConstraintPart {
+        head: SetHead {
+            sequence: 40,
+            made_ns: 1_000_000_900,
+            device_ns: 1_000_000_000,
+            pose: PoseF64 {
+                position: [0.5, 0.25, -0.125],
+                rotation: [1.0, 0.0, 0.0, 0.0],
+            },
+            flags: 1,
+        },
+        rows_in_set: 9,
+        part: 1,
+        parts: 2,
+        first_row: 2,
+        rows: ArrayVec::from_iter([
+            plain,
+            of(RowSeparation::OfBody),
+            of(RowSeparation::OfEdges(along)),
+            of(RowSeparation::OfBall(0.25)),
+            of(RowSeparation::OfRim([0.5; 3], [0.0, 0.0, 1.0], 0.125)),
+            of(RowSeparation::OfRods(along, [0.5, 0.25])),
+            ConstraintRow {
+                came: 0.5,
+                shading_normal: Some([0.0, 0.5, 0.5]),
+                ..plain
+            },
+        ]),
+    }
+}
+
+pub fn coupling() -> EdgeCoupling {
+    EdgeCoupling {
+        mass: 1.0,
+        inertia: [0.5, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.25],
+        reference_point: [0.0, 0.0, 0.5],
+        radius: 0.125,
+        k_s: 0.5,
+        k_h: 2000.0,
+        radius_of_gyration: Some(0.0625),
+        adaptation: Some(EdgeAdaptation {
+            duration: 0.015_625,
+            threshold: -0.000_976_562_5,
+        }),
+        look_ahead: true,
+        passive: false,
+        force_limit: 20.0,
+        torque_limit: 0.5,
+        rest_distance: 0.000_007_629_394_531_25,
+        motion_tolerance: 0.000_000_029_802_322_387_695_312,
+        max_constraints: 1024,
+        implicit_rounds: 2,
+        solver: EdgeSolver::ActiveSet,
+        set_rate_hz: 1000.0,
+        obstacles: vec![EdgeSurface {
+            pose: PoseF64::IDENTITY,
+            friction: 0.25,
+            sine: Some(EdgeSine {
+                axis: [1.0, 0.0, 0.0],
+                wavelength: 0.001_953_125,
+                amplitude: 0.125,
+            }),
+        }],
+    }
 }
 
 pub fn scene() -> SceneDescription {
@@ -208,11 +300,22 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ("stats", ControlMessage::Stats(stats)),
         ("log", ControlMessage::Log(log)),
         (
+            "coupling_at_edge",
+            ControlMessage::Coupling(CouplingOffer::AtEdge(coupling())),
+        ),
+        (
+            "coupling_at_server",
+            ControlMessage::Coupling(CouplingOffer::AtServer {
+                reason: "a height map".to_owned(),
+            }),
+        ),
+        (
             "bye",
             ControlMessage::Bye(Bye {
                 reason: "done".to_owned(),
             }),
         ),
+        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
     ]
 }
 
@@ -346,8 +449,8 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         prop::collection::vec(finite64(), 6)
             .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
     };
-    let input = (any::<(u64, u64, u16, u16)>(), pose64(), six()).prop_map(
-        |((sample_time_ns, index, buttons, flags), pose, velocity)| {
+    let input = (any::<(u64, u64, u16, u16, u64)>(), pose64(), six(), six()).prop_map(
+        |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
             Payload::Input(InputSample {
                 sample_time_ns,
                 index,
@@ -355,6 +458,8 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 velocity,
                 buttons,
                 flags,
+                rendered,
+                set_sequence,
             })
         },
     );
@@ -382,7 +487,83 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         Just(Payload::Heartbeat),
         input,
         wrench,
+        any_part().prop_map(Payload::Constraints),
     ]
+}
+
+pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
+    let three = || prop::array::uniform3(finite32());
+    let two = move || prop::array::uniform2(three());
+    let separation = prop_oneof![
+        Just(RowSeparation::OfObstacle),
+        Just(RowSeparation::OfBody),
+        two().prop_map(RowSeparation::OfEdges),
+        finite32().prop_map(RowSeparation::OfBall),
+        (three(), three(), finite32()).prop_map(|(c, a, r)| RowSeparation::OfRim(c, a, r)),
+        (two(), prop::array::uniform2(finite32())).prop_map(|(u, r)| RowSeparation::OfRods(u, r)),
+    ];
+    let feature = || (0_u8..16, any::<u32>()).prop_map(|(kind, index)| RowFeature { kind, index });
+    let came = prop_oneof![Just(0.0_f32), prop::num::f32::NORMAL];
+    (
+        any::<u16>(),
+        (feature(), feature()),
+        (three(), three(), finite32(), came),
+        separation,
+        prop::option::of(three()),
+    )
+        .prop_map(
+            |(obstacle, (on_body, on_obstacle), (arm, normal, gap, came), separation, shading)| {
+                ConstraintRow {
+                    obstacle,
+                    on_body,
+                    on_obstacle,
+                    arm,
+                    normal,
+                    gap,
+                    came,
+                    separation,
+                    shading_normal: shading,
+                }
+            },
+        )
+}
+
+/// As many rows as a datagram surely holds, at any place of a set.
+pub fn any_part() -> impl Strategy<Value = ConstraintPart> {
+    (
+        any::<(u64, u64, u64)>(),
+        pose64(),
+        0_u8..4,
+        (1..=MAX_PARTS as u8).prop_flat_map(|parts| (0..parts, Just(parts))),
+        prop::collection::vec(any_row(), 0..=11.min(MAX_PART_ROWS)),
+        (0..=MAX_SET_ROWS as u16 - 11).prop_flat_map(|first| (Just(first), 0..=first)),
+    )
+        .prop_map(
+            |(
+                (sequence, made_ns, device_ns),
+                pose,
+                flags,
+                (part, parts),
+                rows,
+                (before, after),
+            )| {
+                let first_row = before - after;
+                ConstraintPart {
+                    head: SetHead {
+                        sequence,
+                        made_ns,
+                        device_ns,
+                        pose,
+                        flags,
+                    },
+                    rows_in_set: first_row + rows.len() as u16 + after,
+                    part,
+                    parts,
+                    first_row,
+                    rows: ArrayVec::from_iter(rows),
+                }
+            },
+        )
 }
 
 pub fn any_scene() -> impl Strategy<Value = SceneDescription> {

@@ -1,4 +1,4 @@
-//! Times updates and forces of conforming contact: `cargo run --release --example conforming_timing -- [filter] [reference stride] [pace]`.
+//! Times updates and forces of conforming contact: `cargo run --release --example conforming_timing -- [filter] [reference stride] [pace] [work budget, nominal us]`.
 //!
 //! A peg of 27,000 triangles in a hole of 27,000 triangles at three clearances, exact and with vertices perturbed by a micrometre, and a
 //! nut on its bolt where `TAUT_DATA` or `../shared/data` has them. The device inserts, pushes sideways, tilts, slides along and turns at 1 kHz.
@@ -228,7 +228,11 @@ fn measure(
             surface: Surface::default(),
         }],
     });
+    let work_budget = std::env::args()
+        .nth(4)
+        .map(|s| s.parse().expect("a work budget"));
     let settings = Settings {
+        work_budget,
         adaptation: None,
         force_limit: 1e3,
         torque_limit: 1e3,

@@ -22,7 +22,7 @@ use nalgebra::{Point3, Vector3};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
-use crate::spatial::{Pose, Vector6, advance_pose, angular, pose_difference};
+use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference};
 
 /// The rounds after the first projection, and their memory.
 #[derive(Clone, Debug)]
@@ -65,6 +65,8 @@ pub(crate) struct ImplicitAnswer {
     pub(crate) unconstrained: Vector6,
     pub(crate) projection: Projection,
     pub(crate) rounds: u32,
+    /// Largest length of a round's motion, as a share of that of the one before; the linear answer is the first.
+    pub(crate) contraction: f64,
 }
 
 impl ImplicitRounds {
@@ -109,6 +111,8 @@ impl ImplicitRounds {
         let full = given.projection.acceleration / given.scale;
         let mut candidate = advance_pose(given.start, &full, 1.0);
         let mut turned = angular(&full).norm();
+        let mut length = self.length(&full);
+        let mut contraction = 0.0_f64;
         let mut branch = given.branch - angular(&full);
         let mut answer: Option<ImplicitAnswer> = None;
         self.remember_active(given.projection);
@@ -134,6 +138,9 @@ impl ImplicitRounds {
             let step = projection.acceleration / given.scale;
             let reached = advance_pose(&candidate, &step, 1.0);
             turned = angular(&step).norm();
+            let shorter = self.length(&step);
+            contraction = contraction.max(shorter / length);
+            length = shorter;
             branch = angular(&difference) - angular(&step);
             answer = Some(ImplicitAnswer {
                 linearised_at: candidate,
@@ -142,6 +149,7 @@ impl ImplicitRounds {
                 unconstrained,
                 projection,
                 rounds: round,
+                contraction,
             });
             candidate = reached;
         }
@@ -164,6 +172,11 @@ impl ImplicitRounds {
                 bound: bound_at(row) + given.scale * (constraint.gap - moved.gap),
             });
         }
+    }
+
+    /// Bound on the path of the body's fastest point, m.
+    fn length(&self, motion: &Vector6) -> f64 {
+        linear(motion).norm() + self.radius * angular(motion).norm()
     }
 
     fn remember_active(&mut self, projection: &Projection) {

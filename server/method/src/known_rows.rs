@@ -2,7 +2,7 @@
 //!
 //! Both sets are in ascending order of their features, so that one pass over the two finds what came, what went and what moved.
 
-use crate::constraint::{FeaturePair, NonPenetrationConstraint};
+use crate::prepared_rows::RowName;
 
 /// In [`KnownRows::places`]: the row is gone.
 const GONE: u32 = u32::MAX;
@@ -11,7 +11,7 @@ const GONE: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 pub(crate) struct KnownRows {
     any_set_yet: bool,
-    known: Vec<FeaturePair>,
+    known: Vec<RowName>,
     /// For each row of the set before, its place in the present set.
     places: Vec<u32>,
     arrivals: Vec<u32>,
@@ -28,19 +28,19 @@ impl KnownRows {
         }
     }
 
-    /// The present set becomes the one before. `rows` are at most as many as the capacity, in ascending order of their features.
-    pub(crate) fn replace(&mut self, rows: &[NonPenetrationConstraint]) {
+    /// The present set becomes the one before. `rows` are the names of its rows, at most as many as the capacity, ascending.
+    pub(crate) fn replace(&mut self, rows: &[RowName]) {
         let rows = &rows[..rows.len().min(self.known.capacity())];
         self.places.clear();
         self.arrivals.clear();
         let mut row = 0;
         for known in &self.known {
             // Usually the next row is the same again.
-            while row < rows.len() && rows[row].features != *known && rows[row].features < *known {
+            while row < rows.len() && rows[row] < *known {
                 self.arrivals.push(row as u32);
                 row += 1;
             }
-            if row < rows.len() && rows[row].features == *known {
+            if row < rows.len() && rows[row] == *known {
                 self.places.push(row as u32);
                 row += 1;
             } else {
@@ -54,7 +54,7 @@ impl KnownRows {
         }
         self.any_set_yet = true;
         self.known.clear();
-        self.known.extend(rows.iter().map(|row| row.features));
+        self.known.extend_from_slice(rows);
     }
 
     /// Where row `before` of the set before is now; `None` if it is gone.
@@ -74,28 +74,17 @@ impl KnownRows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraint::{Feature, Separation};
-    use nalgebra::{Point3, Vector3};
+    use crate::constraint::{Feature, FeaturePair};
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    fn rows(names: &BTreeSet<u32>) -> Vec<NonPenetrationConstraint> {
-        names
-            .iter()
-            .map(|name| NonPenetrationConstraint {
-                features: FeaturePair {
-                    obstacle: 0,
-                    on_body: Feature::Vertex(name / 3),
-                    on_obstacle: Feature::Face(name % 3),
-                },
-                point: Point3::origin(),
-                normal: Vector3::z(),
-                gap: 0.0,
-                came: 0.0,
-                separation: Separation::OfObstacle,
-                shading_normal: None,
-            })
-            .collect()
+    fn rows(names: &BTreeSet<u32>) -> Vec<RowName> {
+        let features = names.iter().map(|name| FeaturePair {
+            obstacle: 0,
+            on_body: Feature::Vertex(name / 3),
+            on_obstacle: Feature::Face(name % 3),
+        });
+        features.map(|pair| RowName::of(&pair)).collect()
     }
 
     proptest! {

@@ -28,15 +28,19 @@ mod adaptation;
 pub mod collision;
 pub mod constraint;
 mod coupling;
+mod damping;
 pub mod geometry;
 mod god_object;
 mod implicit;
 mod known_rows;
+mod obstacle_work;
+mod prepared_rows;
 pub mod quasi_statics;
 mod settings;
 pub mod shape;
 pub mod spatial;
 pub mod surface;
+mod turn_memory;
 mod world;
 
 pub use constraint::{ConstraintSet, NonPenetrationConstraint};
@@ -48,5 +52,7 @@ pub use quasi_statics::{ProjectionStatus, SolverKind};
 pub use settings::{Adaptation, RotationMetric, Settings, SettingsError};
 pub use shape::Primitive;
 pub use spatial::{Pose, Vector6};
-pub use surface::{HeightMap, HeightMapTexture, ShadedAcceleration};
+pub use surface::{
+    HeightMap, HeightMapTexture, ShadedAcceleration, TextureCoordinates, UvHeightMapTexture,
+};
 pub use world::{Body, ForceShading, Obstacle, SineTexture, Surface, Texture, World};

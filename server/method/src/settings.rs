@@ -4,6 +4,7 @@
 //! |----------|---------------------------------|-------|---------|----------------------------------------------------|
 //! | k_s      | [`Settings::k_s`]               | –     | 0.5     | share of the pose difference covered in one update |
 //! | k_h      | [`Settings::k_h`]               | 1/s^2 | –       | coupling constant                                  |
+//! | tau      | [`Settings::damping_time`]      | s     | –       | damping of a contact over its stiffness            |
 //! | K_t      | [`Settings::stiffness`]         | N/m   | –       | k_h k_s m: what the hand feels in translation      |
 //! | delta_c  | [`Settings::rest_distance`]     | m     | –       | gap at which the god-object rests                  |
 //! | delta_min| [`Settings::minimum_gap`]       | m     | –       | gap below which it never comes                     |
@@ -54,13 +55,16 @@ pub struct Settings {
     pub k_s: f64,
     /// Coupling constant, 1/s^2.
     pub k_h: f64,
+    /// Damping of a contact over its stiffness, s: a wall of 1000 N/m and 20 ms damps as 20 N s/m. 0, the default, is the paper's
+    /// spring. What the sampling bears is the device's matter, as for the stiffness.
+    pub damping_time: f64,
     /// The rotational part of the metric.
     pub rotation_metric: RotationMetric,
     /// Constraint adaptation; `None` lets every constraint in at once.
     pub adaptation: Option<Adaptation>,
     /// Publish contacts before they touch, with their gaps. Off: the paper's cone of touching contacts.
     pub look_ahead: bool,
-    /// Bound the energy that the hand takes out over a run by what it has put in, see
+    /// Bound the energy that the hand takes out over a run by what it and obstacles that move have put in, see
     /// [`EnergyObserver`](crate::surface::EnergyObserver).
     pub passive: bool,
     /// Largest force on the hand, N; clamped by norm.
@@ -78,8 +82,8 @@ pub struct Settings {
     pub activation_distance: f64,
     /// Most that look-ahead adds to the activation distance, m.
     pub look_ahead_limit: f64,
-    /// Triangle pairs with features to look at that one collection may cost. One that costs more shortens the next: late updates must not make
-    /// later ones still later.
+    /// Pairs of triangles, and of their features, that one collection may look at. It looks nearest first: one that would cost more reaches less
+    /// far. Late updates must not make later ones still later.
     pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less than this is none, m.
     pub motion_tolerance: f64,
@@ -105,6 +109,7 @@ impl Settings {
         Self {
             k_s: 0.5,
             k_h: 2000.0,
+            damping_time: 0.0,
             rotation_metric: RotationMetric::Inertia,
             adaptation: Some(Adaptation {
                 duration: 0.02,
@@ -119,7 +124,7 @@ impl Settings {
             gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
             activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
             look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
-            look_ahead_pairs: 1000,
+            look_ahead_pairs: 1400,
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,
@@ -154,17 +159,6 @@ impl Settings {
             bound
         } else {
             bound.max(0.0)
-        }
-    }
-
-    /// Bound of a row in the coupling loop, m: the same, but a_u is only the fraction k_s of the difference, and a body
-    /// nearer than the rest distance is not pushed: there is no force at a distance.
-    #[inline]
-    pub(crate) fn coupling_bound(&self, gap: f64) -> f64 {
-        if self.look_ahead {
-            (self.k_s * (self.rest_distance - gap)).min(0.0)
-        } else {
-            0.0
         }
     }
 
@@ -238,6 +232,12 @@ impl Settings {
                     large,
                 });
             }
+        }
+        if !(self.damping_time.is_finite() && self.damping_time >= 0.0) {
+            return Err(SettingsError::NotPositive {
+                key: "damping_time",
+                value: self.damping_time,
+            });
         }
         if !(self.look_ahead_limit.is_finite() && self.look_ahead_limit >= 0.0) {
             return Err(SettingsError::NotPositive {

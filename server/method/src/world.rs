@@ -10,7 +10,7 @@ use crate::quasi_statics::Metric;
 use crate::settings::RotationMetric;
 use crate::shape::Primitive;
 use crate::spatial::Pose;
-use crate::surface::HeightMapTexture;
+use crate::surface::{HeightMapTexture, UvHeightMapTexture};
 
 /// The rigid body in the user's hand.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ pub(crate) fn metric_at(
     Metric::new(mass, &inertia_in_world)
 }
 
-/// A body that stands still.
+/// A body that stands still, unless [`GodObject::move_obstacle`](crate::GodObject::move_obstacle) sends it somewhere.
 #[derive(Clone, Debug)]
 pub struct Obstacle {
     /// Name in messages.
@@ -60,7 +60,7 @@ pub struct Obstacle {
     pub mesh: Mesh,
     /// The exact form, if it is one; the mesh, within it, then is for drawing and for independent checks.
     pub primitive: Option<Primitive>,
-    /// World from obstacle.
+    /// World from obstacle, at the start.
     pub pose: Pose,
     /// How the surface feels.
     pub surface: Surface,
@@ -89,8 +89,10 @@ pub struct ForceShading {
 pub enum Texture {
     /// A sine.
     Sine(SineTexture),
-    /// The gradient of a height map.
+    /// The gradient of a height map, laid on along the axes.
     HeightMap(HeightMapTexture),
+    /// The gradient of a height map, laid on by the mesh's texture coordinates.
+    UvHeightMap(UvHeightMapTexture),
 }
 
 /// A sine along one axis that tilts the force, Section 6.2.

@@ -97,3 +97,58 @@ fn a_pose_or_a_row_that_is_broken_gives_no_force_and_the_next_set_does() {
     assert_eq!(felt.status, ProjectionStatus::Solved);
     assert!((felt.wrench - expected).norm() <= 1e-9 * expected.norm());
 }
+
+/// Rows made ready by who publishes a set change its cost, not its force: whatever the device pose that was foreseen, and for whomever.
+#[test]
+fn sets_made_ready_give_the_force_of_those_that_are_not() {
+    let world = support::box_on_table();
+    let settings = Settings {
+        adaptation: None,
+        ..Settings::for_size(0.1)
+    };
+    let other = Settings {
+        k_s: 0.25,
+        rest_distance: 2e-5,
+        ..settings
+    };
+    let random = &mut Random(43);
+    let mut given = Coupling::new(&world, &settings);
+    let mut ready = Coupling::new(&world, &settings);
+    let mut published = ConstraintSet::with_capacity(130);
+    let mut pushed = 0;
+    for sequence in 0..300 {
+        let names: BTreeSet<u32> = (0..1 + random.below(60))
+            .map(|_| random.below(120) as u32)
+            .collect();
+        let pose = Pose::new(random.vector3() * 1e-4, random.vector3() * 1e-2);
+        let set = set_of(&names, sequence, pose);
+        let mut made = set.clone();
+        let foreseen = Pose::new(random.vector3() * 1e-3, random.vector3() * 1e-2);
+        match sequence % 4 {
+            0 => made.prepare(&world.body, &settings, None),
+            1 => made.prepare(&world.body, &settings, Some(&foreseen)),
+            2 => made.prepare(
+                &world.body,
+                &settings,
+                Some(&Pose::translation(f64::NAN, 0.0, 0.0)),
+            ),
+            _ => made.prepare(&world.body, &other, Some(&foreseen)),
+        }
+        published.clone_from(&made);
+        for sample in 0..3 {
+            let time = sequence as f64 * 1e-3 + f64::from(sample) * 3e-4;
+            let device = Pose::new(random.vector3() * 1e-3, random.vector3() * 1e-2);
+            let expected = given.step(time, &device, &set);
+            let felt = ready.step(time, &device, &published);
+            assert_eq!(felt.status, ProjectionStatus::Solved);
+            assert!(felt.kkt <= 1e-12, "{:e}", felt.kkt);
+            let difference = (felt.wrench - expected.wrench).norm();
+            assert!(
+                difference <= 1e-9 * (1.0 + expected.wrench.norm()),
+                "set {sequence}: {difference:e}"
+            );
+            pushed += usize::from(felt.active > 0);
+        }
+    }
+    assert!(pushed > 400, "most samples touch: {pushed}");
+}

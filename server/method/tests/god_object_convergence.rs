@@ -1,4 +1,6 @@
 //! With the device at rest the god-object comes to the constrained minimiser and stays there, bit for bit.
+//!
+//! Other presses: `PROPTEST_RNG_SEED=2 PROPTEST_CASES=20000 cargo test --release -p god-object --test god_object_convergence`.
 
 mod support;
 
@@ -13,8 +15,11 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use support::{box_body, box_obstacle, penetrates};
 
-/// Updates after which nothing may move any more.
-const UPDATES: u32 = 600;
+/// Updates after which nothing may move any more. Most presses take a hundred; where the contacts are bent so that they nearly cancel the
+/// metric, an update leaves 99 % of the way.
+const UPDATES: u32 = 3000;
+/// Updates without motion that are rest.
+const AT_REST: u32 = 20;
 
 fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
     Obstacle {
@@ -26,10 +31,22 @@ fn tilted(center: [f64; 3], rotation: [f64; 3]) -> Obstacle {
     }
 }
 
+/// The same presses in every run, unless others are asked for.
+fn config() -> ProptestConfig {
+    let asked = ProptestConfig::default();
+    let rng_seed = match asked.rng_seed {
+        RngSeed::Random => RngSeed::Fixed(1),
+        fixed => fixed,
+    };
+    ProptestConfig {
+        failure_persistence: None,
+        rng_seed,
+        ..asked
+    }
+}
+
 proptest! {
-    // A fixed seed: of some 2,000 random presses one still goes round among three wedged features, by less than the rest distance, and
-    // with rounds of implicit constraints one of 1,000 stops micrometres short. Neither penetrates.
-    #![proptest_config(ProptestConfig { cases: 120, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config())]
 
     #[test]
     fn a_pressing_hand_at_rest_leads_to_the_minimiser_and_no_further(
@@ -46,16 +63,19 @@ proptest! {
         let mut god_object =
             GodObject::new(world.clone(), settings, Pose::translation(0.0, 0.0, 0.1)).expect("a free start");
         let device = Pose::new(Vector3::from(press), Vector3::from(turn));
+        let mut rest = *god_object.pose();
+        let mut still = 0;
         for _ in 0..UPDATES {
             let report = god_object.step(&device, None);
             prop_assert!(report.gap_min >= settings.minimum_gap);
             prop_assert!(report.substeps <= settings.max_substeps);
+            still = if *god_object.pose() == rest { still + 1 } else { 0 };
+            rest = *god_object.pose();
+            if still == AT_REST {
+                break;
+            }
         }
-        let rest = *god_object.pose();
-        for _ in 0..20 {
-            god_object.step(&device, None);
-            prop_assert_eq!(*god_object.pose(), rest);
-        }
+        prop_assert_eq!(still, AT_REST, "the body comes to rest");
         prop_assert!(!penetrates(&world, &rest));
 
         // Eq. (1) on a set collected anew, its answer held against the optimality conditions themselves: there is nowhere left to go. (An

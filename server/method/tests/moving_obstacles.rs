@@ -115,6 +115,52 @@ fn the_force_of_a_rising_plate_grows_evenly_between_slow_updates() {
 }
 
 #[test]
+fn passivity_lets_a_plate_push_the_hand_with_the_plates_own_energy() {
+    let world = world(5e-3, 0.5);
+    let (mut god_object, mut plain, settings) = loops(&world);
+    let mut passive = Coupling::new(
+        &world,
+        &Settings {
+            passive: true,
+            ..settings
+        },
+    );
+    let mut felt = 0.0;
+    for millisecond in 0..200 {
+        let time = f64::from(millisecond) * 1e-3;
+        // 5 mm into a hand that stands, then on with a hand that gives way: 5 N at 0.1 m/s.
+        let face = 0.018 + 0.1 * time;
+        let device = Pose::translation(0.0, 0.0, 0.03 + 0.1 * (time - 0.07).max(0.0));
+        god_object.move_obstacle(0, &Pose::translation(0.0, 0.0, face - 2.5e-3));
+        god_object.step(&device, None);
+        let set = god_object.constraint_set();
+        felt = plain.step(time, &device, set).wrench[2];
+        assert_eq!(
+            passive.step(time, &device, set).wrench[2],
+            felt,
+            "at {time} s"
+        );
+    }
+    assert!((felt - 5.0).abs() < 0.1, "{felt}");
+    let energy = passive.energy().expect("it is observed");
+    // 13 mm at 5 N.
+    assert!(
+        (energy.highest() - 5.0 * 0.013).abs() < 2e-3,
+        "{}",
+        energy.highest()
+    );
+    assert_eq!(energy.generated(), 0.0);
+    // And what compressed the coupling.
+    let spring = 0.5 * settings.stiffness(1.0) * 0.005 * 0.005;
+    let expected = 5.0 * 0.013 + spring;
+    assert!(
+        (plain.obstacle_work() - expected).abs() < 0.03 * expected,
+        "{}",
+        plain.obstacle_work()
+    );
+}
+
+#[test]
 fn a_body_between_plate_and_ceiling_stops_the_plate() {
     let world = world(2e-3, 0.05);
     let (mut god_object, _, settings) = loops(&world);
@@ -176,6 +222,44 @@ fn a_blade_that_turns_takes_the_body_along() {
         assert!(in_blade.y > 0.0, "passed through at {angle}: {in_blade}");
     }
     assert_eq!(blocked, 0);
+}
+
+#[test]
+fn a_body_in_a_slot_that_moves_goes_with_it() {
+    // Two jaws in one piece, 0.1 mm from the body on either side; it goes three clearances in each update, and turns.
+    let (half, clearance) = (Vector3::new(0.02, 0.02, 0.01), 1e-4);
+    let jaw = Vector3::new(0.005, 0.05, 0.05);
+    let middle = half.x + clearance + jaw.x;
+    let one = box_obstacle("slot", jaw, Vector3::zeros());
+    let (corners, faces) = (one.mesh.vertices(), one.mesh.triangles());
+    let vertices = [-middle, middle]
+        .into_iter()
+        .flat_map(|x| corners.iter().map(move |c| c + Vector3::x() * x));
+    let second = faces.iter().map(|t| t.map(|i| i + corners.len() as u32));
+    let triangles = faces.iter().copied().chain(second);
+    let mesh =
+        god_object::Mesh::new(vertices.collect(), triangles.collect()).expect("two closed boxes");
+    let world = Arc::new(World {
+        body: box_body(half),
+        obstacles: vec![god_object::Obstacle { mesh, ..one }],
+    });
+    let settings = Settings::for_size(0.04);
+    let mut god_object =
+        GodObject::new(world.clone(), settings, Pose::identity()).expect("a free start");
+    for update in 1..=100 {
+        let way = 3.0 * clearance * f64::from(update);
+        let slot = Pose::new(
+            Vector3::new(way, 0.0, 0.0),
+            Vector3::new(0.0, 0.0, 5e-3 * f64::from(update)),
+        );
+        god_object.move_obstacle(0, &slot);
+        let device = *god_object.pose();
+        let report = god_object.step(&device, None);
+        assert_eq!(report.obstacles_blocked, 0, "in update {update}");
+        assert!(!overlaps(&world, &god_object));
+        let aside = (slot.inverse() * god_object.pose()).translation.x;
+        assert!(aside.abs() < middle, "left the slot: {aside}");
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{FeaturePair, collect_contacts, contact_jacobian};
 use god_object::geometry::mass_properties;
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
-use god_object::quasi_statics::{HalfSpace, Projector, SolverKind};
+use god_object::quasi_statics::{HalfSpace, Projection, Projector, SolverKind};
 use god_object::spatial::{angular, linear, pose_difference, six};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, Vector6, World};
 
@@ -113,13 +113,22 @@ fn set_rows(god_object: &GodObject, rest_distance: f64) -> Vec<HalfSpace> {
         .collect()
 }
 
-fn projected(world: &World, god_object: &GodObject, rows: &[HalfSpace], a: &Vector6) -> Vector6 {
+fn projection(
+    world: &World,
+    god_object: &GodObject,
+    rows: &[HalfSpace],
+    a: &Vector6,
+) -> Projection {
     let metric = world
         .body
         .metric(god_object.settings().rotation_metric, god_object.pose())
         .expect("a metric");
     let mut projector = Projector::new(SolverKind::ActiveSet, rows.len());
-    projector.project(&metric, a, rows, &[]).acceleration
+    projector.project(&metric, a, rows, &[])
+}
+
+fn projected(world: &World, god_object: &GodObject, rows: &[HalfSpace], a: &Vector6) -> Vector6 {
+    projection(world, god_object, rows, a).acceleration
 }
 
 #[test]
@@ -130,12 +139,14 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
         GodObject::new(Arc::clone(&world), settings, hole_pose()).expect("a free start");
     let mut coupling = Coupling::new(&world, &settings);
     let radius = world.body.mesh.radius_about(&Point3::origin());
-    let (mut compared, mut most_rows) = (0, 0);
-    for k in 0..STEPS {
+    let (mut compared, mut most_rows, mut bounded) = (0, 0, 0);
+    // In the end the hand rests.
+    let hand = |k: usize| hand(k.min(STEPS));
+    for k in 0..STEPS + 20 {
         god_object.step(&hand(k), None);
         let set = god_object.constraint_set();
         most_rows = most_rows.max(set.constraints.len());
-        if !k.is_multiple_of(10) {
+        if !k.is_multiple_of(10) && k < STEPS {
             continue;
         }
         // The device has gone on when the force is computed.
@@ -146,7 +157,8 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
                 + radius * angular(&difference).norm()
                 + 2.0 * settings.rest_distance;
             let rows = every_row(&world, god_object.pose(), reach, settings.rest_distance);
-            let a_c = projected(&world, &god_object, &rows, &difference);
+            let full = projection(&world, &god_object, &rows, &difference);
+            let a_c = full.acceleration;
             let expected = (linear(&a_c) - linear(&difference)) * settings.stiffness(1.0);
             let error = (linear(&felt.wrench) - expected).norm();
             assert!(
@@ -157,8 +169,18 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
                 rows.len()
             );
             compared += usize::from(expected.norm() > 0.5);
+            // The stated bound is for the pose that the set was made for, and for what the way reaches.
+            let way = linear(&a_c).norm() + radius * angular(&a_c).norm();
+            if device == hand(k) && way + 2.0 * settings.rest_distance <= set.complete_within {
+                let stiffness = settings.stiffness(1.0);
+                let forces: f64 = full.active.iter().map(|row| row.multiplier).sum();
+                let stated = set.force_error_bound(stiffness, stiffness * forces);
+                assert!(error <= stated + 1e-9, "step {k}: {error} N, {stated} N");
+                bounded += 1;
+            }
         }
     }
+    assert!(bounded > 20, "{bounded}");
     assert!(compared > 30 && most_rows <= 150, "{compared} {most_rows}");
 }
 

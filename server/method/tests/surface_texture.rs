@@ -6,12 +6,13 @@ mod support;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use god_object::constraint::Feature;
 use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
-use god_object::surface::Textures;
+use god_object::surface::{CornerCoordinates, TextureCoordinatesError, Textures};
 use god_object::{
-    Body, Coupling, GodObject, HeightMap, HeightMapTexture, Pose, Settings, SineTexture, Texture,
-    Vector6, World,
+    Body, Coupling, GodObject, HeightMap, HeightMapTexture, Obstacle, Pose, Settings, SineTexture,
+    Texture, TextureCoordinates, UvHeightMapTexture, Vector6, World,
 };
 use support::{box_obstacle, box_on_table};
 
@@ -28,10 +29,10 @@ fn table_with(texture: Option<Texture>) -> World {
     world
 }
 
-type Touched = (u16, Point3<f64>, Vector3<f64>);
+type Touched = (u16, Feature, Point3<f64>, Vector3<f64>);
 
 fn contact_at(x: f64) -> Touched {
-    (0, Point3::new(x, 0.0, 0.0), Vector3::z())
+    (0, Feature::Face(0), Point3::new(x, 0.0, 0.0), Vector3::z())
 }
 
 fn tilted(texture: Texture, contacts: &[Touched]) -> Vector6 {
@@ -54,6 +55,34 @@ fn the_force_tilts_by_the_sine_and_keeps_its_magnitude() {
     let arm = Vector3::new(0.5e-3, 0.0, 0.0);
     let torque = arm.cross(&(linear(&felt) - Vector3::z() * 5.0));
     assert!((angular(&felt) - torque).norm() < 1e-12);
+}
+
+#[test]
+fn a_texture_goes_with_its_obstacle() {
+    let world = table_with(Some(Texture::Sine(SINE)));
+    let wrench = Vector6::new(0.0, 0.0, 5.0, 0.0, 0.0, 0.0);
+    let tilt = |place: &Pose, contact: Touched| {
+        let mut textures = Textures::of(&world).expect("a texture");
+        textures.place(0, place);
+        textures.place(7, &Pose::translation(9.0, 0.0, 0.0)); // none of the world's
+        let still = Vector6::zeros();
+        textures.tilt(&wrench, &Pose::identity(), &still, [contact].into_iter())
+    };
+    let stood = tilt(&Pose::identity(), contact_at(0.5e-3));
+    let gone = tilt(&Pose::translation(0.3e-3, 0.0, 0.0), contact_at(0.8e-3));
+    assert!((linear(&gone) - linear(&stood)).norm() < 1e-12);
+    // A quarter turn about the normal: the sine runs along y.
+    let turned = Pose::rotation(Vector3::z() * (0.25 * TAU));
+    let felt = tilt(
+        &turned,
+        (
+            0,
+            Feature::Face(0),
+            Point3::new(0.0, 0.5e-3, 0.0),
+            Vector3::z(),
+        ),
+    );
+    assert!((felt[1] / felt[2] - 0.2).abs() < 1e-12 && felt[0].abs() < 1e-12);
 }
 
 #[test]
@@ -92,9 +121,73 @@ fn on_a_height_map_the_force_leans_down_the_slope() {
     );
 }
 
+#[test]
+fn a_picture_laid_on_by_texture_coordinates_feels_as_the_same_picture_along_the_axes() {
+    let (width, tile) = (64, 4e-3);
+    let heights: Vec<f64> = (0..width * width)
+        .map(|i| {
+            let [u, v] = [i % width, i / width].map(|k| TAU * k as f64 / width as f64);
+            0.5 + 0.3 * u.sin() + 0.2 * (u + 2.0 * v).cos()
+        })
+        .collect();
+    let map = Arc::new(HeightMap::new(width, &heights).expect("a map"));
+    // The middle of the first texel lies at the origin; seen from above, x and y are u and v.
+    let plate = plate();
+    let corner = |p: Point3<f64>| [p.x, p.y].map(|x| x / tile + 0.5 / width as f64);
+    let count = plate.mesh.triangles().len() as u32;
+    let coordinates: Vec<CornerCoordinates> = (0..count)
+        .map(|t| plate.mesh.corners(t).map(corner))
+        .collect();
+    let along_axes = Texture::HeightMap(HeightMapTexture {
+        map: map.clone(),
+        tile,
+        amplitude: 1e-4,
+    });
+    let by_coordinates = Texture::UvHeightMap(UvHeightMapTexture {
+        map,
+        coordinates: Arc::new(TextureCoordinates::new(&plate.mesh, &coordinates).expect("fit")),
+        amplitude: 1e-4,
+    });
+    for (speed, period) in [(0.05, 1), (0.05, 14)] {
+        let expected = slide(along_axes.clone(), speed, period);
+        let felt = slide(by_coordinates.clone(), speed, period);
+        let largest = expected.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        assert!(largest > 0.1, "{largest}");
+        for (felt, expected) in felt.iter().zip(&expected) {
+            assert!(
+                (felt - expected).abs() < 1e-9 * largest,
+                "{felt} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn texture_coordinates_that_do_not_fit_the_mesh_are_refused() {
+    let plate = plate();
+    let mut coordinates = vec![[[0.0; 2]; 3]; plate.mesh.triangles().len()];
+    coordinates[3][1][0] = f64::NAN;
+    let refused = |given: &[CornerCoordinates]| TextureCoordinates::new(&plate.mesh, given).err();
+    assert_eq!(
+        refused(&coordinates),
+        Some(TextureCoordinatesError::NotFinite { triangle: 3 })
+    );
+    assert_eq!(
+        refused(&coordinates[..3]),
+        Some(TextureCoordinatesError::Count {
+            given: 3,
+            triangles: 12
+        })
+    );
+}
+
+fn plate() -> Obstacle {
+    box_obstacle("plate", Vector3::new(0.3, 0.05, 0.01), Vector3::zeros())
+}
+
 /// Sideways force per ms of a tip that slides at `speed` on `texture`, the god-object updated every `period` ms.
 fn slide(texture: Texture, speed: f64, period: usize) -> Vec<f64> {
-    let mut plate = box_obstacle("plate", Vector3::new(0.3, 0.05, 0.01), Vector3::zeros());
+    let mut plate = plate();
     plate.surface.texture = Some(texture);
     let world = Arc::new(World {
         body: Body {

@@ -37,5 +37,8 @@ pub use options::{
     DEFAULT_GRPC_PORT, DEFAULT_MEMORY_LIMIT_BYTES, DEFAULT_WEB_PORT, MonitorOptions,
 };
 pub use queue::MonitorSender;
-pub use sample::{LoopTime, MAX_SHOWN_CONTACTS, MonitorSample, ShownContact, ShownContacts};
+pub use sample::{
+    LoopTime, MAX_MOVING_OBSTACLES, MAX_SHOWN_CONTACTS, MonitorSample, MovingObstacles,
+    ShownContact, ShownContacts,
+};
 pub use scene::{BodyRole, MonitorBody, MonitorScene, MonitorScreen, Pose};

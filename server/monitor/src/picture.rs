@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 use rerun::{
-    Arrows3D, Ellipsoids3D, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, RecordingStream,
-    RecordingStreamResult, Transform3D, ViewCoordinates,
+    Arrows3D, Ellipsoids3D, EntityPath, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
+    RecordingStream, RecordingStreamResult, Transform3D, ViewCoordinates,
 };
 
 use crate::error::MonitorError;
@@ -29,6 +29,8 @@ pub(crate) struct Picture {
     diagonal: f64,
     metres_per_newton: f64,
     head: Option<Head>,
+    /// Path of each obstacle that moves; `None` for one at rest. In the scene's order of obstacles.
+    moving: Vec<Option<EntityPath>>,
     contacts_are_drawn: bool,
 }
 
@@ -103,6 +105,7 @@ impl Picture {
                 .arrow_metres_per_newton
                 .unwrap_or(diagonal / NEWTONS_PER_DIAGONAL),
             head,
+            moving: moving_paths(scene),
             contacts_are_drawn: true,
         })
     }
@@ -122,12 +125,22 @@ impl Picture {
         let finite = is_finite(&sample.god_object_pose)
             && is_finite(&sample.device_pose)
             && sample.head_pose.as_ref().is_none_or(is_finite)
+            && sample
+                .moving
+                .as_slice()
+                .iter()
+                .all(|(_, pose)| is_finite(pose))
             && sample.wrench.iter().all(|x| x.is_finite());
         if !finite {
             return Ok(false);
         }
         stream.log(paths::GOD_OBJECT, &transform(&sample.god_object_pose))?;
         stream.log(paths::DEVICE, &transform(&sample.device_pose))?;
+        for (obstacle, pose) in sample.moving.as_slice() {
+            if let Some(Some(path)) = self.moving.get(usize::from(*obstacle)) {
+                stream.log(path.clone(), &transform(pose))?;
+            }
+        }
         self.show_head(stream, sample)?;
         self.show_contacts(stream, sample.contacts.as_slice())?;
         self.show_force(stream, sample)?;
@@ -222,10 +235,15 @@ fn draw_body(stream: &RecordingStream, body: &MonitorBody) -> RecordingStreamRes
         }
     };
     match body.role {
-        BodyRole::Obstacle => {
+        BodyRole::Obstacle | BodyRole::MovingObstacle => {
             let [r, g, b] = body.colour.unwrap_or(colours::OBSTACLE);
-            let path = paths::named("world/obstacles", &body.name);
-            stream.log_static(path.clone(), &transform(&body.pose))?;
+            let path = obstacle_path(body);
+            // What is static hides what comes later at the same place.
+            if body.role == BodyRole::Obstacle {
+                stream.log_static(path.clone(), &transform(&body.pose))?;
+            } else {
+                stream.log(path.clone(), &transform(&body.pose))?;
+            }
             stream.log_static(
                 path,
                 &mesh
@@ -243,6 +261,20 @@ fn draw_body(stream: &RecordingStream, body: &MonitorBody) -> RecordingStreamRes
             stream.log(paths::DEVICE, &transform(&body.pose))
         }
     }
+}
+
+fn obstacle_path(body: &MonitorBody) -> EntityPath {
+    paths::named("world/obstacles", &body.name)
+}
+
+fn moving_paths(scene: &MonitorScene) -> Vec<Option<EntityPath>> {
+    let obstacles = scene
+        .bodies
+        .iter()
+        .filter(|body| body.role != BodyRole::GodObject);
+    obstacles
+        .map(|body| (body.role == BodyRole::MovingObstacle).then(|| obstacle_path(body)))
+        .collect()
 }
 
 fn draw_head(stream: &RecordingStream) -> RecordingStreamResult<()> {

@@ -4,6 +4,8 @@ use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::scene::Pose;
 
+/// Most obstacles whose places one sample carries.
+pub const MAX_MOVING_OBSTACLES: usize = 12;
 /// Most contacts that one sample carries; the others are counted, not drawn.
 pub const MAX_SHOWN_CONTACTS: usize = 64;
 
@@ -16,6 +18,8 @@ pub struct MonitorSample {
     pub session_time_ns: u64,
     /// Pose of the god-object.
     pub god_object_pose: Pose,
+    /// Where the obstacles that move are, at the same instant.
+    pub moving: MovingObstacles,
     /// Pose of the device, possibly inside an obstacle.
     pub device_pose: Pose,
     /// Pose of the viewer's head, if it is tracked.
@@ -51,6 +55,7 @@ impl MonitorSample {
         MonitorSample {
             session_time_ns,
             god_object_pose: Pose::identity(),
+            moving: MovingObstacles::default(),
             device_pose: Pose::identity(),
             head_pose: None,
             wrench: Vector6::zeros(),
@@ -75,6 +80,40 @@ pub struct LoopTime {
     pub last_us: f32,
     /// 99th percentile, microseconds.
     pub p99_us: f32,
+}
+
+/// Places of up to [`MAX_MOVING_OBSTACLES`] obstacles.
+#[derive(Clone, Copy, Debug)]
+pub struct MovingObstacles {
+    places: [(u16, Pose); MAX_MOVING_OBSTACLES],
+    count: usize,
+}
+
+impl MovingObstacles {
+    /// Adds an obstacle by its index among the scene's obstacles. False where there is no room. No allocation.
+    pub fn push(&mut self, obstacle: u16, world_from_obstacle: Pose) -> bool {
+        let Some(place) = self.places.get_mut(self.count) else {
+            return false;
+        };
+        *place = (obstacle, world_from_obstacle);
+        self.count += 1;
+        true
+    }
+
+    /// Index among the scene's obstacles and pose, each.
+    #[must_use]
+    pub fn as_slice(&self) -> &[(u16, Pose)] {
+        &self.places[..self.count]
+    }
+}
+
+impl Default for MovingObstacles {
+    fn default() -> MovingObstacles {
+        MovingObstacles {
+            places: [(0, Pose::identity()); MAX_MOVING_OBSTACLES],
+            count: 0,
+        }
+    }
 }
 
 /// One contact as it is drawn.

@@ -57,7 +57,7 @@ pub struct MonitorBody {
     pub colour: Option<[u8; 3]>,
     /// What the body is.
     pub role: BodyRole,
-    /// Pose at the start; an obstacle keeps it.
+    /// Pose at the start; an obstacle at rest keeps it.
     pub pose: Pose,
 }
 
@@ -68,6 +68,8 @@ pub enum BodyRole {
     GodObject,
     /// A fixed body.
     Obstacle,
+    /// A body that moves by itself: samples say where it is. Counted among the obstacles.
+    MovingObstacle,
 }
 
 /// The outline of one screen of the workbench.

@@ -131,6 +131,35 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
 }
 
 #[test]
+fn an_obstacle_that_moves_is_recorded_with_every_picture_and_one_at_rest_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    let mut scene = scene();
+    scene.bodies[1].name = "wall".into();
+    scene
+        .bodies
+        .push(tetrahedron("plate", BodyRole::MovingObstacle));
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene).unwrap();
+    for index in 0..SAMPLES {
+        let mut sample = sample(index);
+        let up = Isometry3::translation(0.0, 0.0, 1e-3 * index as f64);
+        // The wall is at rest, and 7 is none of the scene's.
+        for obstacle in [1, 0, 7] {
+            assert!(sample.moving.push(obstacle, up));
+        }
+        assert!(sender.offer(sample));
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    monitor.stop().unwrap();
+    let rows = inspect(&path).unwrap().rows;
+    let pictures = rows["/world/god_object"];
+    assert!(pictures > 2, "{rows:?}");
+    // The mesh is one row more.
+    assert_eq!(rows["/world/obstacles/plate"], pictures + 1);
+    assert_eq!(rows["/world/obstacles/wall"], 2);
+}
+
+#[test]
 fn dropping_the_monitor_completes_the_recording_too() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session.rrd");

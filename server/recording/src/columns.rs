@@ -46,7 +46,7 @@ impl Line for HapticsRecord {
 
 impl Line for UpdateRecord {
     const FILE: &'static str = "updates.csv";
-    const HEADER: &'static str = "update,published_ns,sample,hx,hy,hz,hqw,hqx,hqy,hqz,obstacles_ns,shaded_set,ax,ay,az,awx,awy,awz,sx,sy,sz,sqw,sqx,sqy,sqz,contacts,gap_min";
+    const HEADER: &'static str = "update,published_ns,sample,hx,hy,hz,hqw,hqx,hqy,hqz,obstacles_ns,ahead,shaded_set,ax,ay,az,awx,awy,awz,sx,sy,sz,sqw,sqx,sqy,sqz,contacts,gap_min";
 
     fn write(&self, line: &mut String) {
         first(line, self.sequence);
@@ -54,6 +54,7 @@ impl Line for UpdateRecord {
         push(line, self.device_sequence);
         pose(line, &self.device_pose);
         nanoseconds(line, self.obstacle_time);
+        push(line, self.device_ahead);
         match &self.shaded {
             Some(shaded) => {
                 push(line, shaded.sequence);
@@ -75,6 +76,7 @@ impl Parse for UpdateRecord {
             device_sequence: fields.number()?,
             device_pose: fields.pose()?,
             obstacle_time: fields.time()?,
+            device_ahead: fields.number()?,
             shaded: fields.shaded()?,
             pose: fields.pose()?,
             contacts: fields.number()?,

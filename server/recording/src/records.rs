@@ -34,10 +34,12 @@ pub struct UpdateRecord {
     pub published: Duration,
     /// Sequence number of the device sample.
     pub device_sequence: u64,
-    /// Device pose that it followed.
+    /// Device pose that it followed: where a hand behind a network was taken to be.
     pub device_pose: Pose,
-    /// Session time for which obstacles with a motion were moved.
+    /// Time on the traces of obstacles with a motion, since these began: where the obstacles were sent.
     pub obstacle_time: Duration,
+    /// How much farther than its pose the device was taken to be, m.
+    pub device_ahead: f64,
     /// Second pass of force shading that reached it.
     pub shaded: Option<ShadedAcceleration>,
     /// Its answer: the god-object's pose.

@@ -50,6 +50,7 @@ fn update(sequence: u32) -> UpdateRecord {
         device_sequence: u64::from(sequence),
         device_pose: pose(sequence),
         obstacle_time: Duration::from_nanos(7),
+        device_ahead: 0.125,
         shaded: (sequence % 2 == 1).then(|| ShadedAcceleration {
             sequence: 5,
             acceleration: Vector6::repeat(1.0 / 3.0),

@@ -27,9 +27,9 @@ pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
-    GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapSpec, LimitSpec, MassSpec, MethodSpec,
-    MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, SceneSource, Shape,
-    ShippedScene, View, shipped_scene_text,
+    GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,
+    MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene,
+    SceneSource, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::Simplified;
 pub use trace::{
@@ -37,8 +37,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, SHIPPED_WORKBENCH,
-    Screen, Show, Stereo, TransportKind, Viewer, Window, Workbench,
+    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
+    RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
+    VrpnSensor, Window, Workbench,
 };
 
 /// Why a scene could not be used.

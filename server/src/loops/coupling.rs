@@ -79,6 +79,13 @@ impl CouplingLoop {
         let device = self.device.held();
         let contacts = self.contacts.held();
 
+        if new_constraints {
+            for place in &contacts.moving {
+                self.coupling
+                    .place_obstacle(usize::from(place.obstacle), &place.pose);
+            }
+        }
+
         let before = thread_cpu_time();
         let output = self
             .coupling
@@ -100,6 +107,7 @@ impl CouplingLoop {
             kkt: output.kkt,
             solved: output.status == ProjectionStatus::Solved,
             saturated: output.saturated,
+            obstacle_work: self.coupling.obstacle_work(),
         });
         if let Some(tap) = &mut self.recording {
             tap.push(ForceRecord {

@@ -2,24 +2,36 @@
 //!
 //! Reads [`device_state`](crate::shared::device_state) and [`shaded_acceleration`](crate::shared::shaded_acceleration); writes
 //! [`contact_snapshot`](crate::shared::contact_snapshot). Source: Ortega et al. 2007, Section 4.
+//!
+//! Obstacles with a motion are sent to where their traces, which begin at the first update, are at the session time of each
+//! update. An update that comes late sends them farther at once: the method moves them the whole way without passing through the body.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::realtime::thread_cpu_time;
-use god_object::{GodObject, ShadedAcceleration};
+use god_object::{GodObject, Pose, ShadedAcceleration};
+use taut_bridge::edge::{device_ahead, device_predicted};
+use taut_proto::ArrayVec;
 use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
+use taut_scene::BuiltMotion;
 
-use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::contact_snapshot::{ContactSnapshot, MAX_MOVING, MovingObstacle};
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::timing::Histogram;
+
+/// Sets reach a bridge that couples by itself at least this often.
+const SET_PERIOD: Duration = Duration::from_millis(1);
 
 /// Loop 1 with its ends of the shared data.
 #[derive(Debug)]
 pub struct GodObjectLoop {
     god_object: GodObject,
+    motions: Vec<BuiltMotion>,
+    /// Session time of the first update, at which the obstacles' traces begin.
+    began: Option<Duration>,
     device: Subscriber<DeviceState>,
     shaded: Subscriber<Option<ShadedAcceleration>>,
     contacts: Publisher<ContactSnapshot>,
@@ -46,6 +58,8 @@ pub struct GodObjectStatistics {
     pub contacts: Histogram,
     /// Projections that the chosen solver did not certify.
     pub solver_fallbacks: AtomicU64,
+    /// Updates in which an obstacle did not get to where its trace is.
+    pub blocked_updates: AtomicU64,
 }
 
 impl GodObjectLoop {
@@ -63,6 +77,8 @@ impl GodObjectLoop {
         contacts.publish(&snapshot);
         Self {
             god_object,
+            motions: Vec::new(),
+            began: None,
             device,
             shaded,
             contacts,
@@ -72,28 +88,50 @@ impl GodObjectLoop {
         }
     }
 
+    /// The same with obstacles that move, from the first update on; the first constraint set is published with their poses.
+    ///
+    /// Motions beyond [`MAX_MOVING`] are left out: their obstacles stand.
+    #[must_use]
+    pub fn with_motions(mut self, mut motions: Vec<BuiltMotion>) -> Self {
+        motions.truncate(MAX_MOVING);
+        self.motions = motions;
+        note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
+        self.contacts.publish(&self.snapshot);
+        self
+    }
+
     /// The counters that this loop writes.
     pub fn statistics(&self) -> Arc<GodObjectStatistics> {
         self.statistics.clone()
     }
 
-    /// One update towards the newest device pose. `clock` is read again when the answer is there, for its age.
+    /// One update towards the newest device pose. `clock` is read for where the obstacles are to be, and again when the answer is
+    /// there, for its age.
     pub fn tick(&mut self, clock: impl Fn() -> Duration) {
+        let obstacle_time = self.send_obstacles(&clock);
         self.device.refresh();
         let device = self.device.held();
         let shaded = *self.shaded.newest();
+        let (device_pose, ahead) = followed(device, clock(), &self.god_object);
+        self.god_object.set_device_ahead(ahead);
 
         let before = thread_cpu_time();
-        let report = self.god_object.step(&device.pose, shaded.as_ref());
+        let report = self.god_object.step(&device_pose, shaded.as_ref());
         self.statistics
             .update
             .record_time(thread_cpu_time().saturating_sub(before));
 
         self.statistics.contacts.record(report.contacts as u64);
-        let fallbacks = &self.statistics.solver_fallbacks;
-        fallbacks.store(
-            fallbacks.load(Ordering::Relaxed) + u64::from(report.solver_fallbacks),
-            Ordering::Relaxed,
+        let add = |counter: &AtomicU64, more: u64| {
+            counter.store(counter.load(Ordering::Relaxed) + more, Ordering::Relaxed);
+        };
+        add(
+            &self.statistics.solver_fallbacks,
+            report.solver_fallbacks.into(),
+        );
+        add(
+            &self.statistics.blocked_updates,
+            u64::from(report.obstacles_blocked > 0),
         );
         self.snapshot
             .set
@@ -101,6 +139,7 @@ impl GodObjectLoop {
         self.snapshot.published = clock();
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;
+        note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         if let Some(taps) = &mut self.recording {
             let set = &self.snapshot.set;
@@ -108,8 +147,9 @@ impl GodObjectLoop {
                 sequence: set.sequence,
                 published: self.snapshot.published,
                 device_sequence: device.sequence,
-                device_pose: device.pose,
-                obstacle_time: Duration::ZERO,
+                device_pose,
+                obstacle_time,
+                device_ahead: ahead,
                 shaded,
                 pose: set.god_object_pose,
                 contacts: u32::try_from(set.constraints.len()).unwrap_or(u32::MAX),
@@ -118,4 +158,52 @@ impl GodObjectLoop {
             taps.constraints.push_set(set);
         }
     }
+
+    /// Sends the obstacles to where their traces are now; the time on the traces.
+    fn send_obstacles(&mut self, clock: impl Fn() -> Duration) -> Duration {
+        if self.motions.is_empty() {
+            return Duration::ZERO;
+        }
+        let now = clock();
+        let elapsed = now.saturating_sub(*self.began.get_or_insert(now));
+        for motion in &self.motions {
+            let there = motion.pose_at(elapsed.as_secs_f64());
+            self.god_object.move_obstacle(motion.obstacle, &there);
+        }
+        elapsed
+    }
+}
+
+/// Writes where the obstacles that move are.
+fn note_obstacles(
+    motions: &[BuiltMotion],
+    god_object: &GodObject,
+    moving: &mut ArrayVec<MovingObstacle, MAX_MOVING>,
+) {
+    moving.clear();
+    for motion in motions {
+        let place = god_object.obstacle_poses().nth(motion.obstacle);
+        if let (Some(pose), Ok(obstacle)) = (place, u16::try_from(motion.obstacle)) {
+            moving.push(MovingObstacle {
+                obstacle,
+                pose: *pose,
+            });
+        }
+    }
+}
+
+/// The device pose to follow, and how much farther on the device may be, m.
+///
+/// For a hand beside a bridge that couples by itself: where it will be when the set is there. For any other its pose.
+fn followed(device: &DeviceState, now: Duration, god_object: &GodObject) -> (Pose, f64) {
+    if !device.felt.is_some_and(|felt| felt.at_edge) {
+        return (device.pose, 0.0);
+    }
+    let age = now.saturating_sub(device.time);
+    let (pose, velocity) = (&device.pose, &device.velocity);
+    let point = god_object.reference_point();
+    (
+        device_predicted(pose, velocity, point, age, SET_PERIOD),
+        device_ahead(velocity, god_object.radius(), age, SET_PERIOD),
+    )
 }

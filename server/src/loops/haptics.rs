@@ -1,36 +1,31 @@
 //! Loop 3, haptics: the hand's pose in, a safe wrench out, at the device's rate.
 //!
 //! Reads [`wrench_command`](crate::shared::wrench_command); writes [`device_state`](crate::shared::device_state) and wakes the
-//! coupling. The wrench rendered at sample k answers sample k - 1: the loop never waits for the coupling. A tick neither
-//! allocates nor waits.
+//! coupling. The wrench rendered at sample k answers sample k - 1: the loop never waits for the coupling. Everything passes the
+//! [`DevicePort`]. A tick neither allocates nor waits.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use god_object::spatial::{Pose, Vector6};
-use taut_bridge::{Device, EnergyObserver, Safety};
+use god_object::spatial::Pose;
+use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Reading, TickReport};
 use taut_recording::{HapticsRecord, Tap};
 
-use super::incidents::{Incident, IncidentCounts};
+use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::shared::wrench_command::WrenchCommand;
 use crate::timing::Histogram;
 
-/// A constraint set may be this old before its age counts as age of the force. With the hold of 20 ms in
-/// `taut_bridge::Safety` the force fades once the constraints are older than 100 ms (three updates of the slowest scene last 45 ms).
-const CONSTRAINT_AGE_ALLOWED: Duration = Duration::from_millis(80);
-
 /// Loop 3 with its device and its ends of the shared data.
 pub struct HapticsLoop {
-    device: Box<dyn Device>,
-    safety: Safety,
-    energy: EnergyObserver,
+    port: DevicePort,
     wrench: Subscriber<WrenchCommand>,
     states: Publisher<DeviceState>,
     coupling: Waker,
+    switch: Arc<ArmSwitch>,
     state: DeviceState,
     last_tick: Option<Duration>,
     recording: Option<Tap<HapticsRecord>>,
@@ -44,12 +39,16 @@ pub struct HapticsStatistics {
     pub period: Histogram,
     /// Deadlines that passed without a tick in their period.
     pub deadline_misses: AtomicU64,
-    /// Times at which the safety stage or a device fault changed the force.
+    /// Times at which the port changed the force or lost the device.
     pub safety_events: AtomicU64,
-    /// The same by kind, and the device's returns.
+    /// All events of the port by kind.
     pub incidents: IncidentCounts,
     /// Energy given to the hand beyond what it had put in, J, as the bits of an `f64`.
     energy_injected_bits: AtomicU64,
+    /// Net work of moving obstacles on the hand, J, as the bits of an `f64`.
+    obstacle_work_bits: AtomicU64,
+    /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
+    energy_generated_bits: AtomicU64,
     /// The device does not answer now.
     pub device_faulty: AtomicBool,
 }
@@ -59,26 +58,34 @@ impl HapticsStatistics {
     pub fn energy_injected(&self) -> f64 {
         f64::from_bits(self.energy_injected_bits.load(Ordering::Relaxed))
     }
+
+    /// Net work that moving obstacles have done on the hand, J.
+    pub fn obstacle_work(&self) -> f64 {
+        f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+    }
+
+    /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
+    pub fn energy_generated(&self) -> f64 {
+        f64::from_bits(self.energy_generated_bits.load(Ordering::Relaxed))
+    }
 }
 
 impl HapticsLoop {
-    /// Puts a device, which stands at `start`, between its shared data.
+    /// Puts the port of a device, which stands at `start`, between its shared data.
     pub fn new(
-        device: Box<dyn Device>,
-        safety: Safety,
-        energy: EnergyObserver,
+        port: DevicePort,
         start: &Pose,
         wrench: Subscriber<WrenchCommand>,
         states: Publisher<DeviceState>,
         coupling: Waker,
+        switch: Arc<ArmSwitch>,
     ) -> Self {
         Self {
-            device,
-            safety,
-            energy,
+            port,
             wrench,
             states,
             coupling,
+            switch,
             state: DeviceState::at_start(start),
             last_tick: None,
             recording: None,
@@ -98,25 +105,68 @@ impl HapticsLoop {
         self.statistics.clone()
     }
 
+    /// What stands between this loop and the device.
+    pub fn port(&self) -> &DevicePort {
+        &self.port
+    }
+
     /// One period: read, publish, wake the coupling, render the newest wrench.
     pub fn tick(&mut self, now: Duration) {
         if let Some(last) = self.last_tick.replace(now) {
             self.statistics.period.record_time(now.saturating_sub(last));
         }
-        let trusted = self.read(now);
-        self.states.publish(&self.state);
-        self.coupling.wake();
+        match self.switch.take() {
+            Some(ArmWish::Arm) => self.port.ask_to_arm(),
+            Some(ArmWish::Disarm) => self.port.ask_to_disarm(),
+            None => {}
+        }
+        let (state, states, wrench) = (&mut self.state, &mut self.states, &mut self.wrench);
+        let coupling = &self.coupling;
+        let report = self.port.tick(now, |reading| {
+            follow(state, reading);
+            states.publish(state);
+            coupling.wake();
+            Some(newest_command(wrench))
+        });
+        self.count(&report);
+    }
 
-        let wrench = if trusted {
-            self.safe_wrench(now)
-        } else {
-            Vector6::zeros()
-        };
-        self.device.write(now, &wrench);
-        self.energy.step(&self.state.pose, &wrench);
-        self.statistics
+    /// Lets the force come down without reading the device; whether it is zero. Call it once per period until it is.
+    pub fn release_step(&mut self, now: Duration) -> bool {
+        self.port.release_step(now)
+    }
+
+    /// What of the energy given is the obstacles', and what nobody's.
+    fn tell_obstacle_work(&self) {
+        let given = self.port.energy().delivered();
+        let work = self.wrench.held().obstacle_work;
+        let generated = (given - work).max(self.statistics.energy_generated()); // NaN: as before
+        let store = |bits: &AtomicU64, energy: f64| bits.store(energy.to_bits(), Ordering::Relaxed);
+        store(&self.statistics.obstacle_work_bits, work);
+        store(&self.statistics.energy_generated_bits, generated);
+    }
+
+    fn count(&mut self, report: &TickReport) {
+        let statistics = &self.statistics;
+        for event in report.events.iter() {
+            statistics.incidents.count(event);
+            if !event.kind.is_good_news() {
+                let events = &statistics.safety_events;
+                events.store(events.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+            }
+        }
+        self.state.safety.follow(report);
+        statistics
+            .device_faulty
+            .store(report.reading.fault.is_some(), Ordering::Relaxed);
+        statistics
             .energy_injected_bits
-            .store(self.energy.injected().to_bits(), Ordering::Relaxed);
+            .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        self.tell_obstacle_work();
+        let felt = report
+            .reading
+            .felt
+            .map_or(report.wrench, |felt| felt.wrench);
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
@@ -125,67 +175,29 @@ impl HapticsLoop {
                 velocity: self.state.velocity,
                 buttons: self.state.buttons,
                 faulty: self.state.faulty,
-                wrench,
+                wrench: felt,
             });
         }
     }
+}
 
-    /// Leaves the device without force.
-    pub fn release(&mut self, now: Duration) {
-        self.safety.reset();
-        self.device.write(now, &Vector6::zeros());
-    }
+/// Takes the reading over into the state that is published.
+fn follow(state: &mut DeviceState, reading: &Reading) {
+    state.sequence += 1;
+    state.faulty = reading.fault.is_some();
+    state.time = reading.sample.time;
+    state.pose = reading.sample.pose;
+    state.velocity = reading.sample.velocity;
+    state.buttons = reading.sample.buttons;
+    state.felt = reading.felt;
+}
 
-    /// Reads the device into the state; false when it has no pose that may be trusted.
-    fn read(&mut self, now: Duration) -> bool {
-        let was_faulty = self.state.faulty;
-        self.state.sequence += 1;
-        match self.device.read(now) {
-            Ok(sample) => {
-                self.state.time = sample.time;
-                self.state.pose = sample.pose;
-                self.state.velocity = sample.velocity;
-                self.state.buttons = sample.buttons;
-                self.state.faulty = false;
-                if was_faulty {
-                    self.statistics.incidents.count(Incident::DeviceBack);
-                }
-            }
-            Err(fault) => {
-                // The last good pose stands; the force drops at once and ramps in when the device is back.
-                self.state.velocity = Vector6::zeros();
-                self.state.faulty = true;
-                self.safety.reset();
-                if !was_faulty {
-                    self.count_event(Incident::from(&fault));
-                }
-            }
-        }
-        if was_faulty != self.state.faulty {
-            self.statistics
-                .device_faulty
-                .store(self.state.faulty, Ordering::Relaxed);
-        }
-        !self.state.faulty
-    }
-
-    /// The newest wrench of the coupling after the safety stage.
-    fn safe_wrench(&mut self, now: Duration) -> Vector6 {
-        let command = *self.wrench.newest();
-        let stale_constraints = command
-            .constraint_age
-            .saturating_sub(CONSTRAINT_AGE_ALLOWED);
-        let made = command.time.saturating_sub(stale_constraints);
-        let safe = self.safety.step(now, &command.wrench, made);
-        if let Some(event) = &safe.event {
-            self.count_event(Incident::from(event));
-        }
-        safe.wrench
-    }
-
-    fn count_event(&self, incident: Incident) {
-        self.statistics.incidents.count(incident);
-        let events = &self.statistics.safety_events;
-        events.store(events.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+/// The newest wrench of the coupling, as the port takes it.
+fn newest_command(wrench: &mut Subscriber<WrenchCommand>) -> Command {
+    let command = wrench.newest();
+    Command {
+        wrench: command.wrench,
+        made: command.time,
+        constraint_age: command.constraint_age,
     }
 }

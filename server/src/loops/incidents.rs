@@ -1,134 +1,91 @@
-//! What goes wrong in the haptics loop, by kind: counted there without waiting, told elsewhere.
+//! The events of the device port, by kind: counted in the haptics loop without waiting, told elsewhere.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
-use taut_bridge::{DeviceFault, SafetyEvent};
+use taut_bridge::{EventKind, SafetyEvent};
 
-/// One kind of incident; each is counted when it begins, not on every tick that it lasts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Incident {
-    /// The coupling's wrench was not finite.
-    WrenchNotFinite,
-    /// The coupling's wrench or its constraints were too old.
-    WrenchStale,
-    /// The coupling's wrench came from the future.
-    WrenchNotOnClock,
-    /// Fresh wrenches came again.
-    WrenchRecovered,
-    /// The norm of the force was limited.
-    ForceLimited,
-    /// The norm of the torque was limited.
-    TorqueLimited,
-    /// No sample of the device has ever come.
-    DeviceNotStarted,
-    /// The device's samples stopped.
-    DeviceLost,
-    /// The device sent what is no pose.
-    DeviceNotFinite,
-    /// The device's time stamps make no sense.
-    DeviceNotOnClock,
-    /// The device said that it is faulty.
-    DeviceReportedFault,
-    /// The device's bridge was replaced.
-    DeviceReconnected,
-    /// The recorded trace ended.
-    DeviceEnded,
-    /// The device gives good samples again.
-    DeviceBack,
-}
-
-impl Incident {
-    /// All kinds, each at the place that its number says.
-    pub const ALL: [Self; 14] = [
-        Self::WrenchNotFinite,
-        Self::WrenchStale,
-        Self::WrenchNotOnClock,
-        Self::WrenchRecovered,
-        Self::ForceLimited,
-        Self::TorqueLimited,
-        Self::DeviceNotStarted,
-        Self::DeviceLost,
-        Self::DeviceNotFinite,
-        Self::DeviceNotOnClock,
-        Self::DeviceReportedFault,
-        Self::DeviceReconnected,
-        Self::DeviceEnded,
-        Self::DeviceBack,
-    ];
-
-    /// What happened, for people.
-    pub fn sentence(self) -> &'static str {
-        match self {
-            Self::WrenchNotFinite => "safety: the computed force is not finite, so there is none",
-            Self::WrenchStale => "safety: the computed force is too old and fades",
-            Self::WrenchNotOnClock => "safety: the computed force is ahead of the clock and fades",
-            Self::WrenchRecovered => "safety: fresh forces come, the force ramps in",
-            Self::ForceLimited => "safety: the force is limited",
-            Self::TorqueLimited => "safety: the torque is limited",
-            Self::DeviceNotStarted => "device: no sample has come yet, there is no force",
-            Self::DeviceLost => "device: lost, there is no force",
-            Self::DeviceNotFinite => "device: its pose is not finite, there is no force",
-            Self::DeviceNotOnClock => {
-                "device: its time stamps are not on this clock, there is no force"
-            }
-            Self::DeviceReportedFault => {
-                "device: it reports a fault at the far end, there is no force"
-            }
-            Self::DeviceReconnected => "device: its bridge has just reconnected",
-            Self::DeviceEnded => "device: the recorded trace ended, there is no force",
-            Self::DeviceBack => "device: good samples come",
-        }
-    }
-
-    /// Whether it is part of normal work.
-    pub fn is_good_news(self) -> bool {
-        matches!(
-            self,
-            Self::WrenchRecovered | Self::DeviceBack | Self::DeviceReconnected
-        )
-    }
-}
-
-impl From<&SafetyEvent> for Incident {
-    fn from(event: &SafetyEvent) -> Self {
-        match event {
-            SafetyEvent::NotFinite => Self::WrenchNotFinite,
-            SafetyEvent::Stale { .. } => Self::WrenchStale,
-            SafetyEvent::TimeNotOnClock => Self::WrenchNotOnClock,
-            SafetyEvent::Recovered => Self::WrenchRecovered,
-            SafetyEvent::ForceLimited { .. } => Self::ForceLimited,
-            SafetyEvent::TorqueLimited { .. } => Self::TorqueLimited,
-        }
-    }
-}
-
-impl From<&DeviceFault> for Incident {
-    fn from(fault: &DeviceFault) -> Self {
-        match fault {
-            DeviceFault::NotStarted => Self::DeviceNotStarted,
-            DeviceFault::Lost { .. } => Self::DeviceLost,
-            DeviceFault::NotFinite => Self::DeviceNotFinite,
-            DeviceFault::TimeNotOnClock => Self::DeviceNotOnClock,
-            DeviceFault::ReportedFault => Self::DeviceReportedFault,
-            DeviceFault::Reconnected => Self::DeviceReconnected,
-            DeviceFault::Ended => Self::DeviceEnded,
-        }
-    }
-}
-
-/// How often each kind began. One writer; any thread may read.
+/// How often each kind of event happened, and the newest of each. One writer; any thread may read.
 #[derive(Debug, Default)]
-pub struct IncidentCounts([AtomicU64; Incident::ALL.len()]);
+pub struct IncidentCounts([Incident; EventKind::ALL.len()]);
+
+#[derive(Debug, Default)]
+struct Incident {
+    count: AtomicU64,
+    /// Number of the newest event among all of the port.
+    number: AtomicU64,
+    /// Its time, ns.
+    time_ns: AtomicU64,
+    /// Its value, as the bits of an `f64`.
+    value_bits: AtomicU64,
+}
 
 impl IncidentCounts {
     /// Counts one. Wait-free.
-    pub fn count(&self, incident: Incident) {
-        self.0[incident as usize].fetch_add(1, Ordering::Relaxed);
+    pub fn count(&self, event: &SafetyEvent) {
+        let incident = &self.0[event.kind as usize];
+        let time_ns = u64::try_from(event.time.as_nanos()).unwrap_or(u64::MAX);
+        incident.number.store(event.number, Ordering::Relaxed);
+        incident.time_ns.store(time_ns, Ordering::Relaxed);
+        incident
+            .value_bits
+            .store(event.value.to_bits(), Ordering::Relaxed);
+        // Last: who sees the count grow sees the newest event too, or a newer one.
+        incident.count.fetch_add(1, Ordering::Release);
     }
 
-    /// How often this kind began.
-    pub fn of(&self, incident: Incident) -> u64 {
-        self.0[incident as usize].load(Ordering::Relaxed)
+    /// How often this kind happened.
+    pub fn of(&self, kind: EventKind) -> u64 {
+        self.0[kind as usize].count.load(Ordering::Acquire)
+    }
+
+    /// The newest event of this kind, if there was one. Parts of two events may mix if one happens meanwhile: for people to read.
+    pub fn newest(&self, kind: EventKind) -> Option<SafetyEvent> {
+        let incident = &self.0[kind as usize];
+        (self.of(kind) > 0).then(|| SafetyEvent {
+            number: incident.number.load(Ordering::Relaxed),
+            time: Duration::from_nanos(incident.time_ns.load(Ordering::Relaxed)),
+            kind,
+            value: f64::from_bits(incident.value_bits.load(Ordering::Relaxed)),
+        })
+    }
+}
+
+/// What one listener has heard of the counts.
+#[derive(Debug)]
+pub struct IncidentNews([u64; EventKind::ALL.len()]);
+
+impl Default for IncidentNews {
+    fn default() -> Self {
+        Self([0; EventKind::ALL.len()])
+    }
+}
+
+impl IncidentNews {
+    /// The newest event of each kind that happened since the last call, with how often it did, in the order of their numbers.
+    pub fn since_last(&mut self, counts: &IncidentCounts) -> Vec<(SafetyEvent, u64)> {
+        let mut news = Vec::new();
+        for (kind, told) in EventKind::ALL.into_iter().zip(&mut self.0) {
+            let count = counts.of(kind);
+            let grown = count - *told;
+            *told = count;
+            if grown > 0 {
+                news.extend(counts.newest(kind).map(|event| (event, grown)));
+            }
+        }
+        news.sort_by_key(|(event, _)| event.number);
+        news
+    }
+}
+
+/// The line that tells of an event that happened `times` times.
+pub fn line(event: &SafetyEvent, times: u64) -> String {
+    let time_s = event.time.as_secs_f64();
+    let line = format!("{event} at {time_s:.3} s, no. {}", event.number);
+    if times > 1 {
+        line + &format!(" ({times} times)")
+    } else {
+        line
     }
 }
 
@@ -137,16 +94,52 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_kind_has_a_count_of_its_own() {
+    fn each_kind_has_a_count_of_its_own_and_its_newest_event() {
         let counts = IncidentCounts::default();
-        for (place, incident) in Incident::ALL.into_iter().enumerate() {
-            assert_eq!(place, incident as usize);
+        let mut number = 0;
+        for (place, kind) in EventKind::ALL.into_iter().enumerate() {
+            assert_eq!(counts.newest(kind), None);
             for _ in 0..=place {
-                counts.count(incident);
+                number += 1;
+                counts.count(&SafetyEvent {
+                    number,
+                    time: Duration::from_millis(number),
+                    kind,
+                    value: number as f64,
+                });
             }
+            let newest = counts.newest(kind).map(|event| (event.number, event.value));
+            assert_eq!(newest, Some((number, number as f64)));
         }
-        for (place, incident) in Incident::ALL.into_iter().enumerate() {
-            assert_eq!(counts.of(incident), place as u64 + 1, "{incident:?}");
+        for (place, kind) in EventKind::ALL.into_iter().enumerate() {
+            assert_eq!(counts.of(kind), place as u64 + 1, "{kind:?}");
         }
+    }
+
+    #[test]
+    fn a_listener_hears_of_each_kind_once_and_how_often() {
+        let (counts, mut news) = (IncidentCounts::default(), IncidentNews::default());
+        let event = |number, kind| SafetyEvent {
+            number,
+            time: Duration::from_millis(1500),
+            kind,
+            value: 0.021,
+        };
+        counts.count(&event(1, EventKind::DeviceLost));
+        counts.count(&event(2, EventKind::Arming));
+        counts.count(&event(3, EventKind::DeviceLost));
+        let heard = news.since_last(&counts);
+        let lines: Vec<_> = heard
+            .iter()
+            .map(|(event, times)| line(event, *times))
+            .collect();
+        assert_eq!(
+            lines,
+            [
+                "safety: the force ramps in at 1.500 s, no. 2",
+                "device: lost, the force fades (0.021 s) at 1.500 s, no. 3 (2 times)"
+            ]
+        );
+        assert!(news.since_last(&counts).is_empty());
     }
 }

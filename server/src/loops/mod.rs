@@ -4,7 +4,7 @@
 //! |------|----------------|---------------------------------------|----------------------------|
 //! | 1    | [`god_object`] | milliseconds                          | `god_object::GodObject`    |
 //! | 2    | [`coupling`]   | every device sample, constraint set   | `god_object::Coupling`     |
-//! | 3    | [`haptics`]    | the device's, 1 kHz                   | `taut_bridge::Device`      |
+//! | 3    | [`haptics`]    | the device's, 1 kHz                   | `taut_bridge::DevicePort`  |
 //!
 //! Each is a struct whose `tick(now)` does one round, so that a virtual clock can drive it; a thread of [`shell`] does it in time.
 //! [`wiring`] puts them together.

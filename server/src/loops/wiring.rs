@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
-use taut_bridge::{Device, EnergyObserver, Safety, SafetySettings};
+use taut_bridge::{ArmSwitch, Device, DevicePort, SafetySettings};
 use taut_recording::Taps;
+use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
 use super::god_object::{GodObjectLoop, UpdateTaps};
@@ -27,6 +28,8 @@ pub struct WiredLoops {
     pub haptics: HapticsLoop,
     /// Wakes loop 2: loop 3 does after each sample, loop 1's thread after each constraint set.
     pub coupling_waker: Waker,
+    /// Asks loop 3 for force or for none.
+    pub arm_switch: Arc<ArmSwitch>,
     /// For those who look on.
     pub observers: Observers,
     /// What all of them count.
@@ -74,6 +77,7 @@ impl WiredLoops {
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
         let coupling_waker = Waker::default();
+        let arm_switch = Arc::<ArmSwitch>::default();
         let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
             let updates = UpdateTaps {
                 updates: taps.updates,
@@ -98,13 +102,12 @@ impl WiredLoops {
             force_tap,
         );
         let haptics = HapticsLoop::new(
-            device,
-            Safety::new(safety),
-            EnergyObserver::new(world.body.reference_point),
+            DevicePort::new(device, safety, world.body.reference_point, &start),
             &start,
             wrench_readers.haptics,
             states,
             coupling_waker.clone(),
+            arm_switch.clone(),
         )
         .with_recording(haptics_tap);
         let statistics = Statistics {
@@ -132,8 +135,18 @@ impl WiredLoops {
             coupling,
             haptics,
             coupling_waker,
+            arm_switch,
             observers,
             statistics,
+        }
+    }
+
+    /// The same with obstacles that move.
+    #[must_use]
+    pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {
+        Self {
+            god_object: self.god_object.with_motions(motions),
+            ..self
         }
     }
 }

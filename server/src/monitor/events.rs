@@ -6,8 +6,10 @@
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use taut_bridge::EventKind;
+
 use super::Severity;
-use crate::loops::incidents::Incident;
+use crate::loops::incidents::line;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::statistics::Statistics;
 
@@ -25,7 +27,7 @@ pub(super) struct EventLog {
     rest_distance: f64,
     obstacles: Vec<Touch>,
     contact_lines: ContactLines,
-    incidents: [Repeated; Incident::ALL.len()],
+    incidents: [Repeated; EventKind::ALL.len()],
     penetrations: Repeated,
 }
 
@@ -91,23 +93,20 @@ impl EventLog {
         mut say: impl FnMut(Severity, &str),
     ) {
         self.follow_contacts(now, contacts, &mut say);
-        for (incident, repeated) in Incident::ALL.into_iter().zip(&mut self.incidents) {
-            let count = statistics.haptics.incidents.of(incident);
-            let Some(news) = repeated.news(now, count) else {
+        for (kind, repeated) in EventKind::ALL.into_iter().zip(&mut self.incidents) {
+            let incidents = &statistics.haptics.incidents;
+            let Some(news) = repeated.news(now, incidents.of(kind)) else {
                 continue;
             };
-            let severity = if incident.is_good_news() {
+            let Some(newest) = incidents.newest(kind) else {
+                continue;
+            };
+            let severity = if kind.is_good_news() {
                 Severity::Info
             } else {
                 Severity::Warning
             };
-            match news {
-                1 => say(severity, incident.sentence()),
-                times => say(
-                    severity,
-                    &format!("{} ({times} times)", incident.sentence()),
-                ),
-            }
+            say(severity, &line(&newest, news));
         }
         let checks = &statistics.checks;
         let count = checks.penetrations.load(Ordering::Relaxed);
@@ -181,6 +180,7 @@ mod tests {
     use god_object::constraint::{Feature, FeaturePair, NonPenetrationConstraint};
     use god_object::nalgebra::{Point3, Vector3};
     use god_object::spatial::Pose;
+    use taut_bridge::SafetyEvent;
 
     const REST: f64 = 1e-5;
 
@@ -260,10 +260,19 @@ mod tests {
     fn incidents_and_penetrations_are_told_once_and_counted_after() {
         let mut watched = Watched::new();
         let haptics = watched.statistics.haptics.clone();
-        haptics.incidents.count(Incident::DeviceLost);
-        assert_eq!(watched.look(0, 1.0), [Incident::DeviceLost.sentence()]);
-        haptics.incidents.count(Incident::DeviceLost);
-        haptics.incidents.count(Incident::DeviceLost);
+        let lost = |number| SafetyEvent {
+            number,
+            time: Duration::from_millis(7),
+            kind: EventKind::DeviceLost,
+            value: 0.021,
+        };
+        haptics.incidents.count(&lost(1));
+        assert_eq!(
+            watched.look(0, 1.0),
+            ["device: lost, the force fades (0.021 s) at 0.007 s, no. 1"]
+        );
+        haptics.incidents.count(&lost(2));
+        haptics.incidents.count(&lost(3));
         assert_eq!(watched.look(20, 1.0), [""; 0], "told a moment ago");
         let again = watched.look(1100, 1.0);
         assert!(

@@ -4,7 +4,8 @@
 
 #[cfg(not(feature = "monitor"))]
 mod absent;
-#[cfg(feature = "monitor")]
+// Needs nothing of the monitor, so its tests run in every build.
+#[cfg(any(test, feature = "monitor"))]
 mod events;
 #[cfg(feature = "monitor")]
 mod streaming;
@@ -51,6 +52,8 @@ pub struct MonitorPicture {
     pub name: String,
     /// Bodies and their meshes.
     pub world: Arc<World>,
+    /// Indices of the obstacles that move.
+    pub moving: Vec<usize>,
     /// Where the god-object starts.
     pub start: Pose,
     /// The screens, workbench frame.
@@ -59,8 +62,8 @@ pub struct MonitorPicture {
     pub workbench_from_scene: Pose,
     /// Size of the scene on the workbench over its size in the simulation.
     pub display_scale: f64,
-    /// The viewer.
-    pub head: Head,
+    /// The viewer's head at rest, workbench frame.
+    pub head: Pose,
     /// Gap at which bodies touch, m.
     pub rest_distance: f64,
 }
@@ -68,6 +71,8 @@ pub struct MonitorPicture {
 /// The shared data that the monitor reads.
 #[derive(Debug)]
 pub struct MonitorSources {
+    /// Where the viewer's head is.
+    pub head: Head,
     /// What the loops publish.
     pub shared: SharedView,
     /// All counters.

@@ -12,7 +12,7 @@ use god_object::spatial::Pose;
 use taut_bridge::realtime::sleep_until;
 use taut_monitor::{
     BodyRole, LogLevel, LoopTime, Monitor, MonitorBody, MonitorError, MonitorOptions,
-    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, ShownContact,
+    MonitorSample, MonitorScene, MonitorScreen, MonitorSender, MovingObstacles, ShownContact,
 };
 use taut_proto::scene::ScreenDescription;
 
@@ -20,7 +20,6 @@ use super::events::EventLog;
 use super::{MonitorPicture, MonitorSettings, MonitorSources, NetworkCounts, Severity};
 use crate::clock::nanoseconds;
 use crate::failure::Failure;
-use crate::head::Head;
 use crate::loops::shell::spawn;
 use crate::shutdown::Shutdown;
 use crate::timing::{Histogram, HistogramWindow};
@@ -64,9 +63,8 @@ impl MonitorFeed {
         let obstacles = picture.world.obstacles.iter();
         let names = obstacles.map(|obstacle| obstacle.name.clone());
         let events = EventLog::new(names, picture.rest_distance);
-        let head = picture.head;
         let thread = spawn("monitor feed", shutdown, move || {
-            feed(sources, sender, events, &network, &head, &frame, &asked);
+            feed(sources, sender, events, &network, &frame, &asked);
         })
         .map_err(Failure::failed)?;
         Ok(Self { monitor, thread })
@@ -164,20 +162,20 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
         BodyRole::GodObject,
         &picture.start,
     );
-    for obstacle in &world.obstacles {
-        body(
-            &obstacle.name,
-            &obstacle.mesh,
-            BodyRole::Obstacle,
-            &obstacle.pose,
-        );
+    for (index, obstacle) in world.obstacles.iter().enumerate() {
+        let role = if picture.moving.contains(&index) {
+            BodyRole::MovingObstacle
+        } else {
+            BodyRole::Obstacle
+        };
+        body(&obstacle.name, &obstacle.mesh, role, &obstacle.pose);
     }
     scene.screens = picture
         .screens
         .iter()
         .map(|screen| outline(screen, frame))
         .collect();
-    scene.head = Some(frame.pose(&picture.head.rest));
+    scene.head = Some(frame.pose(&picture.head));
     scene.reference_point = world.body.reference_point;
     scene.up = frame.scene_from_workbench.rotation * Vector3::z();
     scene
@@ -199,7 +197,6 @@ fn feed(
     mut sender: MonitorSender,
     mut events: EventLog,
     network: &NetworkCounts,
-    head: &Head,
     frame: &SceneFrame,
     shutdown: &Shutdown,
 ) {
@@ -208,7 +205,7 @@ fn feed(
     while !shutdown.is_asked() {
         deadline = sources.clock.now().max(deadline + SAMPLE_PERIOD);
         sleep_until(sources.clock.monotonic(deadline));
-        let mut sample = sample(&mut sources, head, frame);
+        let mut sample = sample(&mut sources, frame);
         times.follow(&sources, &mut sample);
         sample.packets_sent = network.packets_sent.load(Ordering::Relaxed);
         sample.packets_received = network.packets_received.load(Ordering::Relaxed);
@@ -223,17 +220,25 @@ fn feed(
     }
 }
 
-fn sample(sources: &mut MonitorSources, head: &Head, frame: &SceneFrame) -> MonitorSample {
+fn sample(sources: &mut MonitorSources, frame: &SceneFrame) -> MonitorSample {
     let now = sources.clock.now();
     let device = *sources.shared.device.newest();
     let wrench = *sources.shared.wrench.newest();
     let contacts = sources.shared.contacts.newest();
     let gap_min = contacts.set.gap_min;
+    let mut moving = MovingObstacles::default();
+    for place in &contacts.moving {
+        // There is room for as many as a session has.
+        moving.push(place.obstacle, place.pose);
+    }
+    let head = &mut sources.head;
+    let head_pose = head.moves().then(|| frame.pose(&head.pose(now)));
     MonitorSample {
         god_object_pose: contacts.set.god_object_pose,
+        moving,
         device_pose: device.pose,
-        head_pose: head.moves().then(|| frame.pose(&head.pose(now))),
-        wrench: wrench.wrench,
+        head_pose,
+        wrench: device.felt.map_or(wrench.wrench, |felt| felt.wrench),
         contacts: contacts
             .set
             .constraints

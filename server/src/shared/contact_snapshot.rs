@@ -1,4 +1,4 @@
-//! God-object loop → coupling: the god-object pose and the constraints that hold there, as one value.
+//! God-object loop → coupling: the god-object pose, the obstacles' poses and the constraints that hold there, as one value.
 //!
 //! * Writer: the god-object loop, once per update (at most `god_object_rate`).
 //! * Readers: coupling, broadcast, monitor, checker.
@@ -12,14 +12,30 @@ use std::time::Duration;
 use god_object::StepReport;
 use god_object::constraint::ConstraintSet;
 use god_object::spatial::Pose;
+use taut_proto::ArrayVec;
+use taut_proto::state::MAX_BODIES;
 
 use super::fanout::{Publisher, Subscriber, fanout};
+
+/// Most obstacles of a session that move: as many as a state to the clients has room for.
+pub const MAX_MOVING: usize = MAX_BODIES;
+
+/// Where an obstacle that moves is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingObstacle {
+    /// Its index in the world.
+    pub obstacle: u16,
+    /// World from obstacle: where it is, not where it was sent; a squeezed body holds it up.
+    pub pose: Pose,
+}
 
 /// One answer of the god-object loop. Its sequence number is that of the constraint set.
 #[derive(Debug)]
 pub struct ContactSnapshot {
     /// God-object pose and constraints.
     pub set: ConstraintSet,
+    /// The obstacles that move, at the same instant; all others stand where the world has them.
+    pub moving: ArrayVec<MovingObstacle, MAX_MOVING>,
     /// Session time at which it was published.
     pub published: Duration,
     /// Session time of the device sample that it answers.
@@ -35,6 +51,7 @@ impl ContactSnapshot {
         set.god_object_pose = *pose;
         Self {
             set,
+            moving: ArrayVec::new(),
             published: Duration::ZERO,
             device_time: Duration::ZERO,
             report: StepReport::default(),
@@ -47,12 +64,14 @@ impl Clone for ContactSnapshot {
     fn clone(&self) -> Self {
         Self {
             set: self.set.clone(),
+            moving: self.moving.clone(),
             ..*self
         }
     }
 
     fn clone_from(&mut self, source: &Self) {
         self.set.clone_from(&source.set);
+        self.moving.clone_from(&source.moving);
         self.published = source.published;
         self.device_time = source.device_time;
         self.report = source.report;

@@ -8,6 +8,7 @@
 use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6};
+use taut_bridge::{ArmingState, Felt, SafetyEvent, TickReport};
 
 use super::fanout::{Publisher, Subscriber, fanout};
 
@@ -26,6 +27,43 @@ pub struct DeviceState {
     pub buttons: u16,
     /// The device does not answer; the pose is the last good one.
     pub faulty: bool,
+    /// What the hand feels from `time` on, where a bridge tells it; `None` where it is the haptics loop's wrench.
+    pub felt: Option<Felt>,
+    /// What the port did in the tick before.
+    pub safety: SafetyState,
+}
+
+/// Most recent events that a state carries: readers that miss a few states miss none.
+pub const RECENT_EVENTS: usize = 8;
+
+/// Where the device port stands and what it told last.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SafetyState {
+    /// Whether there is force.
+    pub arming: ArmingState,
+    /// The newest events, at their number modulo the length.
+    pub events: [Option<SafetyEvent>; RECENT_EVENTS],
+}
+
+impl SafetyState {
+    /// Takes over what a tick did.
+    pub fn follow(&mut self, report: &TickReport) {
+        self.arming = report.state;
+        for event in report.events.iter() {
+            self.events[event.number as usize % RECENT_EVENTS] = Some(*event);
+        }
+    }
+
+    /// The events after the one of this number, oldest first.
+    pub fn after(&self, number: u64) -> impl Iterator<Item = &SafetyEvent> {
+        let newest = self.events.iter().flatten().map(|event| event.number).max();
+        let newest = newest.unwrap_or(0);
+        let oldest = (number + 1).max(newest.saturating_sub(RECENT_EVENTS as u64 - 1));
+        (oldest..=newest).filter_map(|number| {
+            let event = self.events[number as usize % RECENT_EVENTS].as_ref();
+            event.filter(|event| event.number == number)
+        })
+    }
 }
 
 impl DeviceState {
@@ -38,6 +76,8 @@ impl DeviceState {
             velocity: Vector6::zeros(),
             buttons: 0,
             faulty: false,
+            felt: None,
+            safety: SafetyState::default(),
         }
     }
 }

@@ -31,6 +31,8 @@ pub struct WrenchCommand {
     pub solved: bool,
     /// Whether a limit on force or torque was at work.
     pub saturated: bool,
+    /// Net work that moving obstacles have done on the hand since the start, J.
+    pub obstacle_work: f64,
 }
 
 impl WrenchCommand {
@@ -46,6 +48,7 @@ impl WrenchCommand {
             kkt: 0.0,
             solved: true,
             saturated: false,
+            obstacle_work: 0.0,
         }
     }
 }

@@ -17,7 +17,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::{
-    DecodeError, PROTOCOL_VERSION, Refusal, SceneDescription, Transport,
+    CouplingOffer, DecodeError, PROTOCOL_VERSION, Refusal, Role, SceneDescription, Transport,
     control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
 };
 use tokio::time::{Instant, sleep_until, timeout_at};
@@ -42,7 +42,12 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         .map_err(|_| unreachable())??;
 
     let joining = timeout_at(deadline, join(&options, &connection));
-    let (welcome, description, send) = match joining.await {
+    let Joined {
+        welcome,
+        description,
+        coupling,
+        send,
+    } = match joining.await {
         Ok(Ok(joined)) => joined,
         Ok(Err(error)) => {
             connection.close(CLOSE_REFUSED, b"not joined");
@@ -59,7 +64,12 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
             welcome.udp_port,
         ))?,
     };
-    let hot = Arc::new(Hot::new(connection, sealer, Inbound::new(opener), path));
+    let hot = Arc::new(Hot::new(
+        connection,
+        sealer,
+        Inbound::new(opener, options.role),
+        path,
+    ));
     hot.clone().start()?;
     Ok(ClientLink::new(
         options.server,
@@ -67,6 +77,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         hot,
         welcome.session,
         description,
+        coupling,
         send,
     ))
 }
@@ -144,11 +155,17 @@ async fn reach(
     }
 }
 
-/// Hello to scene.
-async fn join(
-    options: &ClientOptions,
-    connection: &Connection,
-) -> Result<(Welcome, SceneDescription, SendStream), LinkError> {
+/// What a client knows once it is in.
+struct Joined {
+    welcome: Welcome,
+    description: SceneDescription,
+    /// For a device bridge.
+    coupling: Option<CouplingOffer>,
+    send: SendStream,
+}
+
+/// Hello to scene, and to the coupling for a device bridge.
+async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined, LinkError> {
     let lost = |error: ConnectionError| LinkError::Closed {
         server: options.server.clone(),
         reason: close_text(&error, "the server"),
@@ -189,13 +206,33 @@ async fn join(
             server: options.server.clone(),
         });
     }
-    match expect(options, connection, &mut recv).await? {
-        ControlMessage::Scene(description) => Ok((welcome, description, send)),
-        other => Err(protocol(
-            options,
-            format!("it sends {} where the scene is due", other.name()),
-        )),
-    }
+    let description = match expect(options, connection, &mut recv).await? {
+        ControlMessage::Scene(description) => description,
+        other => {
+            return Err(protocol(
+                options,
+                format!("it sends {} where the scene is due", other.name()),
+            ));
+        }
+    };
+    let coupling = match options.role {
+        Role::Device => match expect(options, connection, &mut recv).await? {
+            ControlMessage::Coupling(offer) => Some(offer),
+            other => {
+                return Err(protocol(
+                    options,
+                    format!("it sends {} where the coupling is due", other.name()),
+                ));
+            }
+        },
+        _ => None,
+    };
+    Ok(Joined {
+        welcome,
+        description,
+        coupling,
+        send,
+    })
 }
 
 async fn expect(

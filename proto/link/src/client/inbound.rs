@@ -1,4 +1,5 @@
-//! What arrives on the hot plane: states into a bounded queue, the newest wrench, time into the clock filter; everything else counted.
+//! What arrives on the hot plane: states into a bounded queue, the newest wrench, constraint sets put together, time into the clock
+//! filter; everything else counted.
 
 use super::{ReceivedState, ReceivedWrench};
 use crate::counters::ClientCounterCells;
@@ -8,7 +9,7 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    ClockFilter, DecodeError, Payload, SessionTime,
+    Assembler, ClockFilter, ConstraintSet, DecodeError, PartTaken, Payload, Role, SessionTime,
     seal::{OpenError, Opened, Opener},
 };
 
@@ -29,10 +30,18 @@ struct Inner {
     /// Highest sequence number of a state so far.
     newest_state: Option<u64>,
     wrench: Option<ReceivedWrench>,
+    sets: Option<ReceivedSets>,
+}
+
+/// Constraint sets, for a device bridge.
+struct ReceivedSets {
+    assembler: Assembler,
+    /// When the newest whole set was completed or came again.
+    confirmed: Option<Instant>,
 }
 
 impl Inbound {
-    pub(crate) fn new(opener: Opener) -> Inbound {
+    pub(crate) fn new(opener: Opener, role: Role) -> Inbound {
         Inbound {
             inner: Mutex::new(Inner {
                 opener,
@@ -40,6 +49,10 @@ impl Inbound {
                 states: VecDeque::with_capacity(MAX_QUEUED_STATES),
                 newest_state: None,
                 wrench: None,
+                sets: (role == Role::Device).then(|| ReceivedSets {
+                    assembler: Assembler::new(),
+                    confirmed: None,
+                }),
             }),
             start: Instant::now(),
             counters: ClientCounterCells::default(),
@@ -80,6 +93,19 @@ impl Inbound {
 
     pub(crate) fn latest_wrench(&self) -> Option<ReceivedWrench> {
         self.lock().wrench
+    }
+
+    /// Copies the newest whole set into `out`, if `out` is older; when it was last confirmed. `None` before the first.
+    pub(crate) fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
+        let inner = self.lock();
+        let sets = inner.sets.as_ref()?;
+        let (newest, confirmed) = (sets.assembler.newest()?, sets.confirmed?);
+        if out.head.sequence == newest.head.sequence {
+            out.head = newest.head;
+        } else {
+            out.clone_from(newest);
+        }
+        Some(confirmed)
     }
 
     pub(crate) fn session_at(&self, moment: Instant) -> Option<SessionTime> {
@@ -138,6 +164,18 @@ impl Inner {
                     });
                 }
             }
+            Payload::Constraints(part) => match &mut self.sets {
+                Some(sets) => match sets.assembler.take(&part) {
+                    PartTaken::Whole => {
+                        counters.sets.one();
+                        sets.confirmed = Some(received);
+                    }
+                    PartTaken::Repeated => sets.confirmed = Some(received),
+                    PartTaken::Waiting | PartTaken::Overtaken => {}
+                    PartTaken::Refused => counters.garbage.one(),
+                },
+                None => counters.garbage.one(),
+            },
             Payload::Heartbeat => {}
             // The server has no business sending these.
             Payload::Input(_) | Payload::TimeRequest(_) => counters.garbage.one(),

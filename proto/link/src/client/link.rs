@@ -11,8 +11,9 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, InputSample, MeshBlob, MeshHash, Payload, SceneDescription, SessionTime,
-    control::{Bye, ControlMessage, LogEvent, LogLevel},
+    ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
+    SceneDescription, SessionTime,
+    control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -28,6 +29,7 @@ pub struct ClientLink {
     hot: Arc<Hot>,
     session: u16,
     description: SceneDescription,
+    coupling: Option<CouplingOffer>,
     meshes: Meshes,
     outbox: mpsc::Sender<ControlMessage>,
 }
@@ -40,6 +42,7 @@ impl ClientLink {
         hot: Arc<Hot>,
         session: u16,
         description: SceneDescription,
+        coupling: Option<CouplingOffer>,
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
@@ -50,6 +53,7 @@ impl ClientLink {
             hot,
             session,
             description,
+            coupling,
             meshes: Meshes::default(),
             outbox,
         }
@@ -58,6 +62,11 @@ impl ClientLink {
     /// The scene and the workbench, as at join.
     pub fn description(&self) -> &SceneDescription {
         &self.description
+    }
+
+    /// Where the force may be computed, as at join; `None` unless [`crate::Role::Device`] joined.
+    pub fn coupling(&self) -> Option<&CouplingOffer> {
+        self.coupling.as_ref()
     }
 
     /// Number of this session at the server.
@@ -102,6 +111,15 @@ impl ClientLink {
         self.hot.inbound.latest_wrench()
     }
 
+    /// Copies the newest whole constraint set into `out`, unless it is there already, and tells when it was completed or came again:
+    /// the measure for the bridge's watchdog. `None` before the first, and unless [`crate::Role::Device`] joined. No allocation if `out` has
+    /// the capacity of [`ConstraintSet::new`].
+    ///
+    /// `out` must be of this session: a set is known by its sequence number.
+    pub fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
+        self.hot.inbound.newest_set(out)
+    }
+
     /// Sends a report, waiting while earlier ones are not away yet.
     pub async fn send_stats(&self, stats: ClientStats) -> Result<(), LinkError> {
         let closed = |reason: String| LinkError::Closed {
@@ -128,6 +146,12 @@ impl ClientLink {
     /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
     pub fn post_log(&self, level: LogLevel, text: String) -> bool {
         self.post(ControlMessage::Log(LogEvent { level, text }))
+    }
+
+    /// Asks for force at the device, or for none, without waiting; `false` if it was not taken. Counts if [`crate::Role::Operator`] joined; the
+    /// server ends the session of anybody else who asks.
+    pub fn post_arm(&self, arm: bool) -> bool {
+        self.post(ControlMessage::Arm(ArmRequest { arm }))
     }
 
     fn post(&self, message: ControlMessage) -> bool {

@@ -16,7 +16,7 @@ use crate::{
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
-    DecodeError, PROTOCOL_VERSION, Refusal, Transport,
+    DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
     control::{
         ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
         Welcome,
@@ -87,6 +87,9 @@ async fn join(
         .await
         .is_ok();
     welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
+    if session.role == Role::Device {
+        welcomed = welcomed && send.write_all(&shared.content.coupling).await.is_ok();
+    }
     if !welcomed {
         shared.sessions.remove(session.number);
         return None;
@@ -235,6 +238,12 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 node: session.node.clone(),
                 event,
             }),
+            Ok(ControlMessage::Arm(request)) if session.role == Role::Operator => {
+                shared.tell(LinkEvent::Arm {
+                    node: session.node.clone(),
+                    arm: request.arm,
+                });
+            }
             Ok(ControlMessage::Bye(bye)) => return bye.reason,
             Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
             Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),

@@ -6,13 +6,13 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    HotState, Kind, Payload, Role, WrenchCommand,
+    ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
     codec::encode_into,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     state::payload_hash,
 };
 
-/// Sends states and wrenches. Belongs to one thread; never waits for a client: what the system does not take at once is counted and gone.
+/// Sends states, wrenches and constraint sets. Belongs to one thread; never waits for a client: what the system does not take at once is counted and gone.
 pub struct Broadcaster {
     shared: Arc<Shared>,
     sessions: Arc<[Arc<Session>]>,
@@ -75,14 +75,21 @@ impl Broadcaster {
 
     /// Sends `wrench` to the device bridge; `false` if there is none or sending failed.
     pub fn send_wrench(&mut self, wrench: &WrenchCommand) -> bool {
+        self.send_to_device(&Payload::Wrench(*wrench))
+    }
+
+    /// Sends a part of a constraint set to the device bridge; `false` if there is none or sending failed.
+    pub fn send_constraints(&mut self, part: ConstraintPart) -> bool {
+        self.send_to_device(&Payload::Constraints(part))
+    }
+
+    fn send_to_device(&mut self, payload: &Payload) -> bool {
         self.shared
             .sessions
             .refresh(&mut self.sessions, &mut self.generation);
         self.sessions
             .iter()
             .find(|session| session.role == Role::Device)
-            .is_some_and(|session| {
-                session.send(&Payload::Wrench(*wrench), &self.shared) == Sent::Yes
-            })
+            .is_some_and(|session| session.send(payload, &self.shared) == Sent::Yes)
     }
 }

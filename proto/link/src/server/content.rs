@@ -2,7 +2,7 @@
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
-use taut_proto::{MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
+use taut_proto::{CouplingOffer, MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
 
 /// What clients fetch at join.
 #[derive(Clone, Debug)]
@@ -17,12 +17,14 @@ pub struct Content {
 pub(crate) struct EncodedContent {
     /// The framed scene message.
     pub(crate) scene: Vec<u8>,
+    /// The framed message about coupling, for the device bridge.
+    pub(crate) coupling: Vec<u8>,
     pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
 }
 
 impl Content {
     /// Encodes everything; an error if the description names a mesh that is not there.
-    pub(crate) fn encode(self) -> Result<EncodedContent, LinkError> {
+    pub(crate) fn encode(self, coupling: CouplingOffer) -> Result<EncodedContent, LinkError> {
         let refuse = |reason: String| LinkError::Content { reason };
         let mut meshes = HashMap::new();
         for mesh in &self.meshes {
@@ -41,6 +43,13 @@ impl Content {
         let scene = ControlMessage::Scene(self.description)
             .to_frame()
             .map_err(|error| refuse(error.to_string()))?;
-        Ok(EncodedContent { scene, meshes })
+        let coupling = ControlMessage::Coupling(coupling)
+            .to_frame()
+            .map_err(|error| refuse(error.to_string()))?;
+        Ok(EncodedContent {
+            scene,
+            coupling,
+            meshes,
+        })
     }
 }

@@ -46,7 +46,7 @@ pub struct ServerLink {
 ///
 /// Fails if an address cannot be had, or if `content` names a mesh that it does not hold; nothing is left running then.
 pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLink, LinkError> {
-    let content = content.encode()?;
+    let content = content.encode(options.coupling)?;
     let quic_socket = listen(options.quic, "control")?;
     let udp = listen(options.udp, "state")?;
     let address_of = |socket: &UdpSocket| {

@@ -84,7 +84,10 @@ pub(crate) fn receive(
         }
         Payload::Input(_) => counters.inputs_refused.one(),
         // A client has no business sending these.
-        Payload::Hot(_) | Payload::TimeResponse(_) | Payload::Wrench(_) => counters.garbage.one(),
+        Payload::Hot(_)
+        | Payload::TimeResponse(_)
+        | Payload::Wrench(_)
+        | Payload::Constraints(_) => counters.garbage.one(),
     }
 }
 

@@ -77,4 +77,11 @@ pub enum LinkEvent {
         /// The line.
         event: LogEvent,
     },
+    /// An operator wants force at the device, or none.
+    Arm {
+        /// Its name.
+        node: String,
+        /// Force, or none.
+        arm: bool,
+    },
 }

@@ -152,6 +152,8 @@ pub fn input(index: u64) -> InputSample {
         velocity: [0.0; 6],
         buttons: 1,
         flags: 0,
+        rendered: [0.0; 6],
+        set_sequence: 0,
     }
 }
 

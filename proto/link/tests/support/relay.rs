@@ -1,13 +1,14 @@
 //! A relay between one client and the server's UDP port that loses, doubles, delays and damages datagrams, by a seed.
 
 use std::{
+    collections::VecDeque,
     net::{SocketAddr, UdpSocket},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread::JoinHandle,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 /// What the relay does to a datagram, in thousandths.
@@ -19,6 +20,8 @@ pub struct Impairment {
     pub swapped: u64,
     /// Passed, and once more with one bit flipped.
     pub damaged: u64,
+    /// Time on the way for everything, each way, in microseconds.
+    pub delay_us: u64,
 }
 
 #[derive(Default)]
@@ -116,6 +119,8 @@ fn run(
     let mut client = None;
     let mut buffer = [0; 2048];
     let (mut held_up, mut held_down) = (None, None);
+    let delay = Duration::from_micros(impairment.delay_us);
+    let (mut going_up, mut going_down) = (UnderWay::new(delay), UnderWay::new(delay));
     while !seen.stop.load(Ordering::SeqCst) {
         let mut idle = true;
         if let Ok((length, from)) = client_side.recv_from(&mut buffer) {
@@ -130,21 +135,17 @@ fn run(
                 impairment,
                 &mut random,
                 &mut held_up,
-                |datagram| {
-                    let _ = server_side.send_to(datagram, server);
-                },
+                |datagram| going_up.push(datagram),
             );
         }
-        if let (Ok((length, _)), Some(client)) = (server_side.recv_from(&mut buffer), client) {
+        if let Ok((length, _)) = server_side.recv_from(&mut buffer) {
             idle = false;
             let copies = impair(
                 &buffer[..length],
                 impairment,
                 &mut random,
                 &mut held_down,
-                |datagram| {
-                    let _ = client_side.send_to(datagram, client);
-                },
+                |datagram| going_down.push(datagram),
             );
             match copies {
                 0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
@@ -152,8 +153,46 @@ fn run(
                 _ => 0,
             };
         }
+        going_up.deliver(|datagram| {
+            let _ = server_side.send_to(datagram, server);
+        });
+        if let Some(client) = client {
+            going_down.deliver(|datagram| {
+                let _ = client_side.send_to(datagram, client);
+            });
+        }
         if idle {
             std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+}
+
+/// Datagrams that have not arrived yet.
+struct UnderWay {
+    delay: Duration,
+    queue: VecDeque<(Instant, Vec<u8>)>,
+}
+
+impl UnderWay {
+    fn new(delay: Duration) -> UnderWay {
+        UnderWay {
+            delay,
+            queue: VecDeque::new(),
+        }
+    }
+
+    fn push(&mut self, datagram: &[u8]) {
+        let arrival = Instant::now() + self.delay;
+        self.queue.push_back((arrival, datagram.to_vec()));
+    }
+
+    fn deliver(&mut self, mut pass: impl FnMut(&[u8])) {
+        while let Some((arrival, _)) = self.queue.front()
+            && *arrival <= Instant::now()
+        {
+            if let Some((_, datagram)) = self.queue.pop_front() {
+                pass(&datagram);
+            }
         }
     }
 }

@@ -5,19 +5,22 @@
 //! | d      | `apart`        | m    | from the centre of one of the eight to that of the single volume                |
 //! | s      | `sweep`        | m    | path of the body's volume in half the interval, to first order                  |
 //! | theta  | `angle`        | rad  | rotation in half the interval                                                   |
-//! | a, b   | `axis`         | –    | axes of the slabs; b is turned round, so that a.b is 1 where they face each other |
+//! | a, a'  | `axis`         | –    | axes of the slabs; a' is turned round, so that a.a' is 1 where they face each other |
 //! | u      |                | –    | half a unit in the last place of 1 in single precision, 2^-24                   |
 //!
 //! At the middle of the interval the body's volume is at its place; at other times of the interval it strays from there
 //! by `s`, by at most `theta rho` more because the arms of its points differ, and by at most `theta^2 |r| / 2` because
-//! the path is curved. The volumes do not come within the margin when that and their extents leave them apart along a side
-//! of the boxes or along the axis of a slab; and no features inside them face each other when no normal of the one,
-//! turned by at most theta, is opposite to one of the other: when the angle between a and b exceeds the sum of the cones.
+//! the path is curved. Seen along its own axis a, with sides t and b = a x t of half lengths d and e, the arms make less: with the turn w,
+//! `|w.b| d + |w.t| e`, and along any other axis by `theta rho` times the chord between the two more. The volumes do not come
+//! within the margin when that and their extents leave them apart along a side of the boxes or along the axis of a slab; and no
+//! features inside them face each other when no normal of the one, turned by at most theta, is opposite to one of the other:
+//! when the angle between a and a' exceeds the sum of the cones.
 //!
 //! **Rounding.** Let L be the reach of both meshes about their origins, the distance of the origins and the path together. A
 //! coordinate of d comes with at most 10 u L (the rotation's rounding, its product and three sums), its product with a
-//! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 15 (their sine), 19 (sweep) and 13 u L (the
-//! other middle), sums with 9 u L: less than 128 u L, which the margin is widened by. Cosines come with less than 24 u.
+//! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 26 (sides), 6 (axes and tangents that are unit and square
+//! only to rounding), 19 (sweep), 5 (what arms make of it) and 13 u L (the other middle), sums with 9 u L: less than 128 u L,
+//! which the margin is widened by. Cosines come with less than 24 u, squares of chords with twice that.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes); Larsson and Akenine-Moller 2009 (slab along a direction); the
 //! facing of cones as in normal-cone hierarchies, Johnson and Cohen 2001.
@@ -26,14 +29,16 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
 use super::work::Work;
-use crate::geometry::lanes::LANES;
-use crate::geometry::wide_tree::{Below, Child, ROOT, Volume, WideNode, WideTree};
+use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::volume::Volume;
+use crate::geometry::wide_tree::{Below, Child, ROOT, WideNode, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
 const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
 /// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
 const LENGTH_ROUNDING: f64 = 128.0 * HALF_UNIT;
 const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
+const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
 /// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
 const CONE_WIDENING: f64 = 1e-6;
 /// Pairs that a descent holds: each level of either tree adds seven, and there are fewer levels than in the binary trees.
@@ -67,15 +72,21 @@ pub(crate) struct Against {
     center: [f32; 3],
     half: [f32; 3],
     axis: [f32; 3],
+    /// Of the volume's box: tangent and its product with the axis, times half the sides.
+    sides: [[f32; 3]; 2],
     middle: f32,
     slab: f32,
-    radius: f32,
     cosine: f32,
     sine: f32,
     sweep: [f32; 3],
     spin: [f32; 3],
     stray: f32,
-    stray_per_radius: f32,
+    /// Along sides of boxes: what the volume's points stray by more.
+    stray_along_sides: f32,
+    stray_along_axis: f32,
+    /// Path of the volume's farthest point about its centre, and that of the eight, per radius.
+    turning: f32,
+    turning_per_radius: f32,
 }
 
 impl FacingVolumes {
@@ -159,46 +170,66 @@ impl FacingVolumes {
     #[inline]
     pub(crate) fn of_body(&self, v: &Volume) -> Against {
         let arm = apply(&self.rotation, &v.center);
-        let axis = apply(&self.rotation, &v.axis);
+        let turned = |d: &[f32; 3]| apply(&self.rotation, d);
         let sweep = sum(&self.half_path[0], &product(&self.half_turn[0], &arm));
-        let (cosine, sine) = self.widened(v);
+        let half = apply(&self.rotation_abs, &v.half);
         Against {
             center: sum(&arm, &self.offset),
-            half: apply(&self.rotation_abs, &v.half),
-            axis: [-axis[0], -axis[1], -axis[2]],
-            middle: -v.middle,
-            slab: v.slab,
-            radius: v.radius,
-            cosine,
-            sine,
             sweep,
-            spin: [0.0; 3],
-            stray: self.stray + self.angle * v.radius,
-            stray_per_radius: 0.0,
+            stray_along_sides: self.angle * v.radius,
+            stray_along_axis: stray_along_axis(v, &self.half_turn[1]),
+            turning: self.angle * v.radius,
+            ..self.against(v, turned, half)
         }
     }
 
     /// A volume of the obstacle, to be tested against volumes of the body.
     #[inline]
     pub(crate) fn of_obstacle(&self, v: &Volume) -> Against {
-        let axis = apply_transposed(&self.rotation, &v.axis);
-        let (cosine, sine) = self.widened(v);
+        let turned = |d: &[f32; 3]| apply_transposed(&self.rotation, d);
+        let half = apply_transposed(&self.rotation_abs, &v.half);
         Against {
-            center: sum(
-                &apply_transposed(&self.rotation, &v.center),
-                &self.offset_back,
-            ),
-            half: apply_transposed(&self.rotation_abs, &v.half),
-            axis: [-axis[0], -axis[1], -axis[2]],
-            middle: -v.middle,
-            slab: v.slab,
-            radius: v.radius,
-            cosine,
-            sine,
+            center: sum(&turned(&v.center), &self.offset_back),
             sweep: self.half_path[1],
             spin: self.half_turn[1],
+            turning_per_radius: self.angle,
+            ..self.against(v, turned, half)
+        }
+    }
+
+    /// What is the same for both, at rest.
+    #[inline(always)]
+    fn against(
+        &self,
+        v: &Volume,
+        turned: impl Fn(&[f32; 3]) -> [f32; 3],
+        half: [f32; 3],
+    ) -> Against {
+        let (axis, tangent) = (turned(&v.axis), turned(&v.tangent));
+        let sides = [
+            scaled(&tangent, v.along),
+            scaled(&product(&axis, &tangent), v.across),
+        ];
+        // The box about the axis is the narrower one where the surface runs aslant.
+        let thickness = v.middle.abs() + v.slab;
+        let aslant = |i: usize| axis[i].abs() * thickness + sides[0][i].abs() + sides[1][i].abs();
+        let (cosine, sine) = self.widened(v);
+        Against {
+            center: [0.0; 3],
+            half: [0, 1, 2].map(|i| half[i].min(aslant(i))),
+            axis: [-axis[0], -axis[1], -axis[2]],
+            sides,
+            middle: -v.middle,
+            slab: v.slab,
+            cosine,
+            sine,
+            sweep: [0.0; 3],
+            spin: [0.0; 3],
             stray: self.stray,
-            stray_per_radius: self.angle,
+            stray_along_sides: 0.0,
+            stray_along_axis: 0.0,
+            turning: 0.0,
+            turning_per_radius: 0.0,
         }
     }
 
@@ -216,43 +247,82 @@ impl FacingVolumes {
 }
 
 impl Against {
-    /// Which of the eight may come within the margin of this volume, facing it: a bit each. All that NaN is in.
+    /// By how much more than the margin each of the eight is apart from this volume at least, m: infinite where they do not face, not above
+    /// zero where they may come near. NaN is passed over: what has no other bound is near.
     ///
     /// One loop over the lanes, without branches: the compiler makes vectors of it.
     #[inline]
-    pub(crate) fn facing(&self, node: &WideNode) -> u32 {
+    fn beyond<const MOVES: bool>(&self, node: &WideNode) -> Lanes {
         let (n, q) = (node, self);
-        let mut mask = 0;
+        let mut beyond = Lanes::splat(0.0);
         for k in 0..LANES {
             let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
             let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
-            let (rho, slab, middle) = (n.radius.0[k], n.slab.0[k], n.middle.0[k]);
+            let t = [n.tangent[0].0[k], n.tangent[1].0[k], n.tangent[2].0[k]];
+            let b = product(&a, &t);
+            let (slab, middle) = (n.slab.0[k], n.middle.0[k]);
+            let (along, across) = (n.along.0[k], n.across.0[k]);
             let d = [q.center[0] - c[0], q.center[1] - c[1], q.center[2] - c[2]];
-            let s = sum(&q.sweep, &product(&q.spin, &c));
-            let stray = q.stray + q.stray_per_radius * rho;
-            // Along the sides of the boxes.
-            let off_x = d[0].abs() > n.half[0].0[k] + q.half[0] + s[0].abs() + stray;
-            let off_y = d[1].abs() > n.half[1].0[k] + q.half[1] + s[1].abs() + stray;
-            let off_z = d[2].abs() > n.half[2].0[k] + q.half[2] + s[2].abs() + stray;
-            // Along the axes of the eight, and along that of the one.
             let cosine = dot(&a, &q.axis);
-            let sine = norm(&product(&q.axis, &a));
+            let (mut s, mut stray_x, mut stray_a) = ([0.0; 3], q.stray, q.stray);
+            if MOVES {
+                s = sum(&q.sweep, &product(&q.spin, &c));
+                let turning = q.turning_per_radius * n.radius.0[k];
+                stray_x += q.stray_along_sides + turning;
+                // Seen along an axis, points stray by what the axes' own turn lets them; the axes differ by a chord.
+                let chord = ((2.0 - 2.0 * cosine).max(0.0) + CHORD_ROUNDING).sqrt();
+                stray_a += q.stray_along_axis
+                    + dot(&q.spin, &b).abs() * along
+                    + dot(&q.spin, &t).abs() * across
+                    + chord * (q.turning + turning);
+            }
+            // Along the sides of the boxes.
+            let off_x = d[0].abs() - (n.half[0].0[k] + q.half[0] + s[0].abs() + stray_x);
+            let off_y = d[1].abs() - (n.half[1].0[k] + q.half[1] + s[1].abs() + stray_x);
+            let off_z = d[2].abs() - (n.half[2].0[k] + q.half[2] + s[2].abs() + stray_x);
+            // Along the axes of the eight, and along that of the one.
             let slant = cosine.abs();
             let height = dot(&a, &d) + cosine * q.middle - middle;
-            let extent = slab + slant * q.slab + sine * q.radius + dot(&a, &s).abs() + stray;
-            let off_a = height.abs() > extent;
+            let sides = dot(&a, &q.sides[0]).abs() + dot(&a, &q.sides[1]).abs();
+            let extent = slab + slant * q.slab + sides + dot(&a, &s).abs() + stray_a;
+            let off_a = height.abs() - extent;
             let height = dot(&q.axis, &d) + q.middle - cosine * middle;
-            let extent = q.slab + slant * slab + sine * rho + dot(&q.axis, &s).abs() + stray;
-            let off_b = height.abs() > extent;
+            let sides = dot(&q.axis, &t).abs() * along + dot(&q.axis, &b).abs() * across;
+            let extent = q.slab + slant * slab + sides + dot(&q.axis, &s).abs() + stray_a;
+            let off_b = height.abs() - extent;
             // Cones: the sum of two angles is above pi where its sine is not above zero.
             let [cos, sin] = [n.cosine.0[k], n.sine.0[k]];
             let narrow = sin * q.cosine + cos * q.sine > 0.0;
             let away = cosine < cos * q.cosine - sin * q.sine - COSINE_ROUNDING;
-            let off = off_x | off_y | off_z | off_a | off_b | (narrow & away);
-            mask |= u32::from(!off) << k;
+            let off = larger(larger(off_x, off_y), larger(off_z, larger(off_a, off_b)));
+            beyond.0[k] = if narrow & away { f32::INFINITY } else { off };
         }
-        mask
+        beyond
     }
+}
+
+/// Which lanes are not beyond the margin: a bit each.
+#[inline(always)]
+fn near(beyond: &Lanes) -> u32 {
+    let mut mask = 0;
+    for (k, lane) in beyond.0.iter().enumerate() {
+        let off = *lane > 0.0; // false for NaN
+        mask |= u32::from(!off) << k;
+    }
+    mask
+}
+
+/// The larger of two; the second if the first is NaN.
+#[inline(always)]
+fn larger(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
+}
+
+/// What the points of a volume stray by from its centre along its axis while they turn, the turn in the mesh's axes.
+#[inline(always)]
+fn stray_along_axis(v: &Volume, turn: &[f32; 3]) -> f32 {
+    let across = product(&v.axis, &v.tangent);
+    dot(turn, &across).abs() * v.along + dot(turn, &v.tangent).abs() * v.across
 }
 
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
@@ -276,7 +346,7 @@ pub(crate) fn for_facing_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair((body, obstacle), volumes, (a, b), |(a, b)| {
+        open_pair::<false>((body, obstacle), volumes, (a, b), |(a, b)| {
             if wanted(body.owned(a), obstacle.owned(b)) {
                 stack.push((a, b));
             }
@@ -284,37 +354,48 @@ pub(crate) fn for_facing_triangle_pairs(
     }
 }
 
-/// Opens the larger of two volumes that are not both triangles, and hands on its children that face the other.
+/// Opens the thicker of two volumes that are not both triangles, and hands on its children that face the other.
 #[inline]
-pub(crate) fn open_pair(
+pub(crate) fn open_pair<const MOVES: bool>(
+    trees: (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    pair: (Child, Child),
+    mut found: impl FnMut((Child, Child)),
+) {
+    open_pair_with::<MOVES>(trees, volumes, pair, |pair, _| found(pair));
+}
+
+/// The same; each child comes with how much farther than the margin it is apart at least, m: not above zero.
+#[inline]
+pub(super) fn open_pair_with<const MOVES: bool>(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     (a, b): (Child, Child),
-    mut found: impl FnMut((Child, Child)),
+    mut found: impl FnMut((Child, Child), f32),
 ) {
     match (body.below(a), obstacle.below(b)) {
         (Below::Node(node), below)
-            if matches!(below, Below::Triangle(_)) || body.radius(a) > obstacle.radius(b) =>
+            if matches!(below, Below::Triangle(_)) || body.thickness(a) > obstacle.thickness(b) =>
         {
             let against = volumes.of_obstacle(obstacle.volume(b));
-            for_each_child(node, against.facing(body.node(node)), |child| {
-                found((child, b));
-            });
+            let beyond = against.beyond::<MOVES>(body.node(node));
+            for_each_child(node, &beyond, |child, beyond| found((child, b), beyond));
         }
         (_, Below::Node(node)) => {
             let against = volumes.of_body(body.volume(a));
-            for_each_child(node, against.facing(obstacle.node(node)), |child| {
-                found((a, child));
-            });
+            let beyond = against.beyond::<MOVES>(obstacle.node(node));
+            for_each_child(node, &beyond, |child, beyond| found((a, child), beyond));
         }
-        (_, Below::Triangle(_)) => found((a, b)),
+        (_, Below::Triangle(_)) => found((a, b), 0.0),
     }
 }
 
 #[inline(always)]
-fn for_each_child(node: u32, mut mask: u32, mut each: impl FnMut(Child)) {
+fn for_each_child(node: u32, beyond: &Lanes, mut each: impl FnMut(Child, f32)) {
+    let mut mask = near(beyond);
     while mask != 0 {
-        each(node * LANES as u32 + mask.trailing_zeros());
+        let lane = mask.trailing_zeros();
+        each(node * LANES as u32 + lane, beyond.0[lane as usize]);
         mask &= mask - 1;
     }
 }
@@ -339,6 +420,11 @@ fn apply_transposed(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
         m[0][1] * v[0] + m[1][1] * v[1] + m[2][1] * v[2],
         m[0][2] * v[0] + m[1][2] * v[1] + m[2][2] * v[2],
     ]
+}
+
+#[inline(always)]
+fn scaled(v: &[f32; 3], length: f32) -> [f32; 3] {
+    [v[0] * length, v[1] * length, v[2] * length]
 }
 
 #[inline(always)]

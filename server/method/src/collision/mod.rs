@@ -1,6 +1,7 @@
 //! Continuous collision detection: how far a body may move, and whether it is in penetration where it is.
 
 mod advancement;
+mod bands;
 mod distance;
 mod facing_volumes;
 mod gaps;
@@ -22,6 +23,7 @@ pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
+pub(crate) use bands::for_nearest_triangle_pairs;
 pub(crate) use facing_volumes::{FacingVolumes, for_facing_triangle_pairs};
 pub(crate) use motion::{Placement, RelativeMotion};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

@@ -295,7 +295,7 @@ impl Problem<'_> {
                 stack.push((a, b, 2 * index));
                 continue;
             }
-            open_pair(trees, &interval.volumes, (a, b), |(a, b)| {
+            open_pair::<true>(trees, &interval.volumes, (a, b), |(a, b)| {
                 stack.push((a, b, index));
             });
         }

@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use super::bands::Bands;
 use super::facing_volumes::WIDE_STACK_CAPACITY;
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
@@ -20,6 +21,7 @@ pub(crate) const MAX_HINTS: usize = 64;
 #[derive(Clone, Debug)]
 pub struct CollisionWorkspace {
     pub(crate) pairs: Vec<(u32, u32)>,
+    pub(crate) bands: Bands,
     /// Pairs of volumes and an interval.
     pub(super) stack: Vec<(u32, u32, u32)>,
     pub(super) intervals: Intervals,
@@ -39,6 +41,7 @@ impl CollisionWorkspace {
     pub fn with_candidates(candidates: usize) -> Self {
         Self {
             pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
+            bands: Bands::new(),
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),

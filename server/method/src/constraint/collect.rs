@@ -7,6 +7,7 @@ use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
     CollisionWorkspace, FacingVolumes, MAX_HINTS, Placement, Work, for_facing_triangle_pairs,
+    for_nearest_triangle_pairs,
 };
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
@@ -42,7 +43,8 @@ pub fn collect_contacts(
     )
 }
 
-/// The same, given up when more than `pairs` triangle pairs with features to look at come near: what was found by then is complete within no distance.
+/// The same, nearest first, given up after `pairs` pairs of triangles and of their features: what was found is complete within the distance that is
+/// returned. `u64::MAX` is no bound.
 #[allow(
     clippy::too_many_arguments,
     reason = "two placed meshes, two bounds, and memory to work in"
@@ -67,38 +69,36 @@ pub(crate) fn collect_bounded(
         obstacle_index,
         activation_distance,
     };
-    let candidates = &mut workspace.candidates;
-    candidates.clear();
-    let capacity = workspace.candidate_limit;
-    let room = (out.capacity() - out.len()).min(capacity / 2);
-    let mut truncated = false;
-    let mut complete_within = activation_distance;
+    let mut nearest = Nearest {
+        limit: workspace.candidate_limit,
+        room: (out.capacity() - out.len()).min(workspace.candidate_limit / 2),
+        candidates: &mut workspace.candidates,
+        truncated: false,
+    };
+    nearest.candidates.clear();
     let mut looked_at = 0;
-    let stack = &mut workspace.pairs;
-    for_facing_triangle_pairs(trees, &volumes, stack, work, can_touch, |a, b, work| {
-        looked_at += 1;
+    let mut look = |a, b, work: &mut Work| {
+        let before = work.feature_pairs;
         let pair = facing.pair(a, b);
         if facing.may_face(&pair) {
-            for_contacts(&facing, &pair, work, |contact| {
-                if candidates.len() == capacity {
-                    keep_nearest(candidates, room);
-                    truncated = true;
-                }
-                candidates.push(contact);
-            });
+            for_contacts(&facing, &pair, work, |contact| nearest.take(contact));
         }
-        let affordable = looked_at <= pairs;
-        if !affordable {
-            complete_within = 0.0;
-        }
-        affordable
-    });
-
-    if candidates.len() > room {
-        keep_nearest(candidates, room);
-        truncated = true;
+        looked_at += 1 + work.feature_pairs - before;
+        looked_at < pairs
+    };
+    let mut complete_within = activation_distance;
+    if pairs == u64::MAX {
+        let stack = &mut workspace.pairs;
+        for_facing_triangle_pairs(trees, &volumes, stack, work, can_touch, look);
+    } else {
+        let bands = &mut workspace.bands;
+        let volumes = (&volumes, activation_distance);
+        let within = for_nearest_triangle_pairs(trees, volumes, bands, work, can_touch, &mut look);
+        complete_within = complete_within.min(within);
     }
-    candidates.sort_unstable_by(nearer);
+    nearest.finish();
+    let truncated = nearest.truncated;
+    let candidates = &workspace.candidates;
     if truncated {
         complete_within = complete_within.min(candidates.last().map_or(0.0, |c| c.gap));
     }
@@ -171,18 +171,45 @@ pub(super) fn for_contacts(
     }
 }
 
+/// The nearest of the contacts that it is given, at most `room` of them in the end.
+pub(crate) struct Nearest<'a> {
+    pub(crate) candidates: &'a mut Vec<Contact>,
+    /// Most held at a time, twice the room or more.
+    pub(crate) limit: usize,
+    pub(crate) room: usize,
+    /// Some were left out.
+    pub(crate) truncated: bool,
+}
+
+impl Nearest<'_> {
+    #[inline]
+    pub(crate) fn take(&mut self, contact: Contact) {
+        if self.candidates.len() == self.limit {
+            self.keep();
+        }
+        self.candidates.push(contact);
+    }
+
+    /// Leaves the nearest, nearest first.
+    pub(crate) fn finish(&mut self) {
+        self.keep();
+        self.candidates.sort_unstable_by(nearer);
+    }
+
+    fn keep(&mut self) {
+        if self.room < self.candidates.len() {
+            self.candidates.select_nth_unstable_by(self.room, nearer);
+            self.candidates.truncate(self.room);
+            self.truncated = true;
+        }
+    }
+}
+
 /// By gap, then by features: the order says nothing of the traversal.
 fn nearer(a: &Contact, b: &Contact) -> std::cmp::Ordering {
     a.gap
         .total_cmp(&b.gap)
         .then_with(|| a.features.cmp(&b.features))
-}
-
-fn keep_nearest(candidates: &mut Vec<Contact>, count: usize) {
-    if count < candidates.len() {
-        candidates.select_nth_unstable_by(count, nearer);
-        candidates.truncate(count);
-    }
 }
 
 pub(super) fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
@@ -194,11 +221,12 @@ pub(super) fn triangle_of(mesh: &Mesh, feature: Feature) -> Option<u32> {
     }
 }
 
-pub(super) fn in_world(contact: &Contact, obstacle_pose: &Pose) -> Contact {
+/// A contact of the frame that is at `pose`, in the world.
+pub(crate) fn in_world(contact: &Contact, pose: &Pose) -> Contact {
     Contact {
-        point_on_body: obstacle_pose * contact.point_on_body,
-        point_on_obstacle: obstacle_pose * contact.point_on_obstacle,
-        normal: obstacle_pose.rotation * contact.normal,
+        point_on_body: pose * contact.point_on_body,
+        point_on_obstacle: pose * contact.point_on_obstacle,
+        normal: pose.rotation * contact.normal,
         ..*contact
     }
 }

@@ -31,7 +31,7 @@ pub struct Collected {
     pub truncated: bool,
     /// Every contact with a smaller gap was found and kept, m: the distance asked for, less where room or work did not suffice.
     pub complete_within: f64,
-    /// Triangle pairs whose features were looked at.
+    /// Pairs of triangles, and of their features, that were looked at.
     pub looked_at: u64,
     /// Smallest gap, m; infinite when no contact is within the activation distance.
     pub gap_min: f64,

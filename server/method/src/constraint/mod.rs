@@ -8,8 +8,8 @@ mod reduction;
 mod separation;
 mod set;
 
-pub(crate) use collect::collect_bounded;
 pub use collect::collect_contacts;
+pub(crate) use collect::{Nearest, collect_bounded, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
 pub(crate) use reduction::{At, Purpose, RowReduction};

@@ -13,6 +13,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{FeaturePair, Separation};
+use crate::prepared_rows::PreparedRows;
 use crate::spatial::{Pose, Vector6, six};
 
 /// A half-space of accelerations that one pair of facing features allows.
@@ -47,8 +48,15 @@ pub struct ConstraintSet {
     pub gap_min: f64,
     /// The capacity did not hold every row; the nearest were kept.
     pub truncated: bool,
-    /// Most by which a row that was left out is violated by a motion that the rows were chosen for, m; zero for a full set.
+    /// Every facing pair nearer than this was looked at, m: rows of pairs farther apart may be missing. Infinite without an obstacle.
+    pub complete_within: f64,
+    /// Most by which a facing pair without a row, of those nearer than `complete_within`, is violated by a motion that the rows were chosen for, m;
+    /// zero for a full set. Those motions are the projected ways to the device's pose at the update, and to poses that lie off it by
+    /// the activation distance and the device's last path, along and about each axis. The way to a pose that is a metric distance d off one
+    /// of these violates pair k by at most `|J_k| d` more, in the inverse metric: projections bring nothing farther apart.
     pub reduction_error: f64,
+    /// The rows made ready for the coupling, see [`ConstraintSet::prepare`].
+    pub(crate) prepared: PreparedRows,
 }
 
 impl ConstraintSet {
@@ -57,8 +65,21 @@ impl ConstraintSet {
         Self {
             constraints: Vec::with_capacity(capacity),
             gap_min: f64::INFINITY,
+            prepared: PreparedRows::with_capacity(capacity),
             ..Self::default()
         }
+    }
+}
+
+impl ConstraintSet {
+    /// Bound on the error of the force by the rows that were left out, N, where `normal_forces` is the sum of the contacts' forces, N, and
+    /// `stiffness` is k_h k_s m, N/m. It holds for the motions that [`Self::reduction_error`] speaks of, where the full set would let no point
+    /// of the body go further than `complete_within` less the rest distance: every pair that holds it there is then nearer.
+    ///
+    /// Let mu be the multipliers of the full set: its Lagrangian is strongly convex, and the reduced answer costs no more than the full one, so that
+    /// `|a' - a|^2 <= 2 k_s e sum(mu)` in the metric, e the error; and the forces are `k_h mu`.
+    pub fn force_error_bound(&self, stiffness: f64, normal_forces: f64) -> f64 {
+        (2.0 * stiffness * self.reduction_error * normal_forces).sqrt()
     }
 }
 
@@ -76,7 +97,9 @@ impl Clone for ConstraintSet {
         self.constraints.clone_from(&source.constraints);
         self.gap_min = source.gap_min;
         self.truncated = source.truncated;
+        self.complete_within = source.complete_within;
         self.reduction_error = source.reduction_error;
+        self.prepared.copy_from(&source.prepared);
     }
 }
 

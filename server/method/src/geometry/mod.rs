@@ -11,8 +11,10 @@ mod normals;
 mod one_sided_distance;
 mod report;
 mod self_intersection;
+mod thin_parts;
 mod topology;
 mod tree;
+pub(crate) mod volume;
 pub(crate) mod wide_tree;
 
 pub use mass::{MassProperties, mass_properties};

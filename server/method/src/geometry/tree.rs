@@ -1,11 +1,12 @@
 //! Bounding-volume tree over the triangles of a mesh: boxes in the mesh's frame.
 //!
-//! Built once by the surface-area heuristic on binned centroids; flat arrays, first child next to its parent.
+//! Built once, from the top: each node is cut where its parts are thinnest ([`thin_parts`](super::thin_parts)). Flat arrays, first child next to
+//! its parent.
 
 use nalgebra::{Point3, Vector3};
 
-/// Bins of the surface-area heuristic along the longest axis.
-const BINS: usize = 16;
+use super::thin_parts::split_by_thickness;
+
 /// Depth below which a subtree is halved by count, so that the depth is bounded whatever the mesh.
 const HALVE_BELOW_DEPTH: usize = 48;
 /// Bound on the depth of any tree: `HALVE_BELOW_DEPTH` and 32 halvings.
@@ -44,10 +45,17 @@ pub struct Tree {
 
 /// What the build knows of a triangle.
 #[derive(Clone, Copy)]
-struct Item {
-    low: Point3<f64>,
-    high: Point3<f64>,
-    center: Point3<f64>,
+pub(super) struct Item {
+    pub(super) low: Point3<f64>,
+    pub(super) high: Point3<f64>,
+    /// Of the box, m.
+    pub(super) center: Point3<f64>,
+    /// Of the corners, m.
+    pub(super) mean: Point3<f64>,
+    /// Unit; zero for a triangle without area.
+    pub(super) normal: Vector3<f64>,
+    /// Twice the area, m^2.
+    pub(super) area: f64,
     triangle: u32,
 }
 
@@ -73,7 +81,12 @@ impl Tree {
 fn item(vertices: &[Point3<f64>], corners: &[u32; 3], triangle: u32) -> Item {
     let [a, b, c] = corners.map(|v| vertices[v as usize]);
     let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+    let doubled = (b - a).cross(&(c - a));
+    let area = doubled.norm();
     Item {
+        mean: Point3::from((a.coords + b.coords + c.coords) / 3.0),
+        normal: doubled.try_normalize(0.0).unwrap_or_default(),
+        area,
         low,
         high,
         center: nalgebra::center(&low, &high),
@@ -100,7 +113,7 @@ fn grow(items: &mut [Item], depth: usize, nodes: &mut Vec<Node>) {
         return;
     }
     let split = if depth < HALVE_BELOW_DEPTH {
-        split_by_area(items)
+        split_by_thickness(items)
     } else {
         None
     };
@@ -119,7 +132,7 @@ fn bounds(items: &[Item]) -> (Point3<f64>, Point3<f64>) {
         })
 }
 
-fn center_bounds(items: &[Item]) -> (Point3<f64>, Vector3<f64>) {
+pub(super) fn center_bounds(items: &[Item]) -> (Point3<f64>, Vector3<f64>) {
     let first = items[0].center;
     let (low, high) = items.iter().fold((first, first), |(low, high), i| {
         (low.inf(&i.center), high.sup(&i.center))
@@ -136,55 +149,4 @@ fn split_by_count(items: &mut [Item]) -> usize {
             .unwrap_or(std::cmp::Ordering::Equal)
     });
     middle
-}
-
-/// Partitions the items where the areas of the two boxes, weighted by their counts, are least; `None` when they cannot be told apart.
-fn split_by_area(items: &mut [Item]) -> Option<usize> {
-    let (low, extent) = center_bounds(items);
-    let axis = extent.imax();
-    let scale = BINS as f64 / extent[axis];
-    if !scale.is_finite() {
-        return None;
-    }
-    let bin_of = |i: &Item| (((i.center[axis] - low[axis]) * scale) as usize).min(BINS - 1);
-    let mut bins: [Option<(Point3<f64>, Point3<f64>)>; BINS] = [None; BINS];
-    let mut counts = [0_usize; BINS];
-    for i in items.iter() {
-        let bin = bin_of(i);
-        counts[bin] += 1;
-        bins[bin] =
-            Some(bins[bin].map_or((i.low, i.high), |(l, h)| (l.inf(&i.low), h.sup(&i.high))));
-    }
-    let cost_of = |range: std::ops::Range<usize>| {
-        let count: usize = counts[range.clone()].iter().sum();
-        let joined = bins[range]
-            .iter()
-            .flatten()
-            .copied()
-            .reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
-        joined.map(|(l, h)| half_area(&(h - l)) * count as f64)
-    };
-    let mut best: Option<(f64, usize)> = None;
-    for cut in 1..BINS {
-        if let (Some(left), Some(right)) = (cost_of(0..cut), cost_of(cut..BINS)) {
-            let cost = left + right;
-            if best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, cut));
-            }
-        }
-    }
-    let (_, cut) = best?;
-    // Items of the lower bins to the front.
-    let mut front = 0;
-    for k in 0..items.len() {
-        if bin_of(&items[k]) < cut {
-            items.swap(front, k);
-            front += 1;
-        }
-    }
-    (front > 0 && front < items.len()).then_some(front)
-}
-
-fn half_area(sides: &Vector3<f64>) -> f64 {
-    sides.x * sides.y + sides.y * sides.z + sides.z * sides.x
 }

@@ -1,32 +1,16 @@
-//! Wide bounding-volume tree: eight children a node, each a box, a slab, a ball and a cone of normals, in single precision.
+//! Wide bounding-volume tree: eight children a node, a volume each, in single precision.
 //!
-//! | symbol | name in code  | unit | meaning                                                                       |
-//! |--------|---------------|------|-------------------------------------------------------------------------------|
-//! | c      | `center`      | m    | centre of the box, from the tree's `origin`, mesh axes                        |
-//! | a      | `axis`        | –    | mean normal of the triangles inside, unit to rounding                         |
-//! | m, h   | `middle`, `slab` | m | `a.(p - c)` is in [m - h, m + h] for every point p inside                     |
-//! | rho    | `radius`      | m    | `|p - c| <= rho` for every point p inside                                     |
-//! | alpha  | `cosine`, `sine` | – | half-angle about a of a cone that holds the normal cones of all features inside |
-//!
-//! A slab is thin where the surface is nearly flat, whatever its orientation: surfaces that lie on each other are told apart
-//! by slabs long before they are by boxes. Seen along a direction at angle phi from a, the slab's points reach over
-//! `m cos(phi) +- (h |cos(phi)| + rho sin(phi))`.
-//!
-//! **Rounding.** All is relative to the middle of the mesh, so that a mesh far from its frame's origin loses nothing. The
-//! centre and the axis are what single precision holds; half sides, slab, radius and angle are measured from them in double
-//! precision and rounded outward by `OUTWARD`, more than one unit in the last place of either precision.
+//! The volumes lie component by component, so that one is tested against eight at a time ([`Volume`]).
 
 use nalgebra::{Point3, Vector3};
 
 use super::lanes::{LANES, Lanes};
 use super::normal_cone::NormalCone;
-use super::tree::{Node, Tree};
+use super::tree::Tree;
+use super::volume::{Source, Volume};
 
-/// Outward rounding of a length relative to it and to the coordinates that it is the difference of.
-const OUTWARD: f64 = f32::EPSILON as f64;
-const OUTWARD_DOUBLE: f64 = 8.0 * f64::EPSILON;
-/// Cones are wider than computed by this, rad: the rounding of an arc tangent, and then some.
-const CONE_ROUNDING: f64 = 1e-7;
+/// What a flat volume counts as in thickness, per radius.
+const THICKNESS_PER_RADIUS: f32 = 0.01;
 /// Marks a child that is a triangle.
 const TRIANGLE: u32 = 1 << 31;
 
@@ -41,28 +25,14 @@ pub(crate) struct WideNode {
     pub(crate) center: [Lanes; 3],
     pub(crate) half: [Lanes; 3],
     pub(crate) axis: [Lanes; 3],
+    pub(crate) tangent: [Lanes; 3],
     pub(crate) middle: Lanes,
     pub(crate) slab: Lanes,
+    pub(crate) along: Lanes,
+    pub(crate) across: Lanes,
     pub(crate) radius: Lanes,
     pub(crate) cosine: Lanes,
     pub(crate) sine: Lanes,
-}
-
-/// What a child holds, once more by itself: one line of the cache.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(64))]
-pub(crate) struct Volume {
-    pub(crate) center: [f32; 3],
-    pub(crate) half: [f32; 3],
-    pub(crate) axis: [f32; 3],
-    pub(crate) middle: f32,
-    pub(crate) slab: f32,
-    pub(crate) radius: f32,
-    pub(crate) cosine: f32,
-    pub(crate) sine: f32,
-    below: u32,
-    /// Which kinds of features the triangles inside own, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
-    owned: u32,
 }
 
 /// What lies below a child.
@@ -84,20 +54,6 @@ pub(crate) struct WideTree {
     pub(crate) origin: Point3<f64>,
     /// Largest distance of a vertex from `origin`, m.
     pub(crate) reach: f64,
-}
-
-/// What the build reads.
-struct Source<'a> {
-    vertices: &'a [Point3<f64>],
-    triangles: &'a [[u32; 3]],
-    face_normals: &'a [Vector3<f64>],
-    cones: &'a [NormalCone],
-    owned: &'a [u8],
-    binary: &'a [Node],
-    /// Triangles in the order of the binary tree's leaves, and the range of them below each of its nodes.
-    order: Vec<u32>,
-    ranges: Vec<[u32; 2]>,
-    origin: Point3<f64>,
 }
 
 impl WideTree {
@@ -149,8 +105,9 @@ impl WideTree {
             reach,
         };
         tree.add_node();
-        tree.set(ROOT, source.volume(0));
-        let below = source.grow(0, &mut tree);
+        let whole = source.volume(0, None);
+        tree.set(ROOT, whole);
+        let below = source.grow(0, &whole.tangent, &mut tree);
         tree.volumes[ROOT as usize].below = below;
         tree
     }
@@ -187,6 +144,13 @@ impl WideTree {
         self.volumes[child as usize].radius
     }
 
+    /// What tells which of two volumes is to be opened: the thicker one, m; of flat ones, the larger.
+    #[inline]
+    pub(crate) fn thickness(&self, child: Child) -> f32 {
+        let volume = &self.volumes[child as usize];
+        volume.slab + THICKNESS_PER_RADIUS * volume.radius
+    }
+
     /// Which kinds of features the triangles below a child own.
     #[inline]
     pub(crate) fn owned(&self, child: Child) -> u8 {
@@ -212,8 +176,11 @@ impl WideNode {
             center: [zero; 3],
             half: [Lanes::splat(f32::NEG_INFINITY); 3],
             axis: [zero; 3],
+            tangent: [zero; 3],
             middle: zero,
             slab: zero,
+            along: zero,
+            across: zero,
             radius: zero,
             cosine: zero,
             sine: zero,
@@ -225,9 +192,12 @@ impl WideNode {
             self.center[i].0[k] = volume.center[i];
             self.half[i].0[k] = volume.half[i];
             self.axis[i].0[k] = volume.axis[i];
+            self.tangent[i].0[k] = volume.tangent[i];
         }
         self.middle.0[k] = volume.middle;
         self.slab.0[k] = volume.slab;
+        self.along.0[k] = volume.along;
+        self.across.0[k] = volume.across;
         self.radius.0[k] = volume.radius;
         self.cosine.0[k] = volume.cosine;
         self.sine.0[k] = volume.sine;
@@ -236,7 +206,7 @@ impl WideNode {
 
 impl Source<'_> {
     /// Appends what lies below node `top` of the binary tree; says what it is.
-    fn grow(&self, top: u32, tree: &mut WideTree) -> u32 {
+    fn grow(&self, top: u32, tangent: &[f32; 3], tree: &mut WideTree) -> u32 {
         let node = &self.binary[top as usize];
         if node.is_leaf() {
             return node.triangle | TRIANGLE;
@@ -258,76 +228,11 @@ impl Source<'_> {
         }
         let index = tree.add_node();
         for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
-            tree.set(child, self.volume(*opened));
-            tree.volumes[child as usize].below = self.grow(*opened, tree);
+            let volume = self.volume(*opened, Some(tangent));
+            tree.set(child, volume);
+            tree.volumes[child as usize].below = self.grow(*opened, &volume.tangent, tree);
         }
         index
-    }
-
-    /// What node `index` of the binary tree holds, measured triangle by triangle.
-    fn volume(&self, index: u32) -> Volume {
-        let node = &self.binary[index as usize];
-        let [from, to] = self.ranges[index as usize];
-        let inside = &self.order[from as usize..to as usize];
-        let center = (node.center - self.origin).map(|x| x as f32);
-        let axis = self.mean_normal(inside).map(|x| x as f32);
-        let (wide_center, wide_axis) = (self.origin + center.map(f64::from), axis.map(f64::from));
-
-        let (mut low, mut high, mut radius): (f64, f64, f64) =
-            (f64::INFINITY, f64::NEG_INFINITY, 0.0);
-        let mut half = Vector3::zeros();
-        let mut angle: f64 = 0.0;
-        for t in inside {
-            for v in self.triangles[*t as usize] {
-                let arm = self.vertices[v as usize] - wide_center;
-                let height = wide_axis.dot(&arm);
-                (low, high) = (low.min(height), high.max(height));
-                radius = radius.max(arm.norm_squared());
-                half = half.sup(&arm.abs());
-            }
-            let cone = &self.cones[*t as usize];
-            let between = wide_axis
-                .cross(&cone.axis)
-                .norm()
-                .atan2(wide_axis.dot(&cone.axis));
-            angle = angle.max(between + cone.angle + CONE_ROUNDING);
-        }
-        // Coordinates are exact in the mesh's frame; their differences are rounded relative to them.
-        let error = OUTWARD_DOUBLE * (self.origin.coords.amax() + wide_center.coords.amax());
-        let outward = |length: f64| (length * (1.0 + 2.0 * OUTWARD) + error) as f32;
-        let middle = (0.5 * (low + high)) as f32;
-        let slab = (high - f64::from(middle)).max(f64::from(middle) - low);
-        let angle = angle.min(std::f64::consts::PI);
-        Volume {
-            center: center.into(),
-            half: half.map(outward).into(),
-            axis: axis.into(),
-            middle,
-            slab: outward(slab + OUTWARD_DOUBLE * radius.sqrt()),
-            radius: outward(radius.sqrt()),
-            cosine: angle.cos() as f32,
-            sine: angle.sin() as f32,
-            below: 0,
-            owned: inside
-                .iter()
-                .fold(0, |kinds, t| kinds | u32::from(self.owned[*t as usize])),
-        }
-    }
-
-    /// Mean of the normals, each with its triangle's area; some unit vector where they cancel.
-    fn mean_normal(&self, inside: &[u32]) -> Vector3<f64> {
-        let mut sum = Vector3::zeros();
-        for t in inside {
-            let [a, b, c] = self.triangles[*t as usize].map(|v| self.vertices[v as usize]);
-            let area = (b - a).cross(&(c - a)).norm();
-            sum += self.face_normals[*t as usize] * area;
-        }
-        let first = self.face_normals[inside[0] as usize];
-        // One triangle: its normal as it is.
-        if inside.len() == 1 {
-            return first;
-        }
-        sum.try_normalize(f64::MIN_POSITIVE).unwrap_or(first)
     }
 }
 
@@ -387,6 +292,10 @@ mod tests {
                 }
                 assert!(arm.norm() <= f64::from(v.radius));
                 assert!((axis.dot(&arm) - f64::from(v.middle)).abs() <= f64::from(v.slab));
+                let tangent = wide(v.tangent);
+                assert!(tangent.dot(&arm).abs() <= f64::from(v.along));
+                assert!(axis.cross(&tangent).dot(&arm).abs() <= f64::from(v.across));
+                assert!((tangent.norm() - 1.0).abs() < 1e-6 && axis.dot(&tangent).abs() < 1e-6);
             }
             let normal = mesh.face_normal(*t);
             let off = axis.cross(normal).norm().atan2(axis.dot(normal));

@@ -12,11 +12,12 @@ impl GodObject {
         if self.refresh(distance, work) {
             return;
         }
-        let pairs_before = work.triangle_pairs;
+        let pairs_before = work.triangle_pairs + work.feature_pairs;
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;
         self.set.gap_min = f64::INFINITY;
         self.set.truncated = false;
+        self.set.complete_within = distance;
         self.set.constraints.clear();
         let placed = self.world.obstacles.iter().zip(&self.obstacles);
         for (index, (obstacle, placed)) in placed.enumerate() {
@@ -35,6 +36,9 @@ impl GodObject {
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             let room = self.settings.max_constraints - self.set.constraints.len();
             self.set.truncated |= collected.truncated || self.contacts.len() > room;
+            let held = self.contacts.get(room).map_or(f64::INFINITY, |c| c.gap);
+            let within = collected.complete_within.min(held);
+            self.set.complete_within = self.set.complete_within.min(within);
             for contact in self.contacts.iter().take(room) {
                 let shading_normal = self.shading[index].as_ref().and_then(|normals| {
                     // Shading knows the obstacle where the world has it.
@@ -63,7 +67,8 @@ impl GodObject {
                 });
             }
         }
-        self.afford_look_ahead(distance, work.triangle_pairs - pairs_before);
+        let pairs = work.triangle_pairs + work.feature_pairs - pairs_before;
+        self.afford_look_ahead(distance, pairs);
         // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
         self.set
             .constraints

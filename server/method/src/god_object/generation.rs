@@ -12,18 +12,11 @@ use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::world::World;
 
-/// A row that is violated by less than this share of the rest distance is left out: 1 um for a body of 0.1 m.
-const TOLERANCE_PER_REST_DISTANCE: f64 = 0.1;
-/// Pairs up to this many rest distances apart are always collected, whatever it costs.
-const TOUCHING_REST_DISTANCES: f64 = 2.0;
-/// Share of the distance collected that a body may go before the next collection, where the work allows no greater distance.
+/// A row that is violated by less than this share of the rest distance is left out: 0.1 um for a body of 0.1 m, by which a force of 2 N at
+/// 1000 N/m is off by at most one per cent.
+const TOLERANCE_PER_REST_DISTANCE: f64 = 0.01;
+/// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
-/// A collection that costs too much is given up, and done within this share of its distance; one that costs little lets the next go
-/// further.
-const LOOK_AHEAD_SHRINKS: f64 = 0.3;
-const LOOK_AHEAD_GROWS: f64 = 1.25;
-/// Most collections that are begun at one pose.
-const MAX_ATTEMPTS: u32 = 8;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
@@ -48,9 +41,7 @@ impl GodObject {
             reduction.move_to(&at, &self.collision.hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
-            let wanted = distance.min(LONGER_WAY * self.affordable);
-            let reaches = moved + wanted <= within
-                || (self.affordable <= distance && moved <= LONGER_WAY * self.affordable);
+            let reaches = moved + distance.min(LONGER_WAY * within) <= within;
             self.set.gap_min = reduction.gap_min();
             if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
@@ -61,7 +52,7 @@ impl GodObject {
         true
     }
 
-    /// Every facing pair within `distance`, m, or within what the work allows.
+    /// The facing pairs within `distance`, m, nearest first, as far as the work allows: every obstacle has its share of it.
     fn collect_candidates(
         &mut self,
         reduction: &mut RowReduction,
@@ -69,38 +60,26 @@ impl GodObject {
         distance: f64,
         work: &mut Work,
     ) {
-        let least = TOUCHING_REST_DISTANCES * self.settings.rest_distance;
-        for _ in 0..MAX_ATTEMPTS {
-            let distance = distance.min(self.affordable).max(least);
-            let mut pairs = 0;
-            reduction.begin(at);
-            self.set.gap_min = f64::INFINITY;
-            for (index, obstacle) in at.world.obstacles.iter().enumerate() {
-                self.contacts.clear();
-                let collected = collect_bounded(
-                    (&at.world.body.mesh, &at.pose),
-                    (&obstacle.mesh, &obstacle.pose),
-                    u16::try_from(index).unwrap_or(u16::MAX),
-                    distance,
-                    self.settings.look_ahead_pairs.saturating_sub(pairs),
-                    &mut self.collision,
-                    &mut self.contacts,
-                    work,
-                );
-                pairs += collected.looked_at;
-                self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-                reduction.offer(at, &self.contacts, &collected);
-            }
-            if pairs > self.settings.look_ahead_pairs {
-                self.affordable = (distance * LOOK_AHEAD_SHRINKS).max(least);
-                if distance > least {
-                    continue;
-                }
-            } else if pairs < self.settings.look_ahead_pairs / 2 {
-                let limit = self.settings.activation_distance + self.settings.look_ahead_limit;
-                self.affordable = (self.affordable * LOOK_AHEAD_GROWS).min(limit);
-            }
-            break;
+        reduction.begin(at, distance);
+        self.set.gap_min = f64::INFINITY;
+        let mut pairs = self.settings.look_ahead_pairs;
+        let mut obstacles_left = at.world.obstacles.len() as u64;
+        for (index, obstacle) in at.world.obstacles.iter().enumerate() {
+            self.contacts.clear();
+            let collected = collect_bounded(
+                (&at.world.body.mesh, &at.pose),
+                (&obstacle.mesh, &obstacle.pose),
+                u16::try_from(index).unwrap_or(u16::MAX),
+                distance,
+                (pairs / obstacles_left).max(1),
+                &mut self.collision,
+                &mut self.contacts,
+                work,
+            );
+            pairs = pairs.saturating_sub(collected.looked_at);
+            obstacles_left -= 1;
+            self.set.gap_min = self.set.gap_min.min(collected.gap_min);
+            reduction.offer(at, &self.contacts, &collected);
         }
         // Known rows may be nearer than what a collection that was given up has found.
         self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
@@ -140,14 +119,15 @@ impl GodObject {
         };
         if let Some(at) = self.place() {
             let moved = reduction.moved(self.radius) > 0.0;
-            let complete = reduction.complete_within() >= published || self.affordable <= published;
+            // What was given up at this pose would be given up again.
+            let complete = reduction.was_given_up() || reduction.asked() >= published;
             if moved || !complete {
                 self.collect_candidates(&mut reduction, &at, published, &mut report.work);
             }
         }
         self.reduction = Some(reduction);
-        let reach = self.settings.activation_distance
-            + update.all_moved.min(self.settings.look_ahead_limit);
+        let reach =
+            self.settings.activation_distance + update.all_moved.min(self.look_ahead_limit());
         self.choose(difference, reach, &mut report.work);
     }
 
@@ -220,6 +200,7 @@ impl GodObject {
         self.set.god_object_pose = self.pose;
         self.set.truncated = reduction.truncated();
         self.set.reduction_error = reduction.error();
+        self.set.complete_within = reduction.known_within(self.radius);
         self.set.constraints.clear();
         let room = self.settings.max_constraints;
         for contact in reduction.contacts().take(room) {

@@ -1,5 +1,7 @@
 //! How far a published set looks ahead, and what that may cost: late updates must not make later ones still later.
 
+use nalgebra::Point3;
+
 use super::GodObject;
 use super::substep::Update;
 
@@ -10,6 +12,31 @@ const LOOK_AHEAD_GROWS: f64 = 1.25;
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 
 impl GodObject {
+    /// The body's fastest point at the device may be up to `distance` (m) from where the device pose of the next updates puts it, by the
+    /// time at which their sets are used: the pose came late, or the sets travel. They look ahead that much farther, also beyond
+    /// [`Settings::look_ahead_limit`](crate::Settings::look_ahead_limit), as far as the work allows.
+    ///
+    /// What is not a positive finite number counts as zero.
+    pub fn set_device_ahead(&mut self, distance: f64) {
+        let ahead = distance.is_finite() && distance > 0.0;
+        self.device_ahead = if ahead { distance } else { 0.0 };
+    }
+
+    /// Most that look-ahead adds to the activation distance, m.
+    pub(super) fn look_ahead_limit(&self) -> f64 {
+        self.settings.look_ahead_limit.max(self.device_ahead)
+    }
+
+    /// The point G of the body, in its own frame, m.
+    pub fn reference_point(&self) -> &Point3<f64> {
+        &self.world.body.reference_point
+    }
+
+    /// Distance of the body's farthest point from the reference point, m.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// How far the set that an update publishes collects, m.
     pub(super) fn published_distance(&self, update: &Update) -> f64 {
         if self.settings.look_ahead {
@@ -19,7 +46,7 @@ impl GodObject {
         }
     }
 
-    /// Takes note of what a collection within `distance` (m) cost, in triangle pairs.
+    /// Takes note of what a collection within `distance` (m) cost, in pairs of triangles and of features.
     pub(super) fn afford_look_ahead(&mut self, distance: f64, pairs: u64) {
         if pairs > self.settings.look_ahead_pairs {
             let beyond = (distance - self.settings.activation_distance).max(0.0);
@@ -27,7 +54,7 @@ impl GodObject {
         } else if pairs < self.settings.look_ahead_pairs / 4 {
             self.affordable = (self.affordable * LOOK_AHEAD_GROWS)
                 .max(self.settings.activation_distance)
-                .min(self.settings.look_ahead_limit);
+                .min(self.look_ahead_limit());
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! | symbol | name in code   | unit   | meaning                                                                      |
 //! |--------|----------------|--------|------------------------------------------------------------------------------|
-//! | u_k    | `ahead`        | m      | what the obstacle's point at contact k has still to go, times `share`        |
+//! | u_k    | `ahead`        | m      | how far the obstacle's point at contact k goes over the next `share` of its way |
 //! | b_k    | `bound`        | m      | bound of the row while the obstacle stands                                   |
 //!
 //! One update alternates: every obstacle goes on towards its target as far as it is free of the body, by the same collision search with
@@ -14,9 +14,9 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use super::{GodObject, StepReport};
-use crate::collision::{Motion, TimeOfImpact};
+use crate::collision::TimeOfImpact;
 use crate::constraint::NonPenetrationConstraint;
-use crate::shape;
+use crate::shape::{self, ObstacleWay, Primitive};
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
 };
@@ -26,6 +26,8 @@ use crate::world::Obstacle;
 const MAX_ALTERNATIONS: u32 = 12;
 /// How much less of its way an obstacle is to go at once when the body cannot be moved ahead of it.
 const SQUEEZED_SHARE: f64 = 0.5;
+/// What an alternation is to bring, of the way that it is for; otherwise the next one is for less.
+const LEAST_PROGRESS: f64 = 0.05;
 /// Smallest such share: below it the body is held.
 const LEAST_SHARE: f64 = 1e-2;
 
@@ -37,7 +39,9 @@ pub(super) struct PlacedObstacle {
     /// World from obstacle when the update began.
     before: Pose,
     target: Pose,
-    /// Radius of the mesh about its origin, m.
+    /// World from obstacle where the body makes room for it next: a share of its way.
+    next: Pose,
+    /// Radius of the mesh about its origin, m; of a half-space that of what can touch the body.
     radius: f64,
 }
 
@@ -47,6 +51,7 @@ impl PlacedObstacle {
             pose: obstacle.pose,
             before: obstacle.pose,
             target: obstacle.pose,
+            next: obstacle.pose,
             radius: obstacle.mesh.radius_about(&Point3::origin()),
         }
     }
@@ -87,9 +92,9 @@ impl PlacedObstacle {
         normal.dot(&(point - before))
     }
 
-    /// How far its point at `point` has still to go along `normal`, m.
+    /// How far its point at `point` goes next along `normal`, m.
     fn ahead(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
-        let then = self.target * self.pose.inverse_transform_point(point);
+        let then = self.next * self.pose.inverse_transform_point(point);
         normal.dot(&(then - point))
     }
 }
@@ -97,8 +102,8 @@ impl PlacedObstacle {
 /// What the body must make room for when it is projected.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ahead {
-    /// Share of what the obstacles have still to go.
-    share: f64,
+    /// Whether the body may follow where an obstacle goes away: not before that has gone. A body in a hole that moves has no other room.
+    follows: bool,
     /// Whether rows nearer than the rest distance are eased out at the same time.
     eases: bool,
 }
@@ -130,6 +135,7 @@ impl GodObject {
         for obstacle in &mut self.obstacles {
             obstacle.before = obstacle.pose;
         }
+        self.bound_half_spaces();
         let asked = self.longest_way_left();
         if asked == 0.0 {
             if came {
@@ -149,10 +155,11 @@ impl GodObject {
             if self.longest_way_left() == 0.0 || share < LEAST_SHARE || !budget_left {
                 break;
             }
+            let enough = (LEAST_PROGRESS * share * asked).max(self.settings.motion_tolerance);
             match self.make_room(share, report) {
-                Some(made) if made + gone <= self.settings.motion_tolerance => break,
-                Some(_) => share = (share / SQUEEZED_SHARE).min(1.0),
-                None => share *= SQUEEZED_SHARE,
+                Some(made) if made + gone > enough => share = (share / SQUEEZED_SHARE).min(1.0),
+                // No room; or none is needed at the end of a long turn, but on the way there.
+                _ => share *= SQUEEZED_SHARE,
             }
         }
         let blocked = self.obstacles.iter().filter(|o| o.is_moving()).count();
@@ -160,6 +167,16 @@ impl GodObject {
         let distance = self.settings.activation_distance;
         self.collect(distance, &mut report.work);
         asked
+    }
+
+    /// A half-space has no farthest point: what counts is the part that the body can reach.
+    fn bound_half_spaces(&mut self) {
+        let center = self.pose_at_reference_point().translation.vector;
+        for (placed, obstacle) in self.obstacles.iter_mut().zip(&self.world.obstacles) {
+            if matches!(obstacle.primitive, Some(Primitive::Plane { .. })) {
+                placed.radius = (center - placed.pose.translation.vector).norm() + self.radius;
+            }
+        }
     }
 
     /// The obstacles stand: no row comes nearer by itself any more.
@@ -186,14 +203,17 @@ impl GodObject {
             if !placed.is_moving() {
                 continue;
             }
-            let motion = Motion {
-                start: placed.pose,
-                displacement: placed.left() * share,
-                reference_point: Point3::origin(),
-            };
+            let displacement = placed.left() * share;
+            let way = ObstacleWay::new(
+                obstacle,
+                &placed.pose,
+                &displacement,
+                &self.world.body,
+                &self.pose,
+            );
             let found = shape::time_of_impact_of_obstacle(
                 obstacle,
-                &motion,
+                &way,
                 &self.world.body,
                 &self.pose,
                 &settings,
@@ -208,11 +228,11 @@ impl GodObject {
                 TimeOfImpact::Overlapping => 0.0,
             };
             if time > 0.0 {
-                longest = longest.max(placed.length(&motion.displacement) * time);
+                longest = longest.max(placed.length(&displacement) * time);
                 placed.pose = if time >= 1.0 && share >= 1.0 {
                     placed.target
                 } else {
-                    advance_pose(&motion.start, &motion.displacement, time)
+                    way.pose_at(time)
                 };
             }
         }
@@ -225,8 +245,15 @@ impl GodObject {
         let distance = (2.0 * (self.settings.rest_distance + way))
             .min(self.settings.activation_distance + self.affordable);
         self.collect(distance, &mut report.work);
-        for eases in [true, false] {
-            let ahead = Ahead { share, eases };
+        for placed in &mut self.obstacles {
+            placed.next = if placed.is_moving() && share < 1.0 {
+                advance_pose(&placed.pose, &(placed.left() * share), 1.0)
+            } else {
+                placed.target
+            };
+        }
+        for (follows, eases) in [(false, true), (false, false), (true, true), (true, false)] {
+            let ahead = Ahead { follows, eases };
             let Some(projected) = self.project(&Vector6::zeros(), Some(&ahead), report) else {
                 continue;
             };
@@ -256,6 +283,6 @@ impl GodObject {
             .get(usize::from(row.features.obstacle))
             .filter(|obstacle| obstacle.is_moving())
             .map_or(0.0, |obstacle| obstacle.ahead(&row.point, &row.normal));
-        standing + to_go * ahead.share
+        standing + if ahead.follows { to_go } else { to_go.max(0.0) }
     }
 }

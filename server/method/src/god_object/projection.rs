@@ -10,6 +10,10 @@ use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatu
 use crate::spatial::{Vector6, advance_pose, angular, pose_difference};
 use crate::surface::{Friction, FrictionProblem};
 
+/// Rounds that each cover less than this share of the one before add up to no less than an eighth of the linear answer in three rounds: where
+/// that one moves the body, they do.
+const SETTLING_CONTRACTION: f64 = 0.5;
+
 /// A motion that the rows allow.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Projected {
@@ -19,6 +23,8 @@ pub(super) struct Projected {
     pub(super) straight: Point3<f64>,
     /// Every row is satisfied; otherwise rows contradict, and nothing is eased out.
     pub(super) feasible: bool,
+    /// False where the rounds of implicit constraints did not come nearer to an answer, and the linear one is given.
+    pub(super) settled: bool,
 }
 
 impl GodObject {
@@ -123,12 +129,21 @@ impl GodObject {
         };
         report.work.projections += u64::from(answer.rounds);
         report.kkt = report.kkt.max(answer.projection.kkt_residual);
+        // Rounds that do not shrink may end anywhere, even where they began: they must not be what holds the body.
+        let settled = answer.contraction <= SETTLING_CONTRACTION; // false for NaN
+        if !settled {
+            return Projected {
+                settled,
+                ..Projected::about(linear.acceleration, reference_point)
+            };
+        }
         report.active = answer.projection.active.len();
         let nearest = angular(&linear.acceleration);
         Projected {
             acceleration: pose_difference(&answer.reached, &start, &nearest),
             straight: self.held_point(&answer).unwrap_or(reference_point),
             feasible: true,
+            settled: true,
         }
     }
 
@@ -161,6 +176,7 @@ impl Projected {
             acceleration,
             straight,
             feasible: true,
+            settled: true,
         }
     }
 }

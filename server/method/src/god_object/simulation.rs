@@ -17,6 +17,7 @@ use crate::spatial::{
     pose_is_finite,
 };
 use crate::surface::{Friction, ShadedAcceleration, ShadingNormals};
+use crate::turn_memory::TurnMemory;
 use crate::world::World;
 
 /// Loop 1 of the method.
@@ -35,10 +36,12 @@ pub struct GodObject {
     pub(super) implicit: ImplicitRounds,
     pub(super) rows: Vec<HalfSpace>,
     pub(super) warm_start: Vec<u32>,
-    pub(super) rotation: Vector3<f64>,
+    pub(super) turn: TurnMemory,
     pub(super) radius: f64,
     pub(super) trust_length: f64,
     pub(super) last_device: Option<Pose>,
+    /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
+    pub(super) device_ahead: f64,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
@@ -79,16 +82,20 @@ impl GodObject {
             ),
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(6),
-            rotation: Vector3::zeros(),
+            turn: TurnMemory::default(),
             radius,
             trust_length: f64::INFINITY,
             last_device: None,
+            device_ahead: 0.0,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };
         let work = &mut Work::default();
         god_object.collect(settings.activation_distance, work);
         god_object.choose(&Vector6::zeros(), settings.activation_distance, work);
+        god_object
+            .set
+            .prepare(&god_object.world.body, &settings, None);
         Ok(god_object)
     }
 
@@ -124,8 +131,7 @@ impl GodObject {
         // 1. and 2. The share of the way that this update is to cover, as a pose to arrive at.
         let start = self.pose_at_reference_point();
         let device = at_reference_point(device_pose, &self.world.body.reference_point);
-        let difference = pose_difference(&device, &start, &self.rotation);
-        self.rotation = angular(&difference);
+        let difference = self.turn.difference(&device, &start);
         let unconstrained = match shaded {
             Some(pass) if pass.sequence == self.set.sequence => pass.acceleration,
             _ => difference * self.settings.k_s,
@@ -133,7 +139,7 @@ impl GodObject {
         let goal = advance_pose(&start, &unconstrained, 1.0);
         let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
             self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
-        });
+        }) + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
         let obstacles_moved = self.carry_obstacles(&mut report);
@@ -169,8 +175,12 @@ impl GodObject {
         if self.reduction.is_none() && self.collected_within < published {
             self.collect(published, &mut report.work);
         }
-        let difference = pose_difference(&device, &self.pose_at_reference_point(), &self.rotation);
+        let difference = self
+            .turn
+            .difference(&device, &self.pose_at_reference_point());
         self.publish(&difference, &update, &mut report);
+        self.set
+            .prepare(&self.world.body, &self.settings, Some(device_pose));
         self.describe_set(&mut report);
         report
     }

@@ -16,8 +16,10 @@ use crate::spatial::{
 const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is not worth a search.
 const WORTH_SHARE: f64 = 0.05;
-/// How much shorter the motions become when one turns back on the last.
-const TURNING_BACK_DAMPING: f64 = 0.5;
+/// Most by which motions become shorter when one turns back on the last.
+const LARGEST_DAMPING: f64 = 16.0;
+/// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
+const LOST_GAP_SHARE: f64 = 0.5;
 
 /// What the sub-steps of one update hand on.
 #[derive(Clone, Copy, Debug)]
@@ -48,24 +50,11 @@ impl GodObject {
         if !moves && !eases {
             return false;
         }
-        // 3. Project, on no more of the way than the linear constraints are trusted for.
-        let trusted = if length > self.trust_length {
-            left * (self.trust_length / length)
-        } else {
-            *left
-        };
-        self.complete(&trusted, report);
-        let Some(projected) = self.project(&trusted, None, report) else {
+        // 3. Project. The way that comes out may be longer than the linear constraints are trusted for: then less is asked for.
+        let Some((projected, cut)) = self.project_trusted(left, report) else {
             return false;
         };
-        let mut constrained = projected.acceleration;
-        // A motion that turns back on the last one says that the minimum lies between: features took turns in holding.
-        if self.turns_back(&constrained, &update.last_motion) {
-            update.damping *= TURNING_BACK_DAMPING;
-        }
-        constrained *= update.damping;
-        update.last_motion = constrained;
-        let covered = self.motion_length(&constrained);
+        let covered = self.motion_length(&projected.acceleration);
         if report.substeps == 1 {
             // This update covers the share k_s of what is free, the next sets must serve the rest.
             update.look_ahead =
@@ -74,7 +63,7 @@ impl GodObject {
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
         // but for easing out, which is little always: a body left below the rest distance stops at every motion. Nor is a motion
         // little that was cut to what is trusted.
-        let little = if eases || length > self.trust_length {
+        let little = if eases || cut {
             0.0
         } else {
             WORTH_SHARE * update.made
@@ -85,13 +74,12 @@ impl GodObject {
         }
 
         // 4. Move as far as continuous collision detection allows.
+        update.relax(&projected.acceleration, self.radius);
+        let constrained = projected.acceleration * update.damping;
+        let covered = covered * update.damping;
+        let gap_before = self.set.gap_min.min(self.settings.rest_distance);
         let time = self.go(&projected, &constrained, report);
         update.made += covered * time;
-        if time < TRUSTED_SHARE {
-            self.trust_length = (covered * time).max(self.settings.rest_distance);
-        } else if time >= 1.0 {
-            self.trust_length *= 2.0;
-        }
 
         // 5. Collect at the pose reached: for the next sub-step what it can reach, or all when it is likely the last.
         let distance = if covered < self.settings.rest_distance {
@@ -102,7 +90,55 @@ impl GodObject {
                 .min(2.0 * self.settings.rest_distance + covered)
         };
         self.collect(distance, &mut report.work);
+
+        // The linear rows foretell no gap below the rest distance that was not there before.
+        let lost = gap_before - self.set.gap_min;
+        let true_rows = lost <= LOST_GAP_SHARE * self.settings.rest_distance; // false for NaN
+        if time < TRUSTED_SHARE {
+            self.trust_length = (covered * time).max(self.settings.rest_distance);
+        } else if !true_rows {
+            self.trust_length = (TRUSTED_SHARE * covered).max(self.settings.motion_tolerance);
+        } else if time >= 1.0 {
+            self.trust_length *= 2.0;
+        }
+        if time < TRUSTED_SHARE || !true_rows {
+            // What comes next is a way out, and no turning back.
+            update.last_motion = Vector6::zeros();
+        }
         true
+    }
+
+    /// Eq. (1) for as much of `left` as leads no farther than the linear constraints are trusted for; whether that is less than all.
+    fn project_trusted(
+        &mut self,
+        left: &Vector6,
+        report: &mut StepReport,
+    ) -> Option<(Projected, bool)> {
+        self.complete(left, report);
+        let projected = self.project(left, None, report)?;
+        let trusted = if projected.settled {
+            self.trust_length
+        } else {
+            self.trust_length.min(self.straight_length())
+        };
+        let covered = self.motion_length(&projected.acceleration);
+        if covered <= trusted {
+            return Some((projected, false));
+        }
+        let share = left * (trusted / covered);
+        self.complete(&share, report);
+        let mut projected = self.project(&share, None, report)?;
+        // Rows on the way may let a share of the wish go as far as the whole.
+        let covered = self.motion_length(&projected.acceleration);
+        if covered > trusted {
+            projected.acceleration *= trusted / covered;
+        }
+        Some((projected, true))
+    }
+
+    /// A motion shorter than this turns no point of the body out of its tangent by more than the rest distance, m: linear rows are true.
+    fn straight_length(&self) -> f64 {
+        (2.0 * self.radius * self.settings.rest_distance).sqrt()
     }
 
     /// Moves the body by `displacement`, as far as it is free; the share of it that was.
@@ -143,11 +179,22 @@ impl GodObject {
             reference_point: *straight,
         }
     }
+}
 
-    /// Whether one motion undoes a part of the other, points of the body weighed alike.
-    fn turns_back(&self, motion: &Vector6, last: &Vector6) -> bool {
-        let along = linear(motion).dot(&linear(last))
-            + self.radius * self.radius * angular(motion).dot(&angular(last));
-        along < 0.0
+impl Update {
+    /// Takes note of a projected motion, before it is made: one that turns back on the last says that the last went too far.
+    fn relax(&mut self, motion: &Vector6, radius: f64) {
+        let weighed = |a: &Vector6, b: &Vector6| {
+            linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
+        };
+        let along = weighed(motion, &self.last_motion);
+        if along < 0.0 {
+            // Aitken's extrapolation: motions in proportion to the way that is left would end here.
+            let ratio = along / weighed(&self.last_motion, &self.last_motion);
+            self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
+        } else {
+            self.damping = (2.0 * self.damping).min(1.0);
+        }
+        self.last_motion = *motion;
     }
 }

@@ -57,6 +57,11 @@ impl ActiveSet {
         self
     }
 
+    /// Takes over the rows that are held in `source`, with their factorisation.
+    pub(crate) fn copy_from(&mut self, source: &ActiveSet) {
+        self.set.clone_from(&source.set);
+    }
+
     /// Begins with those rows of the last answer that push here as well; returns the point they give.
     fn warm_start(&mut self, problem: &LeastDistance, rows: &[u32]) -> Vector6 {
         self.set.hold(problem, rows);

@@ -81,6 +81,13 @@ impl LeastDistance {
         self.prepared
     }
 
+    /// Takes over metric and rows that were prepared elsewhere. No allocation where there is room for them.
+    pub(crate) fn copy_from(&mut self, source: &LeastDistance) {
+        self.metric = source.metric;
+        self.prepared = source.prepared;
+        self.rows.copy_from(&source.rows);
+    }
+
     /// Replaces the bound of one row, in the unit that the row was given in.
     #[inline]
     pub(crate) fn set_bound(&mut self, row: usize, bound: f64) {

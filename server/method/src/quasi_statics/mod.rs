@@ -19,5 +19,6 @@ mod working_set;
 pub use half_space::HalfSpace;
 pub use kkt::{KktResidual, kkt_residual};
 pub use metric::Metric;
+pub(crate) use projection::MAX_ACTIVE;
 pub use projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
 pub use projector::{KKT_TOLERANCE, Projector};

@@ -80,6 +80,13 @@ impl Projector {
         self.problem.prepare(metric, rows);
     }
 
+    /// Takes over the metric and the rows that another projector has prepared, and what it found out about the rows of its last answer: a
+    /// warm start from those is free. No allocation where there is room for the rows.
+    pub(crate) fn copy_from(&mut self, source: &Projector) {
+        self.problem.copy_from(&source.problem);
+        self.active_set.copy_from(&source.active_set);
+    }
+
     /// Replaces the bound of one prepared row, in the unit that the row was given in. A row out of range is ignored.
     pub fn set_bound(&mut self, row: usize, bound: f64) {
         self.problem.set_bound(row, bound);

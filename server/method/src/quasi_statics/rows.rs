@@ -101,6 +101,15 @@ impl Rows {
         Prepared::Ready
     }
 
+    /// The same rows. No allocation where there is room for them; the capacity grows to that of the source.
+    pub(crate) fn copy_from(&mut self, source: &Self) {
+        self.blocks.clone_from(&source.blocks);
+        self.len = source.len;
+        self.max_rows = self.max_rows.max(source.max_rows);
+        self.has_positive_bound = source.has_positive_bound;
+        self.has_impossible_row = source.has_impossible_row;
+    }
+
     /// Number of rows, ignored ones included: row k here is row k of the call.
     #[inline]
     pub(crate) fn len(&self) -> usize {

@@ -15,6 +15,8 @@
 //! Source: Goldfarb, Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs";
 //! Daniel, Gragg, Kaufman, Stewart 1976, for the updates.
 
+mod dual_step;
+
 use super::lanes::{Lanes8, add_scaled, combine, dot, products, vector6, widened};
 use super::least_distance::LeastDistance;
 use super::projection::MAX_ACTIVE;
@@ -23,10 +25,6 @@ use crate::spatial::Vector6;
 /// A row whose normal lies nearer than this to the span of the rows held (sine of the angle) is dependent on them.
 /// The vertex of a slit narrower than this is 1e10 times farther away than it is wide: not a place, but rounding of the normals.
 pub(crate) const DEPENDENT_SINE: f64 = 1e-10;
-
-/// A coefficient of a dependent row is noise below this, relative to the largest one. Only its sign matters: a row that
-/// noise made blocking would hand an arbitrary force to the others.
-const COEFFICIENT_TOLERANCE: f64 = 1e-9;
 
 /// A second pass of Gram-Schmidt is needed where the first one leaves less than this of a unit normal, squared: what is lost
 /// of orthogonality is one rounding over the length that is left.
@@ -218,57 +216,6 @@ impl WorkingSet {
         self.v[last] = ZERO;
         self.len = last;
         self.updates += 1;
-    }
-
-    /// How far the new row's multiplier may grow before one of the rows held stops pushing, and which one that is.
-    #[inline]
-    pub(crate) fn longest_dual_step(&self, seen: &Decomposed) -> (f64, Option<usize>) {
-        // Noise in the coefficients of a dependent row must not make a row block.
-        let threshold = if seen.is_dependent() {
-            self.coefficient_noise(seen)
-        } else {
-            0.0
-        };
-        let mut step = (f64::INFINITY, None);
-        for k in 0..self.len {
-            let coefficient = seen.coefficients[k];
-            if coefficient > threshold && self.multiplier[k] < step.0 * coefficient {
-                step = (self.multiplier[k] / coefficient, Some(k));
-            }
-        }
-        step
-    }
-
-    #[inline]
-    fn coefficient_noise(&self, seen: &Decomposed) -> f64 {
-        let largest = seen.coefficients[..self.len]
-            .iter()
-            .fold(0.0_f64, |l, c| l.max(c.abs()));
-        COEFFICIENT_TOLERANCE * largest
-    }
-
-    /// Moves the multipliers of the rows held while that of the new row grows by `step`.
-    #[inline]
-    pub(crate) fn take_dual_step(&mut self, seen: &Decomposed, step: f64) {
-        for k in 0..self.len {
-            let moved = self.multiplier[k] - step * seen.coefficients[k];
-            self.multiplier[k] = moved.max(0.0);
-        }
-    }
-
-    /// Gives the force `force` of a dependent row to the rows held, as much of it as leaves none of them pulling.
-    /// `None` if they took all; else what they took, and the position of the row that has no force left.
-    pub(crate) fn take_over(&mut self, seen: &Decomposed, force: f64) -> Option<(f64, usize)> {
-        let noise = self.coefficient_noise(seen);
-        let mut taken = (force, None);
-        for k in 0..self.len {
-            let coefficient = seen.coefficients[k];
-            if coefficient < -noise && self.multiplier[k] < -coefficient * taken.0 {
-                taken = (self.multiplier[k] / -coefficient, Some(k));
-            }
-        }
-        self.take_dual_step(seen, -taken.0);
-        taken.1.map(|position| (taken.0, position))
     }
 
     /// The shortest y that holds every row of the set at equality; sets the multipliers, of either sign.

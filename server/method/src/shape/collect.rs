@@ -14,7 +14,7 @@ use super::element::{
 };
 use super::primitive::unit_axis;
 use crate::collision::{CollisionWorkspace, MAX_CANDIDATES, Placement, Work};
-use crate::constraint::{Collected, Contact, Feature, FeaturePair};
+use crate::constraint::{Collected, Contact, Feature, FeaturePair, Nearest, in_world};
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
 
@@ -89,11 +89,9 @@ impl Touching {
 
 /// Where rows go: the workspace's candidates, in the common frame.
 struct Sink<'a> {
-    candidates: &'a mut Vec<Contact>,
+    nearest: Nearest<'a>,
     activation_distance: f64,
     obstacle: u16,
-    room: usize,
-    truncated: bool,
 }
 
 impl Sink<'_> {
@@ -103,15 +101,11 @@ impl Sink<'_> {
         if !near {
             return;
         }
-        if self.candidates.len() == MAX_CANDIDATES {
-            keep_nearest(self.candidates, self.room);
-            self.truncated = true;
-        }
         let (obstacle_triangle, barycentric) = on_obstacle
             .map_or((NO_TRIANGLE, [1.0, 0.0, 0.0]), |(mesh, t)| {
                 (t, weights(mesh, t, &row.on_second))
             });
-        self.candidates.push(Contact {
+        self.nearest.take(Contact {
             features: FeaturePair {
                 obstacle: self.obstacle,
                 on_body: row.features[0],
@@ -157,15 +151,19 @@ pub(super) fn collect(
     work: &mut Work,
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
-    let looked_before = work.triangle_pairs;
+    let looked = |work: &Work| work.triangle_pairs + work.feature_pairs;
+    let looked_before = looked(work);
     let room = (out.capacity() - out.len()).min(MAX_CANDIDATES / 2);
     workspace.candidates.clear();
     let mut sink = Sink {
-        candidates: &mut workspace.candidates,
+        nearest: Nearest {
+            candidates: &mut workspace.candidates,
+            limit: MAX_CANDIDATES,
+            room,
+            truncated: false,
+        },
         activation_distance,
         obstacle: obstacle_index,
-        room,
-        truncated: false,
     };
     let frame = match *pairing {
         Pairing::Primitives(body, obstacle) => {
@@ -196,20 +194,16 @@ pub(super) fn collect(
             body_pose
         }
     };
-    let mut truncated = sink.truncated;
-    let candidates = &mut workspace.candidates;
-    if candidates.len() > room {
-        keep_nearest(candidates, room);
-        truncated = true;
-    }
-    candidates.sort_unstable_by(nearer);
+    sink.nearest.finish();
+    let truncated = sink.nearest.truncated;
+    let candidates = &workspace.candidates;
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
     out.extend(candidates.iter().map(|c| in_world(c, frame)));
     Collected {
         truncated,
         gap_min,
         complete_within: activation_distance,
-        looked_at: work.triangle_pairs - looked_before,
+        looked_at: looked(work) - looked_before,
     }
 }
 
@@ -374,28 +368,5 @@ fn primitive_pair(a: &Touching, b: &Touching, reach: f64, found: &mut dyn FnMut(
         (_, Touching::Cylinder(_) | Touching::Plane(..)) => {
             primitive_pair(b, a, reach, &mut |row: Row| found(row.reversed()));
         }
-    }
-}
-
-/// By gap, then by features: the order says nothing of the traversal.
-fn nearer(a: &Contact, b: &Contact) -> std::cmp::Ordering {
-    a.gap
-        .total_cmp(&b.gap)
-        .then_with(|| a.features.cmp(&b.features))
-}
-
-fn keep_nearest(candidates: &mut Vec<Contact>, count: usize) {
-    if count < candidates.len() {
-        candidates.select_nth_unstable_by(count, nearer);
-        candidates.truncate(count);
-    }
-}
-
-fn in_world(contact: &Contact, frame: &Pose) -> Contact {
-    Contact {
-        point_on_body: frame * contact.point_on_body,
-        point_on_obstacle: frame * contact.point_on_obstacle,
-        normal: frame.rotation * contact.normal,
-        ..*contact
     }
 }

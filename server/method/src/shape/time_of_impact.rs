@@ -53,7 +53,7 @@ impl<'a> Form<'a> {
     }
 }
 
-/// Finds a time up to which the body may move. A half-space cannot move: it stops at 0.
+/// Finds a time up to which the body may move. A half-space as the body stops at 0: let the other side move, in its frame.
 pub(super) fn time_of_impact(
     body: Form<'_>,
     motion: &Motion,

@@ -15,6 +15,9 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
+use super::texture_coordinates::TextureCoordinates;
+use crate::constraint::Feature;
+
 /// How sharply one of the three projections takes over from another: power of the normal's components.
 const BLEND_POWER: i32 = 4;
 /// Texels that a tip may cover in one update: the finest wave of a level is two texels long.
@@ -93,6 +96,11 @@ impl HeightMap {
     /// Texels in a row.
     pub fn width(&self) -> usize {
         self.levels[0].width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.levels[0].height
     }
 
     /// d(h)/d(u, v) per texel at a place in texels, periodic; `covered` are the texels that the tip covers in one update.
@@ -202,6 +210,35 @@ impl HeightMapTexture {
             gradient[v] += weight * steepness * slope[1];
         }
         gradient
+    }
+}
+
+/// A height map on a surface, by the mesh's texture coordinates; past 0 and 1 it repeats.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UvHeightMapTexture {
+    /// The slopes; shared, as the same map may lie on many obstacles.
+    pub map: Arc<HeightMap>,
+    /// Where on the picture each triangle lies.
+    pub coordinates: Arc<TextureCoordinates>,
+    /// Height of a 1 in the map, m.
+    pub amplitude: f64,
+}
+
+impl UvHeightMapTexture {
+    /// The gradient of the height (m/m, obstacle frame) at a point (m, obstacle frame) of a feature of the mesh, for a
+    /// tip that covers `covered` metres in one update. Zero where the feature has no texture coordinates.
+    pub fn gradient(&self, feature: Feature, point: &Point3<f64>, covered: f64) -> Vector3<f64> {
+        let Some(triangle) = self.coordinates.at(feature) else {
+            return Vector3::zeros();
+        };
+        let texels = [self.map.width() as f64, self.map.height() as f64];
+        let place = triangle.place(point);
+        // Coordinates count from the picture's edge, slopes from the middle of its first texel.
+        let [u, v] = [0, 1].map(|k| place[k] * texels[k] - 0.5);
+        let per_metre = [0, 1].map(|k| triangle.along[k] * texels[k]);
+        let finest = per_metre[0].norm().max(per_metre[1].norm());
+        let slope = self.map.slope(u, v, covered * finest);
+        (per_metre[0] * slope[0] + per_metre[1] * slope[1]) * self.amplitude
     }
 }
 

@@ -6,10 +6,12 @@ mod height_map;
 mod passivity;
 mod shading;
 mod texture;
+mod texture_coordinates;
 
 pub(crate) use friction::StickAnchor;
 pub use friction::{Friction, FrictionProblem};
-pub use height_map::{HeightMap, HeightMapError, HeightMapTexture};
+pub use height_map::{HeightMap, HeightMapError, HeightMapTexture, UvHeightMapTexture};
 pub use passivity::EnergyObserver;
 pub use shading::{ShadedAcceleration, ShadingNormals};
 pub use texture::Textures;
+pub use texture_coordinates::{CornerCoordinates, TextureCoordinates, TextureCoordinatesError};

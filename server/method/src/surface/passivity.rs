@@ -5,7 +5,8 @@
 //! | F       | `wrench`      | N, N m | on the hand at the reference point, held from one sample to the next      |
 //! | dx      | `moved`       | m, rad | what the device moved from one sample to the next                         |
 //! | E       | `given`       | J      | `sum F . dx`: what the hand has received; negative is what it has put in   |
-//! | -E      | `reserve`     | J      | what may still be given back                                              |
+//! | W       | `granted`     | J      | what obstacles that move have put in                                      |
+//! | W - E   | `reserve`     | J      | what may still be given                                                   |
 //!
 //! The observer is exact for a held force, whatever the device does. The controller can only expect the next motion: it
 //! takes it to be as the last one or a quarter longer, and where the held wrench would then give more than the reserve it
@@ -53,6 +54,8 @@ impl CompensatedSum {
 pub struct EnergyObserver {
     given: CompensatedSum,
     highest: f64,
+    granted: f64,
+    generated: f64,
     held: Option<(Pose, Vector6)>,
     moved: Vector6,
 }
@@ -73,6 +76,7 @@ impl EnergyObserver {
                 self.given.add(work);
             }
             self.highest = self.highest.max(self.given.value());
+            self.generated = self.generated.max(self.given.value() - self.granted);
         }
         self.given.value()
     }
@@ -98,15 +102,28 @@ impl EnergyObserver {
         self.highest
     }
 
+    /// Net work since the start that moving obstacles have done on the hand, J: it may be given beyond what the hand has put in.
+    pub fn grant(&mut self, work: f64) {
+        if work.is_finite() {
+            self.granted = work;
+        }
+    }
+
+    /// The most that was given beyond what hand and obstacles had put in, J: above zero the coupling made it.
+    pub fn generated(&self) -> f64 {
+        self.generated
+    }
+
     /// What the device moved between the last two samples, m and rad.
     pub fn moved(&self) -> &Vector6 {
         &self.moved
     }
 
-    /// The wrench within the reserve: `wrench` itself where the last motion, made a little longer, takes no more than has been put in.
+    /// The wrench within the reserve: `wrench` itself where the last motion, made a little longer, takes no more than hand and
+    /// moving obstacles have put in.
     pub fn within_reserve(&self, metric: &Metric, wrench: &Vector6) -> Vector6 {
         let expected = wrench.dot(&self.moved);
-        let allowed = -self.given.value() / MOTION_GROWTH;
+        let allowed = (self.granted - self.given.value()) / MOTION_GROWTH;
         let gives = expected > 0.0 && expected > allowed; // false for NaN
         if !gives {
             return *wrench;
@@ -163,5 +180,26 @@ mod tests {
         let large = Vector6::new(3.0, 4.0, 0.0, 0.0, 0.0, 0.0);
         let bounded = observer.within_reserve(&metric, &large);
         assert!((bounded - Vector6::new(0.8, 4.0, 0.0, 0.0, 0.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn what_obstacles_put_in_may_be_given_and_is_not_generated() {
+        let metric = Metric::new(1.0, &Matrix3::identity()).expect("an inertia");
+        let mut observer = EnergyObserver::new();
+        let at = |x: f64| Pose::translation(x, 0.0, 0.0);
+        let push = Vector6::new(1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        observer.arrive(&at(0.0));
+        observer.grant(0.025);
+        observer.hold(&at(0.0), &push);
+        observer.arrive(&at(0.01));
+        assert_eq!(observer.within_reserve(&metric, &push), push);
+        observer.hold(&at(0.01), &push);
+        observer.arrive(&at(0.02));
+        assert_eq!(observer.generated(), 0.0);
+        assert!(observer.within_reserve(&metric, &push).x < 0.5);
+        observer.hold(&at(0.02), &push);
+        observer.arrive(&at(0.03));
+        assert!((observer.generated() - 0.005).abs() < 1e-15);
+        assert!((observer.highest() - 0.03).abs() < 1e-15);
     }
 }

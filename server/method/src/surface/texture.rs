@@ -12,6 +12,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::constraint::Feature;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference, six};
 use crate::world::{SineTexture, Texture, World};
 
@@ -55,10 +56,17 @@ impl Textures {
         })
     }
 
+    /// An obstacle is at this pose, world from obstacle, as of the constraint set in use: its texture goes with it.
+    pub fn place(&mut self, obstacle: usize, pose: &Pose) {
+        if let Some(surface) = self.surfaces.get_mut(obstacle) {
+            surface.pose = *pose;
+        }
+    }
+
     /// Tilts `wrench` (N, N m, at the reference point) by the textures of the obstacles touched.
     ///
     /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
-    /// there (m, rad); `touched` yields obstacle index, point (m, world) and unit normal (world) of every active contact.
+    /// there (m, rad); `touched` yields obstacle index, its feature, point (m, world) and unit normal (world) of every active contact.
     /// Call it for every sample: from one to the next the speed is taken. Obstacles without a texture count as contacts of
     /// tilt zero. Without any textured contact the wrench is returned unchanged.
     pub fn tilt(
@@ -66,7 +74,7 @@ impl Textures {
         wrench: &Vector6,
         god_object: &Pose,
         moved: &Vector6,
-        touched: impl Iterator<Item = (u16, Point3<f64>, Vector3<f64>)>,
+        touched: impl Iterator<Item = (u16, Feature, Point3<f64>, Vector3<f64>)>,
     ) -> Vector6 {
         let felt = advance_pose(god_object, moved, 1.0);
         let step = self.felt.map_or(Vector6::zeros(), |last| {
@@ -84,7 +92,7 @@ impl Textures {
         let mut tilt = Vector3::zeros();
         let mut arms = Vector3::zeros();
         let (mut count, mut textured) = (0.0, false);
-        for (obstacle, at, normal) in touched {
+        for (obstacle, feature, at, normal) in touched {
             let arm = at - center;
             let point = at + linear(moved) + angular(moved).cross(&arm);
             count += 1.0;
@@ -93,7 +101,7 @@ impl Textures {
                 continue;
             };
             let covered = linear(&step) + angular(&step).cross(&arm);
-            if let Some(tilted) = surface.tilt_at(&point, &normal, &covered) {
+            if let Some(tilted) = surface.tilt_at(feature, &point, &normal, &covered) {
                 textured = true;
                 tilt += tilted;
             }
@@ -115,6 +123,7 @@ impl TexturedSurface {
     /// The tilt at a point, in the contact plane, as the tangent of the angle; all in world axes. `None` when smooth.
     fn tilt_at(
         &self,
+        feature: Feature,
         point: &Point3<f64>,
         normal: &Vector3<f64>,
         covered: &Vector3<f64>,
@@ -128,6 +137,7 @@ impl TexturedSurface {
             Texture::HeightMap(map) => {
                 -map.gradient(&point, &in_surface(normal), tangential.norm())
             }
+            Texture::UvHeightMap(map) => -map.gradient(feature, &point, tangential.norm()),
         };
         let tilt = self.pose.rotation * tilt;
         Some(tilt - normal * tilt.dot(normal))

@@ -5,6 +5,7 @@ use std::path::Path;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::buffer::Source;
 use gltf::mesh::Mode;
+use god_object::surface::CornerCoordinates;
 use nalgebra::{Matrix4, Point3};
 
 use super::read::finite_vertex;
@@ -17,6 +18,25 @@ const MAX_NODE_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
 pub(super) fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
+    parse_with(bytes, directory, None).map(RawMesh::welded)
+}
+
+/// Texture coordinates of every triangle that [`parse`] gives, in its order. v runs down the picture, as it does in the file.
+pub(super) fn parse_texture_coordinates(
+    bytes: &[u8],
+    directory: Option<&Path>,
+) -> Result<Vec<CornerCoordinates>, Fault> {
+    let mut coordinates = Vec::new();
+    parse_with(bytes, directory, Some(&mut coordinates))?;
+    Ok(coordinates)
+}
+
+/// Vertices as often as the file has them.
+fn parse_with(
+    bytes: &[u8],
+    directory: Option<&Path>,
+    mut coordinates: Option<&mut Vec<CornerCoordinates>>,
+) -> Result<RawMesh, Fault> {
     let file = gltf::Gltf::from_slice(bytes)
         .map_err(|e| Fault::new(format!("is no valid glTF ({e}); export it again")))?;
     let buffers = buffers(&file, directory)?;
@@ -42,7 +62,14 @@ pub(super) fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, F
         let world_from_node = world_from_parent * parent_from_node;
         if let Some(of_node) = node.mesh() {
             for primitive in of_node.primitives() {
-                append(&mut mesh, &primitive, &world_from_node, &buffers).map_err(|text| {
+                append(
+                    &mut mesh,
+                    coordinates.as_deref_mut(),
+                    &primitive,
+                    &world_from_node,
+                    &buffers,
+                )
+                .map_err(|text| {
                     Fault::new(format!(
                         "mesh {} primitive {}: {text}",
                         of_node.index(),
@@ -56,7 +83,7 @@ pub(super) fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, F
                 .map(|child| (child, world_from_node, depth + 1)),
         );
     }
-    Ok(mesh.welded())
+    Ok(mesh)
 }
 
 fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, Fault> {
@@ -105,6 +132,7 @@ fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, 
 
 fn append(
     mesh: &mut RawMesh,
+    coordinates: Option<&mut Vec<CornerCoordinates>>,
     primitive: &gltf::Primitive<'_>,
     world_from_node: &Matrix4<f64>,
     buffers: &[Vec<u8>],
@@ -160,12 +188,57 @@ fn append(
         ));
     }
     let mirrored = world_from_node.determinant() < 0.0;
-    for triangle in triangles(primitive.mode(), &corners) {
-        let [a, b, c] = triangle.map(|corner| first as u32 + corner);
-        mesh.triangles
-            .push(if mirrored { [a, c, b] } else { [a, b, c] });
+    let mut triangles = triangles(primitive.mode(), &corners);
+    if mirrored {
+        triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+    let placed = triangles
+        .iter()
+        .map(|t| t.map(|corner| first as u32 + corner));
+    mesh.triangles.extend(placed);
+    if let Some(coordinates) = coordinates {
+        let of_vertices = texture_coordinates(primitive, buffers, count)?;
+        let of_corners = triangles
+            .iter()
+            .map(|t| t.map(|corner| of_vertices[corner as usize].map(f64::from)));
+        coordinates.extend(of_corners);
     }
     Ok(())
+}
+
+/// The first set of texture coordinates, one pair for each of the `count` vertices.
+fn texture_coordinates(
+    primitive: &gltf::Primitive<'_>,
+    buffers: &[Vec<u8>],
+    count: usize,
+) -> Result<Vec<[f32; 2]>, String> {
+    let accessor = primitive
+        .get(&gltf::Semantic::TexCoords(0))
+        .ok_or("has no texture coordinates; export it with them")?;
+    check_accessor(&accessor, buffers)?;
+    let known = matches!(
+        accessor.data_type(),
+        DataType::F32 | DataType::U8 | DataType::U16
+    );
+    if accessor.dimensions() != Dimensions::Vec2 || !known {
+        return Err(
+            "has texture coordinates that are not pairs of numbers; export it again".into(),
+        );
+    }
+    let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(Vec::as_slice));
+    let pairs: Vec<[f32; 2]> = reader
+        .read_tex_coords(0)
+        .ok_or("has unreadable texture coordinates; export it again")?
+        .into_f32()
+        .collect();
+    if pairs.len() == count {
+        Ok(pairs)
+    } else {
+        Err(format!(
+            "has {} texture coordinates for {count} vertices; export it again",
+            pairs.len()
+        ))
+    }
 }
 
 /// Corners to triangles; every second one of a strip is turned.
@@ -299,6 +372,41 @@ mod tests {
     fn a_mirroring_node_keeps_the_outside_outside() {
         let mesh = parse(triangle(r#","scale":[-1,1,1]"#, 2).as_bytes(), None).unwrap();
         assert_eq!(mesh.triangles, [[0, 2, 1]]);
+    }
+
+    #[test]
+    fn texture_coordinates_go_with_their_corners() {
+        // The file's floats, read in pairs, serve as coordinates.
+        let with_coordinates = |node: &str| {
+            triangle(node, 2)
+                .replace("\"POSITION\":1", "\"POSITION\":1,\"TEXCOORD_0\":2")
+                .replace(
+                    "\"byteLength\":36}",
+                    "\"byteLength\":36},{\"buffer\":0,\"byteOffset\":8,\"byteLength\":24}",
+                )
+                .replace(
+                    "\"max\":[1,1,0]}",
+                    "\"max\":[1,1,0]},{\"bufferView\":2,\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}",
+                )
+        };
+        let read = |text: String| parse_texture_coordinates(text.as_bytes(), None);
+        assert_eq!(
+            read(with_coordinates("")).unwrap(),
+            [[[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]]]
+        );
+        // As the corners are exchanged, so are theirs.
+        assert_eq!(
+            read(with_coordinates(r#","scale":[-1,1,1]"#)).unwrap(),
+            [[[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]]
+        );
+        let fault = read(triangle("", 2)).unwrap_err();
+        assert!(
+            fault
+                .text
+                .contains("mesh 0 primitive 0: has no texture coordinates"),
+            "{}",
+            fault.text
+        );
     }
 
     #[test]

@@ -6,8 +6,10 @@ mod ply;
 mod raw_mesh;
 mod read;
 mod stl;
+mod texture_coordinates;
 
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
 pub use read::{is_mesh_path, read_mesh};
+pub(crate) use texture_coordinates::read_texture_coordinates;

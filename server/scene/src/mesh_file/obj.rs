@@ -1,4 +1,7 @@
-//! Wavefront OBJ: `v` and `f` lines, in double precision, with line numbers. Everything else is appearance and skipped.
+//! Wavefront OBJ: `v` and `f` lines, in double precision, with line numbers; `vt` lines where they are asked for. Everything else is
+//! appearance and skipped.
+
+use god_object::surface::CornerCoordinates;
 
 use super::read::finite_vertex;
 use super::{Fault, RawMesh};
@@ -43,6 +46,79 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
         return Err(Fault::at(line, text));
     }
     Ok(mesh)
+}
+
+/// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
+pub(super) fn parse_texture_coordinates(bytes: &[u8]) -> Result<Vec<CornerCoordinates>, Fault> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut pairs: Vec<[f64; 2]> = Vec::new();
+    // Faces may name pairs that come later.
+    let mut faces: Vec<(usize, [u32; 3])> = Vec::new();
+    for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
+        let mut words = line
+            .split('#')
+            .next()
+            .unwrap_or_default()
+            .split_whitespace();
+        match words.next() {
+            Some("vt") => {
+                let [u, v] =
+                    [words.next(), words.next()].map(|word| word.unwrap_or("0").parse::<f64>());
+                let (Ok(u), Ok(v)) = (u, v) else {
+                    let text = "a texture coordinate is no number; repair the line";
+                    return Err(Fault::at(number, text));
+                };
+                pairs.push([u, 1.0 - v]);
+            }
+            Some("f") => {
+                let corners: Vec<u32> = words
+                    .take(MAX_FACE_CORNERS)
+                    .map(|word| coordinate_of(word, pairs.len()))
+                    .collect::<Result<_, _>>()
+                    .map_err(|text| Fault::at(number, text))?;
+                let fan = corners.windows(2).skip(1);
+                faces.extend(fan.map(|pair| (number, [corners[0], pair[0], pair[1]])));
+            }
+            _ => {}
+        }
+    }
+    let of_face = |(number, corners): (usize, [u32; 3])| {
+        let mut found = [[0.0; 2]; 3];
+        for (place, corner) in found.iter_mut().zip(corners) {
+            *place = *pairs.get(corner as usize).ok_or_else(|| {
+                let text = format!(
+                    "a face names texture coordinate {}, but the file has {}; repair the mesh",
+                    corner + 1,
+                    pairs.len()
+                );
+                Fault::at(number, text)
+            })?;
+        }
+        Ok(found)
+    };
+    faces.into_iter().map(of_face).collect()
+}
+
+/// The second of `v/vt/vn`, counted from 0.
+fn coordinate_of(word: &str, pairs_so_far: usize) -> Result<u32, String> {
+    let second = word.split('/').nth(1).filter(|text| !text.is_empty());
+    let Some(second) = second else {
+        return Err(format!(
+            "`{word}` names no texture coordinate; export the mesh with them, or use mapping = \"triplanar\""
+        ));
+    };
+    let index: i64 = second
+        .parse()
+        .map_err(|_| format!("`{word}` is no index of a texture coordinate; repair the line"))?;
+    let place = if index > 0 {
+        index - 1
+    } else {
+        pairs_so_far as i64 + index
+    };
+    u32::try_from(place)
+        .ok()
+        .filter(|place| index != 0 && *place < u32::MAX)
+        .ok_or_else(|| format!("`{word}` names no texture coordinate; indices start at 1"))
 }
 
 fn vertex<'w>(
@@ -107,6 +183,42 @@ mod tests {
             parse(b"# square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-9\nf 1/1/1 2//2 3 -1\n").unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices[3].z, 1e-9);
+    }
+
+    #[test]
+    fn texture_coordinates_follow_the_fan_of_triangles() {
+        let text = "vt 0 0\nvt 1 0\nf 1/1 2/2/7 3/3 4/-1\nvt 1 1\nvt 0 0.25\n";
+        // -1 is the last one so far.
+        let fan = parse_texture_coordinates(text.as_bytes()).unwrap();
+        assert_eq!(
+            fan,
+            [
+                [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]],
+                [[0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]
+            ]
+        );
+    }
+
+    #[test]
+    fn faces_without_texture_coordinates_are_named_by_line() {
+        for (text, line, expected) in [
+            (
+                "vt 0 0\nf 1/1 2//1 3/1\n",
+                2,
+                "`2//1` names no texture coordinate",
+            ),
+            (
+                "f 1/1 2/1 3/1\n",
+                1,
+                "a face names texture coordinate 1, but the file has 0",
+            ),
+            ("vt 0 x\n", 1, "a texture coordinate is no number"),
+            ("vt 0 0\nf 1/0 2/1 3/1\n", 2, "indices start at 1"),
+        ] {
+            let fault = parse_texture_coordinates(text.as_bytes()).unwrap_err();
+            assert_eq!(fault.line, Some(line));
+            assert!(fault.text.contains(expected), "{}", fault.text);
+        }
     }
 
     #[test]

@@ -32,7 +32,7 @@ impl Fault {
         }
     }
 
-    fn in_file(self, path: &Path) -> Problem {
+    pub(super) fn in_file(self, path: &Path) -> Problem {
         Problem {
             file: path.display().to_string(),
             line: self.line,
@@ -49,7 +49,7 @@ pub fn is_mesh_path(path: &Path) -> bool {
     )
 }
 
-fn extension(path: &Path) -> String {
+pub(super) fn extension(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())
         .unwrap_or_default()

@@ -126,9 +126,10 @@ impl Scene {
         let textures: Vec<Option<Texture>> = spec
             .obstacles
             .iter()
-            .map(|o| {
-                let map = o.height_map.as_ref()?;
-                self.height_map(map)
+            .zip(&obstacle_meshes)
+            .map(|(o, mesh)| {
+                let (map, mesh) = (o.height_map.as_ref()?, mesh.as_ref()?);
+                self.height_map(map, &o.shape, mesh)
                     .map_err(|error| problems.extend(error.into_problems()))
                     .ok()
             })
@@ -324,6 +325,7 @@ impl Scene {
         let settings = Settings {
             k_s: coupling.k_s.unwrap_or(defaults.k_s),
             k_h: coupling.k_h.unwrap_or(defaults.k_h),
+            damping_time: coupling.damping_time.unwrap_or(defaults.damping_time),
             rotation_metric: coupling.rotation_metric.unwrap_or(defaults.rotation_metric),
             adaptation: match coupling.adaptation {
                 None => defaults.adaptation,

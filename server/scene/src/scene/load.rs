@@ -3,17 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use god_object::{HeightMapTexture, Texture};
+use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
 
 use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
-    BodySpec, CouplingSpec, HandPathSpec, HeightMapSpec, LimitSpec, MethodSpec, ObstacleSpec, View,
+    BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
+    ObstacleSpec, Shape, View,
 };
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
-use crate::mesh_file::{RawMesh, read_mesh};
+use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
 
@@ -201,14 +202,53 @@ impl Scene {
         read_mesh(&self.locate(name, at)?)
     }
 
-    /// The texture of a height map, its picture read.
-    pub(super) fn height_map(&self, spec: &HeightMapSpec) -> Result<Texture, FileError> {
-        let map = read_height_map(&self.locate(&spec.path, &spec.at)?)?;
+    /// The texture of a height map, its picture read and laid on this shape with this mesh.
+    pub(super) fn height_map(
+        &self,
+        spec: &HeightMapSpec,
+        shape: &Shape,
+        mesh: &Mesh,
+    ) -> Result<Texture, FileError> {
+        let map = Arc::new(read_height_map(&self.locate(&spec.path, &spec.at)?)?);
+        let amplitude = spec.amplitude;
+        let tile = match spec.mapping {
+            HeightMapMapping::Triplanar { tile } => tile,
+            HeightMapMapping::Uv => {
+                return Ok(Texture::UvHeightMap(UvHeightMapTexture {
+                    map,
+                    coordinates: Arc::new(self.texture_coordinates(spec, shape, mesh)?),
+                    amplitude,
+                }));
+            }
+        };
         Ok(Texture::HeightMap(HeightMapTexture {
-            map: Arc::new(map),
-            tile: spec.tile,
-            amplitude: spec.amplitude,
+            map,
+            tile,
+            amplitude,
         }))
+    }
+
+    /// Of the mesh file that the shape names.
+    fn texture_coordinates(
+        &self,
+        spec: &HeightMapSpec,
+        shape: &Shape,
+        mesh: &Mesh,
+    ) -> Result<TextureCoordinates, FileError> {
+        let Shape::Mesh {
+            path,
+            simplify: None,
+            ..
+        } = shape
+        else {
+            let text = "mapping = \"uv\" needs the texture coordinates of a mesh file, as it is; name one without `simplify`, or use mapping = \"triplanar\"";
+            return Err(spec.at.problem(text).into());
+        };
+        let coordinates = read_texture_coordinates(&self.locate(path, &spec.at)?)?;
+        TextureCoordinates::new(mesh, &coordinates).map_err(|error| {
+            let text = format!("the mesh \"{path}\" has no use for its texture coordinates: {error}; export it again");
+            spec.at.problem(text).into()
+        })
     }
 
     /// Beside the scene, else in a data directory.

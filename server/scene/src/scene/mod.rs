@@ -12,6 +12,7 @@ pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::pose_of;
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapSpec, LimitSpec,
-    MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, Shape, View,
+    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,
+    HeightMapSpec, LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint,
+    Shape, View,
 };

@@ -225,6 +225,7 @@ fn coupling(section: Section<'_>) -> CouplingSpec {
         k_s: section.number("k_s", Range::PositiveUpTo(1.0)),
         k_h: section.number("k_h", Range::Positive),
         rotation_metric,
+        damping_time: section.number("damping_time", Range::NotNegative),
         adaptation,
         look_ahead: section.boolean("look_ahead"),
         passive: section.boolean("passive"),

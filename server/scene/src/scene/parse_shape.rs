@@ -3,7 +3,7 @@
 use god_object::{ForceShading, Pose, SineTexture, Surface, Texture};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::spec::{HeightMapSpec, Shape};
+use super::spec::{HeightMapMapping, HeightMapSpec, Shape};
 use crate::document::{Range, Section, Value};
 use crate::rotation::unit_quaternion;
 use crate::shapes::{Axis, PLATE, hole_circumradius};
@@ -274,14 +274,28 @@ pub(super) fn surface(body: &Section<'_>) -> (Surface, Option<HeightMapSpec>) {
 
 fn height_map(section: &Section<'_>) -> Option<HeightMapSpec> {
     let path = section.required_text("file", "file = \"leather.png\"");
-    let tile = section.required_number("tile", Range::Positive, "tile = 0.05");
     let amplitude = section.required_number("amplitude", Range::NotNegative, "amplitude = 2e-4");
-    // Meshes carry no texture coordinates, so that there is one way to lay a picture on them.
-    section.choice("mapping", &[("triplanar", ())]);
+    let by_coordinates = section.choice("mapping", &[("triplanar", false), ("uv", true)]);
+    let mapping = if by_coordinates.unwrap_or(false) {
+        if let Some(tile) = section.get("tile") {
+            section.complain(
+                &tile.at,
+                format!(
+                    "`tile` in {} has no meaning with mapping = \"uv\", where the picture covers 0 to 1 of the mesh's texture coordinates; leave it out",
+                    section.name()
+                ),
+            );
+        }
+        Some(HeightMapMapping::Uv)
+    } else {
+        section
+            .required_number("tile", Range::Positive, "tile = 0.05")
+            .map(|tile| HeightMapMapping::Triplanar { tile })
+    };
     let at = section.get("file").map_or(section.at(), |node| &node.at);
     Some(HeightMapSpec {
         path: path?.to_owned(),
-        tile: tile?,
+        mapping: mapping?,
         amplitude: amplitude?,
         at: at.clone(),
     })

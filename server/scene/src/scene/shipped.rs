@@ -11,7 +11,7 @@ pub struct ShippedScene {
 }
 
 /// The shipped scenes, the default one first.
-pub const SHIPPED_SCENES: [ShippedScene; 3] = [
+pub const SHIPPED_SCENES: [ShippedScene; 4] = [
     ShippedScene {
         name: "peg-in-a-hole",
         summary: "the paper's peg (288 triangles) and box (280 triangles), clearance 0.5 mm",
@@ -27,10 +27,15 @@ pub const SHIPPED_SCENES: [ShippedScene; 3] = [
         summary: "a sphere slides on a plane",
         text: include_str!("../../../scenes/sphere-on-plane.toml"),
     },
+    ShippedScene {
+        name: "moving-plate",
+        summary: "a plate comes up at 0.1 m/s under a hand that holds still, and tilts",
+        text: include_str!("../../../scenes/moving-plate.toml"),
+    },
 ];
 
 /// Files that shipped scenes refer to.
-const FILES: [(&str, &str); 3] = [
+const FILES: [(&str, &str); 5] = [
     (
         "peg-in-a-hole.csv",
         include_str!("../../../scenes/peg-in-a-hole.csv"),
@@ -42,6 +47,14 @@ const FILES: [(&str, &str); 3] = [
     (
         "sphere-on-plane.csv",
         include_str!("../../../scenes/sphere-on-plane.csv"),
+    ),
+    (
+        "moving-plate.csv",
+        include_str!("../../../scenes/moving-plate.csv"),
+    ),
+    (
+        "moving-plate-hand.csv",
+        include_str!("../../../scenes/moving-plate-hand.csv"),
     ),
 ];
 

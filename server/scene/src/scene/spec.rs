@@ -167,11 +167,23 @@ pub struct MotionSpec {
 pub struct HeightMapSpec {
     /// A grey PNG, relative to the scene file, else to the data directory.
     pub path: String,
-    /// Length of one row of the picture, m.
-    pub tile: f64,
+    /// How the picture is laid on.
+    pub mapping: HeightMapMapping,
     /// Height of white over black, m.
     pub amplitude: f64,
     pub(crate) at: At,
+}
+
+/// How a picture is laid on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HeightMapMapping {
+    /// Along the obstacle's axes, whatever its form.
+    Triplanar {
+        /// Length of one row of the picture, m.
+        tile: f64,
+    },
+    /// By the texture coordinates of the mesh file; the picture covers 0 to 1.
+    Uv,
 }
 
 /// Constraint adaptation as written.
@@ -192,6 +204,8 @@ pub struct CouplingSpec {
     pub k_h: Option<f64>,
     /// The rotational part of the metric.
     pub rotation_metric: Option<RotationMetric>,
+    /// Damping over stiffness, s.
+    pub damping_time: Option<f64>,
     /// Constraint adaptation.
     pub adaptation: Option<AdaptationSpec>,
     /// Contacts before they touch.

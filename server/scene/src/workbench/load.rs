@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use god_object::Pose;
 
+use super::dynamics::DeviceDynamics;
 use super::parse::parse;
-use super::spec::{Device, Monitoring, Network, Node, RealTime, Screen, Show, Viewer};
+use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::problem::FileError;
@@ -31,12 +32,16 @@ pub struct Workbench {
     pub viewer: Viewer,
     /// The device.
     pub device: Device,
+    /// What a real device is, where it is declared.
+    pub dynamics: Option<DeviceDynamics>,
     /// The network.
     pub network: Network,
     /// The rerun stream.
     pub monitoring: Monitoring,
     /// Scheduling.
     pub realtime: RealTime,
+    /// What no force may pass.
+    pub safety: Safety,
     /// What is drawn beside the bodies.
     pub show: Show,
     pub(super) scene_at: At,

@@ -1,11 +1,15 @@
 //! The workbench: screens, nodes, viewer, device, network, monitoring, real time.
 
+mod dynamics;
 mod load;
 mod parse;
+mod safety;
 mod spec;
+mod tracker;
 
+pub use dynamics::DeviceDynamics;
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
-    Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
-    TransportKind, Viewer, Window,
+    Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
+    Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
 };

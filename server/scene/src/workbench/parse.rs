@@ -7,11 +7,14 @@ use std::path::{Path, PathBuf};
 use god_object::Pose;
 use nalgebra::Point3;
 
+use super::dynamics::dynamics;
 use super::load::Workbench;
+use super::safety::safety;
 use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
     TransportKind, Viewer, Window,
 };
+use super::tracker::vrpn_sensor;
 use crate::document::{Document, Range, Section};
 use crate::problem::FileError;
 use crate::scene::{HandPreset, pose_of, shipped_scene_text};
@@ -65,9 +68,11 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         seed: 0,
     };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
+    let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
+    let safety = table(&root, "safety", safety).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
@@ -98,9 +103,11 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         nodes,
         viewer,
         device,
+        dynamics,
         network,
         monitoring,
         realtime,
+        safety,
         show,
         scene_at,
     })
@@ -281,7 +288,15 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
             ),
         );
     }
-    let tracking = sway.unwrap_or(HeadTracking::Fixed);
+    let tracker = table(section, "tracker", vrpn_sensor);
+    if let (Some(_), Some(_), Some(node)) = (&sway, &tracker, section.get("tracker")) {
+        let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
+        section.complain(&node.at, text);
+    }
+    let tracking = match tracker {
+        Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
+        None => sway.unwrap_or(HeadTracking::Fixed),
+    };
     Some(Viewer {
         eye_separation,
         head: head.flatten()?,
@@ -296,6 +311,8 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     enum Kind {
         Simulated,
         Trace,
+        Vrpn,
+        SpaceMouse,
         Remote,
     }
     if !section.has("kind") {
@@ -304,11 +321,26 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     let kinds = [
         ("simulated", Kind::Simulated),
         ("trace", Kind::Trace),
+        ("vrpn", Kind::Vrpn),
+        ("space-mouse", Kind::SpaceMouse),
+        ("mouse", Kind::Remote),
         ("remote", Kind::Remote),
     ];
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
-        for key in ["hand", "path", "tremor", "seed", "loop"] {
+        for key in ["hand", "path", "tremor", "seed", "loop"]
+            .iter()
+            .chain(&["server", "sensor", "mode", "axes", "scale", "max_age"])
+            .chain(&[
+                "origin",
+                "mount",
+                "anchor",
+                "dead_zone",
+                "speed",
+                "turn_rate",
+            ])
+            .chain(&["reach", "tilt", "yield_force", "yield_torque"])
+        {
             section.has(key);
         }
         return None;
@@ -328,6 +360,29 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
             Some(Device::Trace {
                 path: files.path(section, "path")?,
                 repeat: section.boolean("loop").unwrap_or(false),
+            })
+        }
+        Kind::Vrpn => {
+            let anchors = [("start", false), ("workbench", true)];
+            let on_workbench = section.choice("anchor", &anchors).unwrap_or(false);
+            Some(Device::Vrpn {
+                sensor: Box::new(vrpn_sensor(section)?),
+                on_workbench,
+            })
+        }
+        Kind::SpaceMouse => {
+            let number = |key, most| section.number(key, Range::PositiveUpTo(most));
+            Some(Device::SpaceMouse {
+                position: section
+                    .choice("mode", &[("rate", false), ("position", true)])
+                    .unwrap_or(false),
+                dead_zone: section.number("dead_zone", Range::UpTo(0.9)),
+                speed: number("speed", 10.0),
+                turn_rate: number("turn_rate", 100.0),
+                reach: number("reach", 10.0),
+                tilt: number("tilt", 3.0),
+                yield_force: number("yield_force", 1e3),
+                yield_torque: number("yield_torque", 1e3),
             })
         }
         Kind::Remote => Some(Device::Remote),

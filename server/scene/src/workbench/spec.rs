@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_vrpn::{Address, SensorMapping};
 
 use crate::scene::HandPreset;
 
@@ -73,7 +74,7 @@ pub struct Node {
 }
 
 /// Where the viewer's head comes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum HeadTracking {
     /// It stays where the file says.
     Fixed,
@@ -84,10 +85,27 @@ pub enum HeadTracking {
         /// s.
         period: f64,
     },
+    /// A VRPN tracker says where it is.
+    Vrpn(Box<VrpnSensor>),
+}
+
+/// A sensor of a VRPN tracker, and where the thing that it is fixed to is on the workbench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VrpnSensor {
+    /// The tracker.
+    pub address: Address,
+    /// Which of its sensors, from 0.
+    pub sensor: i32,
+    /// Reports as datagrams, by a call-back of the server; else all over TCP.
+    pub udp: bool,
+    /// Axes, unit, origin and mount.
+    pub mapping: SensorMapping,
+    /// Silence after which it counts as lost, s.
+    pub max_age: f64,
 }
 
 /// The viewer.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Viewer {
     /// Distance between the pupils, m.
     pub eye_separation: f64,
@@ -122,7 +140,33 @@ pub enum Device {
         /// Begin again at the end.
         repeat: bool,
     },
-    /// `taut bridge`, over the network.
+    /// A sensor of a VRPN tracker; no force.
+    Vrpn {
+        /// Which.
+        sensor: Box<VrpnSensor>,
+        /// The body is where the sensor is on the workbench; else it moves from its start as the sensor does.
+        on_workbench: bool,
+    },
+    /// A 3Dconnexion SpaceMouse; no force. What is `None` is as the driver has it.
+    SpaceMouse {
+        /// The body comes back when the cap is let go.
+        position: bool,
+        /// Deflections up to this share of the largest count as none.
+        dead_zone: Option<f64>,
+        /// At full deflection, m/s on the workbench.
+        speed: Option<f64>,
+        /// At full deflection, rad/s.
+        turn_rate: Option<f64>,
+        /// At full deflection in position mode, m on the workbench.
+        reach: Option<f64>,
+        /// At full deflection in position mode, rad.
+        tilt: Option<f64>,
+        /// Coupling force that stops the body, N.
+        yield_force: Option<f64>,
+        /// Coupling torque that stops it, N m.
+        yield_torque: Option<f64>,
+    },
+    /// `taut bridge`, or the mouse of a render window, over the network.
     Remote,
 }
 
@@ -201,6 +245,75 @@ pub struct RealTime {
     pub god_object_core: Option<usize>,
     /// Most god-object updates per second; `None` is as many as there can be.
     pub god_object_rate: Option<f64>,
+}
+
+/// Who arms the force at the start and after a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rearm {
+    /// The program, once device and forces are in order.
+    Automatic,
+    /// A person.
+    Manual,
+}
+
+/// What is done about energy that comes out of the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Passivity {
+    /// It is measured.
+    #[default]
+    Observe,
+    /// It is damped away.
+    Control,
+}
+
+/// What no force may pass. `None` leaves it to the scene or the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Safety {
+    /// Largest norm of the force, N.
+    pub max_force: Option<f64>,
+    /// Largest norm of the torque, N m.
+    pub max_torque: Option<f64>,
+    /// Fastest change of the force, N/ms.
+    pub force_slew: f64,
+    /// Fastest change of the torque, N m/ms.
+    pub torque_slew: f64,
+    /// From no force to all of it on arming, s.
+    pub ramp_in: f64,
+    /// A device that is faster has jumped, m/s.
+    pub max_speed: f64,
+    /// A device that turns faster has jumped, rad/s.
+    pub max_turn_rate: f64,
+    /// Who arms; `None` is by device.
+    pub rearm: Option<Rearm>,
+    /// Number of the button that must be held.
+    pub dead_man: Option<u8>,
+    /// Number of the button whose press arms.
+    pub arm_button: Option<u8>,
+    /// Energy.
+    pub passivity: Passivity,
+}
+
+impl Safety {
+    /// Time in which a force fades once its inputs are lost, ms: fixed, because what is promised of faults rests on it.
+    pub const FADE_MS: f64 = 100.0;
+}
+
+impl Default for Safety {
+    fn default() -> Self {
+        Self {
+            max_force: None,
+            max_torque: None,
+            force_slew: 0.5,
+            torque_slew: 0.05,
+            ramp_in: 0.5,
+            max_speed: 3.0,
+            max_turn_rate: 30.0,
+            rearm: None,
+            dead_man: None,
+            arm_button: None,
+            passivity: Passivity::Observe,
+        }
+    }
 }
 
 /// What render nodes draw beside the god-object and the obstacles.

@@ -7,3 +7,4 @@ mod scene_faults;
 mod shipped;
 mod simplification;
 mod workbench_faults;
+mod workbench_inputs;

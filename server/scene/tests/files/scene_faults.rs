@@ -153,7 +153,21 @@ fn every_fault_names_file_line_and_key() {
                 "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
                 "height_map = { file = \"a.png\", tile = 0.05, amplitude = 2e-4, mapping = \"uv\" }",
             ),
-            "s.toml:10: `mapping` in [[obstacle]] surface texture height_map is \"uv\", but must be \"triplanar\"",
+            "s.toml:10: `tile` in [[obstacle]] surface texture height_map has no meaning with mapping = \"uv\"",
+        ),
+        (
+            changed(
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+                "height_map = { file = \"a.png\", amplitude = 2e-4, mapping = \"round\" }",
+            ),
+            "s.toml:10: `mapping` in [[obstacle]] surface texture height_map is \"round\", but must be \"triplanar\" or \"uv\"",
+        ),
+        (
+            changed(
+                "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+                "height_map = { file = \"a.png\", amplitude = 2e-4 }",
+            ),
+            "s.toml:10: `tile` is missing in [[obstacle]] surface texture height_map; add tile = 0.05",
         ),
         (
             changed(
@@ -346,7 +360,7 @@ fn a_scene_that_is_neither_shipped_nor_a_file_lists_the_shipped_ones() {
     let found = Scene::named_or_file("peg-in-hole").unwrap_err().to_string();
     assert_eq!(
         found,
-        "peg-in-hole: is neither a file nor a shipped scene; write a path or one of peg-in-a-hole, two-bunnies, sphere-on-plane"
+        "peg-in-hole: is neither a file nor a shipped scene; write a path or one of peg-in-a-hole, two-bunnies, sphere-on-plane, moving-plate"
     );
 }
 
@@ -393,5 +407,44 @@ fn friction_passivity_and_a_height_map_reach_the_method() {
         panic!("{:?}", surface.texture);
     };
     assert_eq!((texture.tile, texture.amplitude), (0.05, 2e-4));
-    assert_eq!(texture.map.width(), 16);
+    assert_eq!((texture.map.width(), texture.map.height()), (16, 8));
+}
+
+#[test]
+fn a_height_map_is_laid_on_by_the_texture_coordinates_of_a_mesh_file() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let at = |name: &str| directory.path().join(name);
+    image::DynamicImage::new_luma16(16, 8)
+        .save(at("flat.png"))
+        .expect("written");
+    // A tetrahedron whose faces all lie on the same part of the picture.
+    let mesh = "v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nv 0 0 0.02\nvt 0 0\nvt 1 0\nvt 0 1\n\
+                f 1/1 3/2 2/3\nf 1/1 2/2 4/3\nf 1/1 4/2 3/3\nf 2/1 3/2 4/3\n";
+    std::fs::write(at("part.obj"), mesh).expect("written");
+    let scene_with = |shape: &str| {
+        let text = changed(
+            "sine = { axis = \"x\", wavelength = 2e-3, amplitude = 0.2 }",
+            "height_map = { file = \"flat.png\", amplitude = 2e-4, mapping = \"uv\" }",
+        )
+        .replace("{ box = { half_extents = [0.1, 0.1, 0.01] } }", shape);
+        Scene::parse("s.toml", &text, directory.path()).and_then(|scene| scene.build())
+    };
+    let built = scene_with("{ mesh = \"part.obj\" }").expect("a built scene");
+    let Some(Texture::UvHeightMap(texture)) = &built.world.obstacles[0].surface.texture else {
+        panic!("{:?}", built.world.obstacles[0].surface.texture);
+    };
+    assert_eq!((texture.map.width(), texture.amplitude), (16, 2e-4));
+
+    let refused = |shape: &str| scene_with(shape).expect_err("refused").to_string();
+    let text = refused("{ sphere = { radius = 0.01 } }");
+    assert!(
+        text.contains("needs the texture coordinates of a mesh file"),
+        "{text}"
+    );
+    std::fs::write(at("bare.obj"), mesh.replace("/1", "")).expect("written");
+    let text = refused("{ mesh = \"bare.obj\" }");
+    assert!(
+        text.contains("bare.obj:8: `1` names no texture coordinate"),
+        "{text}"
+    );
 }

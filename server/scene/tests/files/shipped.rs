@@ -38,6 +38,30 @@ fn the_sphere_scene_is_ready_to_run() {
 }
 
 #[test]
+fn the_plate_of_the_moving_scene_comes_up_at_a_tenth_of_a_metre_per_second() {
+    let built = Scene::named_or_file("moving-plate")
+        .unwrap()
+        .build()
+        .unwrap();
+    assert_start_and_loop(&built.hand.as_ref().unwrap().path, &built.start);
+    let [motion] = built.motions.as_slice() else {
+        panic!("one obstacle moves")
+    };
+    assert!(motion.repeat);
+    let plate = &built.world.obstacles[motion.obstacle];
+    assert_eq!(plate.name, "plate");
+    assert_eq!(plate.pose, motion.pose_at(0.0), "it starts on its trace");
+    assert_eq!(built.bodies[1 + motion.obstacle].pose, plate.pose);
+    assert_eq!(motion.path.samples()[0].pose, plate.pose);
+    let height = |t: f64| motion.pose_at(t).translation.z;
+    assert!((height(1.3) - height(1.1) - 0.1 * 0.2).abs() < 1e-12);
+    // It lifts the body, whose lower face is at 20 mm, by 15 mm.
+    assert!((height(2.0) + 0.005 - 0.035).abs() < 1e-12);
+    let (end, begin) = (motion.pose_at(8.0 - 1e-9), motion.pose_at(8.0));
+    assert!((end.translation.vector - begin.translation.vector).norm() < 1e-12);
+}
+
+#[test]
 fn the_bunnies_load_or_say_how_to_get_them() {
     let scene = Scene::named_or_file("two-bunnies").unwrap();
     assert_start_and_loop(

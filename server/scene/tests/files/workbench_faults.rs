@@ -108,6 +108,42 @@ fn every_fault_names_file_line_and_key() {
             "`stereo` in [[node]] is \"sidebyside\", but must be",
         ),
         (
+            "force_slew = 0.5 ",
+            "force_slew = -0.5 ",
+            "force_slew",
+            "`force_slew` in [safety] is -0.5, but must be greater than zero and at most 100",
+        ),
+        (
+            "# max_force = 20.0 ",
+            "max_force = 60.0 #",
+            "max_force = 60",
+            "`max_force` in [safety] is 60 N, which cannot fade in 100 ms at `force_slew` = 0.5 N/ms; use at most 50 N, or a larger `force_slew`",
+        ),
+        (
+            "# rearm = \"manual\" ",
+            "rearm = \"never\" #",
+            "\"never\"",
+            "`rearm` in [safety] is \"never\", but must be \"automatic\" or \"manual\"",
+        ),
+        (
+            "# dead_man = 0 ",
+            "dead_man = 16 #",
+            "dead_man = 16",
+            "`dead_man` in [safety] is 16, but must be between 0 and 15",
+        ),
+        (
+            "torque_slew = 0.05",
+            "torque_slow = 0.05",
+            "torque_slow",
+            "unknown key `torque_slow` in [safety]; did you mean `torque_slew`?",
+        ),
+        (
+            "passivity = \"observe\"",
+            "passivity = \"obey\"",
+            "\"obey\"",
+            "`passivity` in [safety] is \"obey\", but must be \"observe\" or \"control\"",
+        ),
+        (
             "upper_left = [-0.9, 0.0, 1.2]",
             "upper_left = [0.9, 0.0, 1.2]",
             "[[screen]]",

@@ -9,11 +9,11 @@
 //! Conforming surfaces have thousands of facing pairs, of which a projection needs at most six. Pairs are collected as
 //! candidates; rows are added one after the other: project on the rows known, find the candidate that the answer violates
 //! most, add it, repeat. The answer is then that of all candidates: it is optimal on a part of the rows, and violates no
-//! other by more than eps. That is the error stated, for the motions asked for. Motions between them may violate a row that
-//! was left out by more; tests bound by how much.
+//! other by more than eps. That is the error stated, for the motions asked for and the pairs collected; what it says of other motions and of
+//! the force is said where it is published ([`ConstraintSet`](super::ConstraintSet::reduction_error)).
 //!
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
-//! looked at as it is. Pairs farther than the collection reached, and all that its bound of work left out, have no row until
+//! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
@@ -57,6 +57,8 @@ struct Known {
     idle: u32,
 }
 
+/// Pairs up to this many rest distances apart touch.
+const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
@@ -97,8 +99,9 @@ pub(crate) struct RowReduction {
     warm_start: Vec<u32>,
     /// Largest violation that a motion asked for was left with, m.
     error: f64,
-    /// A search or a row did not find room.
+    /// A row that touches may be missing.
     truncated: bool,
+    asked: f64,
     /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
     outdated: bool,
 }
@@ -114,6 +117,7 @@ impl RowReduction {
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
+            asked: 0.0,
             outdated: false,
         }
     }
@@ -128,7 +132,7 @@ impl RowReduction {
         self.error
     }
 
-    /// Whether candidates or rows did not find room, or the last collection was given up for its work.
+    /// Whether rows did not find room, or the last collection was given up before it had every pair that touches.
     pub(crate) fn truncated(&self) -> bool {
         self.truncated
     }
@@ -171,6 +175,21 @@ impl RowReduction {
         self.candidates.complete_within
     }
 
+    /// Distance that was asked for when they were collected, m.
+    pub(crate) fn asked(&self) -> f64 {
+        self.asked
+    }
+
+    /// Whether the work did not allow to collect as far as was asked for.
+    pub(crate) fn was_given_up(&self) -> bool {
+        self.complete_within() < self.asked
+    }
+
+    /// Distance within which every pair was a candidate or is known to be farther at the present pose, m: `radius` bounds its points' arms about G.
+    pub(crate) fn known_within(&self, radius: f64) -> f64 {
+        (self.candidates.complete_within - self.moved(radius)).max(0.0)
+    }
+
     /// Smallest gap of the rows and candidates, m; that of candidates to first order. Infinite when there are none.
     pub(crate) fn gap_min(&self) -> f64 {
         let known = self.known.iter().map(|row| row.contact.gap);
@@ -178,8 +197,9 @@ impl RowReduction {
         known.chain(carried).fold(f64::INFINITY, f64::min)
     }
 
-    /// Forgets the candidates; those of the present pose are to be offered.
-    pub(crate) fn begin(&mut self, at: &At) {
+    /// Forgets the candidates; those of the present pose are to be offered, within a distance asked for, m.
+    pub(crate) fn begin(&mut self, at: &At, asked: f64) {
+        self.asked = asked;
         self.truncated = false;
         self.outdated = false;
         self.candidates.clear(&at.reference);
@@ -196,8 +216,8 @@ impl RowReduction {
         if contacts.len() > room {
             within = within.min(contacts[room].gap);
         }
-        let given_up = collected.complete_within == 0.0;
-        self.truncated |= collected.truncated || given_up || contacts.len() > room;
+        let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
+        self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
     }
 

@@ -124,8 +124,8 @@ impl ConeProblem {
             cut += contact.tangents[0] * u + contact.tangents[1] * v;
         }
         // What no contact can hold (contacts that contradict each other) counts as cut, too.
+        let y = self.wrench();
         let missed = self.contacts.iter().fold(0.0, |worst: f64, contact| {
-            let y = self.wrench();
             worst.max((contact.slack + contact.normal.dot(&y)).abs())
         });
         cut.norm() + missed

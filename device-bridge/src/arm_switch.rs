@@ -1,0 +1,106 @@
+//! Anybody → the loop of a device: the wish for force or for none.
+//!
+//! * Writers: whoever hears the operator (network, console).
+//! * Reader: the loop that ticks the port, which takes each wish once.
+
+use std::io::{BufRead, IsTerminal};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// What an operator wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ArmWish {
+    /// Force.
+    Arm,
+    /// No force.
+    Disarm,
+}
+
+const NOTHING: u8 = 0;
+const ARM: u8 = 1;
+const DISARM: u8 = 2;
+
+/// Carries the newest wish. Wait-free; share it by `Arc`.
+#[derive(Debug, Default)]
+pub struct ArmSwitch(AtomicU8);
+
+impl ArmSwitch {
+    /// Makes a wish. A wish for no force that was not yet taken is not undone by one for force.
+    pub fn wish(&self, wish: ArmWish) {
+        match wish {
+            ArmWish::Arm => {
+                // Fails where another wish waits: that one stands.
+                let _ = self
+                    .0
+                    .compare_exchange(NOTHING, ARM, Ordering::Relaxed, Ordering::Relaxed);
+            }
+            ArmWish::Disarm => self.0.store(DISARM, Ordering::Relaxed),
+        }
+    }
+
+    /// Takes the wish, if there is one.
+    pub fn take(&self) -> Option<ArmWish> {
+        match self.0.swap(NOTHING, Ordering::Relaxed) {
+            ARM => Some(ArmWish::Arm),
+            DISARM => Some(ArmWish::Disarm),
+            _ => None,
+        }
+    }
+}
+
+/// Lets lines that are typed at the terminal move `switch`: `arm`, and `off` for no force. Where standard input is no terminal nobody
+/// types.
+pub fn listen_at_console(switch: &Arc<ArmSwitch>) {
+    if !std::io::stdin().is_terminal() {
+        return;
+    }
+    let typed = Arc::clone(switch);
+    // The thread ends with the process, or where there is nothing more to read.
+    let thread = std::thread::Builder::new()
+        .name("console".to_owned())
+        .spawn(move || {
+            for line in std::io::stdin().lock().lines() {
+                let Ok(line) = line else { return };
+                match wish_of(&line) {
+                    Some(wish) => typed.wish(wish),
+                    None => eprintln!("type `arm` for force, `off` for none"),
+                }
+            }
+        });
+    if let Err(error) = thread {
+        tracing::warn!("nobody listens at the console ({error}); arm by button or by `taut arm`");
+    }
+}
+
+fn wish_of(line: &str) -> Option<ArmWish> {
+    match line.trim() {
+        "arm" => Some(ArmWish::Arm),
+        "off" => Some(ArmWish::Disarm),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wish_is_taken_once_and_no_force_goes_first() {
+        let switch = Arc::<ArmSwitch>::default();
+        let other = Arc::clone(&switch);
+        assert_eq!(switch.take(), None);
+        other.wish(ArmWish::Arm);
+        assert_eq!(switch.take(), Some(ArmWish::Arm));
+        assert_eq!(switch.take(), None);
+        other.wish(ArmWish::Disarm);
+        other.wish(ArmWish::Arm);
+        assert_eq!(switch.take(), Some(ArmWish::Disarm));
+    }
+
+    #[test]
+    fn two_words_are_understood() {
+        assert_eq!(wish_of(" arm\r"), Some(ArmWish::Arm));
+        assert_eq!(wish_of("off"), Some(ArmWish::Disarm));
+        assert_eq!(wish_of(""), None);
+    }
+}

@@ -1,0 +1,462 @@
+//! Which device: one word on the command line, with options after commas.
+//!
+//! `simulated`, `trace:FILE`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use taut_vrpn::{Address, AddressError, SensorMapping};
+
+use crate::device::Device;
+use crate::devices::{
+    Anchor, CapMode, CapSettings, HidPort, SourceError, SpaceMouse, VrpnDevice, VrpnSettings,
+};
+use crate::placement::Placement;
+use crate::vrpn::{VrpnMode, VrpnSource};
+
+/// Similarity (Jaro-Winkler, 0 to 1) from which a name is offered for an unknown one.
+const SUGGESTION_SIMILARITY: f64 = 0.7;
+
+/// A driver, for lists that people read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Driver {
+    /// Its name in choices and in workbench files.
+    pub name: &'static str,
+    /// How it is chosen.
+    pub form: &'static str,
+    /// What it is.
+    pub what: &'static str,
+}
+
+/// All drivers.
+pub const DRIVERS: [Driver; 5] = [
+    Driver {
+        name: "simulated",
+        form: "simulated",
+        what: "a simulated device in a simulated hand: pose and force",
+    },
+    Driver {
+        name: "trace",
+        form: "trace:FILE",
+        what: "a recorded trace of poses: no force",
+    },
+    Driver {
+        name: "space-mouse",
+        form: "space-mouse[,mode=rate|position,speed=M/S,turn-rate=RAD/S,dead-zone=D,...]",
+        what: "a 3Dconnexion SpaceMouse: six degrees of freedom in, no force",
+    },
+    Driver {
+        name: "vrpn",
+        form: "vrpn:TRACKER@HOST[:PORT][,sensor=N,mode=tcp|udp,axes=x -z y,scale=M,...]",
+        what: "a sensor of a VRPN tracker: six degrees of freedom in, no force",
+    },
+    Driver {
+        name: "mouse",
+        form: "mouse",
+        what: "mouse and keyboard of a render window (`taut demo`, `taut render --hold`): no force",
+    },
+];
+
+/// Which device is read.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DeviceChoice {
+    /// [`crate::SimulatedDevice`].
+    Simulated,
+    /// [`crate::RecordedDevice`] of a trace file.
+    Trace(PathBuf),
+    /// An input device of this machine or network.
+    Input(InputChoice),
+    /// The mouse of a render window, which joins as a bridge of its own.
+    Mouse,
+}
+
+/// An input device without force.
+#[derive(Clone, Debug, PartialEq)]
+pub enum InputChoice {
+    /// [`SpaceMouse`].
+    SpaceMouse(CapSettings),
+    /// [`VrpnDevice`].
+    Vrpn(Box<VrpnSettings>),
+}
+
+/// Why an input device cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum InputError {
+    /// The SpaceMouse.
+    #[error(transparent)]
+    SpaceMouse(#[from] SourceError),
+    /// The tracker.
+    #[error("cannot start to listen to the tracker {address}: {cause}; end other programs")]
+    Vrpn {
+        /// Of the tracker.
+        address: Address,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+}
+
+impl InputChoice {
+    /// Starts to read it.
+    ///
+    /// # Errors
+    /// [`InputError`]. A tracker that does not answer yet is no error: it is waited for.
+    pub fn open(&self, placement: Placement) -> Result<Box<dyn Device>, InputError> {
+        Ok(match self {
+            Self::SpaceMouse(settings) => {
+                Box::new(SpaceMouse::open(Box::new(HidPort), *settings, placement)?)
+            }
+            Self::Vrpn(settings) => {
+                let device = VrpnDevice::start(settings, placement);
+                Box::new(device.map_err(|cause| InputError::Vrpn {
+                    address: settings.source.address.clone(),
+                    cause,
+                })?)
+            }
+        })
+    }
+}
+
+/// A text that chooses no device.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownDevice {
+    /// No driver of that name.
+    #[error("there is no device `{name}`{hint}; use {}", names_and_forms())]
+    Name {
+        /// What was written.
+        name: String,
+        /// The nearest name, in a sentence's end, or nothing.
+        hint: String,
+    },
+    /// The driver needs more than its name.
+    #[error("the device `{name}` is incomplete; write {form}")]
+    Incomplete {
+        /// The driver.
+        name: &'static str,
+        /// What to write.
+        form: &'static str,
+    },
+    /// The tracker's address.
+    #[error(transparent)]
+    Address(#[from] AddressError),
+    /// No such option.
+    #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
+    Option {
+        /// The driver.
+        device: &'static str,
+        /// What was written.
+        option: String,
+        /// The nearest option.
+        hint: String,
+        /// All of them.
+        known: String,
+    },
+    /// A value that the option does not take.
+    #[error("`{option}` of the device `{device}` is `{value}`, but must be {wanted}")]
+    Value {
+        /// The driver.
+        device: &'static str,
+        /// The option.
+        option: &'static str,
+        /// What was written.
+        value: String,
+        /// What it takes.
+        wanted: String,
+    },
+}
+
+impl FromStr for DeviceChoice {
+    type Err = UnknownDevice;
+
+    fn from_str(text: &str) -> Result<Self, UnknownDevice> {
+        let end = text.find([':', ',']).unwrap_or(text.len());
+        let (name, rest) = text.split_at(end);
+        let Some(driver) = DRIVERS.iter().find(|driver| driver.name == name) else {
+            return Err(UnknownDevice::Name {
+                name: text.to_owned(),
+                hint: nearest(name, DRIVERS.iter().map(|driver| driver.name)),
+            });
+        };
+        let incomplete = UnknownDevice::Incomplete {
+            name: driver.name,
+            form: driver.form,
+        };
+        match (driver.name, rest.strip_prefix(':')) {
+            ("simulated", None) if rest.is_empty() => Ok(Self::Simulated),
+            ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
+            ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
+            ("space-mouse", None) => {
+                let settings = cap_settings(rest.trim_start_matches(','))?;
+                Ok(Self::Input(InputChoice::SpaceMouse(settings)))
+            }
+            ("vrpn", Some(rest)) => Ok(Self::Input(InputChoice::Vrpn(Box::new(vrpn_settings(
+                rest,
+            )?)))),
+            _ => Err(incomplete),
+        }
+    }
+}
+
+fn cap_settings(options: &str) -> Result<CapSettings, UnknownDevice> {
+    let mut settings = CapSettings::default();
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("space-mouse", option);
+        option.choice("mode", &CapMode::NAMED, &mut settings.mode)?;
+        option.number("dead-zone", 0.0, 0.9, &mut settings.dead_zone)?;
+        option.number("speed", 1e-3, 10.0, &mut settings.speed)?;
+        option.number("turn-rate", 1e-2, 100.0, &mut settings.turn_rate)?;
+        option.number("reach", 1e-3, 10.0, &mut settings.reach)?;
+        option.number("tilt", 1e-2, 3.0, &mut settings.tilt)?;
+        option.number("yield-force", 1e-2, 1e3, &mut settings.yield_force)?;
+        option.number("yield-torque", 1e-3, 1e3, &mut settings.yield_torque)?;
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+fn vrpn_settings(text: &str) -> Result<VrpnSettings, UnknownDevice> {
+    let (address, options) = text.split_once(',').unwrap_or((text, ""));
+    let mut settings = VrpnSettings {
+        source: VrpnSource {
+            address: address.parse()?,
+            sensor: 0,
+            mode: VrpnMode::default(),
+        },
+        mapping: SensorMapping::identity(),
+        anchor: Anchor::default(),
+        max_age: VrpnSettings::DEFAULT_MAX_AGE,
+    };
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("vrpn", option);
+        let (mut sensor, mut max_age) = (None, None);
+        option.number("sensor", 0.0, 1e6, sensor.get_or_insert(0.0))?;
+        option.choice("mode", &VrpnMode::NAMED, &mut settings.source.mode)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        option.number("scale", 1e-6, 1e6, &mut settings.mapping.scale)?;
+        option.number("max-age", 1e-3, 10.0, max_age.get_or_insert(0.0))?;
+        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
+        match option.name {
+            "sensor" => settings.source.sensor = sensor.unwrap_or(0.0) as i32,
+            "max-age" => settings.max_age = Duration::from_secs_f64(max_age.unwrap_or(0.1)),
+            _ => {}
+        }
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+/// One option as it was written; each question that names it takes its value.
+struct OptionText<'a> {
+    device: &'static str,
+    name: &'a str,
+    value: &'a str,
+    known: Vec<&'static str>,
+}
+
+impl<'a> OptionText<'a> {
+    fn new(device: &'static str, text: &'a str) -> Self {
+        let (name, value) = text.split_once('=').unwrap_or((text, ""));
+        Self {
+            device,
+            name: name.trim(),
+            value: value.trim(),
+            known: Vec::new(),
+        }
+    }
+
+    /// The value, if this is the option.
+    fn asked(&mut self, option: &'static str) -> Option<&'a str> {
+        self.known.push(option);
+        (self.name == option).then_some(self.value)
+    }
+
+    fn wrong(&self, option: &'static str, wanted: impl Into<String>) -> UnknownDevice {
+        UnknownDevice::Value {
+            device: self.device,
+            option,
+            value: self.value.to_owned(),
+            wanted: wanted.into(),
+        }
+    }
+
+    fn number(
+        &mut self,
+        option: &'static str,
+        low: f64,
+        high: f64,
+        target: &mut f64,
+    ) -> Result<(), UnknownDevice> {
+        let Some(value) = self.asked(option) else {
+            return Ok(());
+        };
+        match value.parse() {
+            Ok(number) if (low..=high).contains(&number) => *target = number,
+            _ => return Err(self.wrong(option, format!("a number from {low} to {high}"))),
+        }
+        Ok(())
+    }
+
+    fn choice<T: Copy>(
+        &mut self,
+        option: &'static str,
+        choices: &[(&'static str, T)],
+        target: &mut T,
+    ) -> Result<(), UnknownDevice> {
+        let Some(value) = self.asked(option) else {
+            return Ok(());
+        };
+        match choices.iter().find(|(name, _)| *name == value) {
+            Some((_, choice)) => *target = *choice,
+            None => {
+                let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+                return Err(self.wrong(option, names.join(" or ")));
+            }
+        }
+        Ok(())
+    }
+
+    fn parsed<T: FromStr>(
+        &mut self,
+        option: &'static str,
+        wanted: &str,
+        target: &mut T,
+    ) -> Result<(), UnknownDevice> {
+        let Some(value) = self.asked(option) else {
+            return Ok(());
+        };
+        *target = value.parse().map_err(|_| self.wrong(option, wanted))?;
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(), UnknownDevice> {
+        if self.known.contains(&self.name) {
+            return Ok(());
+        }
+        Err(UnknownDevice::Option {
+            device: self.device,
+            option: self.name.to_owned(),
+            hint: nearest(self.name, self.known.iter().copied()),
+            known: self.known.join(", "),
+        })
+    }
+}
+
+/// "; did you mean `x`?" for the most similar name, if one is similar.
+fn nearest(name: &str, names: impl Iterator<Item = &'static str>) -> String {
+    names
+        .map(|known| (strsim::jaro_winkler(name, known), known))
+        .filter(|(similarity, _)| *similarity >= SUGGESTION_SIMILARITY)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(String::new, |(_, known)| {
+            format!(" (did you mean `{known}`?)")
+        })
+}
+
+/// The forms of all drivers, in a sentence.
+fn names_and_forms() -> String {
+    let forms: Vec<&str> = DRIVERS.iter().map(|driver| short(driver.form)).collect();
+    let (last, others) = forms.split_last().unwrap_or((&"", &[]));
+    format!("{} or {last}", others.join(", "))
+}
+
+/// A form without its options.
+fn short(form: &'static str) -> &'static str {
+    form.split('[').next().unwrap_or(form)
+}
+
+/// What follows the arguments in `--help`: every driver with its options.
+#[must_use]
+pub fn drivers_help() -> String {
+    let mut help = "Devices:\n".to_owned();
+    for Driver { form, what, .. } in DRIVERS {
+        help += &format!("  {form}\n      {what}\n");
+    }
+    help
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn choice(text: &str) -> DeviceChoice {
+        text.parse().unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn error(text: &str) -> String {
+        text.parse::<DeviceChoice>().expect_err(text).to_string()
+    }
+
+    #[test]
+    fn every_driver_is_chosen_by_its_form() {
+        for driver in DRIVERS {
+            let text = short(driver.form)
+                .replace("TRACKER@HOST", "Tracker0@host")
+                .replace("FILE", "a,b.csv");
+            choice(&text);
+        }
+        assert_eq!(
+            choice("trace:a,b.csv"),
+            DeviceChoice::Trace("a,b.csv".into())
+        );
+    }
+
+    #[test]
+    fn options_reach_the_drivers() {
+        let DeviceChoice::Input(InputChoice::SpaceMouse(cap)) =
+            choice("space-mouse,mode=position,reach=0.3,dead-zone=0.2")
+        else {
+            panic!();
+        };
+        let wanted = CapSettings {
+            mode: CapMode::Position,
+            reach: 0.3,
+            dead_zone: 0.2,
+            ..CapSettings::default()
+        };
+        assert_eq!(cap, wanted);
+        let DeviceChoice::Input(InputChoice::Vrpn(vrpn)) = choice(
+            "vrpn:Tracker0@lab:4000,sensor=2,mode=udp,axes=x -z y,scale=0.001,anchor=workbench,max-age=0.2",
+        ) else {
+            panic!();
+        };
+        assert_eq!(vrpn.source.address.to_string(), "Tracker0@lab:4000");
+        assert_eq!((vrpn.source.sensor, vrpn.source.mode), (2, VrpnMode::Udp));
+        assert_eq!(vrpn.mapping.axes.to_string(), "x -z y");
+        assert_eq!(
+            (vrpn.mapping.scale, vrpn.anchor),
+            (0.001, Anchor::Workbench)
+        );
+        assert_eq!(vrpn.max_age, Duration::from_millis(200));
+    }
+
+    #[test]
+    fn wrong_words_are_answered_with_the_right_ones() {
+        for (text, part) in [
+            ("spacemouse", "did you mean `space-mouse`?"),
+            ("simulatd", "did you mean `simulated`?"),
+            ("phantom", "use simulated, trace:FILE, space-mouse"),
+            ("trace:", "write trace:FILE"),
+            ("trace", "write trace:FILE"),
+            ("simulated,hand=firm", "write simulated"),
+            ("vrpn", "write vrpn:TRACKER@HOST"),
+            ("vrpn:Tracker0", "DEVICE@HOST:PORT"),
+            ("vrpn:T@h,sensors=1", "did you mean `sensor`?"),
+            ("vrpn:T@h,axes=x y", "such as `x -z y`"),
+            ("vrpn:T@h,mode=tpc", "must be tcp or udp"),
+            ("space-mouse,speed=fast", "a number from 0.001 to 10"),
+            ("space-mouse,speed=NaN", "a number from 0.001 to 10"),
+            ("space-mouse,sped=1", "did you mean `speed`?"),
+        ] {
+            let error = error(text);
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_help_names_every_driver() {
+        let help = drivers_help();
+        for driver in DRIVERS {
+            assert!(help.contains(driver.form) && help.contains(driver.what));
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! A 3Dconnexion SpaceMouse: six degrees of freedom in, no force out.
+//!
+//! A thread waits for reports and hands on what they add up to; the device loop moves the body by it
+//! ([`RateControl`]). A device that is pulled out is a fault until it is back; the body stays where it is.
+
+mod report;
+mod source;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use nalgebra::Vector6;
+
+pub use report::{CapState, Report, ShortReport};
+use source::MAX_REPORT_BYTES;
+pub use source::{HidPort, MODELS, Model, ReportPort, ReportSource, SourceError};
+
+use super::rate_control::{CapSettings, RateControl};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use crate::placement::Placement;
+
+/// How long one wait for a report lasts; the end of the program waits no longer.
+const WAIT: Duration = Duration::from_millis(50);
+/// Between two attempts to open the device.
+const RETRY: Duration = Duration::from_millis(500);
+/// A deflected cap reports about every 16 ms; one that has been silent for this long is taken as let go.
+const LET_GO_AFTER: Duration = Duration::from_millis(250);
+
+/// What the reading thread hands to the device loop.
+#[derive(Clone, Copy, Debug, Default)]
+struct Newest {
+    cap: CapState,
+    is_open: bool,
+    /// Counts reports.
+    reports: u64,
+}
+
+/// The device. Dropping it ends its thread.
+pub struct SpaceMouse {
+    info: DeviceInfo,
+    body: RateControl,
+    newest: triple_buffer::Output<Newest>,
+    /// Reports seen, and when the last came, on the loop's clock.
+    seen: (u64, Duration),
+    was_open: bool,
+    wrench: Vector6<f64>,
+    /// Ends the thread when it is dropped.
+    _reader: Reader,
+}
+
+struct Reader {
+    end: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl SpaceMouse {
+    /// Opens the SpaceMouse behind `port`.
+    ///
+    /// # Errors
+    /// [`SourceError`]: it is not there now. One that goes later is waited for.
+    pub fn open(
+        mut port: Box<dyn ReportPort>,
+        settings: CapSettings,
+        placement: Placement,
+    ) -> Result<Self, SourceError> {
+        let source = port.open()?;
+        tracing::info!("reading {}", source.name());
+        let info = DeviceInfo {
+            name: source.name().to_owned(),
+            sensed_degrees_of_freedom: 6,
+            actuated_degrees_of_freedom: 0,
+            limits: DeviceLimits::UNLIMITED,
+            rate_hz: 1000.0,
+        };
+        let first = Newest {
+            is_open: true,
+            ..Newest::default()
+        };
+        let (output, newest) = triple_buffer::TripleBuffer::new(&first).split();
+        let end = Arc::new(AtomicBool::new(false));
+        let ended = Arc::clone(&end);
+        let thread = thread::Builder::new()
+            .name("taut-spacemouse".to_owned())
+            .spawn(move || read_reports(port, source, output, &ended))
+            .map_err(|error| SourceError::Gone(error.to_string()))?;
+        Ok(Self {
+            info,
+            body: RateControl::new(settings, placement),
+            newest,
+            seen: (0, Duration::ZERO),
+            was_open: true,
+            wrench: Vector6::zeros(),
+            _reader: Reader {
+                end,
+                thread: Some(thread),
+            },
+        })
+    }
+}
+
+impl Device for SpaceMouse {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let newest = *self.newest.read();
+        if newest.reports != self.seen.0 {
+            self.seen = (newest.reports, now);
+        }
+        let silence = now.saturating_sub(self.seen.1);
+        let held = newest.is_open && silence < LET_GO_AFTER;
+        let deflection = if held {
+            newest.cap.deflection()
+        } else {
+            Vector6::zeros()
+        };
+        self.body.step(now, &deflection, &self.wrench);
+        let was_open = std::mem::replace(&mut self.was_open, newest.is_open);
+        match (was_open, newest.is_open) {
+            (_, false) => Err(DeviceFault::Lost { age: silence }),
+            (false, true) => Err(DeviceFault::Reconnected),
+            (true, true) => {
+                let (pose, velocity) = self.body.state();
+                Ok(DeviceSample {
+                    time: now,
+                    pose,
+                    velocity,
+                    buttons: newest.cap.buttons as u16,
+                })
+            }
+        }
+    }
+
+    /// Nobody feels the wrench; the body yields to it.
+    fn write(&mut self, _now: Duration, wrench: &Vector6<f64>) {
+        self.wrench = *wrench;
+    }
+}
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // It panics nowhere; if it did, there would be nothing left to end.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread: reports in, their sum out; opens the device again when it is gone.
+fn read_reports(
+    mut port: Box<dyn ReportPort>,
+    first: Box<dyn ReportSource>,
+    mut output: triple_buffer::Input<Newest>,
+    end: &AtomicBool,
+) {
+    let mut newest = Newest {
+        is_open: true,
+        ..Newest::default()
+    };
+    let mut source = Some(first);
+    let mut buffer = [0; MAX_REPORT_BYTES];
+    while !end.load(Ordering::Relaxed) {
+        let Some(open) = &mut source else {
+            thread::sleep(RETRY);
+            if let Ok(found) = port.open() {
+                tracing::info!("{} is back", found.name());
+                newest.is_open = true;
+                output.write(newest);
+                source = Some(found);
+            }
+            continue;
+        };
+        match open.read(&mut buffer, WAIT) {
+            Ok(0) => {}
+            Ok(bytes) => {
+                // A report that is too short says nothing; the next one does.
+                if let Ok(report) = Report::parse(&buffer[..bytes.min(MAX_REPORT_BYTES)]) {
+                    newest.cap.take(&report);
+                    newest.reports += 1;
+                    output.write(newest);
+                }
+            }
+            Err(error) => {
+                tracing::warn!("{error}");
+                newest.cap = CapState::default();
+                newest.is_open = false;
+                output.write(newest);
+                source = None;
+            }
+        }
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::device::Pose;
+    use nalgebra::Point3;
+    use std::os::unix::net::UnixDatagram;
+    use std::sync::mpsc::{Receiver, channel};
+    use std::time::Instant;
+
+    /// Sockets keep the borders of reports, as `/dev/hidraw*` does.
+    struct Fake(UnixDatagram);
+    struct FakePort(Receiver<UnixDatagram>);
+
+    impl ReportPort for FakePort {
+        fn open(&mut self) -> Result<Box<dyn ReportSource>, SourceError> {
+            let socket = self.0.try_recv().map_err(|_| SourceError::NotFound)?;
+            Ok(Box::new(Fake(socket)))
+        }
+    }
+
+    impl ReportSource for Fake {
+        fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, SourceError> {
+            self.0.set_read_timeout(Some(timeout)).expect("a timeout");
+            match self.0.recv(buffer) {
+                // An empty datagram stands for a cable that is pulled.
+                Ok(0) => Err(SourceError::Gone("end".to_owned())),
+                Ok(bytes) => Ok(bytes),
+                Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => Ok(0),
+                Err(error) => Err(SourceError::Gone(error.to_string())),
+            }
+        }
+
+        fn name(&self) -> &str {
+            "fake"
+        }
+    }
+
+    /// Reads at growing times of a virtual clock until `done`; five real seconds at most.
+    fn read_until(
+        mouse: &mut SpaceMouse,
+        now: &mut Duration,
+        done: impl Fn(&Result<DeviceSample, DeviceFault>) -> bool,
+    ) -> Result<DeviceSample, DeviceFault> {
+        let start = Instant::now();
+        loop {
+            *now += Duration::from_millis(1);
+            let sample = mouse.read(*now);
+            if done(&sample) {
+                return sample;
+            }
+            assert!(
+                start.elapsed() < Duration::from_secs(5),
+                "it never came: {sample:?}"
+            );
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn reports_move_the_body_until_the_cap_is_let_go_or_the_cable_is_pulled() {
+        let (ports, receiver) = channel();
+        let (device, host) = UnixDatagram::pair().expect("sockets");
+        ports.send(host).expect("open");
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let placement = Placement::plain(start, Point3::origin());
+        let mut mouse = SpaceMouse::open(
+            Box::new(FakePort(receiver)),
+            CapSettings::default(),
+            placement,
+        )
+        .expect("it is there");
+        let mut now = Duration::ZERO;
+        assert_eq!(mouse.read(now).expect("open").pose, start);
+
+        // Full to the right, and button 2.
+        device.send(b"\x03\x02\0").expect("sent");
+        device.send(b"\x01\x5e\x01\0\0\0\0").expect("sent");
+        let moving = read_until(&mut mouse, &mut now, |s| {
+            s.as_ref().is_ok_and(|s| s.velocity[0] > 0.0)
+        })
+        .expect("a sample");
+        assert!(moving.velocity[0] <= 0.1);
+        assert_eq!(moving.buttons, 2);
+
+        // Silence is a cap let go: the body stops, and no fault.
+        for _ in 0..1000 {
+            now += Duration::from_millis(1);
+            let _ = mouse.read(now);
+        }
+        let still = mouse.read(now).expect("open");
+        assert!(still.velocity.norm() < 1e-6);
+        let moved = still.pose.translation.vector.x;
+        assert!(
+            (moved - 0.025).abs() < 5e-4,
+            "a quarter of a second at 0.1 m/s: {moved}"
+        );
+
+        device.send(b"").expect("sent");
+        let lost = read_until(&mut mouse, &mut now, Result::is_err);
+        assert!(matches!(lost, Err(DeviceFault::Lost { .. })));
+        let (_again, host) = UnixDatagram::pair().expect("sockets");
+        ports.send(host).expect("open");
+        let back = read_until(&mut mouse, &mut now, |s| {
+            !matches!(s, Err(DeviceFault::Lost { .. }))
+        });
+        assert_eq!(back, Err(DeviceFault::Reconnected));
+        let after = mouse.read(now).expect("open again");
+        let drift = after.pose.translation.vector - still.pose.translation.vector;
+        assert!(drift.norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_device_that_is_not_there_is_said_at_once() {
+        let (_ports, receiver) = channel();
+        let placement = Placement::plain(Pose::identity(), Point3::origin());
+        let error = SpaceMouse::open(
+            Box::new(FakePort(receiver)),
+            CapSettings::default(),
+            placement,
+        )
+        .err()
+        .expect("none");
+        assert_eq!(error, SourceError::NotFound);
+    }
+}

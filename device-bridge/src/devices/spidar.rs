@@ -1,0 +1,274 @@
+//! A string-driven device (SPIDAR-G): counts in, pose out; wrench in, tensions out.
+//!
+//! | frame | meaning                                                        |
+//! |-------|----------------------------------------------------------------|
+//! | world | the scene's                                                    |
+//! | frame | the device's, at the middle of its motors                      |
+//! | grip  | the grip's, at the middle of its holes; equal to frame at rest |
+//! | body  | the held body's own                                            |
+//!
+//! The model is `taut-spidar`; the electronics are a [`StringHardware`]. No vendor's motor controller or its protocol was at hand, so
+//! that the only implementation here is the simulated one: a laboratory with a device writes two functions, counts
+//! in and tensions out.
+
+use std::time::Duration;
+
+use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use taut_spidar::{
+    Consistency, Encoders, ForwardKinematics, Geometry, LengthRates, MotorState, PoseAnswer,
+    Reading, ResidualMonitor, STRINGS, StringFault, StringHardware, StringMatrix, TensionAnswer,
+    TensionSettings, TensionSolver, capability,
+};
+
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+
+/// Rate of the published controllers, Hz.
+const RATE_HZ: f64 = 1000.0;
+/// Delay of the force for the stated stiffness limits: one tick.
+const DELAY_S: f64 = 1.0 / RATE_HZ;
+/// A string counts as slack below this share of its least tension, where tensions are measured.
+const SLACK_SHARE: f64 = 0.2;
+/// Slack or inconsistent lengths are a fault only if they last so many samples: a jerk slackens a string for a moment.
+const FAULT_SAMPLES: u32 = 20;
+
+/// Where the device stands and what its grip holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpidarPlacement {
+    /// The device's frame in the world.
+    pub world_from_frame: Pose,
+    /// The held body's own frame in the grip.
+    pub grip_from_body: Pose,
+    /// G, the body's reference point, in its own frame.
+    pub reference_point: Point3<f64>,
+}
+
+impl Default for SpidarPlacement {
+    /// All frames in one.
+    fn default() -> Self {
+        Self {
+            world_from_frame: Pose::identity(),
+            grip_from_body: Pose::identity(),
+            reference_point: Point3::origin(),
+        }
+    }
+}
+
+/// A [`Device`] made of strings.
+#[derive(Debug)]
+pub struct SpidarDevice<H> {
+    info: DeviceInfo,
+    hardware: H,
+    geometry: Geometry,
+    placement: SpidarPlacement,
+    encoders: Encoders,
+    kinematics: ForwardKinematics,
+    monitor: ResidualMonitor,
+    rates: LengthRates,
+    solver: TensionSolver,
+    strings: StringMatrix,
+    world_from_body: Pose,
+    consistency: Option<Consistency>,
+    tensions: Option<TensionAnswer>,
+    /// Samples in a row with a slack string or inconsistent lengths.
+    suspicious: u32,
+    fault: Option<StringFault>,
+}
+
+impl<H: StringHardware> SpidarDevice<H> {
+    /// A device whose grip is held at the centre of the frame, not turned, while this is called: its counters are
+    /// calibrated there.
+    ///
+    /// # Errors
+    /// [`StringFault::Hardware`] if the electronics do not answer.
+    pub fn calibrated_at_centre(
+        geometry: Geometry,
+        mut hardware: H,
+        placement: SpidarPlacement,
+        now: Duration,
+    ) -> Result<Self, StringFault> {
+        let reading = hardware.read_counts(now)?;
+        let centre = Pose::identity();
+        let encoders = Encoders::calibrated(&geometry, &centre, &reading.counts);
+        let solver = TensionSolver::new(&geometry, TensionSettings::default());
+        Ok(Self {
+            info: info(&geometry),
+            hardware,
+            placement,
+            encoders,
+            kinematics: ForwardKinematics::new(&geometry),
+            monitor: ResidualMonitor::new(),
+            rates: LengthRates::new(&geometry.metres_per_count),
+            solver,
+            strings: StringMatrix::at(&geometry, &centre),
+            world_from_body: placement.world_from_frame * placement.grip_from_body,
+            geometry,
+            consistency: None,
+            tensions: None,
+            suspicious: 0,
+            fault: None,
+        })
+    }
+
+    /// Counts to lengths as calibrated now.
+    #[must_use]
+    pub fn encoders(&self) -> &Encoders {
+        &self.encoders
+    }
+
+    /// Takes another calibration, such as a corrected one of `taut_spidar::self_calibrate`. The pose may jump: only while disarmed.
+    pub fn set_encoders(&mut self, encoders: Encoders) {
+        self.encoders = encoders;
+        self.monitor.reset();
+        self.rates.reset();
+        self.suspicious = 0;
+    }
+
+    /// Says what a motor does. The string of one that does not work is left out of the pose.
+    pub fn set_motor(&mut self, string: usize, state: MotorState) {
+        self.solver.set_motor(string, state);
+        self.kinematics
+            .use_string(string, state == MotorState::Working);
+    }
+
+    /// What the redundant lengths said at the last good sample.
+    #[must_use]
+    pub fn consistency(&self) -> Option<&Consistency> {
+        self.consistency.as_ref()
+    }
+
+    /// The tensions of the last write, with what they render: N, N m about the grip's centre, axes of the device's frame.
+    #[must_use]
+    pub fn tensions(&self) -> Option<&TensionAnswer> {
+        self.tensions.as_ref()
+    }
+
+    /// What was wrong at the last sample, if anything was.
+    #[must_use]
+    pub fn fault(&self) -> Option<StringFault> {
+        self.fault
+    }
+
+    /// The electronics.
+    pub fn hardware_mut(&mut self) -> &mut H {
+        &mut self.hardware
+    }
+
+    fn sample(&mut self, now: Duration) -> Result<DeviceSample, StringFault> {
+        let reading = self.hardware.read_counts(now)?;
+        let lengths = self.encoders.lengths(&reading.counts);
+        let rates = self.rates.step(reading.time, &lengths);
+        let answer = self.kinematics.solve(&lengths)?;
+        self.watch(&reading, &answer)?;
+        self.strings = answer.strings;
+
+        let world_from_grip = self.placement.world_from_frame * answer.frame_from_grip;
+        self.world_from_body = world_from_grip * self.placement.grip_from_body;
+        let lever = self.lever();
+        let (v, omega) = halves(&answer.twist(&rates));
+        let turn = self.placement.world_from_frame.rotation;
+        let (v, omega) = (turn * v, turn * omega);
+        Ok(DeviceSample {
+            time: reading.time,
+            pose: self.world_from_body,
+            velocity: stack(&(v + omega.cross(&lever)), &omega),
+            buttons: reading.buttons,
+        })
+    }
+
+    /// Slack strings and lengths that disagree become a fault when they last.
+    fn watch(&mut self, reading: &Reading, answer: &PoseAnswer) -> Result<(), StringFault> {
+        let consistency = self.monitor.step(answer);
+        self.consistency = Some(consistency);
+        let slack_below = SLACK_SHARE * self.geometry.tension_min;
+        let slack = reading.tensions.and_then(|tensions| {
+            let used = self.kinematics.used();
+            (0..STRINGS)
+                .find(|i| used[*i] && tensions[*i] < slack_below)
+                .map(|string| StringFault::Slack {
+                    string,
+                    tension: tensions[string],
+                })
+        });
+        let inconsistent = consistency.alarm.then(|| StringFault::Inconsistent {
+            disagreement: consistency.disagreement,
+            suspect: consistency.culprit(),
+        });
+        let Some(found) = slack.or(inconsistent) else {
+            self.suspicious = 0;
+            return Ok(());
+        };
+        self.suspicious = self.suspicious.saturating_add(1);
+        if self.suspicious >= FAULT_SAMPLES {
+            return Err(found);
+        }
+        Ok(())
+    }
+
+    /// From the grip's centre to G, world axes.
+    fn lever(&self) -> Vector3<f64> {
+        let body_from_grip = self.placement.grip_from_body.inverse();
+        let centre = body_from_grip * Point3::origin();
+        self.world_from_body.rotation * (self.placement.reference_point - centre)
+    }
+}
+
+impl<H: StringHardware> Device for SpidarDevice<H> {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let sample = self.sample(now);
+        self.fault = sample.as_ref().err().copied();
+        if self.fault.is_some() {
+            self.rates.reset();
+        }
+        sample.map_err(DeviceFault::Strings)
+    }
+
+    fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
+        // At a fault the strings stay taut and render nothing.
+        let wanted = if self.fault.is_some() {
+            Vector6::zeros()
+        } else {
+            *wrench
+        };
+        let (force, torque) = halves(&wanted);
+        let to_frame = self.placement.world_from_frame.rotation.inverse();
+        // About the grip's centre instead of G.
+        let torque = torque + self.lever().cross(&force);
+        let at_grip = stack(&(to_frame * force), &(to_frame * torque));
+        // A wrench that is not finite gets the least tensions.
+        let answer = self.solver.distribute(&self.strings, &at_grip);
+        self.tensions = Some(answer);
+        self.hardware.write_tensions(now, &answer.tensions);
+    }
+}
+
+fn stack(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::from_fn(|k, _| if k < 3 { linear[k] } else { angular[k - 3] })
+}
+
+fn halves(six: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (six.fixed_rows::<3>(0).into(), six.fixed_rows::<3>(3).into())
+}
+
+/// What the device bears at its centre, in every direction.
+fn info(geometry: &Geometry) -> DeviceInfo {
+    let centre = capability(geometry, &Isometry3::identity());
+    let reach = 0.5 / RATE_HZ + DELAY_S;
+    let arm = geometry.arm();
+    DeviceInfo {
+        name: format!("SPIDAR {}", geometry.name),
+        sensed_degrees_of_freedom: 6,
+        actuated_degrees_of_freedom: 6,
+        limits: DeviceLimits {
+            // b / (T/2 + t_d), with the damping at the grip's arm for rotation.
+            max_stiffness: geometry.grip_damping / reach,
+            max_rotational_stiffness: geometry.grip_damping * arm * arm / reach,
+            max_force: centre.weakest_force.size,
+            max_torque: centre.weakest_torque.size,
+        },
+        rate_hz: RATE_HZ,
+    }
+}

@@ -1,0 +1,91 @@
+//! Where the hand is by the time at which a constraint set is used: likely, and at most.
+//!
+//! | symbol | name in code | unit  | meaning                                                            |
+//! |--------|--------------|-------|--------------------------------------------------------------------|
+//! | d      | `age`        | s     | of the device reading that the set will answer: the way up          |
+//! | t      | `horizon`    | s     | reading to last use of the set: `2 d` and some periods              |
+//! | v      | `velocity`   | m/s   | of the body's fastest point at the reading                         |
+//! | a      | `HAND_ACCELERATION` | m/s² | most that a hand adds                                        |
+//!
+//! A half-space is a plane: off its pose by s, on a surface of curvature κ, it is wrong by `κ s² / 2` in depth and `κ s` in direction. So the
+//! god-object is sent to where the hand will be, [`device_predicted`], which leaves of `s = v t` what the hand's acceleration makes of it.
+//! And the set must hold every row within [`device_ahead`], `v t + a t² / 2`, or a surface would be felt only when the hand is through it.
+
+use std::time::Duration;
+
+use god_object::Pose;
+use god_object::spatial::{advance_pose, at_reference_point, from_reference_point};
+use nalgebra::{Point3, Vector6};
+
+/// A hand in contact tasks changes its speed by no more than this: assumption, m/s².
+const HAND_ACCELERATION: f64 = 5.0;
+/// Periods from a set to the next one that arrives: three in a row may be lost.
+const PERIODS: u32 = 4;
+/// Ages beyond this are not compensated: the look-ahead would hold the whole scene.
+const OLDEST: Duration = Duration::from_millis(250);
+
+/// How much farther than at its reading, m, the body may be until the set that answers it is replaced.
+///
+/// `velocity` is that of the reference point, then the angular one; `radius` is the body's about that point, m; `age` is that of the
+/// reading and stands for the way back, too; `period` is the time from set to set. Zero for what is not finite.
+#[must_use]
+pub fn device_ahead(velocity: &Vector6<f64>, radius: f64, age: Duration, period: Duration) -> f64 {
+    let horizon = (2 * age.min(OLDEST) + PERIODS * period).as_secs_f64();
+    let speed = velocity.fixed_rows::<3>(0).norm() + radius * velocity.fixed_rows::<3>(3).norm();
+    let ahead = speed * horizon + 0.5 * HAND_ACCELERATION * horizon * horizon;
+    if ahead.is_finite() { ahead } else { 0.0 }
+}
+
+/// The pose (world from body) at which the hand will be when the set that answers the reading is first used: `2 age` and a period on, at the
+/// reading's velocity.
+///
+/// `pose` itself where the velocity is not finite.
+#[must_use]
+pub fn device_predicted(
+    pose: &Pose,
+    velocity: &Vector6<f64>,
+    reference_point: &Point3<f64>,
+    age: Duration,
+    period: Duration,
+) -> Pose {
+    if !velocity.iter().all(|x| x.is_finite()) {
+        return *pose;
+    }
+    let horizon = (2 * age.min(OLDEST) + period).as_secs_f64();
+    let start = at_reference_point(pose, reference_point);
+    let there = advance_pose(&start, &(velocity * horizon), 1.0);
+    from_reference_point(&there, reference_point)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn a_steady_hand_is_where_it_is_predicted_and_nan_predicts_nothing() {
+        let point = Point3::new(0.0, 0.0, 0.1);
+        let pose = Pose::translation(0.3, 0.0, 0.0);
+        let velocity = Vector6::new(0.2, 0.0, 0.0, 0.0, 0.0, 2.0);
+        let there = device_predicted(&pose, &velocity, &point, 20 * MS, 10 * MS);
+        assert!((there * point - Point3::new(0.31, 0.0, 0.1)).norm() < 1e-15);
+        assert!((there.rotation.scaled_axis().z - 0.1).abs() < 1e-15);
+        let broken = Vector6::repeat(f64::NAN);
+        assert_eq!(device_predicted(&pose, &broken, &point, MS, MS), pose);
+    }
+
+    #[test]
+    fn the_way_grows_with_speed_turn_and_delay_and_nan_is_none() {
+        let still = Vector6::zeros();
+        let moving = Vector6::new(0.3, 0.0, 0.0, 0.0, 2.0, 0.0);
+        let near = device_ahead(&moving, 0.05, Duration::ZERO, MS);
+        // 0.4 m/s for 4 ms, and 40 um.
+        assert!((near - (0.4 * 4e-3 + 2.5 * 16e-6)).abs() < 1e-12);
+        let far = device_ahead(&moving, 0.05, 20 * MS, MS);
+        assert!(far > 10.0 * near && far > device_ahead(&still, 0.05, 20 * MS, MS));
+        let longest = device_ahead(&moving, 0.05, 250 * MS, MS);
+        assert_eq!(device_ahead(&moving, 0.05, 3600 * 1000 * MS, MS), longest);
+        assert_eq!(device_ahead(&Vector6::repeat(f64::NAN), 0.05, MS, MS), 0.0);
+    }
+}

@@ -1,0 +1,216 @@
+//! The coupling beside the device: newest whole constraint set, newest device sample, force.
+//!
+//! | time                 | clock              | what for                                                    |
+//! |----------------------|--------------------|-------------------------------------------------------------|
+//! | `now`, `received`    | the bridge's       | adaptation ramps, rows of moving obstacles, the watchdog      |
+//! | [`SetHead::made_ns`] | the session's      | the age that is told in reports                             |
+//!
+//! A ramp begins when its row is first seen here and lasts its time here, whatever the network did; so no step of the force depends on two clocks.
+//! The watchdog counts silence from a set's *arrival*: a network of 50 ms delays every set alike and is no silence.
+//! How old a set may be when it leaves is the server's part: it sends none that its god-object loop has not renewed for 80 ms.
+//!
+//! [`SetHead::made_ns`]: taut_link::proto::constraints::SetHead::made_ns
+
+use std::time::Duration;
+
+use god_object::{ConstraintSet, Coupling, Pose, ProjectionStatus};
+use nalgebra::Vector6;
+use taut_link::proto;
+use taut_link::proto::EdgeCoupling;
+use taut_link::proto::constraints::SET_PAUSED;
+
+use super::offer::{OfferError, world_of};
+use super::sets::{BrokenSet, read_set};
+
+/// A force beside the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeWrench {
+    /// Force then torque on the hand at the reference point, N and N m, world axes; before the safety stage.
+    pub wrench: Vector6<f64>,
+    /// When the constraint set that it rests on arrived, or was last confirmed; on the clock of `now`. What the safety stage counts
+    /// silence from.
+    pub received: Duration,
+    /// Number of that set.
+    pub sequence: u64,
+    /// The projection was solved; if not, the wrench is zero.
+    pub solved: bool,
+}
+
+/// The coupling of a bridge. [`EdgeCoupler::step`] allocates nothing and waits for nobody.
+#[derive(Debug)]
+pub struct EdgeCoupler {
+    coupling: Coupling,
+    set: ConstraintSet,
+    /// Where a set is read to, so that a broken one harms nothing.
+    next: ConstraintSet,
+    received: Option<Duration>,
+    paused: bool,
+}
+
+impl EdgeCoupler {
+    /// The coupling that a server offers.
+    ///
+    /// # Errors
+    /// [`OfferError`] when the offer holds a number that no scene has.
+    pub fn new(offer: &EdgeCoupling) -> Result<Self, OfferError> {
+        let (world, settings) = world_of(offer)?;
+        let capacity = settings.max_constraints;
+        Ok(Self {
+            coupling: Coupling::new(&world, &settings),
+            set: ConstraintSet::with_capacity(capacity),
+            next: ConstraintSet::with_capacity(capacity),
+            received: None,
+            paused: false,
+        })
+    }
+
+    /// Takes a whole set that arrived at `received`, on the clock of [`Self::step`]'s `now`.
+    ///
+    /// The same set again confirms it: its sender is alive. A set older than the present one changes nothing.
+    ///
+    /// # Errors
+    /// [`BrokenSet`]: the one before stays.
+    pub fn take(
+        &mut self,
+        wire: &proto::ConstraintSet,
+        received: Duration,
+    ) -> Result<(), BrokenSet> {
+        let known = self.received.is_some();
+        if known && wire.head.sequence < self.set.sequence {
+            return Ok(());
+        }
+        if !known || wire.head.sequence > self.set.sequence {
+            read_set(wire, &mut self.next)?;
+            std::mem::swap(&mut self.set, &mut self.next);
+        }
+        self.received = Some(received);
+        self.paused = wire.head.flags & SET_PAUSED != 0;
+        Ok(())
+    }
+
+    /// Number of the set in use; `None` before the first.
+    #[must_use]
+    pub fn sequence(&self) -> Option<u64> {
+        self.received.map(|_| self.set.sequence)
+    }
+
+    /// The force for a device pose (world from body); `None` before the first set. `now` never runs back.
+    #[must_use]
+    pub fn step(&mut self, now: Duration, device_pose: &Pose) -> Option<EdgeWrench> {
+        let received = self.received?;
+        let output = self
+            .coupling
+            .step(now.as_secs_f64(), device_pose, &self.set);
+        Some(EdgeWrench {
+            wrench: if self.paused {
+                Vector6::zeros()
+            } else {
+                output.wrench
+            },
+            received,
+            sequence: self.set.sequence,
+            solved: output.status == ProjectionStatus::Solved,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proto::PoseF64;
+    use proto::constraints::{ConstraintRow, SetHead};
+    use proto::coupling::EdgeSolver;
+
+    fn offer() -> EdgeCoupling {
+        EdgeCoupling {
+            mass: 1.0,
+            inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
+            reference_point: [0.0; 3],
+            radius: 0.02,
+            k_s: 0.5,
+            k_h: 2000.0,
+            radius_of_gyration: None,
+            adaptation: None,
+            look_ahead: true,
+            passive: false,
+            force_limit: 20.0,
+            torque_limit: 0.5,
+            rest_distance: 4e-6,
+            motion_tolerance: 2e-8,
+            max_constraints: 1024,
+            implicit_rounds: 0,
+            solver: EdgeSolver::ActiveSet,
+            set_rate_hz: 1000.0,
+            obstacles: Vec::new(),
+        }
+    }
+
+    /// A ball of 20 mm, 1 mm above the floor z = 0.
+    fn floor(sequence: u64, flags: u8) -> proto::ConstraintSet {
+        let mut set = proto::ConstraintSet::new();
+        set.head = SetHead {
+            sequence,
+            pose: PoseF64 {
+                position: [0.0, 0.0, 0.021],
+                ..PoseF64::IDENTITY
+            },
+            flags,
+            ..SetHead::default()
+        };
+        set.rows.push(ConstraintRow {
+            arm: [0.0, 0.0, -0.021],
+            normal: [0.0, 0.0, 1.0],
+            gap: 1e-3,
+            ..ConstraintRow::default()
+        });
+        set
+    }
+
+    const MS: Duration = Duration::from_millis(1);
+
+    #[test]
+    fn the_force_is_the_stiffness_times_the_depth_wherever_the_god_object_is() {
+        let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
+        assert_eq!(coupler.step(MS, &Pose::translation(0.0, 0.0, 0.0)), None);
+        assert_eq!(coupler.take(&floor(1, 0), 5 * MS), Ok(()));
+        for (place, depth) in [(0.0, 5e-3), (0.03, 5e-3), (0.0, -5e-3)] {
+            let pose = Pose::translation(place, 0.0, 0.02 - depth);
+            let felt = coupler.step(6 * MS, &pose).expect("a set is here");
+            // 1000 N/m, from the rest distance of 4 um on.
+            let expected = 1000.0 * f64::max(depth + 4e-6, 0.0);
+            assert!((felt.wrench[2] - expected).abs() < 1e-4, "{felt:?}");
+            assert!(felt.wrench.fixed_rows::<2>(0).norm() < 1e-9);
+            assert_eq!((felt.received, felt.sequence), (5 * MS, 1));
+        }
+    }
+
+    #[test]
+    fn newer_sets_replace_repeats_confirm_and_older_ones_change_nothing() {
+        let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
+        let pose = Pose::translation(0.0, 0.0, 0.015);
+        let mut state = |set: &proto::ConstraintSet, at| {
+            coupler.take(set, at * MS).expect("a set");
+            let felt = coupler.step(at * MS, &pose).expect("a set");
+            (felt.sequence, felt.received)
+        };
+        assert_eq!(state(&floor(4, 0), 1), (4, MS));
+        assert_eq!(state(&floor(3, 0), 2), (4, MS));
+        assert_eq!(state(&floor(4, 0), 3), (4, 3 * MS));
+        assert_eq!(state(&floor(5, 0), 4), (5, 4 * MS));
+    }
+
+    #[test]
+    fn a_paused_server_and_a_broken_set_give_no_new_force() {
+        let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
+        let pose = Pose::translation(0.0, 0.0, 0.015);
+        coupler.take(&floor(1, 0), MS).expect("a set");
+        let before = coupler.step(MS, &pose);
+        let mut broken = floor(2, 0);
+        broken.rows[0].normal = [0.0, 0.0, 0.5];
+        assert_eq!(coupler.take(&broken, 2 * MS), Err(BrokenSet::Normal));
+        assert_eq!(coupler.step(MS, &pose), before);
+        coupler.take(&floor(3, SET_PAUSED), 3 * MS).expect("a set");
+        let paused = coupler.step(3 * MS, &pose).expect("a set");
+        assert_eq!(paused.wrench, Vector6::zeros());
+    }
+}

@@ -1,0 +1,356 @@
+//! What a server tells a bridge at join: mass properties, constants and surfaces, from the method's world and back to one.
+//!
+//! The bridge's world has no geometry: a tetrahedron as large as the body stands for it, a small one for each obstacle. The
+//! coupling looks at none of them but for the body's radius.
+
+use god_object::nalgebra::{Matrix3, Point3, Vector3};
+use god_object::{
+    Adaptation, Body, Mesh, Obstacle, RotationMetric, Settings, SettingsError, SineTexture,
+    SolverKind, Surface, Texture, World,
+};
+use taut_link::proto::constraints::MAX_SET_ROWS;
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface};
+use taut_link::proto::{CouplingOffer, EdgeCoupling, PoseF64};
+
+/// A unit vector may be this far from unit length: some roundings.
+const UNIT_TOLERANCE: f64 = 1e-9;
+
+/// Why a server's offer makes no coupling.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OfferError {
+    /// A constant is out of range.
+    #[error("the server's coupling cannot be used: {0}; install the same release on both sides")]
+    Settings(#[from] SettingsError),
+    /// Mass, inertia, radius, a surface or a pose is none.
+    #[error(
+        "the server's coupling has {what} that is none; install the same release on both sides"
+    )]
+    Invalid {
+        /// What it is.
+        what: &'static str,
+    },
+}
+
+/// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it cannot.
+#[must_use]
+pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> CouplingOffer {
+    let at_server = |reason: &str| CouplingOffer::AtServer {
+        reason: reason.to_owned(),
+    };
+    if settings.max_constraints > MAX_SET_ROWS {
+        return at_server("its constraint sets may have more rows than travel (1024)");
+    }
+    if settings.solver == SolverKind::Clarabel {
+        return at_server("its solver takes memory, which a device's loop may not");
+    }
+    let surface = |obstacle: &Obstacle| {
+        let sine = match &obstacle.surface.texture {
+            None => None,
+            Some(Texture::Sine(sine)) => Some(EdgeSine {
+                axis: sine.axis.into(),
+                wavelength: sine.wavelength,
+                amplitude: sine.amplitude,
+            }),
+            Some(_) => return None,
+        };
+        Some(EdgeSurface {
+            pose: PoseF64::from_isometry(&obstacle.pose),
+            friction: obstacle.surface.friction,
+            sine,
+        })
+    };
+    let Some(obstacles) = world.obstacles.iter().map(surface).collect() else {
+        return at_server("a surface has a height map, which does not travel");
+    };
+    let body = &world.body;
+    let mut inertia = [0.0; 9];
+    // Column by column or row by row: it is symmetric.
+    inertia.copy_from_slice(body.inertia.as_slice());
+    CouplingOffer::AtEdge(EdgeCoupling {
+        mass: body.mass,
+        inertia,
+        reference_point: body.reference_point.coords.into(),
+        radius: body.mesh.radius_about(&body.reference_point),
+        k_s: settings.k_s,
+        k_h: settings.k_h,
+        radius_of_gyration: match settings.rotation_metric {
+            RotationMetric::Inertia => None,
+            RotationMetric::RadiusOfGyration(radius) => Some(radius),
+        },
+        adaptation: settings.adaptation.map(|adaptation| EdgeAdaptation {
+            duration: adaptation.duration,
+            threshold: adaptation.threshold,
+        }),
+        look_ahead: settings.look_ahead,
+        passive: settings.passive,
+        force_limit: settings.force_limit,
+        torque_limit: settings.torque_limit,
+        rest_distance: settings.rest_distance,
+        motion_tolerance: settings.motion_tolerance,
+        max_constraints: settings.max_constraints as u32, // at most MAX_SET_ROWS
+        implicit_rounds: settings.implicit_rounds,
+        solver: match settings.solver {
+            SolverKind::ProjectedGaussSeidel => EdgeSolver::GaussSeidel,
+            SolverKind::ActiveSet | SolverKind::Clarabel => EdgeSolver::ActiveSet,
+        },
+        set_rate_hz,
+        obstacles,
+    })
+}
+
+/// The world and the settings of a coupling as offered.
+///
+/// # Errors
+/// [`OfferError`]: a number that no scene has.
+pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
+    let positive = |value: f64, what| {
+        let positive = value.is_finite() && value > 0.0;
+        positive
+            .then_some(value)
+            .ok_or(OfferError::Invalid { what })
+    };
+    let mass = positive(offer.mass, "a mass")?;
+    let radius = positive(offer.radius, "a radius")?;
+    positive(offer.set_rate_hz, "a rate of sets")?;
+    let inertia = Matrix3::from_row_slice(&offer.inertia);
+    let definite = inertia == inertia.transpose() && inertia.cholesky().is_some();
+    if !definite {
+        return Err(OfferError::Invalid {
+            what: "an inertia tensor",
+        });
+    }
+    let mut reference_point = Point3::from(offer.reference_point);
+    if !reference_point.iter().all(|x| x.is_finite()) {
+        reference_point = Point3::origin();
+    }
+    let settings = settings_of(offer)?;
+    let obstacles = offer
+        .obstacles
+        .iter()
+        .map(obstacle)
+        .collect::<Result<_, _>>()?;
+    let world = World {
+        body: Body {
+            mesh: tetrahedron(&reference_point, radius)?,
+            primitive: None,
+            mass,
+            inertia,
+            reference_point,
+        },
+        obstacles,
+    };
+    Ok((world, settings))
+}
+
+fn settings_of(offer: &EdgeCoupling) -> Result<Settings, OfferError> {
+    let scale = offer.rest_distance / Settings::for_size(1.0).rest_distance;
+    let settings = Settings {
+        k_s: offer.k_s,
+        k_h: offer.k_h,
+        rotation_metric: offer
+            .radius_of_gyration
+            .map_or(RotationMetric::Inertia, RotationMetric::RadiusOfGyration),
+        adaptation: offer.adaptation.map(|adaptation| Adaptation {
+            duration: adaptation.duration,
+            threshold: adaptation.threshold,
+        }),
+        look_ahead: offer.look_ahead,
+        passive: offer.passive,
+        force_limit: offer.force_limit,
+        torque_limit: offer.torque_limit,
+        rest_distance: offer.rest_distance,
+        motion_tolerance: offer.motion_tolerance,
+        max_constraints: (offer.max_constraints as usize).min(MAX_SET_ROWS),
+        implicit_rounds: offer.implicit_rounds,
+        solver: match offer.solver {
+            EdgeSolver::ActiveSet => SolverKind::ActiveSet,
+            EdgeSolver::GaussSeidel => SolverKind::ProjectedGaussSeidel,
+        },
+        // Lengths of the god-object loop, which is not here: in the order that is asked of them.
+        ..Settings::for_size(scale)
+    };
+    settings.validate()?;
+    Ok(settings)
+}
+
+fn obstacle(surface: &EdgeSurface) -> Result<Obstacle, OfferError> {
+    let pose = surface.pose.to_isometry().ok_or(OfferError::Invalid {
+        what: "an obstacle's pose",
+    })?;
+    let friction = surface.friction;
+    if !(friction.is_finite() && friction >= 0.0) {
+        return Err(OfferError::Invalid {
+            what: "a coefficient of friction",
+        });
+    }
+    let texture = surface.sine.map(sine).transpose()?.map(Texture::Sine);
+    Ok(Obstacle {
+        name: String::new(),
+        mesh: tetrahedron(&Point3::origin(), 1.0)?,
+        primitive: None,
+        pose,
+        surface: Surface {
+            shading: None, // shading normals come with the rows
+            texture,
+            friction,
+        },
+    })
+}
+
+fn sine(sine: EdgeSine) -> Result<SineTexture, OfferError> {
+    let axis = Vector3::from(sine.axis);
+    let valid = (axis.norm() - 1.0).abs() <= UNIT_TOLERANCE
+        && sine.wavelength.is_finite()
+        && sine.wavelength > 0.0
+        && sine.amplitude.is_finite();
+    valid
+        .then_some(SineTexture {
+            axis,
+            wavelength: sine.wavelength,
+            amplitude: sine.amplitude,
+        })
+        .ok_or(OfferError::Invalid { what: "a texture" })
+}
+
+/// A regular tetrahedron with its corners at `radius` around `center`, m.
+fn tetrahedron(center: &Point3<f64>, radius: f64) -> Result<Mesh, OfferError> {
+    let corner =
+        |x: f64, y: f64, z: f64| center + Vector3::new(x, y, z) * (radius / 3.0_f64.sqrt());
+    let corners = vec![
+        corner(1.0, 1.0, 1.0),
+        corner(1.0, -1.0, -1.0),
+        corner(-1.0, 1.0, -1.0),
+        corner(-1.0, -1.0, 1.0),
+    ];
+    let faces = vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+    Mesh::new(corners, faces).map_err(|_| OfferError::Invalid { what: "a size" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use god_object::Pose;
+
+    fn scene() -> (World, Settings) {
+        let size = 0.05;
+        let obstacle = |friction, texture| Obstacle {
+            name: "wall".to_owned(),
+            mesh: tetrahedron(&Point3::origin(), 0.3).expect("a mesh"),
+            primitive: None,
+            pose: Pose::translation(0.1, 0.2, 0.3),
+            surface: Surface {
+                shading: None,
+                texture,
+                friction,
+            },
+        };
+        let sine = Texture::Sine(SineTexture {
+            axis: Vector3::y(),
+            wavelength: 2e-3,
+            amplitude: 0.2,
+        });
+        let world = World {
+            body: Body {
+                mesh: tetrahedron(&Point3::new(0.01, 0.0, 0.0), size).expect("a mesh"),
+                primitive: None,
+                mass: 0.7,
+                inertia: Matrix3::from_diagonal(&Vector3::new(2.0, 3.0, 4.0)) * 1e-3,
+                reference_point: Point3::new(0.01, 0.0, 0.0),
+            },
+            obstacles: vec![obstacle(0.0, None), obstacle(0.3, Some(sine))],
+        };
+        let settings = Settings {
+            k_s: 0.7,
+            k_h: 1500.0,
+            rotation_metric: RotationMetric::RadiusOfGyration(0.03),
+            implicit_rounds: 2,
+            force_limit: 15.0,
+            ..Settings::for_size(size)
+        };
+        (world, settings)
+    }
+
+    fn offered(world: &World, settings: &Settings) -> EdgeCoupling {
+        match offer_of(world, settings, 1000.0) {
+            CouplingOffer::AtEdge(offer) => offer,
+            CouplingOffer::AtServer { reason } => panic!("{reason}"),
+        }
+    }
+
+    #[test]
+    fn what_the_coupling_asks_of_a_world_comes_back() {
+        let (world, settings) = scene();
+        let (there, back) = world_of(&offered(&world, &settings)).expect("a world");
+        assert_eq!(there.body.mass, world.body.mass);
+        assert_eq!(there.body.inertia, world.body.inertia);
+        assert_eq!(there.body.reference_point, world.body.reference_point);
+        let radius = |world: &World| world.body.mesh.radius_about(&world.body.reference_point);
+        assert!((radius(&there) - radius(&world)).abs() < 1e-15);
+        for (there, here) in there.obstacles.iter().zip(&world.obstacles) {
+            assert_eq!((&there.pose, &there.surface), (&here.pose, &here.surface));
+        }
+        let relevant = Settings {
+            minimum_gap: back.minimum_gap,
+            gap_tolerance: back.gap_tolerance,
+            activation_distance: back.activation_distance,
+            look_ahead_limit: back.look_ahead_limit,
+            ..settings
+        };
+        assert_eq!(back, relevant);
+    }
+
+    #[test]
+    fn a_height_map_and_too_many_rows_stay_at_the_server() {
+        let (mut world, settings) = scene();
+        let many = Settings {
+            max_constraints: MAX_SET_ROWS + 1,
+            ..settings
+        };
+        assert!(matches!(
+            offer_of(&world, &many, 1000.0),
+            CouplingOffer::AtServer { .. }
+        ));
+        let map = god_object::HeightMap::new(2, &[0.0; 4]);
+        world.obstacles[0].surface.texture = map.ok().map(|map| {
+            Texture::HeightMap(god_object::HeightMapTexture {
+                map: std::sync::Arc::new(map),
+                tile: 0.1,
+                amplitude: 1e-4,
+            })
+        });
+        assert!(matches!(
+            offer_of(&world, &settings, 1000.0),
+            CouplingOffer::AtServer { .. }
+        ));
+    }
+
+    #[test]
+    fn an_offer_that_no_scene_makes_is_refused() {
+        let (world, settings) = scene();
+        let good = offered(&world, &settings);
+        let refused = |change: fn(&mut EdgeCoupling)| {
+            let mut offer = good.clone();
+            change(&mut offer);
+            world_of(&offer).expect_err("nonsense").to_string()
+        };
+        for (sentence, part) in [
+            (refused(|offer| offer.mass = 0.0), "a mass"),
+            (
+                refused(|offer| offer.inertia[0] = -1.0),
+                "an inertia tensor",
+            ),
+            (refused(|offer| offer.radius = f64::NAN), "a radius"),
+            (refused(|offer| offer.k_s = 2.0), "k_s"),
+            (
+                refused(|offer| offer.obstacles[1].friction = -1.0),
+                "friction",
+            ),
+            (
+                refused(|offer| offer.obstacles[0].pose.rotation = [0.0; 4]),
+                "pose",
+            ),
+        ] {
+            assert!(sentence.contains(part), "{sentence}");
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! Whether there is force: a state machine, and the share of the commanded wrench that it lets through.
+//!
+//! ```text
+//!              asked (or automatic), inputs good, dead-man held
+//!   Disarmed ────────────────────────────────────────────────────► Arming ── ramp-in over ──► Armed
+//!      ▲                                                            ▲  │                      │  ▲
+//!      │                      fresh again after a silence           │  │   input late or bad  │  │ fresh again
+//!      │          ┌─────────────────────────────────────────────────┘  ▼                      ▼  │ in time
+//!      │          │                                                 Holding ◄─────────────────────
+//!      │ zero, disarmed by somebody                                    │ older than the hold
+//!      └──────────┤                                                    ▼
+//!              Fading ◄────────────────────────────────────────────────┘
+//!                 │ zero, after a fault
+//!                 ▼
+//!              Faulted ── asked again (or automatic), inputs good ──► Arming
+//! ```
+//!
+//! | name in code | unit | meaning |
+//! |--------------|------|---------|
+//! | `gain`       | –    | share of the wrench that is let through, in [0, 1] |
+
+use std::time::Duration;
+
+use super::event::EventKind;
+use super::settings::{Rearm, SafetySettings};
+
+/// Where the port stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ArmingState {
+    /// No force; nothing is wrong.
+    #[default]
+    Disarmed,
+    /// The force ramps in.
+    Arming,
+    /// The force is there in full.
+    Armed,
+    /// An input is late or bad: the last force is held, for at most the hold.
+    Holding,
+    /// The force ramps out.
+    Fading,
+    /// No force after a fault.
+    Faulted,
+}
+
+impl ArmingState {
+    /// For people.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarmed",
+            Self::Arming => "arming",
+            Self::Armed => "armed",
+            Self::Holding => "holding",
+            Self::Fading => "fading",
+            Self::Faulted => "faulted",
+        }
+    }
+
+    /// Whether somebody has to arm before there is force again, or the port itself when it may.
+    #[must_use]
+    pub fn is_off(self) -> bool {
+        matches!(self, Self::Disarmed | Self::Faulted)
+    }
+}
+
+/// What the port found out about this tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Situation {
+    /// A fault of the samples or of the wrench lasts; since when there was no good input.
+    pub(super) fault_since: Option<Duration>,
+    /// The commands stopped: since when they are too old.
+    pub(super) stale_since: Option<Duration>,
+    /// Nothing is wrong yet, but the last input is late.
+    pub(super) late: bool,
+    /// There was at least one command.
+    pub(super) commanded: bool,
+    /// The dead-man's button is held, or there is none.
+    pub(super) held: bool,
+    /// Somebody asks for force.
+    pub(super) asked: bool,
+    /// Somebody asks for no force.
+    pub(super) disarm: bool,
+}
+
+/// Why the force went away, the gravest last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Cause {
+    Silence,
+    Request,
+    Fault,
+}
+
+/// The way down: what was felt when it began.
+#[derive(Clone, Copy, Debug)]
+struct Fade {
+    since: Duration,
+    gain: f64,
+}
+
+/// The state machine. No allocation.
+#[derive(Clone, Debug)]
+pub(super) struct Arming {
+    state: ArmingState,
+    gain: f64,
+    cause: Cause,
+    fade: Fade,
+    /// The port may arm by itself: as configured, until somebody disarms.
+    automatic: bool,
+    configured: bool,
+    last: Option<Duration>,
+    was_held: bool,
+}
+
+impl Arming {
+    pub(super) fn new(settings: &SafetySettings) -> Self {
+        Self {
+            state: ArmingState::Disarmed,
+            gain: 0.0,
+            cause: Cause::Silence,
+            fade: Fade {
+                since: Duration::ZERO,
+                gain: 0.0,
+            },
+            automatic: settings.rearm == Rearm::Automatic,
+            configured: settings.rearm == Rearm::Automatic,
+            last: None,
+            was_held: false,
+        }
+    }
+
+    pub(super) fn state(&self) -> ArmingState {
+        self.state
+    }
+
+    /// Share of the wrench that is let through now.
+    pub(super) fn gain(&self) -> f64 {
+        self.gain
+    }
+
+    /// Whether the wrench from before the fault goes on being felt, and no new one.
+    pub(super) fn keeps_last_wrench(&self) -> bool {
+        let on_the_way_down = matches!(self.state, ArmingState::Holding | ArmingState::Fading);
+        on_the_way_down && self.cause == Cause::Fault
+    }
+
+    /// The commands come from somebody else from now on: what there was is gone, and new ones ramp in from zero.
+    pub(super) fn restart(&mut self) {
+        if self.state.is_off() || self.cause_lasts() {
+            return;
+        }
+        self.state = ArmingState::Fading;
+        self.cause = Cause::Silence;
+        self.gain = 0.0;
+        self.fade.gain = 0.0;
+    }
+
+    /// On the way down for a graver cause than silence.
+    fn cause_lasts(&self) -> bool {
+        let falling = matches!(self.state, ArmingState::Holding | ArmingState::Fading);
+        falling && self.cause > Cause::Silence
+    }
+
+    /// One tick; tells at most two things.
+    pub(super) fn step(
+        &mut self,
+        now: Duration,
+        settings: &SafetySettings,
+        situation: &Situation,
+    ) -> [Option<EventKind>; 2] {
+        // A clock that goes back passes no time, and a stall of the caller lets no force in at once.
+        let passed = now.saturating_sub(self.last.unwrap_or(now));
+        let passed = passed.min(settings.hold);
+        self.last = Some(self.last.map_or(now, |last| last.max(now)));
+
+        let mut told = [None; 2];
+        let let_go = self.was_held && !situation.held;
+        self.was_held = situation.held;
+        if self.state.is_off() {
+            told[0] = self.while_off(situation);
+            return told;
+        }
+        if let_go {
+            told[0] = Some(EventKind::DeadManReleased);
+        } else if situation.disarm {
+            told[0] = Some(EventKind::Disarmed);
+        }
+        if self.blame(now, settings, situation) {
+            told[1] = Some(EventKind::Arming);
+        }
+        match self.state {
+            ArmingState::Arming => {
+                self.gain = (self.gain + ratio(passed, settings.ramp_in)).min(1.0);
+                if self.gain >= 1.0 {
+                    self.state = ArmingState::Armed;
+                    told[1] = Some(EventKind::Armed);
+                }
+            }
+            ArmingState::Holding if self.cause == Cause::Fault && now >= self.fade.since => {
+                self.state = ArmingState::Fading;
+                told[1] = self.fall(now, settings);
+            }
+            ArmingState::Fading => told[1] = self.fall(now, settings),
+            _ => {}
+        }
+        told
+    }
+
+    /// No force: whether it may come.
+    fn while_off(&mut self, situation: &Situation) -> Option<EventKind> {
+        let in_order = situation.fault_since.is_none()
+            && situation.stale_since.is_none()
+            && situation.commanded
+            && situation.held;
+        if situation.disarm {
+            self.automatic = false;
+            self.state = ArmingState::Disarmed;
+            return Some(EventKind::Disarmed);
+        }
+        if !(situation.asked || self.automatic) {
+            return None;
+        }
+        if in_order {
+            self.state = ArmingState::Arming;
+            self.cause = Cause::Silence;
+            self.gain = 0.0;
+            self.automatic = self.configured;
+            return Some(EventKind::Arming);
+        }
+        situation.asked.then_some(EventKind::ArmRefused)
+    }
+
+    /// Takes the gravest of what is wrong. Whether all is well again after the force had begun to fade.
+    fn blame(&mut self, now: Duration, settings: &SafetySettings, situation: &Situation) -> bool {
+        let falling = matches!(self.state, ArmingState::Holding | ArmingState::Fading);
+        let known = falling.then_some(self.cause);
+        if let Some(since) = situation.fault_since {
+            if known != Some(Cause::Fault) {
+                self.cause = Cause::Fault;
+                if self.state != ArmingState::Fading {
+                    self.state = ArmingState::Holding;
+                    self.fade = Fade {
+                        since: since.saturating_add(settings.hold),
+                        gain: self.gain,
+                    };
+                }
+            }
+        } else if situation.disarm || !situation.held {
+            if known.is_none_or(|cause| cause < Cause::Request) {
+                self.cause = Cause::Request;
+                self.begin_fading(now);
+            }
+        } else if let Some(since) = situation.stale_since {
+            if self.state != ArmingState::Fading
+                && known.is_none_or(|cause| cause == Cause::Silence)
+            {
+                self.cause = Cause::Silence;
+                self.begin_fading(since);
+            }
+        } else if situation.late {
+            if !falling {
+                self.state = ArmingState::Holding;
+                self.cause = Cause::Silence;
+            }
+        } else if falling && self.cause == Cause::Silence {
+            let faded = self.state == ArmingState::Fading;
+            self.state = if self.gain < 1.0 {
+                ArmingState::Arming
+            } else {
+                ArmingState::Armed
+            };
+            return faded;
+        }
+        if situation.disarm {
+            // Who disarms wants to be asked.
+            self.automatic = false;
+        }
+        false
+    }
+
+    fn begin_fading(&mut self, since: Duration) {
+        if self.state != ArmingState::Fading {
+            self.state = ArmingState::Fading;
+            self.fade = Fade {
+                since,
+                gain: self.gain,
+            };
+        }
+    }
+
+    /// Follows the way down; at its end nothing is left.
+    fn fall(&mut self, now: Duration, settings: &SafetySettings) -> Option<EventKind> {
+        let faded = ratio(now.saturating_sub(self.fade.since), settings.ramp_out);
+        self.gain = self.gain.min(self.fade.gain * (1.0 - faded).max(0.0));
+        if self.gain > 0.0 {
+            return None;
+        }
+        match self.cause {
+            Cause::Fault => {
+                self.state = ArmingState::Faulted;
+                (!self.automatic).then_some(EventKind::RearmNeeded)
+            }
+            Cause::Request => {
+                self.state = ArmingState::Disarmed;
+                None
+            }
+            // Fresh inputs ramp it in again, whoever armed it before.
+            Cause::Silence => None,
+        }
+    }
+}
+
+/// `part` over `whole`; one when `whole` is zero.
+fn ratio(part: Duration, whole: Duration) -> f64 {
+    if whole.is_zero() {
+        1.0
+    } else {
+        part.as_secs_f64() / whole.as_secs_f64()
+    }
+}

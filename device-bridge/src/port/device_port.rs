@@ -1,0 +1,387 @@
+//! One tick between a loop and its device: everything in, everything out.
+
+use std::time::Duration;
+
+use nalgebra::{Point3, Vector6};
+
+use super::arming::{Arming, ArmingState, Situation};
+use super::buttons::Buttons;
+use super::clamp::{Clamped, clamp};
+use super::energy::EnergyObserver;
+use super::event::{EventKind, Events, Spell, Teller, kind_of_fault};
+use super::passivity::PassivityController;
+use super::settings::SafetySettings;
+use super::slew::{SlewLimit, Slewed};
+use super::validation::{SampleCheck, Verdict, at_rest};
+use super::watchdog::{Command, Freshness, LATE, Missing, freshness};
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Pose};
+
+/// What the device says in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// The newest sample that may be trusted; at the start the start pose at rest. Its velocity is zero while a fault lasts.
+    pub sample: DeviceSample,
+    /// Why there is no newer one.
+    pub fault: Option<DeviceFault>,
+    /// What the hand feels, where the device is far away and tells.
+    pub felt: Option<Felt>,
+}
+
+/// What a tick did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
+pub struct TickReport {
+    /// What came in.
+    pub reading: Reading,
+    /// What went out: N, N m.
+    pub wrench: Vector6<f64>,
+    /// Where the port stands.
+    pub state: ArmingState,
+    /// What happened.
+    pub events: Events,
+}
+
+/// A device behind all that keeps its forces safe. No allocation after `new`.
+pub struct DevicePort {
+    device: Box<dyn Device>,
+    settings: SafetySettings,
+    check: SampleCheck,
+    arming: Arming,
+    controller: PassivityController,
+    slew: SlewLimit,
+    energy: EnergyObserver,
+    spells: Spells,
+    teller: Teller,
+    last_tick: Option<Duration>,
+    sample: DeviceSample,
+    /// When the newest good sample was seen.
+    last_good: Option<Duration>,
+    fault: Option<DeviceFault>,
+    /// Energy given out since the last sample, J.
+    work: f64,
+    /// The newest command that may be rendered, and when it was seen.
+    held: Vector6<f64>,
+    last_command: Option<Duration>,
+    arm_asked: bool,
+    disarm_asked: bool,
+    buttons: Buttons,
+}
+
+/// What is told when it begins.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spells {
+    not_finite: Spell,
+    stale: [Spell; 3],
+    force: Spell,
+    torque: Spell,
+    force_slew: Spell,
+    torque_slew: Spell,
+    passivity: Spell,
+}
+
+impl DevicePort {
+    /// A port without force. `reference_point` is G in the body's own frame; the device stands at `start` until it says
+    /// otherwise. The limits are those of `settings`, of the device, and what can fade in time, whichever is smallest.
+    #[must_use]
+    pub fn new(
+        device: Box<dyn Device>,
+        settings: SafetySettings,
+        reference_point: Point3<f64>,
+        start: &Pose,
+    ) -> Self {
+        let info = device.info();
+        let mut settings = settings.within(&info.limits).that_can_fade();
+        if info.actuated_degrees_of_freedom == 0 {
+            // A trace may stop dead: nobody feels it.
+            settings.validation.frozen_after = Duration::ZERO;
+        }
+        Self {
+            check: SampleCheck::new(settings.validation, reference_point, settings.period),
+            arming: Arming::new(&settings),
+            controller: PassivityController::new(settings.passivity),
+            slew: SlewLimit::new(settings.force_rate, settings.torque_rate, settings.period),
+            energy: EnergyObserver::new(reference_point),
+            spells: Spells::default(),
+            teller: Teller::default(),
+            last_tick: None,
+            sample: at_rest(start),
+            last_good: None,
+            fault: None,
+            work: 0.0,
+            held: Vector6::zeros(),
+            last_command: None,
+            arm_asked: false,
+            disarm_asked: false,
+            buttons: Buttons::new(settings.dead_man, settings.arm_button),
+            device,
+            settings,
+        }
+    }
+
+    /// What the device is.
+    #[must_use]
+    pub fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    /// Limits and times in force.
+    #[must_use]
+    pub fn settings(&self) -> &SafetySettings {
+        &self.settings
+    }
+
+    /// Where the port stands.
+    #[must_use]
+    pub fn state(&self) -> ArmingState {
+        self.arming.state()
+    }
+
+    /// What the coupling did to the hand.
+    #[must_use]
+    pub fn energy(&self) -> &EnergyObserver {
+        &self.energy
+    }
+
+    /// The fault that the device is in.
+    #[must_use]
+    pub fn fault(&self) -> Option<DeviceFault> {
+        self.fault
+    }
+
+    /// The wrench on the hand since the last write, N and N m.
+    #[must_use]
+    pub fn rendered(&self) -> &Vector6<f64> {
+        self.slew.rendered()
+    }
+
+    /// Asks for force, as a person does; the next tick grants or refuses it.
+    pub fn ask_to_arm(&mut self) {
+        self.arm_asked = true;
+    }
+
+    /// Asks for no force: it fades from the next tick on, until somebody arms again.
+    pub fn ask_to_disarm(&mut self) {
+        self.disarm_asked = true;
+    }
+
+    /// The commands come from somebody else from now on: the force ramps in from zero again.
+    pub fn restart(&mut self) {
+        self.last_command = None;
+        self.held = Vector6::zeros();
+        self.arming.restart();
+    }
+
+    /// One period: reads the device, asks `command` for the newest command (`None` before the first), makes it safe, writes it.
+    pub fn tick(
+        &mut self,
+        now: Duration,
+        command: impl FnOnce(&Reading) -> Option<Command>,
+    ) -> TickReport {
+        self.teller.begin_tick(now);
+        let passed = now.saturating_sub(self.last_tick.unwrap_or(now));
+        self.last_tick = Some(now);
+        if passed > self.settings.hold {
+            self.teller
+                .tell(EventKind::PortStalled, passed.as_secs_f64());
+        }
+        let reading = self.sense(now);
+        let command = command(&reading);
+        let wrench = self.render(now, passed, command);
+        self.device.write(now, &wrench);
+        // A bridge's own word is what does the work.
+        self.energy
+            .hold(&reading.felt.map_or(wrench, |felt| felt.wrench));
+        TickReport {
+            reading,
+            wrench,
+            state: self.arming.state(),
+            events: *self.teller.events(),
+        }
+    }
+
+    /// Lets the force come down by one period's share without reading the device; whether it is zero. For the end of a
+    /// loop: call it once per period until it is true.
+    pub fn release_step(&mut self, now: Duration) -> bool {
+        let wrench = self.slew.step(now, &Vector6::zeros()).wrench;
+        self.device.write(now, &wrench);
+        self.energy.hold(&wrench);
+        self.arming.restart();
+        wrench == Vector6::zeros()
+    }
+
+    /// Reads the device.
+    fn sense(&mut self, now: Duration) -> Reading {
+        let reading = self.device.read(now);
+        let verdict = match self.check.judge(now, reading) {
+            // A driver that gives its last sample for ever has lost its device too.
+            Verdict::Same => match self.last_good.map(|seen| now.saturating_sub(seen)) {
+                Some(age) if age > self.settings.hold => Verdict::Bad(DeviceFault::Lost { age }),
+                _ => Verdict::Same,
+            },
+            verdict => verdict,
+        };
+        self.work = 0.0;
+        match verdict {
+            Verdict::Good(sample) => {
+                self.sample = sample;
+                if !self.check.is_suspect() {
+                    self.last_good = Some(now);
+                }
+                self.work = self.energy.measure(&sample.pose);
+                if self.fault.take().is_some() {
+                    self.teller.tell(EventKind::DeviceBack, 0.0);
+                }
+            }
+            Verdict::Same => {}
+            Verdict::Bad(fault) => {
+                self.sample.velocity = Vector6::zeros();
+                self.energy.skip();
+                if self.fault.is_none() {
+                    let (kind, value) = kind_of_fault(&fault);
+                    self.teller.tell(kind, value);
+                }
+                self.fault.get_or_insert(fault);
+            }
+        }
+        Reading {
+            sample: self.sample,
+            fault: self.fault,
+            felt: self.device.felt(),
+        }
+    }
+
+    /// From a command to what may be written.
+    fn render(
+        &mut self,
+        now: Duration,
+        passed: Duration,
+        command: Option<Command>,
+    ) -> Vector6<f64> {
+        let (situation, taken) = self.situation(now, command);
+        let changes = self.arming.step(now, &self.settings, &situation);
+        for kind in changes.into_iter().flatten() {
+            self.teller.tell(kind, 0.0);
+        }
+        if let Some(wrench) = taken
+            && !self.arming.keeps_last_wrench()
+        {
+            self.held = wrench;
+        }
+        let gain = self.arming.gain();
+        // Limited first too: a huge command would turn infinite, and a small share of it would be none of its limit.
+        let settings = &self.settings;
+        let limited = clamp(&self.held, settings.max_force, settings.max_torque);
+        let shared = limited.wrench * gain;
+        let damping = self.controller.step(
+            self.work,
+            self.energy.travel(),
+            passed.as_secs_f64(),
+            &shared,
+        );
+        let damped = shared + damping.wrench * gain;
+        let safe = clamp(&damped, settings.max_force, settings.max_torque).wrench;
+        let slewed = self.slew.step(now, &safe);
+
+        self.tell_limits(now, &limited, &slewed, damping.debt);
+        slewed.wrench
+    }
+
+    /// Tells which limits begin to act.
+    fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
+        let felt = self.arming.gain() > 0.0;
+        let spells = &mut self.spells;
+        let acting = [
+            (
+                &mut spells.force,
+                EventKind::ForceLimited,
+                limited.force_asked.filter(|_| felt),
+            ),
+            (
+                &mut spells.torque,
+                EventKind::TorqueLimited,
+                limited.torque_asked.filter(|_| felt),
+            ),
+            (
+                &mut spells.force_slew,
+                EventKind::ForceSlewLimited,
+                slewed.force_asked,
+            ),
+            (
+                &mut spells.torque_slew,
+                EventKind::TorqueSlewLimited,
+                slewed.torque_asked,
+            ),
+            (
+                &mut spells.passivity,
+                EventKind::PassivityActs,
+                (debt > 0.0).then_some(debt),
+            ),
+        ];
+        for (spell, kind, value) in acting {
+            if spell.begins(now, value.is_some()) {
+                self.teller.tell(kind, value.unwrap_or(0.0));
+            }
+        }
+    }
+
+    /// What is wrong in this tick, and the wrench of the command if it may be taken.
+    fn situation(
+        &mut self,
+        now: Duration,
+        command: Option<Command>,
+    ) -> (Situation, Option<Vector6<f64>>) {
+        let finite = command.is_none_or(|command| command.wrench.iter().all(|x| x.is_finite()));
+        if self.spells.not_finite.begins(now, !finite) {
+            self.teller.tell(EventKind::WrenchNotFinite, 0.0);
+        }
+        let fresh = command.map(|command| freshness(now, &command, &self.settings));
+        let mut taken = command.map(|command| command.wrench).filter(|_| finite);
+        let mut stale_since = None;
+        match fresh {
+            Some(Freshness::Stale {
+                missing,
+                age,
+                since,
+            }) => {
+                let (spell, kind) = match missing {
+                    Missing::Command => (0, EventKind::ForceStale),
+                    Missing::Constraints => (1, EventKind::ConstraintsStale),
+                    Missing::NotOnClock => (2, EventKind::CommandNotOnClock),
+                };
+                if missing == Missing::NotOnClock {
+                    taken = None;
+                }
+                stale_since = Some(since);
+                let begins = self.spells.stale[spell].begins(now, true);
+                if begins && !self.arming.state().is_off() {
+                    self.teller.tell(kind, age.as_secs_f64());
+                }
+            }
+            Some(_) => {}
+            None => stale_since = Some(now),
+        }
+
+        if taken.is_some() {
+            self.last_command = command.map(|command| command.made.min(now));
+        }
+        // The force is as old as the older of the two that it rests on.
+        let newest = |seen: Option<Duration>| seen.unwrap_or(now);
+        let is_fault = self.fault.is_some() || !finite;
+        let fault_since = is_fault.then(|| newest(self.last_good).min(newest(self.last_command)));
+        let late_sample = self
+            .last_good
+            .is_some_and(|seen| now.saturating_sub(seen) > LATE);
+        let down = self.last_good.map(|_| self.sample.buttons);
+        let (held, pressed) = self.buttons.step(down);
+        let situation = Situation {
+            fault_since,
+            stale_since,
+            late: late_sample || fresh == Some(Freshness::Late),
+            commanded: command.is_some() && self.last_good.is_some(),
+            held,
+            asked: std::mem::take(&mut self.arm_asked) || pressed,
+            disarm: std::mem::take(&mut self.disarm_asked),
+        };
+        (situation, taken)
+    }
+}

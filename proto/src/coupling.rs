@@ -1,0 +1,173 @@
+//! What a device bridge needs in order to couple by itself: told once, at join, on the control stream.
+//!
+//! The bridge gets no geometry: mass properties, constants and the surfaces of the obstacles are all that the coupling asks of a world. Constraint
+//! sets follow as datagrams, see [`crate::constraints`].
+
+use crate::{
+    DecodeError, EncodeError, PoseF64,
+    codec::{Reader, Wire, Writer, wire_struct, wire_tag},
+};
+
+/// Where a device's force may be computed.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "made once per session, never moved in a loop"
+)]
+pub enum CouplingOffer {
+    /// At the server alone.
+    AtServer {
+        /// Why: one sentence, for people.
+        reason: String,
+    },
+    /// Beside the device, too.
+    AtEdge(EdgeCoupling),
+}
+
+/// All that the coupling needs besides constraint sets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EdgeCoupling {
+    /// Mass of the god-object's body, kg.
+    pub mass: f64,
+    /// Inertia tensor about the reference point, body axes, row by row, kg m².
+    pub inertia: [f64; 9],
+    /// The point at which motion is split and wrenches act, body frame, m.
+    pub reference_point: [f64; 3],
+    /// Distance of the body's farthest point from it, m.
+    pub radius: f64,
+    /// Share of the pose difference that one update covers.
+    pub k_s: f64,
+    /// Coupling constant, 1/s².
+    pub k_h: f64,
+    /// Radius of gyration that stands for the inertia tensor in the metric, m; `None`: the tensor.
+    pub radius_of_gyration: Option<f64>,
+    /// How a violated new row enters; `None`: at once.
+    pub adaptation: Option<EdgeAdaptation>,
+    /// Rows act before they touch.
+    pub look_ahead: bool,
+    /// The energy given is bounded by the energy taken.
+    pub passive: bool,
+    /// Largest force, N.
+    pub force_limit: f64,
+    /// Largest torque, N m.
+    pub torque_limit: f64,
+    /// Gap at which the god-object rests, m.
+    pub rest_distance: f64,
+    /// A motion whose fastest point covers less is none, m.
+    pub motion_tolerance: f64,
+    /// Most rows of a set.
+    pub max_constraints: u32,
+    /// How often rows are linearised anew for one force.
+    pub implicit_rounds: u32,
+    /// Who solves the projection.
+    pub solver: EdgeSolver,
+    /// Constraint sets per second.
+    pub set_rate_hz: f64,
+    /// The obstacles, in the scene's order.
+    pub obstacles: Vec<EdgeSurface>,
+}
+
+/// How a violated new row enters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeAdaptation {
+    /// Time that its bound takes to rise, s.
+    pub duration: f64,
+    /// Negative, m: smaller violations enter at once.
+    pub threshold: f64,
+}
+
+/// How an obstacle feels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeSurface {
+    /// Scene from obstacle.
+    pub pose: PoseF64,
+    /// Coefficient of friction; 0 is none.
+    pub friction: f64,
+    /// A sine that tilts the force.
+    pub sine: Option<EdgeSine>,
+}
+
+/// A sine along one axis that tilts the force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeSine {
+    /// Unit vector, obstacle frame.
+    pub axis: [f64; 3],
+    /// m.
+    pub wavelength: f64,
+    /// Largest tilt, as the tangent of the angle.
+    pub amplitude: f64,
+}
+
+/// A solver of the method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeSolver {
+    /// Dual active set.
+    ActiveSet,
+    /// Projected Gauss-Seidel.
+    GaussSeidel,
+}
+
+wire_struct!(EdgeCoupling {
+    mass,
+    inertia,
+    reference_point,
+    radius,
+    k_s,
+    k_h,
+    radius_of_gyration,
+    adaptation,
+    look_ahead,
+    passive,
+    force_limit,
+    torque_limit,
+    rest_distance,
+    motion_tolerance,
+    max_constraints,
+    implicit_rounds,
+    solver,
+    set_rate_hz,
+    obstacles,
+});
+wire_struct!(EdgeAdaptation {
+    duration,
+    threshold
+});
+wire_struct!(EdgeSurface {
+    pose,
+    friction,
+    sine
+});
+wire_struct!(EdgeSine {
+    axis,
+    wavelength,
+    amplitude
+});
+wire_tag!(EdgeSolver, "solver" { ActiveSet = 0, GaussSeidel = 1 });
+
+impl Wire for CouplingOffer {
+    fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
+        match self {
+            CouplingOffer::AtServer { reason } => {
+                0_u8.write(to)?;
+                reason.write(to)
+            }
+            CouplingOffer::AtEdge(coupling) => {
+                1_u8.write(to)?;
+                coupling.write(to)
+            }
+        }
+    }
+
+    fn read(from: &mut Reader<'_>) -> Result<CouplingOffer, DecodeError> {
+        match u8::read(from)? {
+            0 => Ok(CouplingOffer::AtServer {
+                reason: Wire::read(from)?,
+            }),
+            1 => Ok(CouplingOffer::AtEdge(Wire::read(from)?)),
+            tag => Err(DecodeError::UnknownTag {
+                what: "coupling",
+                tag,
+            }),
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Pairs of volumes in the order of how far apart they are at least: nearest first, to a band.
+//!
+//! | symbol | name in code | unit | meaning                                                                     |
+//! |--------|--------------|------|-----------------------------------------------------------------------------|
+//! | D      | `margin`     | m    | pairs farther apart than this are of no interest                            |
+//! | d      |              | m    | least distance of a pair of volumes, by separating axes; 0 where they overlap |
+//! | k      | `band`       | –    | 0 for d below `D / 2^(K - 1)`; each band after that ends at twice the distance |
+//!
+//! A search that is given up has then looked at every pair of triangles nearer than the lower edge of its band. What lies below a
+//! volume is no nearer than the volume: it goes into its band or a later one.
+
+use super::facing_volumes::{FacingVolumes, open_pair_with};
+use super::work::Work;
+use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
+
+/// Number of bands, K. The first is a two-thousandth of the margin wide. More of them would leave the trees' nodes in an order that the cache
+/// does not like.
+const BANDS: usize = 12;
+/// Pairs that wait at a time. One that finds no room ends the search there.
+const CAPACITY: usize = 1 << 15;
+/// Share of a band's edge that single precision may have got wrong.
+const EDGE_ROUNDING: f64 = 1e-5;
+/// Marks the end of a list.
+const NONE: u32 = u32::MAX;
+
+/// Pairs that wait, by band; the last one of a band is the first out. No allocation after `new`.
+#[derive(Clone, Debug)]
+pub(crate) struct Bands {
+    heads: [u32; BANDS],
+    waiting: Vec<Waiting>,
+    free: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    pair: (Child, Child),
+    next: u32,
+}
+
+impl Bands {
+    pub(super) fn new() -> Self {
+        Self {
+            heads: [NONE; BANDS],
+            waiting: Vec::with_capacity(CAPACITY),
+            free: NONE,
+        }
+    }
+
+    fn clear(&mut self) {
+        self.heads = [NONE; BANDS];
+        self.waiting.clear();
+        self.free = NONE;
+    }
+
+    /// False when there is no room.
+    #[inline]
+    fn push(&mut self, band: usize, pair: (Child, Child)) -> bool {
+        let next = self.heads[band];
+        let place = if self.free != NONE {
+            let place = self.free;
+            self.free = self.waiting[place as usize].next;
+            self.waiting[place as usize] = Waiting { pair, next };
+            place
+        } else if self.waiting.len() < CAPACITY {
+            self.waiting.push(Waiting { pair, next });
+            self.waiting.len() as u32 - 1
+        } else {
+            return false;
+        };
+        self.heads[band] = place;
+        true
+    }
+
+    #[inline]
+    fn pop(&mut self, band: usize) -> Option<(Child, Child)> {
+        let place = self.heads[band];
+        if place == NONE {
+            return None;
+        }
+        let Waiting { pair, next } = self.waiting[place as usize];
+        self.heads[band] = next;
+        self.waiting[place as usize].next = self.free;
+        self.free = place;
+        Some(pair)
+    }
+}
+
+/// The distance from which on band `band` begins, m: no more than that.
+fn edge(band: usize, margin: f64) -> f64 {
+    if band == 0 {
+        return 0.0;
+    }
+    margin * (1.0 - EDGE_ROUNDING) / f64::from(1_u32 << (BANDS - band))
+}
+
+/// The band of a share `d / D`; NaN is near.
+#[inline]
+fn band_of(share: f32) -> usize {
+    // The exponent of the number says how often the margin is halved.
+    let exponent = (share.max(f32::MIN_POSITIVE).to_bits() >> 23) as usize;
+    (exponent + BANDS).saturating_sub(127)
+}
+
+/// Calls `visit` for the pairs of triangles, (body, obstacle), whose volumes may come within `margin` and face each other all the way down,
+/// nearest first to a band; stops when it returns false. Pairs of volumes that own features `wanted` refuses are not opened.
+///
+/// `volumes` are at rest and have the same margin. Returns the distance, m, within which every such pair was visited: `margin` unless stopped.
+pub(crate) fn for_nearest_triangle_pairs(
+    trees: (&WideTree, &WideTree),
+    (volumes, margin): (&FacingVolumes, f64),
+    bands: &mut Bands,
+    work: &mut Work,
+    wanted: impl Fn(u8, u8) -> bool,
+    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+) -> f64 {
+    let (body, obstacle) = trees;
+    let scale = (1.0 / margin) as f32;
+    bands.clear();
+    let mut room = bands.push(0, (ROOT, ROOT));
+    let mut band = 0;
+    while band < BANDS {
+        let Some((a, b)) = bands.pop(band) else {
+            band += 1;
+            continue;
+        };
+        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+            work.triangle_pairs += 1;
+            if !visit(t, s, work) {
+                return edge(band, margin);
+            }
+            continue;
+        }
+        work.node_pairs += 1;
+        open_pair_with::<false>(trees, volumes, (a, b), |(a, b), beyond| {
+            if wanted(body.owned(a), obstacle.owned(b)) {
+                let own = band_of(1.0 + beyond * scale);
+                room &= bands.push(own.clamp(band, BANDS - 1), (a, b));
+            }
+        });
+        if !room {
+            return edge(band, margin);
+        }
+    }
+    margin
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_waits_comes_out_by_band_and_places_are_used_again() {
+        let mut bands = Bands::new();
+        for round in 0..3 {
+            for k in 0..CAPACITY as u32 {
+                assert!(bands.push(k as usize % BANDS, (k, round)));
+            }
+            assert!(!bands.push(0, (0, 0)), "full");
+            for band in 0..BANDS {
+                let mut count = 0;
+                while let Some((k, r)) = bands.pop(band) {
+                    assert_eq!((k as usize % BANDS, r), (band, round));
+                    count += 1;
+                }
+                assert_eq!(count, (CAPACITY - band).div_ceil(BANDS));
+            }
+        }
+        assert_eq!(bands.waiting.len(), CAPACITY);
+    }
+
+    #[test]
+    fn bands_begin_at_touch_and_end_at_the_margin() {
+        assert_eq!(edge(0, 2.0), 0.0);
+        assert!(edge(BANDS, 2.0) < 2.0 && edge(BANDS, 2.0) > 1.9999);
+        for share in [0.0, 1e-9, 1e-4, 0.1, 0.25, 0.499, 0.5, 0.99, -1.0, f32::NAN] {
+            let band = band_of(share);
+            let d = f64::from(share.max(0.0)) * 2.0;
+            assert!(edge(band, 2.0) <= d && band < BANDS, "{share}");
+            assert!(
+                band + 1 == BANDS || d < edge(band + 1, 2.0) * 1.001,
+                "{share}"
+            );
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! `taut arm`: asks the device port of a session for force, or for none, and says what it answered.
+
+use std::time::{Duration, Instant};
+
+use taut_bridge::EventKind;
+use taut_link::{ClientOptions, ReceivedState, Role, connect};
+use taut_proto::state::{RunState, event_code};
+
+use crate::cli::ArmArgs;
+use crate::failure::Failure;
+use crate::key;
+
+/// Time for states to come, and for the port to answer: the server looks at its clients ten times a second.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Time between two looks at what has arrived.
+const LOOK_PERIOD: Duration = Duration::from_millis(10);
+
+/// Asks, and waits for the answer in the states; one sentence.
+pub async fn run(args: &ArmArgs) -> Result<&'static str, Failure> {
+    let key = key::read(args.key.as_deref())?;
+    let node = format!("arm-{}", std::process::id());
+    let options = ClientOptions::new(&args.server, key, Role::Operator, node);
+    let link = connect(options).await?;
+    let mut answer = Answer::new(!args.off);
+    let deadline = Instant::now() + PATIENCE;
+    let mut states = Vec::new();
+    let mut asked = false;
+    let told = loop {
+        link.drain_states(&mut states);
+        if let Some(told) = states.drain(..).find_map(|state| answer.look(&state)) {
+            break Some(told);
+        }
+        if answer.knows() && !asked {
+            asked = link.post_arm(!args.off);
+        }
+        if Instant::now() >= deadline {
+            break None;
+        }
+        tokio::time::sleep(LOOK_PERIOD).await;
+    };
+    link.close().await;
+    match told {
+        Some(Ok(sentence)) => Ok(sentence),
+        Some(Err(sentence)) => Err(Failure::failed(sentence)),
+        None if asked => Err(Failure::failed(format!(
+            "{} did not answer; look at its log",
+            args.server
+        ))),
+        None => Err(Failure::failed(format!(
+            "no device sample came from {}; check that the device runs",
+            args.server
+        ))),
+    }
+}
+
+/// Waits for the events that answer the request.
+struct Answer {
+    arm: bool,
+    /// Number of the newest event before the request.
+    before: Option<u32>,
+}
+
+impl Answer {
+    fn new(arm: bool) -> Self {
+        Self { arm, before: None }
+    }
+
+    /// Whether a state came: what is new after it can be told from what is old.
+    fn knows(&self) -> bool {
+        self.before.is_some()
+    }
+
+    /// What a state says of the request, if anything.
+    fn look(&mut self, received: &ReceivedState) -> Option<Result<&'static str, &'static str>> {
+        let state = &received.state;
+        let newest = state.events.iter().map(|event| event.id).max().unwrap_or(0);
+        let Some(before) = self.before else {
+            self.before = Some(newest);
+            return match (self.arm, state.run) {
+                (true, RunState::Running) => Some(Ok("armed already")),
+                (false, RunState::Paused) => Some(Ok("disarmed already")),
+                _ => None,
+            };
+        };
+        let new = state.events.iter().filter(|event| event.id > before);
+        let kinds = new.filter_map(|event| {
+            let (kind, _) = event_code::safety_of(event.code)?;
+            EventKind::from_number(kind)
+        });
+        kinds.into_iter().find_map(|kind| match kind {
+            EventKind::Arming if self.arm => Some(Ok("armed: the force ramps in")),
+            EventKind::ArmRefused if self.arm => Some(Err(
+                "not armed: the device or the forces are not in order; look at the server's log",
+            )),
+            EventKind::Disarmed if !self.arm => Some(Ok("disarmed: the force fades")),
+            _ => None,
+        })
+    }
+}
