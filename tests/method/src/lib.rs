@@ -4,11 +4,13 @@
 //! - [`motion`]: a scene's god-object led along a path, recorded.
 //! - [`hand`]: what a hand adds to the path that it means to follow.
 //! - [`solids`]: bodies and obstacles made in code.
+//! - [`machined`]: gears and threads.
 //! - [`assembly`]: the insertion scenes of the test data and what must come of them.
 
 pub mod assembly;
 pub mod checker;
 pub mod hand;
+pub mod machined;
 pub mod motion;
 pub mod solids;
 pub mod triangles;
