@@ -2,7 +2,7 @@
 //!
 //! | symbol | name in code | unit | meaning                                                    |
 //! |--------|--------------|------|------------------------------------------------------------|
-//! | c      | [`CLEARANCE`]| m    | apothem of the hole less radius of the peg's vertices       |
+//! | c      | `CLEARANCE`  | m    | apothem of the hole less radius of the peg's vertices       |
 //! | d      |              | m    | how far the device is beyond the clearance                  |
 //! | K      |              | N/m  | rendered: `k_h k_s m`                                       |
 //!
