@@ -23,8 +23,9 @@ const MINIMUM_GAP_PER_SIZE: f64 = 1e-5;
 /// Activation distance per metre of body size: 0.4 mm for a body of 0.1 m. What moves is covered by look-ahead; this is for
 /// what begins to move.
 const ACTIVATION_DISTANCE_PER_SIZE: f64 = 4e-3;
-/// Longest look-ahead per metre of body size: a quarter, which a hand at 0.3 m/s covers in 33 ms for a body of 0.04 m.
-const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 0.25;
+/// Longest look-ahead per metre of body size: a cube of 1 mm at 1 m/s goes its own length per update, and a set is used two or three updates
+/// long. What the look-ahead may cost is bounded by itself (`look_ahead_pairs`), so this binds nobody but a hand that jumps.
+const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 4.0;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
 const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
 /// Most rounds of implicit constraints: what three do not mend, the next update does.
