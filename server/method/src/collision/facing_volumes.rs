@@ -16,6 +16,10 @@
 //! features inside them face each other when no normal of the one, turned by at most theta, is opposite to one of the other:
 //! when the angle between a and a' exceeds the sum of the cones.
 //!
+//! At rest more is known: what faces over a distance g lies along a normal, so within the cone of either volume. Seen along its axis it
+//! is in front, and across the axis at most `g` times the sine of the cone aside: the tangents of a volume are axes of separation with a
+//! margin that is narrow where the surface is smooth.
+//!
 //! **Rounding.** Let L be the reach of both meshes about their origins, the distance of the origins and the path together. A
 //! coordinate of d comes with at most 10 u L (the rotation's rounding, its product and three sums), its product with a
 //! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 26 (sides), 6 (axes and tangents that are unit and square
@@ -41,6 +45,8 @@ const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
 const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
 /// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
 const CONE_WIDENING: f64 = 1e-6;
+/// Feet may lie outside their faces by this share of the gap, twice the tolerance of the collection, and sines come with rounding.
+const FOOT_SHARE: f32 = 2e-4;
 /// Pairs that a descent holds: each level of either tree adds seven, and there are fewer levels than in the binary trees.
 pub(crate) const WIDE_STACK_CAPACITY: usize = 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
 
@@ -60,8 +66,10 @@ pub(crate) struct FacingVolumes {
     angle: f32,
     /// Bound on half the path of any point of the body, m.
     longest_half_sweep: f32,
-    /// What volumes stray by, all over the body, and the margin.
+    /// What volumes stray by, all over the body, and rounding, m: without the margin and with it.
+    bare_stray: f32,
     stray: f32,
+    margin: f32,
     /// Cosine and sine of what cones are widened by.
     turn: [f32; 2],
 }
@@ -72,15 +80,22 @@ pub(crate) struct Against {
     center: [f32; 3],
     half: [f32; 3],
     axis: [f32; 3],
-    /// Of the volume's box: tangent and its product with the axis, times half the sides.
-    sides: [[f32; 3]; 2],
+    /// Of the volume's box: tangent and its product with the axis, and half the sides.
+    tangents: [[f32; 3]; 2],
+    sides: [f32; 2],
     middle: f32,
     slab: f32,
     cosine: f32,
     sine: f32,
     sweep: [f32; 3],
     spin: [f32; 3],
+    bare_stray: f32,
     stray: f32,
+    /// Margin along the tangents of this volume, m: what faces its features is no farther aside.
+    margin_aside: f32,
+    margin: f32,
+    /// Cosine and sine of what cones are widened by.
+    turn: [f32; 2],
     /// Along sides of boxes: what the volume's points stray by more.
     stray_along_sides: f32,
     stray_along_axis: f32,
@@ -138,7 +153,7 @@ impl FacingVolumes {
         let path = half_path + half_turn.cross(&(origin - placement.center));
         let arm = (origin - placement.center).norm() + body.reach;
         let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
-        let stray = 0.5 * angle * angle * arm + margin + LENGTH_ROUNDING * reach;
+        let bare_stray = 0.5 * angle * angle * arm + LENGTH_ROUNDING * reach;
         let turn = (angle + widening).min(std::f64::consts::PI);
         let to_body = |v: &Vector3<f64>| rotation.tr_mul(v);
         Self {
@@ -150,7 +165,9 @@ impl FacingVolumes {
             half_turn: [vector(&half_turn), vector(&to_body(&half_turn))],
             angle: angle as f32,
             longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
-            stray: stray as f32,
+            bare_stray: bare_stray as f32,
+            stray: (bare_stray + margin) as f32,
+            margin: margin as f32,
             turn: [turn.cos() as f32, turn.sin() as f32],
         }
     }
@@ -206,9 +223,10 @@ impl FacingVolumes {
         half: [f32; 3],
     ) -> Against {
         let (axis, tangent) = (turned(&v.axis), turned(&v.tangent));
+        let tangents = [tangent, product(&axis, &tangent)];
         let sides = [
-            scaled(&tangent, v.along),
-            scaled(&product(&axis, &tangent), v.across),
+            scaled(&tangents[0], v.along),
+            scaled(&tangents[1], v.across),
         ];
         // The box about the axis is the narrower one where the surface runs aslant.
         let thickness = v.middle.abs() + v.slab;
@@ -218,14 +236,19 @@ impl FacingVolumes {
             center: [0.0; 3],
             half: [0, 1, 2].map(|i| half[i].min(aslant(i))),
             axis: [-axis[0], -axis[1], -axis[2]],
-            sides,
+            tangents,
+            sides: [v.along, v.across],
             middle: -v.middle,
             slab: v.slab,
             cosine,
             sine,
             sweep: [0.0; 3],
             spin: [0.0; 3],
+            bare_stray: self.bare_stray,
             stray: self.stray,
+            margin_aside: self.margin * if cosine > 0.0 { aside(sine) } else { 1.0 },
+            margin: self.margin,
+            turn: self.turn,
             stray_along_sides: 0.0,
             stray_along_axis: 0.0,
             turning: 0.0,
@@ -283,22 +306,66 @@ impl Against {
             // Along the axes of the eight, and along that of the one.
             let slant = cosine.abs();
             let height = dot(&a, &d) + cosine * q.middle - middle;
-            let sides = dot(&a, &q.sides[0]).abs() + dot(&a, &q.sides[1]).abs();
-            let extent = slab + slant * q.slab + sides + dot(&a, &s).abs() + stray_a;
-            let off_a = height.abs() - extent;
+            let [u, v] = &q.tangents;
+            let (on_u, on_v) = (dot(&a, u).abs(), dot(&a, v).abs());
+            let sides = on_u * q.sides[0] + on_v * q.sides[1];
+            let extent = slab + slant * q.slab + sides + dot(&a, &s).abs();
+            let off_a = height.abs() - extent - stray_a;
+            let behind_a = -height - extent - q.bare_stray;
             let height = dot(&q.axis, &d) + q.middle - cosine * middle;
-            let sides = dot(&q.axis, &t).abs() * along + dot(&q.axis, &b).abs() * across;
-            let extent = q.slab + slant * slab + sides + dot(&q.axis, &s).abs() + stray_a;
-            let off_b = height.abs() - extent;
+            let (up_t, up_b) = (dot(&q.axis, &t), dot(&q.axis, &b));
+            let sides = up_t.abs() * along + up_b.abs() * across;
+            let extent = q.slab + slant * slab + sides + dot(&q.axis, &s).abs();
+            let off_b = height.abs() - extent - stray_a;
+            let behind_b = -height - extent - q.bare_stray;
             // Cones: the sum of two angles is above pi where its sine is not above zero.
             let [cos, sin] = [n.cosine.0[k], n.sine.0[k]];
             let narrow = sin * q.cosine + cos * q.sine > 0.0;
             let away = cosine < cos * q.cosine - sin * q.sine - COSINE_ROUNDING;
-            let off = larger(larger(off_x, off_y), larger(off_z, larger(off_a, off_b)));
-            beyond.0[k] = if narrow & away { f32::INFINITY } else { off };
+            let mut off = larger(larger(off_x, off_y), larger(off_z, larger(off_a, off_b)));
+            let mut apart = narrow & away;
+            if !MOVES {
+                // What faces lies along a normal: in front, and as little aside as the cone is narrow.
+                let [cos_w, sin_w] = q.turn;
+                let (cos, sin) = (cos * cos_w - sin * sin_w, sin * cos_w + cos * sin_w);
+                let narrow_a = (cos > 0.0) & (sin >= 0.0);
+                let narrow_b = q.cosine > 0.0;
+                apart |= (narrow_a & (behind_a > 0.0)) | (narrow_b & (behind_b > 0.0));
+                let margin_a = q.margin * if narrow_a { aside(sin) } else { 1.0 };
+                let (tu, tv, bu, bv) = (
+                    dot(&t, u).abs(),
+                    dot(&t, v).abs(),
+                    dot(&b, u).abs(),
+                    dot(&b, v).abs(),
+                );
+                let lateral_t = (dot(&t, &d) + up_t * q.middle).abs()
+                    - (along + up_t.abs() * q.slab + tu * q.sides[0] + tv * q.sides[1])
+                    - q.bare_stray;
+                let lateral_b = (dot(&b, &d) + up_b * q.middle).abs()
+                    - (across + up_b.abs() * q.slab + bu * q.sides[0] + bv * q.sides[1])
+                    - q.bare_stray;
+                let lateral_u = (dot(u, &d) - dot(&a, u) * middle).abs()
+                    - (q.sides[0] + on_u * slab + tu * along + bu * across)
+                    - q.bare_stray;
+                let lateral_v = (dot(v, &d) - dot(&a, v) * middle).abs()
+                    - (q.sides[1] + on_v * slab + tv * along + bv * across)
+                    - q.bare_stray;
+                let of_a = larger(lateral_t, lateral_b);
+                let of_b = larger(lateral_u, lateral_v);
+                apart |= (of_a > margin_a) | (of_b > q.margin_aside);
+                off = larger(off, larger(of_a, of_b) - q.margin);
+            }
+            beyond.0[k] = if apart { f32::INFINITY } else { off };
         }
         beyond
     }
+}
+
+/// The share of a distance that may lie across the axis of a cone whose sine this is.
+#[inline(always)]
+fn aside(sine: f32) -> f32 {
+    let share = sine + FOOT_SHARE;
+    if share < 1.0 { share } else { 1.0 }
 }
 
 /// Which lanes are not beyond the margin: a bit each.

@@ -152,6 +152,7 @@ impl GodObject {
             made: 0.0,
             last_motion: Vector6::zeros(),
             damping: 1.0,
+            turns: 0,
         };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {

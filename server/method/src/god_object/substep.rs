@@ -16,6 +16,10 @@ use crate::spatial::{
 const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is not worth a search.
 const WORTH_SHARE: f64 = 0.05;
+/// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
+const TIGHT_GAP_SHARE: f64 = 0.5;
+/// Motions that turn back on each other more often than this go to and fro about where they end: the next update is nearer.
+const MAX_TURNS: u32 = 2;
 /// Most by which motions become shorter when one turns back on the last.
 const LARGEST_DAMPING: f64 = 16.0;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
@@ -34,6 +38,8 @@ pub(super) struct Update {
     pub(super) last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
     pub(super) damping: f64,
+    /// How often a motion has turned back on the last.
+    pub(super) turns: u32,
 }
 
 impl GodObject {
@@ -61,20 +67,24 @@ impl GodObject {
                 update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
-        // but for easing out, which is little always: a body left below the rest distance stops at every motion. Nor is a motion
+        // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
         // little that was cut to what is trusted.
-        let little = if eases || cut {
+        update.relax(&projected.acceleration, self.radius);
+        let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
+        let little = if tight || cut {
             0.0
         } else {
             WORTH_SHARE * update.made
         };
-        let worth_moving = covered > self.settings.motion_tolerance.max(little); // false for NaN
+        let settling = update.turns > MAX_TURNS && !tight && !cut;
+        let worth_moving = !settling
+            && covered > self.settings.motion_tolerance
+            && covered * update.damping > little; // false for NaN
         if !worth_moving {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
-        update.relax(&projected.acceleration, self.radius);
         let constrained = projected.acceleration * update.damping;
         let covered = covered * update.damping;
         let gap_before = self.set.gap_min.min(self.settings.rest_distance);
@@ -190,6 +200,7 @@ impl Update {
         let along = weighed(motion, &self.last_motion);
         if along < 0.0 {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
+            self.turns += 1;
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
         } else {
