@@ -171,7 +171,7 @@ fn memory_lock(limit: Option<String>) -> Finding {
             format!(
                 "only {bytes} bytes may be locked, so a page of a loop may have to be fetched from disk"
             ),
-            "echo \"@realtime - memlock unlimited\" | sudo tee -a /etc/security/limits.d/99-taut.conf  # then log in again",
+            "echo \"@realtime - memlock unlimited\" | sudo tee -a /etc/security/limits.d/99-taut.conf && sudo groupadd -f realtime && sudo usermod -aG realtime $USER  # then log in again",
         ),
         None => Finding::good(WHAT, "not known on this system"),
     }

@@ -125,7 +125,7 @@ impl Settings {
             gap_tolerance: 0.1 * MINIMUM_GAP_PER_SIZE * size,
             activation_distance: ACTIVATION_DISTANCE_PER_SIZE * size,
             look_ahead_limit: LOOK_AHEAD_LIMIT_PER_SIZE * size,
-            look_ahead_pairs: 1400,
+            look_ahead_pairs: 1000,
             motion_tolerance: MOTION_TOLERANCE_PER_REST_DISTANCE * REST_DISTANCE_PER_SIZE * size,
             max_constraints: 1024,
             max_substeps: 10,
