@@ -12,7 +12,7 @@
 //! server opens nothing that is sealed by a group key.
 //!
 //! Generations change without a gap: sealers begin with a new one [`SPREAD_NS`] after they learned it, so that the others have it too, and openers
-//! take the one before for [`PREVIOUS_NS`] more.
+//! take the one before for [`PREVIOUS_NS`] more. Who comes understands the others when that time is over: the generation before is not for it.
 
 use crate::{
     DecodeError, EncodeError, Header, Kind, Payload, Role,

@@ -127,12 +127,11 @@ async fn nodes_speak_to_each_other_without_the_server() {
     );
     agree(&[&left, &right], &["left", "right"]).await;
 
-    for _ in 0..3 {
-        assert!(left.send_to_member(right.session(), &Payload::Heartbeat));
-    }
-    assert!(right.send_to_member(left.session(), &Payload::Heartbeat));
+    // The one that came first still speaks under the generation before for a moment, which the newcomer does not know.
     wait_until("hearing", || {
-        at_right.list().len() == 3 && at_left.list().len() == 1
+        assert!(left.send_to_member(right.session(), &Payload::Heartbeat));
+        assert!(right.send_to_member(left.session(), &Payload::Heartbeat));
+        at_right.list().len() >= 3 && at_left.list().len() >= 3
     })
     .await;
     assert_eq!(at_left.list()[0], (right.session(), Payload::Heartbeat));
