@@ -3,6 +3,7 @@
 use crate::{
     ConstraintPart, DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
     codec::{decode, encode_into},
+    events::EventAck,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -15,6 +16,8 @@ use crate::{
 pub enum Payload {
     /// State of the workbench.
     Hot(HotState),
+    /// "These events I have."
+    EventAck(EventAck),
     /// Asks for session time.
     TimeRequest(TimeRequest),
     /// Tells session time.
@@ -34,6 +37,7 @@ impl Payload {
     pub fn kind(&self) -> Kind {
         match self {
             Payload::Hot(_) => Kind::Hot,
+            Payload::EventAck(_) => Kind::EventAck,
             Payload::TimeRequest(_) => Kind::TimeRequest,
             Payload::TimeResponse(_) => Kind::TimeResponse,
             Payload::Heartbeat => Kind::Heartbeat,
@@ -47,6 +51,7 @@ impl Payload {
     pub fn encode_into(&self, buffer: &mut [u8]) -> Result<usize, EncodeError> {
         match self {
             Payload::Hot(value) => encode_into(value, buffer),
+            Payload::EventAck(value) => encode_into(value, buffer),
             Payload::TimeRequest(value) => encode_into(value, buffer),
             Payload::TimeResponse(value) => encode_into(value, buffer),
             Payload::Heartbeat => Ok(0),
@@ -60,6 +65,7 @@ impl Payload {
     pub fn decode(kind: Kind, bytes: &[u8]) -> Result<Payload, DecodeError> {
         Ok(match kind {
             Kind::Hot => Payload::Hot(decode(bytes)?),
+            Kind::EventAck => Payload::EventAck(decode(bytes)?),
             Kind::TimeRequest => Payload::TimeRequest(decode(bytes)?),
             Kind::TimeResponse => Payload::TimeResponse(decode(bytes)?),
             Kind::Heartbeat if bytes.is_empty() => Payload::Heartbeat,

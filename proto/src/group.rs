@@ -106,9 +106,12 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
     match kind {
         Kind::Hot => sender == SERVER_SENDER,
         Kind::Heartbeat => true,
-        Kind::TimeRequest | Kind::TimeResponse | Kind::Input | Kind::Wrench | Kind::Constraints => {
-            false
-        }
+        Kind::EventAck
+        | Kind::TimeRequest
+        | Kind::TimeResponse
+        | Kind::Input
+        | Kind::Wrench
+        | Kind::Constraints => false,
     }
 }
 

@@ -23,11 +23,13 @@ pub const MAX_DATAGRAM_BYTES: usize = 1150;
 /// Most bytes of a payload.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_DATAGRAM_BYTES - HEADER_BYTES - TAG_BYTES;
 
-/// What a datagram carries. Numbers 1, 2, 5 and 6 are kept for bulk state, events and the swap barrier.
+/// What a datagram carries. Numbers 1, 5 and 6 are kept for bulk state and the swap barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::HotState`], server to client.
     Hot,
+    /// [`crate::events::EventAck`], client to server.
+    EventAck,
     /// [`crate::time::TimeRequest`], client to server.
     TimeRequest,
     /// [`crate::time::TimeResponse`], server to client.
@@ -46,6 +48,7 @@ impl Kind {
     fn code(self) -> u8 {
         match self {
             Kind::Hot => 0,
+            Kind::EventAck => 2,
             Kind::TimeRequest => 3,
             Kind::TimeResponse => 4,
             Kind::Heartbeat => 7,
@@ -58,6 +61,7 @@ impl Kind {
     fn from_code(tag: u8) -> Result<Kind, DecodeError> {
         match tag {
             0 => Ok(Kind::Hot),
+            2 => Ok(Kind::EventAck),
             3 => Ok(Kind::TimeRequest),
             4 => Ok(Kind::TimeResponse),
             7 => Ok(Kind::Heartbeat),

@@ -7,8 +7,8 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, Group,
-    GroupMember, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role,
+    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, EventsTold,
+    Group, GroupMember, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role,
     SceneDescription, Transport, WrenchCommand,
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
@@ -17,6 +17,7 @@ use taut_proto::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
+    events::EventAck,
     group::GroupSecret,
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
@@ -113,6 +114,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("input", Payload::Input(input)),
         ("wrench", Payload::Wrench(wrench)),
         ("constraints", Payload::Constraints(part())),
+        ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
     ]
 }
 
@@ -318,6 +320,13 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ),
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
         ("group", ControlMessage::Group(group())),
+        (
+            "events",
+            ControlMessage::Events(EventsTold {
+                after: 16,
+                records: hot().events.to_vec(),
+            }),
+        ),
     ]
 }
 

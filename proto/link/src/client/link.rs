@@ -14,6 +14,7 @@ use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
     SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
+    state::EventRecord,
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -84,6 +85,18 @@ impl ClientLink {
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
     pub fn drain_states(&self, out: &mut Vec<ReceivedState>) {
         self.hot.inbound.drain_states(out);
+    }
+
+    /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most
+    /// the newest [`taut_proto::events::MAX_QUEUED`] wait.
+    pub fn drain_events(&self, out: &mut Vec<EventRecord>) {
+        self.hot.inbound.drain_events(out);
+    }
+
+    /// Events since the join that this client did not get: because its stream stood still for longer than the server keeps them, and because nobody
+    /// drained them in time.
+    pub fn events_lost(&self) -> (u64, u64) {
+        self.hot.inbound.events_lost()
     }
 
     /// Session time now; `None` until the clock is locked, about 100 ms after joining.

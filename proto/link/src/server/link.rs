@@ -3,6 +3,7 @@
 use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    events::EventHub,
     group::{self, GroupHub},
     receive,
     sent_states::SentStates,
@@ -82,6 +83,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         inputs: InputWriter::new(input),
         sent_states: SentStates::new(),
         group: GroupHub::new(epoch, None),
+        discrete: EventHub::default(),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();

@@ -71,6 +71,7 @@ pub(crate) fn receive(
             );
         }
         Payload::Heartbeat => {}
+        Payload::EventAck(ack) => session.acknowledge(ack.newest),
         Payload::Input(sample) if session.role == Role::Device => {
             let input = DeviceInput {
                 sample,

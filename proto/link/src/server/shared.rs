@@ -4,6 +4,7 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    events::EventHub,
     group::GroupHub,
     sent_states::SentStates,
     session::{Session, lock},
@@ -32,6 +33,7 @@ pub(crate) struct Shared {
     pub(crate) inputs: InputWriter,
     pub(crate) sent_states: SentStates,
     pub(crate) group: GroupHub,
+    pub(crate) discrete: EventHub,
     pub(crate) stopping: AtomicBool,
 }
 
