@@ -159,6 +159,13 @@ pub struct ArmRequest {
     pub arm: bool,
 }
 
+/// A client says how it takes its states from now on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StatesBy {
+    /// From the group, or by unicast.
+    pub multicast: bool,
+}
+
 /// Last words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
@@ -187,6 +194,7 @@ pub enum ControlMessage {
     Arm(ArmRequest),
     Group(Group),
     Events(EventsTold),
+    StatesBy(StatesBy),
 }
 
 impl ControlMessage {
@@ -206,6 +214,7 @@ impl ControlMessage {
             ControlMessage::Arm(_) => "Arm",
             ControlMessage::Group(_) => "Group",
             ControlMessage::Events(_) => "Events",
+            ControlMessage::StatesBy(_) => "StatesBy",
         }
     }
 
@@ -279,7 +288,7 @@ wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
     Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
-    Events(EventsTold) = 15,
+    Events(EventsTold) = 15, StatesBy(StatesBy) = 16,
 }
 
 wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
@@ -310,3 +319,4 @@ wire_struct!(MeshHeader { hash, length });
 wire_struct!(LogEvent { level, text });
 wire_struct!(Bye { reason });
 wire_struct!(ArmRequest { arm });
+wire_struct!(StatesBy { multicast });

@@ -55,6 +55,10 @@ counters! {
         bytes_sent,
         /// Datagrams that the system or QUIC did not take; the client sees a gap.
         send_errors,
+        /// Times that the way to a client was full: its rate is lowered for a while.
+        congested,
+        /// Datagrams sent to the multicast group.
+        multicast_sent,
         /// States that could not be encoded (a number that is not finite): nobody got them.
         encode_errors,
         /// Authentic datagrams received.
@@ -107,6 +111,10 @@ counters! {
         forged,
         /// Constraint sets that became whole.
         sets,
+        /// Datagrams heard from the multicast group.
+        multicast_heard,
+        /// Times that the multicast group fell silent and states came by unicast again.
+        multicast_lost,
         /// Datagrams sent.
         packets_sent,
         /// Datagrams that the system did not take.

@@ -18,6 +18,7 @@ pub mod counters;
 pub mod error;
 mod framing;
 pub mod key_file;
+pub mod multicast;
 mod readiness;
 pub mod server;
 pub mod transport;
@@ -29,6 +30,7 @@ pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_key_file};
+pub use multicast::MulticastOptions;
 pub use server::{
     Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerLink, ServerOptions, serve,
 };

@@ -18,8 +18,8 @@ use std::{sync::Arc, time::Duration};
 
 /// Silence after which a peer counts as gone.
 pub(crate) const IDLE_TIMEOUT: Duration = Duration::from_secs(1);
-/// Sign of life on an idle connection: five fit the idle timeout.
-const KEEP_ALIVE: Duration = Duration::from_millis(200);
+/// Sign of life on an idle connection: ten fit the idle timeout.
+const KEEP_ALIVE: Duration = Duration::from_millis(100);
 /// Room for hot datagrams that QUIC has not sent yet: about four; the oldest are dropped, newest wins.
 const DATAGRAM_SEND_BYTES: usize = 4800;
 /// Room for hot datagrams that have arrived and wait for the reader: a quarter of a second at 1 kHz.

@@ -14,7 +14,8 @@ use taut_proto::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
     },
     control::{
-        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, StatesBy,
+        Welcome,
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
     events::EventAck,
@@ -326,6 +327,10 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
                 after: 16,
                 records: hot().events.to_vec(),
             }),
+        ),
+        (
+            "states_by",
+            ControlMessage::StatesBy(StatesBy { multicast: true }),
         ),
     ]
 }

@@ -75,7 +75,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         path,
     ));
     hot.clone().start()?;
-    tokio::spawn(told::listen(hot.clone(), recv));
+    tokio::spawn(told::listen(hot.clone(), recv, options.rate_hz == 0));
     Ok(ClientLink::new(
         options.server,
         endpoint,

@@ -1,26 +1,29 @@
 //! The hot plane of a client: a UDP socket with a thread, or QUIC datagrams with a task. Both receive, and both keep the path and the
 //! clock alive with time requests: 16 quick ones at join, then ten per second.
 
-use super::{group::GroupEnd, inbound::Inbound};
+use super::{group::GroupEnd, inbound::Inbound, multicast};
 use crate::LinkError;
 use quinn::Connection;
 use std::{
     io,
     net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket},
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
 };
 use taut_proto::{
     Header, Payload,
+    control::ControlMessage,
     events::EventAck,
     group::{SERVER_SENDER, is_grouped},
     header::MAX_DATAGRAM_BYTES,
     seal::Sealer,
     time::TimeRequest,
 };
+
+use tokio::sync::mpsc;
 
 /// Time requests at join, so that the clock is locked within 100 ms.
 const QUICK_REQUESTS: u32 = 16;
@@ -49,6 +52,9 @@ pub(crate) struct Hot {
     pub(crate) connection: Connection,
     sealer: Sealer,
     path: Path,
+    /// To the control stream.
+    outbox: OnceLock<mpsc::Sender<ControlMessage>>,
+    listens: AtomicBool,
     stop: AtomicBool,
 }
 
@@ -86,6 +92,8 @@ impl Hot {
             connection,
             sealer,
             path,
+            outbox: OnceLock::new(),
+            listens: AtomicBool::new(false),
             stop: AtomicBool::new(false),
         }
     }
@@ -162,6 +170,47 @@ impl Hot {
         }
     }
 
+    /// Sets where control messages go.
+    pub(crate) fn set_outbox(&self, outbox: mpsc::Sender<ControlMessage>) {
+        let _ = self.outbox.set(outbox); // once per link
+    }
+
+    /// Sends a control message without waiting; `false` if it was not taken.
+    pub(crate) fn post(&self, message: ControlMessage) -> bool {
+        let outbox = self.outbox.get();
+        outbox.is_some_and(|outbox| outbox.try_send(message).is_ok())
+    }
+
+    /// Listens to the group where the server says there is one, if states come over UDP and all of them are wanted.
+    pub(crate) fn follow_group(self: &Arc<Hot>, all_states: bool) {
+        let group = self.group.roster().and_then(|roster| roster.multicast);
+        if let (Some(group), Path::Udp { server, .. }, true) = (group, &self.path, all_states)
+            && !self.listens.swap(true, Ordering::Relaxed)
+        {
+            multicast::start(self.clone(), group, *server);
+        }
+    }
+
+    /// Takes what came to the group; whether it is the server's.
+    pub(crate) fn receive_multicast(&self, datagram: &[u8], received: Instant) -> bool {
+        let counters = &self.inbound.counters;
+        let opened = match self.group.open(datagram, self.inbound.local_ns(received)) {
+            Ok(opened) => opened,
+            Err(error) => {
+                self.inbound.count_refused(&error);
+                return false;
+            }
+        };
+        let from_server = opened.header.sender == SERVER_SENDER;
+        if from_server {
+            counters.packets_received.one();
+            counters.multicast_heard.one();
+            self.inbound.take_grouped(opened, received);
+            self.acknowledge();
+        }
+        from_server
+    }
+
     /// Starts receiving; ends by itself with the connection.
     pub(crate) fn start(self: Arc<Hot>) -> Result<(), LinkError> {
         match self.path {
@@ -186,7 +235,7 @@ impl Hot {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.connection.close_reason().is_some()
     }
 

@@ -29,8 +29,10 @@ struct Inner {
     opener: Opener,
     clock: ClockFilter,
     states: VecDeque<ReceivedState>,
-    /// Highest sequence number of a state so far.
-    newest_state: Option<u64>,
+    /// Highest tick of a state so far: states come by two paths, each with its own sequence.
+    newest_tick: Option<u64>,
+    /// When the server was last heard on this client's own path, ns.
+    heard_ns: Option<u64>,
     wrench: Option<ReceivedWrench>,
     sets: Option<ReceivedSets>,
     events: EventInbox,
@@ -52,7 +54,8 @@ impl Inbound {
                 opener,
                 clock: ClockFilter::default(),
                 states: VecDeque::with_capacity(MAX_QUEUED_STATES),
-                newest_state: None,
+                newest_tick: None,
+                heard_ns: None,
                 wrench: None,
                 sets: (role == Role::Device).then(|| ReceivedSets {
                     assembler: Assembler::new(),
@@ -85,7 +88,27 @@ impl Inbound {
             Some(gap) => counters.lost.add(gap),
             None => counters.lost.take_one(), // late: it was counted when it was overtaken
         }
-        inner.take(opened, received, self.local_ns(received), counters);
+        let local_ns = self.local_ns(received);
+        inner.heard_ns = Some(local_ns);
+        inner.take(opened, received, local_ns, counters);
+    }
+
+    /// Takes what the server said to the group.
+    pub(crate) fn take_grouped(&self, opened: Opened, received: Instant) {
+        let counters = &self.counters;
+        // The first number heard of a generation says nothing about those before it.
+        match opened.header.sequence.checked_sub(opened.expected) {
+            Some(gap) if opened.expected > 0 => counters.lost.add(gap),
+            Some(_) => {}
+            None => counters.lost.take_one(),
+        }
+        let local_ns = self.local_ns(received);
+        self.lock().take(opened, received, local_ns, counters);
+    }
+
+    /// When the server was last heard on this client's own path, ns.
+    pub(crate) fn heard_ns(&self) -> Option<u64> {
+        self.lock().heard_ns
     }
 
     /// Counts a datagram that does not open.
@@ -181,10 +204,12 @@ impl Inner {
                 counters.states.one();
                 self.events.repeated(&state.events);
                 // Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
-                if self.newest_state.is_some_and(|last| last > sequence) {
-                    return counters.late.one();
+                match self.newest_tick {
+                    Some(newest) if newest > state.tick => return counters.late.one(),
+                    // By the other path already.
+                    Some(newest) if newest == state.tick => return counters.duplicates.one(),
+                    _ => self.newest_tick = Some(state.tick),
                 }
-                self.newest_state = Some(sequence);
                 if self.states.len() == MAX_QUEUED_STATES {
                     self.states.pop_front();
                     counters.overrun.one();

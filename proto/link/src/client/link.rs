@@ -48,6 +48,7 @@ impl ClientLink {
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
         tokio::spawn(write_reports(send, messages));
+        hot.set_outbox(outbox.clone());
         ClientLink {
             server,
             endpoint,

@@ -6,6 +6,7 @@ mod hot;
 mod inbound;
 mod link;
 mod meshes;
+mod multicast;
 mod options;
 mod told;
 

@@ -6,12 +6,13 @@ use quinn::RecvStream;
 use std::{sync::Arc, time::Instant};
 use taut_proto::control::{ControlMessage, MAX_FRAME_BYTES};
 
-/// Reads until the stream or the connection ends.
-pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream) {
+/// `all_states`: the client wants every state, so that the group's are for it. Reads until the stream or the connection ends.
+pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream, all_states: bool) {
     let reason = loop {
         match read_message(&mut recv, MAX_FRAME_BYTES).await {
             Ok(ControlMessage::Group(group)) => {
                 hot.group.learn(group, hot.inbound.local_ns(Instant::now()));
+                hot.follow_group(all_states);
             }
             Ok(ControlMessage::Events(told)) => {
                 hot.inbound.told_events(&told);

@@ -146,7 +146,7 @@ fn admit(
         );
         old.connection.close(CLOSE_REPLACED, reason.as_bytes());
         shared.tell(LinkEvent::Left {
-            status: old.status(),
+            status: old.status(now_ns),
             reason,
         });
     }
@@ -205,7 +205,7 @@ async fn attend(
 ) {
     shared.counters.joined.one();
     tracing::info!(node = session.node, role = ?session.role, transport = ?session.transport, "client joined");
-    shared.tell(LinkEvent::Joined(session.status()));
+    shared.tell(LinkEvent::Joined(session.status(shared.clock.now_ns())));
 
     let connection = &session.connection;
     let reason = tokio::select! {
@@ -219,7 +219,7 @@ async fn attend(
     if shared.sessions.remove(session.number) {
         tracing::info!(node = session.node, "client left: {reason}");
         shared.tell(LinkEvent::Left {
-            status: session.status(),
+            status: session.status(shared.clock.now_ns()),
             reason,
         });
     }
@@ -246,6 +246,7 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                     arm: request.arm,
                 });
             }
+            Ok(ControlMessage::StatesBy(states)) => session.take_states_by(states),
             Ok(ControlMessage::Bye(bye)) => return bye.reason,
             Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
             Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),

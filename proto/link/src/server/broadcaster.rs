@@ -25,7 +25,7 @@ pub struct Broadcaster {
 /// What became of one send.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SendReport {
-    /// Clients that were sent it.
+    /// Clients that were sent it, by multicast or by themselves.
     pub sent: usize,
     /// Clients that were not due, by their rate, or have not opened their UDP path yet.
     pub skipped: usize,
@@ -67,8 +67,21 @@ impl Broadcaster {
         self.shared
             .sent_states
             .remember(state.tick, payload_hash(payload));
+        // One datagram for all who hear the group; those who do not get their own.
+        let to_group = self.shared.group.is_wanted();
+        if to_group {
+            let group = &self.shared.group;
+            match group.send(Kind::Hot, payload, now_ns, &mut self.buffer) {
+                Some(_) => self.shared.counters.multicast_sent.one(),
+                None => self.shared.counters.send_errors.one(),
+            }
+        }
         for session in self.sessions.iter() {
-            if !session.take_due(state.sample_time_ns) {
+            if to_group && session.is_by_multicast() {
+                report.sent += 1;
+                continue;
+            }
+            if !session.take_due(state.sample_time_ns, now_ns) {
                 report.skipped += 1;
                 continue;
             }

@@ -4,22 +4,30 @@
 //! takes the newest from a watch, so that a member whose stream is slow skips what is old already.
 
 use super::{session::lock, shared::Shared};
-use crate::LinkError;
+use crate::{LinkError, MulticastOptions, multicast};
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
+    io,
     net::SocketAddr,
-    sync::{Arc, Mutex, atomic::Ordering},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
     time::Duration,
 };
 use taut_proto::{
-    Group, GroupMember, GroupSealer,
+    Group, GroupMember, GroupSealer, Kind,
     control::ControlMessage,
     group::{GROUP_SECRET_BYTES, GroupSecret, SERVER_SENDER, is_member},
+    header::MAX_DATAGRAM_BYTES,
+    seal::DatagramBuffer,
 };
 use tokio::sync::watch;
 
 /// How soon a change of membership is told.
 const POLL_PERIOD: Duration = Duration::from_millis(20);
+/// Silence on the group that is filled with a sign of life, ns.
+const QUIET_NS: u64 = 30_000_000;
 
 /// The newest group, and its message ready to be written.
 pub(crate) struct Told {
@@ -31,15 +39,76 @@ pub(crate) struct GroupHub {
     told: watch::Sender<Option<Arc<Told>>>,
     /// What the server says to the group.
     pub(crate) sealer: Mutex<GroupSealer>,
-    multicast: Option<SocketAddr>,
+    multicast: Option<Multicast>,
+}
+
+/// Where states for all go.
+struct Multicast {
+    socket: socket2::Socket,
+    group: SocketAddr,
+    /// What the members are told.
+    announced: SocketAddr,
+    /// Whether anybody may listen.
+    wanted: AtomicBool,
+    /// Session time of the last datagram, ns.
+    sent_ns: AtomicU64,
 }
 
 impl GroupHub {
-    pub(crate) fn new(epoch: u32, multicast: Option<SocketAddr>) -> GroupHub {
-        GroupHub {
+    pub(crate) fn new(epoch: u32, options: Option<MulticastOptions>) -> io::Result<GroupHub> {
+        let multicast = match options {
+            Some(options) => Some(Multicast {
+                socket: multicast::sender(options.interface)?,
+                group: options.group.into(),
+                announced: options.announced.unwrap_or(options.group).into(),
+                wanted: AtomicBool::new(false),
+                sent_ns: AtomicU64::new(0),
+            }),
+            None => None,
+        };
+        Ok(GroupHub {
             told: watch::Sender::new(None),
             sealer: Mutex::new(GroupSealer::new(epoch, SERVER_SENDER)),
             multicast,
+        })
+    }
+
+    /// Whether states go to the group.
+    pub(crate) fn is_wanted(&self) -> bool {
+        self.multicast
+            .as_ref()
+            .is_some_and(|multicast| multicast.wanted.load(Ordering::Relaxed))
+    }
+
+    /// Seals an encoded payload under the group key and sends it to the group; bytes sent. Never waits for the network, no allocation.
+    pub(crate) fn send(
+        &self,
+        kind: Kind,
+        payload: &[u8],
+        now_ns: u64,
+        buffer: &mut DatagramBuffer,
+    ) -> Option<usize> {
+        let multicast = self.multicast.as_ref()?;
+        let sealed = lock(&self.sealer).seal_bytes(kind, payload, now_ns, buffer);
+        let sent = multicast
+            .socket
+            .send_to(sealed.ok()?, &multicast.group.into())
+            .ok()?;
+        multicast.sent_ns.store(now_ns, Ordering::Relaxed);
+        Some(sent)
+    }
+
+    /// Looks who may listen, and keeps the group alive while there is no state to send.
+    fn tend(&self, listeners: bool, now_ns: u64) {
+        let Some(multicast) = &self.multicast else {
+            return;
+        };
+        multicast.wanted.store(listeners, Ordering::Relaxed);
+        let quiet_ns = now_ns.saturating_sub(multicast.sent_ns.load(Ordering::Relaxed));
+        if listeners && quiet_ns >= QUIET_NS {
+            let mut buffer = [0; MAX_DATAGRAM_BYTES];
+            // What is not sent is not heard: the clients draw their conclusions.
+            let _ = self.send(Kind::Heartbeat, &[], now_ns, &mut buffer);
         }
     }
 
@@ -81,7 +150,7 @@ pub(crate) async fn run(shared: Arc<Shared>) {
                     generation,
                     secret: drawn,
                     members: now.clone(),
-                    multicast: shared.group.multicast,
+                    multicast: shared.group.multicast.as_ref().map(|to| to.announced),
                 };
                 shared.group.tell(group, shared.clock.now_ns())
             });
@@ -90,6 +159,12 @@ pub(crate) async fn run(shared: Arc<Shared>) {
                 Err(error) => tracing::warn!("{error}"),
             }
         }
+        let listeners = shared
+            .sessions
+            .all()
+            .iter()
+            .any(|session| session.may_listen());
+        shared.group.tend(listeners, shared.clock.now_ns());
         tokio::time::sleep(POLL_PERIOD).await;
     }
 }

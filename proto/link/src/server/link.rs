@@ -70,6 +70,8 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
     let epoch = random_epoch()?;
+    let group = GroupHub::new(epoch, options.multicast)
+        .map_err(|error| system("open the multicast socket (check the interface)", &error))?;
     let shared = Arc::new(Shared {
         key: options.key,
         clock: options.clock,
@@ -82,7 +84,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: events_in,
         inputs: InputWriter::new(input),
         sent_states: SentStates::new(),
-        group: GroupHub::new(epoch, None),
+        group,
         discrete: EventHub::default(),
         stopping: AtomicBool::new(false),
     });
@@ -137,11 +139,12 @@ impl ServerLink {
 
     /// The clients that are in.
     pub fn clients(&self) -> Vec<ClientStatus> {
+        let now_ns = self.shared.clock.now_ns();
         self.shared
             .sessions
             .all()
             .iter()
-            .map(|session| session.status())
+            .map(|session| session.status(now_ns))
             .collect()
     }
 

@@ -1,6 +1,6 @@
 //! What a server is given: addresses, key, limits.
 
-use crate::{DEFAULT_QUIC_PORT, DEFAULT_UDP_PORT, SessionClock};
+use crate::{DEFAULT_QUIC_PORT, DEFAULT_UDP_PORT, MulticastOptions, SessionClock};
 use std::{
     net::{Ipv4Addr, SocketAddr},
     time::Duration,
@@ -16,6 +16,8 @@ pub struct ServerOptions {
     pub udp: SocketAddr,
     /// Port of the hot plane that clients are told, where a forwarding router or relay stands before the server; `None`: the one of `udp`.
     pub announced_udp_port: Option<u16>,
+    /// Where states for all render nodes go, beside unicast for those who do not hear it; `None` for unicast alone.
+    pub multicast: Option<MulticastOptions>,
     /// The cluster key.
     pub key: ClusterKey,
     /// Most clients at a time.
@@ -29,12 +31,13 @@ pub struct ServerOptions {
 }
 
 impl ServerOptions {
-    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence, coupling at the server.
+    /// Default ports on all IPv4 addresses, unicast, 32 clients, 1 s of silence, coupling at the server.
     pub fn new(key: ClusterKey) -> ServerOptions {
         ServerOptions {
             quic: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_QUIC_PORT)),
             udp: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_UDP_PORT)),
             announced_udp_port: None,
+            multicast: None,
             key,
             max_clients: 32,
             idle_timeout: crate::transport::IDLE_TIMEOUT,

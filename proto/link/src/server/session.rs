@@ -6,12 +6,15 @@ use std::{
     net::SocketAddr,
     sync::{
         Mutex, PoisonError,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
 };
 use taut_proto::{
     ClientStats, Kind, Payload, Role, Transport,
+    control::StatesBy,
     events::is_newer,
+    group::is_member,
+    pace::Pace,
     seal::{DatagramBuffer, OpenError, Opened, Opener, Sealer},
 };
 
@@ -33,6 +36,8 @@ pub(crate) struct Session {
     due_ns: AtomicU64,
     /// Newest event that the client has, in the upper half beside a 1; 0 before it said so.
     acknowledged: AtomicU64,
+    by_multicast: AtomicBool,
+    pace: Mutex<Pace>,
     packets_sent: Cell,
     bytes_sent: Cell,
     send_errors: Cell,
@@ -82,6 +87,8 @@ impl Session {
             last_heard_ns: AtomicU64::new(admitted.joined_ns),
             due_ns: AtomicU64::new(0),
             acknowledged: AtomicU64::new(0),
+            by_multicast: AtomicBool::new(false),
+            pace: Mutex::default(),
             packets_sent: Cell::default(),
             bytes_sent: Cell::default(),
             send_errors: Cell::default(),
@@ -92,11 +99,15 @@ impl Session {
     }
 
     /// Whether the state sampled at `time_ns` is due at this client's rate; if so, plans the next one.
-    pub(crate) fn take_due(&self, time_ns: u64) -> bool {
-        if self.rate_hz == 0 {
+    pub(crate) fn take_due(&self, time_ns: u64, now_ns: u64) -> bool {
+        let wanted = match self.rate_hz {
+            0 => 0,
+            rate_hz => 1_000_000_000 / u64::from(rate_hz),
+        };
+        let period = wanted.max(lock(&self.pace).period_ns(now_ns));
+        if period == 0 {
             return true;
         }
-        let period = 1_000_000_000 / u64::from(self.rate_hz);
         let due = self.due_ns.load(Ordering::Relaxed);
         if time_ns < due {
             return false;
@@ -130,12 +141,25 @@ impl Session {
         let sent = match self.sealer.seal_bytes(kind, payload, buffer) {
             Err(_) => None,
             Ok(datagram) => match address {
-                Some(address) => shared.udp.send_to(datagram, address).ok(),
-                None => self
-                    .connection
-                    .send_datagram(datagram.to_vec().into())
-                    .ok()
-                    .map(|()| datagram.len()),
+                Some(address) => match shared.udp.send_to(datagram, address) {
+                    Ok(bytes) => Some(bytes),
+                    Err(error) => {
+                        if is_full(&error) {
+                            self.note_full(shared);
+                        }
+                        None
+                    }
+                },
+                None => {
+                    // QUIC takes it all the same, and drops the oldest for it.
+                    if self.connection.datagram_send_buffer_space() < datagram.len() {
+                        self.note_full(shared);
+                    }
+                    self.connection
+                        .send_datagram(datagram.to_vec().into())
+                        .ok()
+                        .map(|()| datagram.len())
+                }
             },
         };
         match sent {
@@ -155,6 +179,31 @@ impl Session {
                 Sent::Failed
             }
         }
+    }
+
+    /// The way was full: less is sent for a while.
+    fn note_full(&self, shared: &Shared) {
+        lock(&self.pace).blocked(shared.clock.now_ns());
+        shared.counters.congested.one();
+    }
+
+    /// Takes the client's word on how it gets its states.
+    pub(crate) fn take_states_by(&self, states: StatesBy) {
+        let by_multicast = states.multicast && self.may_listen();
+        if self.by_multicast.swap(by_multicast, Ordering::Relaxed) != by_multicast {
+            let path = if by_multicast { "multicast" } else { "unicast" };
+            tracing::info!(node = self.node, "client takes its states by {path}");
+        }
+    }
+
+    /// Whether the group's states are for this client: it is a member, over UDP, and wants all of them.
+    pub(crate) fn may_listen(&self) -> bool {
+        is_member(self.role) && self.transport == Transport::Udp && self.rate_hz == 0
+    }
+
+    /// Whether it says that it hears the group.
+    pub(crate) fn is_by_multicast(&self) -> bool {
+        self.by_multicast.load(Ordering::Relaxed)
     }
 
     /// Encodes and sends a payload.
@@ -228,7 +277,7 @@ impl Session {
         *lock(&self.stats) = Some(stats);
     }
 
-    pub(crate) fn status(&self) -> ClientStatus {
+    pub(crate) fn status(&self, now_ns: u64) -> ClientStatus {
         ClientStatus {
             session: self.number,
             node: self.node.clone(),
@@ -242,12 +291,23 @@ impl Session {
             round_trip_us: self.connection.rtt().as_micros() as u64,
             packets_sent: self.packets_sent.get(),
             bytes_sent: self.bytes_sent.get(),
+            by_multicast: self.is_by_multicast(),
+            lowered_rate: lock(&self.pace).is_lowered(now_ns),
             send_errors: self.send_errors.get(),
             stats: lock(&self.stats).clone(),
             state_hash_matches: self.matches.get(),
             state_hash_mismatches: self.mismatches.get(),
         }
     }
+}
+
+/// Whether the system has no room for the datagram now. Other refusals (a filter, a client that is gone) say nothing about the rate.
+fn is_full(error: &std::io::Error) -> bool {
+    #[cfg(unix)]
+    let no_buffers = error.raw_os_error() == Some(libc::ENOBUFS);
+    #[cfg(not(unix))]
+    let no_buffers = false;
+    no_buffers || error.kind() == std::io::ErrorKind::WouldBlock
 }
 
 /// The lock, whoever panicked while holding it: no datum here can be left half-changed.

@@ -30,6 +30,10 @@ pub struct ClientStatus {
     pub packets_sent: u64,
     /// Bytes of these.
     pub bytes_sent: u64,
+    /// Whether it takes its states from the multicast group.
+    pub by_multicast: bool,
+    /// Whether its way was full lately, so that it gets 250 states per second at most.
+    pub lowered_rate: bool,
     /// Datagrams that the system or QUIC did not take.
     pub send_errors: u64,
     /// Its last report.
