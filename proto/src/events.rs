@@ -135,7 +135,7 @@ impl EventOutbox {
 }
 
 /// The client's side: each event once, in order.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct EventInbox {
     /// Number of the newest event taken; `None` until the stream said where this client comes in.
     newest: Option<u32>,
@@ -144,8 +144,19 @@ pub struct EventInbox {
     overrun: u64,
 }
 
+impl Default for EventInbox {
+    fn default() -> EventInbox {
+        EventInbox {
+            newest: None,
+            queue: VecDeque::with_capacity(MAX_QUEUED),
+            missed: 0,
+            overrun: 0,
+        }
+    }
+}
+
 impl EventInbox {
-    /// Takes what a state repeats. Allocates only when more than ever before wait in the queue.
+    /// Takes what a state repeats. No allocation.
     pub fn repeated(&mut self, trail: &[EventRecord]) {
         for record in trail {
             if self

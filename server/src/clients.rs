@@ -223,6 +223,8 @@ mod tests {
             round_trip_us: 0,
             packets_sent: 0,
             bytes_sent: 0,
+            by_multicast: false,
+            lowered_rate: false,
             send_errors: 0,
             stats: None,
             state_hash_matches: 0,

@@ -9,10 +9,11 @@ use taut_bridge::{
     InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
     ValidationSettings,
 };
-use taut_link::ClusterKey;
+use taut_link::{ClusterKey, MulticastOptions};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
-    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, Viewer, Workbench,
+    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, TransportKind, Viewer,
+    Workbench,
 };
 
 use crate::content::content;
@@ -93,6 +94,11 @@ pub fn session_setup(
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         announced_udp_port: None,
         key,
+        multicast: (network.transport == TransportKind::Multicast).then_some(MulticastOptions {
+            group: network.multicast_group,
+            announced: None,
+            interface: network.multicast_interface,
+        }),
         max_clients: network.max_clients,
     };
     let safety = safety(workbench, &built.settings);

@@ -104,6 +104,7 @@ impl Session {
             quic: setup.link.quic,
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
+            multicast: setup.link.multicast,
             max_clients: setup.link.max_clients,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)

@@ -320,7 +320,7 @@ async fn a_full_way_lowers_the_rate_and_the_full_rate_comes_back() {
 
     let mut broadcaster = server.broadcaster();
     let lowered = || server.clients().iter().any(|client| client.lowered_rate);
-    let tick = broadcast_until(&mut broadcaster, 1, || lowered()).await;
+    let tick = broadcast_until(&mut broadcaster, 1, &lowered).await;
     assert!(server.counters().congested > 0);
     // At the lowered rate at most every fourth state is for it.
     let (mut sent, mut skipped) = (0, 0);

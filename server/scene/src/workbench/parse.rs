@@ -1,7 +1,7 @@
 //! A workbench out of its document. Every fault is reported, each with its line.
 
 use std::cell::RefCell;
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddrV4};
 use std::path::{Path, PathBuf};
 
 use god_object::Pose;
@@ -27,6 +27,8 @@ const SQUARENESS: f64 = 8.7e-3;
 const MAX_PIXELS: i64 = 16_384;
 /// Fastest stream or loop, 1/s.
 const MAX_RATE: f64 = 10_000.0;
+/// Group of states where the file names none: of this site (RFC 2365).
+const DEFAULT_GROUP: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(239, 255, 72, 87), 4859);
 /// Most clients.
 const MAX_CLIENTS: i64 = 256;
 
@@ -419,6 +421,53 @@ fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     address.ok()
 }
 
+/// Group and interface of multicast; the interface must be known where multicast is asked for.
+fn multicast(
+    section: &Section<'_>,
+    transport: TransportKind,
+    bind: IpAddr,
+) -> (SocketAddrV4, Ipv4Addr) {
+    let complain = |key: &'static str, text: String| {
+        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        section.complain(at, text);
+    };
+    let group = match section.text("multicast_group") {
+        None => DEFAULT_GROUP,
+        Some(text) => match text.parse::<SocketAddrV4>() {
+            Ok(group) if group.ip().is_multicast() && group.port() != 0 => group,
+            _ => {
+                complain(
+                    "multicast_group",
+                    format!(
+                        "`multicast_group` in {} is \"{text}\", which is no multicast address with a port; write one such as \"{DEFAULT_GROUP}\"",
+                        section.name()
+                    ),
+                );
+                DEFAULT_GROUP
+            }
+        },
+    };
+    let interface = match (section.text("multicast_interface"), bind) {
+        (Some(text), _) => text
+            .parse::<Ipv4Addr>()
+            .ok()
+            .filter(|ip| !ip.is_unspecified()),
+        (None, IpAddr::V4(bind)) if !bind.is_unspecified() => Some(bind),
+        (None, _) if transport != TransportKind::Multicast => Some(Ipv4Addr::LOCALHOST),
+        (None, _) => None,
+    };
+    if interface.is_none() {
+        complain(
+            "multicast_interface",
+            format!(
+                "{} does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
+                section.name()
+            ),
+        );
+    }
+    (group, interface.unwrap_or(Ipv4Addr::LOCALHOST))
+}
+
 fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
     section
         .integer(key, 0, i64::from(u16::MAX))
@@ -434,6 +483,8 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             quic_port: 4857,
             udp_port: 4858,
             transport: TransportKind::Udp,
+            multicast_group: DEFAULT_GROUP,
+            multicast_interface: Ipv4Addr::LOCALHOST,
             key_file: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
@@ -442,6 +493,7 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
     let transports = [
         ("udp", TransportKind::Udp),
         ("quic", TransportKind::QuicDatagram),
+        ("multicast", TransportKind::Multicast),
     ];
     let address = bind(&section, loopback);
     let (quic_port, udp_port) = (
@@ -460,11 +512,16 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             ),
         );
     }
+    let transport = section.choice("transport", &transports).unwrap_or_default();
+    let (multicast_group, multicast_interface) =
+        multicast(&section, transport, address.unwrap_or(loopback));
     let network = Network {
         bind: address.unwrap_or(loopback),
         quic_port,
         udp_port,
-        transport: section.choice("transport", &transports).unwrap_or_default(),
+        transport,
+        multicast_group,
+        multicast_interface,
         key_file: files.path(&section, "key_file"),
         broadcast_rate: section.number_or("broadcast_rate", Range::PositiveUpTo(MAX_RATE), 1000.0),
         max_clients: section

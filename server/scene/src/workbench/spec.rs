@@ -1,6 +1,6 @@
 //! A workbench as it was written, checked value by value. SI units, workbench frame: right-handed, z up.
 
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddrV4};
 use std::path::PathBuf;
 
 use god_object::Pose;
@@ -180,6 +180,8 @@ pub enum TransportKind {
     Udp,
     /// QUIC datagrams: one port, for networks that let no other through.
     QuicDatagram,
+    /// One UDP datagram for all who hear the group, unicast for the others.
+    Multicast,
 }
 
 /// Addresses, ports and rates.
@@ -193,6 +195,10 @@ pub struct Network {
     pub udp_port: u16,
     /// What render nodes use.
     pub transport: TransportKind,
+    /// Group and port of multicast.
+    pub multicast_group: SocketAddrV4,
+    /// Interface that multicast leaves from: `bind`, if that is one, unless the file says otherwise.
+    pub multicast_interface: Ipv4Addr,
     /// The cluster key; `None` leaves it to `--key` or TAUT_KEY_FILE.
     pub key_file: Option<PathBuf>,
     /// Poses per second to each render node.

@@ -66,6 +66,18 @@ fn every_fault_names_file_line_and_key() {
             "`quic_port` in [network] is 70000, but must be between 0 and 65535",
         ),
         (
+            "# multicast_group = \"239.255.72.87:4859\"",
+            "multicast_group = \"192.168.1.5:4859\"",
+            "multicast_group",
+            "`multicast_group` in [network] is \"192.168.1.5:4859\", which is no multicast address with a port; write one such as \"239.255.72.87:4859\"",
+        ),
+        (
+            "# multicast_interface = \"192.168.1.5\"",
+            "multicast_interface = \"eth0\"",
+            "multicast_interface",
+            "[network] does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
+        ),
+        (
             "bind = \"127.0.0.1\"",
             "bind = \"here\"",
             "\"here\"",
@@ -204,4 +216,29 @@ fn overrides_reach_every_key() {
     .unwrap();
     assert_eq!(workbench.network.quic_port, 0);
     assert_eq!(workbench.nodes[1].stereo, taut_scene::Stereo::Mono);
+}
+
+#[test]
+fn multicast_leaves_from_the_interface_that_is_listened_on_or_named() {
+    let parse = |overrides: &[&str]| {
+        Workbench::parse_with_overrides("w.toml", SHIPPED_WORKBENCH, Path::new(""), overrides)
+    };
+    let network = parse(&["network.transport=multicast"]).unwrap().network;
+    assert_eq!(network.transport, taut_scene::TransportKind::Multicast);
+    assert_eq!(network.multicast_group.to_string(), "239.255.72.87:4859");
+    assert_eq!(network.multicast_interface.to_string(), "127.0.0.1");
+
+    let everywhere = ["network.transport=multicast", "network.bind=0.0.0.0"];
+    let found = parse(&everywhere).unwrap_err().to_string();
+    assert!(
+        found.contains("does not say from which interface multicast leaves"),
+        "{found}"
+    );
+    let named = [
+        everywhere[0],
+        everywhere[1],
+        "network.multicast_interface=192.168.1.5",
+    ];
+    let network = parse(&named).unwrap().network;
+    assert_eq!(network.multicast_interface.to_string(), "192.168.1.5");
 }
