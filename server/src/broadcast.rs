@@ -497,4 +497,42 @@ mod tests {
             Some(event_code::FAULT)
         );
     }
+
+    #[test]
+    fn more_events_than_a_state_holds_go_into_the_next_ones() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let contacts = ContactSnapshot::at_start(&start, 32);
+        let mut device = DeviceState::at_start(&start);
+        let mut source = EventSource::default();
+        let mut state = taut_proto::ArrayVec::new();
+        let mut told = Vec::new();
+        let mut send = |source: &mut EventSource| {
+            source.take(&mut state);
+            told.extend(state.iter().map(|event| (event.id, event.code)));
+        };
+
+        // All buttons at once, then a storm of them that is more than the states can carry.
+        for press in 0..100 {
+            device.buttons = if press % 2 == 0 { u16::MAX } else { 0 };
+            source.follow(&device, &contacts);
+            send(&mut source);
+        }
+        for _ in 0..2 * MAX_WAITING {
+            source.follow(&device, &contacts);
+            send(&mut source);
+        }
+        let ids: Vec<u32> = told.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=told.len() as u32).collect::<Vec<_>>());
+        for button in 0..BUTTONS {
+            let of_button: Vec<u32> = told
+                .iter()
+                .filter(|(_, code)| code >> BUTTON_SHIFT == button)
+                .map(|(_, code)| code & 0xffff)
+                .collect();
+            assert_eq!(of_button.last(), Some(&event_code::BUTTON_UP), "{button}");
+            let kinds = [event_code::BUTTON_DOWN, event_code::BUTTON_UP];
+            let down_and_up = of_button.iter().zip(kinds.iter().cycle());
+            assert!(down_and_up.clone().all(|(kind, expected)| kind == expected));
+        }
+    }
 }
