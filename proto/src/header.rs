@@ -7,7 +7,7 @@
 //! | 3      | kind     | 1     | [`Kind`]                                                 |
 //! | 4      | epoch    | 4     | incarnation of the server                                |
 //! | 8      | sender   | 2     | session number of the client; 0 is the server            |
-//! | 10     | flags    | 2     | reserved for the run, see [`Header::flags`]              |
+//! | 10     | flags    | 2     | under which key, see [`Header::flags`]                   |
 //! | 12     | sequence | 8     | per session and direction, strictly increasing; the nonce |
 //! | 20     | length   | 2     | payload bytes, without the tag                           |
 //! | 22     | reserved | 2     | 0                                                        |
@@ -81,7 +81,7 @@ pub struct Header {
     pub epoch: u32,
     /// Session number of the client; 0 is the server.
     pub sender: u16,
-    /// Reserved, 0: run state travels in the payload, where it is typed.
+    /// 0 under a session's own keys; [`crate::group::FLAG_GROUP`] and the low bits of the group's generation under a group key.
     pub flags: u16,
     /// Per session and direction, strictly increasing: nonce and replay index.
     pub sequence: u64,

@@ -22,7 +22,9 @@ mod readiness;
 pub mod server;
 pub mod transport;
 
-pub use client::{ClientLink, ClientOptions, ReceivedState, ReceivedWrench, connect};
+pub use client::{
+    ClientLink, ClientOptions, GroupReceiver, ReceivedState, ReceivedWrench, Roster, connect,
+};
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters};
 pub use error::LinkError;

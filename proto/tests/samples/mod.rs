@@ -7,9 +7,9 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, HotState,
-    InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role, SceneDescription, Transport,
-    WrenchCommand,
+    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, Group,
+    GroupMember, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role,
+    SceneDescription, Transport, WrenchCommand,
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
     },
@@ -17,6 +17,7 @@ use taut_proto::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
+    group::GroupSecret,
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
@@ -316,7 +317,28 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
             }),
         ),
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
+        ("group", ControlMessage::Group(group())),
     ]
+}
+
+/// Three members, one of each kind of address.
+pub fn group() -> Group {
+    let member = |sender: u16, node: &str, role, address: Option<&str>| GroupMember {
+        sender,
+        node: node.to_owned(),
+        role,
+        address: address.and_then(|address| address.parse().ok()),
+    };
+    Group {
+        generation: 9,
+        secret: GroupSecret([5; 32]),
+        members: vec![
+            member(1, "left", Role::Render, Some("192.168.7.2:40001")),
+            member(2, "right", Role::Render, Some("[fd00::2]:40002")),
+            member(5, "watcher", Role::Observer, None),
+        ],
+        multicast: "239.255.72.87:4859".parse().ok(),
+    }
 }
 
 fn finite32() -> impl Strategy<Value = f32> {

@@ -2,8 +2,10 @@
 
 use super::{
     ClientLink, ClientOptions,
+    group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    told,
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
@@ -47,6 +49,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         description,
         coupling,
         send,
+        recv,
     } = match joining.await {
         Ok(Ok(joined)) => joined,
         Ok(Err(error)) => {
@@ -68,9 +71,11 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         connection,
         sealer,
         Inbound::new(opener, options.role),
+        GroupEnd::new(welcome.epoch, welcome.session),
         path,
     ));
     hot.clone().start()?;
+    tokio::spawn(told::listen(hot.clone(), recv));
     Ok(ClientLink::new(
         options.server,
         endpoint,
@@ -162,6 +167,8 @@ struct Joined {
     /// For a device bridge.
     coupling: Option<CouplingOffer>,
     send: SendStream,
+    /// What else the server tells.
+    recv: RecvStream,
 }
 
 /// Hello to scene, and to the coupling for a device bridge.
@@ -232,6 +239,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         description,
         coupling,
         send,
+        recv,
     })
 }
 

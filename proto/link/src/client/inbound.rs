@@ -70,12 +70,7 @@ impl Inbound {
         let mut inner = self.lock();
         let opened = match inner.opener.open(datagram) {
             Ok(opened) => opened,
-            Err(OpenError::Header(DecodeError::WrongVersion { .. })) => {
-                return counters.wrong_version.one();
-            }
-            Err(OpenError::Header(_) | OpenError::Payload(_)) => return counters.garbage.one(),
-            Err(OpenError::Forged) => return counters.forged.one(),
-            Err(OpenError::Replayed) => return counters.duplicates.one(),
+            Err(error) => return self.count_refused(&error),
         };
         counters.packets_received.one();
         let sequence = opened.header.sequence;
@@ -84,6 +79,17 @@ impl Inbound {
             None => counters.lost.take_one(), // late: it was counted when it was overtaken
         }
         inner.take(opened, received, self.local_ns(received), counters);
+    }
+
+    /// Counts a datagram that does not open.
+    pub(crate) fn count_refused(&self, error: &OpenError) {
+        let counters = &self.counters;
+        match error {
+            OpenError::Header(DecodeError::WrongVersion { .. }) => counters.wrong_version.one(),
+            OpenError::Header(_) | OpenError::Payload(_) => counters.garbage.one(),
+            OpenError::Forged | OpenError::Misplaced => counters.forged.one(),
+            OpenError::Replayed => counters.duplicates.one(),
+        }
     }
 
     /// Moves the queued states to the end of `out`.
@@ -118,8 +124,13 @@ impl Inbound {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.inner)
     }
+}
+
+/// The lock, whoever panicked while holding it: no datum here can be left half-changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Inner {

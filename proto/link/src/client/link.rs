@@ -1,6 +1,6 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
-use super::{ReceivedState, ReceivedWrench, hot::Hot, meshes::Meshes};
+use super::{GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes};
 use crate::{
     ClientCounters, LinkError,
     framing::{CLOSE_BYE, close_text, write_message},
@@ -118,6 +118,24 @@ impl ClientLink {
     /// `out` must be of this session: a set is known by its sequence number.
     pub fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
         self.hot.inbound.newest_set(out)
+    }
+
+    /// Who is in, as the server told it last; `None` until it did, a moment after joining, and always for a device bridge.
+    pub fn roster(&self) -> Option<Arc<Roster>> {
+        self.hot.group.roster()
+    }
+
+    /// Sends `payload` from node to node under the group key, at once; `false` if the member's address or the key is not known (yet), if a group key
+    /// may not carry it, or if the system did not take it. Over UDP only. No allocation.
+    ///
+    /// It proves to the receiver that a member sent it, not which one: see [`taut_proto::group`].
+    pub fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        self.hot.send_to_member(member, payload)
+    }
+
+    /// Sets who takes what other members send with [`ClientLink::send_to_member`]; `false` if there is one already.
+    pub fn on_group_datagram(&self, receiver: GroupReceiver) -> bool {
+        self.hot.group.set_receiver(receiver)
     }
 
     /// Sends a report, waiting while earlier ones are not away yet.

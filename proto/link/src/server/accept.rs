@@ -1,7 +1,7 @@
 //! How a client gets in, and its control plane while it is in.
 
 use super::{
-    LinkEvent,
+    LinkEvent, downstream,
     receive::receive,
     session::{Admitted, Session},
     shared::{Admission, Refused, Shared},
@@ -199,7 +199,7 @@ async fn refuse(
 async fn attend(
     shared: &Arc<Shared>,
     session: Arc<Session>,
-    _send: SendStream,
+    send: SendStream,
     mut recv: RecvStream,
 ) {
     shared.counters.joined.one();
@@ -211,6 +211,7 @@ async fn attend(
         reason = read_control(shared, &session, &mut recv) => reason,
         reason = serve_meshes(shared, connection) => reason,
         reason = read_datagrams(shared, &session) => reason,
+        reason = downstream::tell(shared, &session, send) => reason,
     };
     connection.close(CLOSE_BYE, b"");
     // A session that was replaced is gone already, and told.

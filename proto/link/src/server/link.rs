@@ -3,6 +3,7 @@
 use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    group::{self, GroupHub},
     receive,
     sent_states::SentStates,
     session::lock,
@@ -67,10 +68,11 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
+    let epoch = random_epoch()?;
     let shared = Arc::new(Shared {
         key: options.key,
         clock: options.clock,
-        epoch: random_epoch()?,
+        epoch,
         content,
         udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),
         udp,
@@ -79,6 +81,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: events_in,
         inputs: InputWriter::new(input),
         sent_states: SentStates::new(),
+        group: GroupHub::new(epoch, None),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();
@@ -87,6 +90,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         .spawn(move || receive::run_udp(&of_thread))
         .map_err(|error| system("start the state thread", &error))?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
+    tokio::spawn(group::run(shared.clone()));
     Ok(ServerLink {
         shared,
         endpoint,
@@ -112,6 +116,11 @@ impl ServerLink {
     /// The clock of the session.
     pub fn clock(&self) -> SessionClock {
         self.shared.clock
+    }
+
+    /// Incarnation of this server, in every datagram's header.
+    pub fn epoch(&self) -> u32 {
+        self.shared.epoch
     }
 
     /// A sender of states, for the broadcast thread.

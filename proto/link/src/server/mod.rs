@@ -4,6 +4,8 @@ mod accept;
 mod broadcaster;
 mod content;
 mod device_input;
+mod downstream;
+mod group;
 mod link;
 mod options;
 mod receive;

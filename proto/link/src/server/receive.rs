@@ -53,7 +53,8 @@ pub(crate) fn receive(
     let opened = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,
         Err(OpenError::Header(error)) => return count_bad_header(shared, error),
-        Err(OpenError::Forged) => return counters.forged.one(),
+        // A group key proves a member, not this one: nothing under it is opened here.
+        Err(OpenError::Forged | OpenError::Misplaced) => return counters.forged.one(),
         Err(OpenError::Replayed) => return counters.replayed.one(),
         Err(OpenError::Payload(_)) => return counters.garbage.one(),
     };

@@ -180,6 +180,11 @@ impl Session {
         Ok(opened)
     }
 
+    /// Where its states go, once its first authentic datagram came; for UDP only.
+    pub(crate) fn udp_address(&self) -> Option<SocketAddr> {
+        *lock(&self.udp_address)
+    }
+
     /// Session time of the last authentic datagram, ns; `None` if there was none yet.
     pub(crate) fn last_heard_ns(&self) -> Option<u64> {
         let heard = self.last_heard_ns.load(Ordering::Relaxed);
@@ -206,7 +211,7 @@ impl Session {
             transport: self.transport,
             rate_hz: self.rate_hz,
             address: self.connection.remote_address(),
-            udp_address: *lock(&self.udp_address),
+            udp_address: self.udp_address(),
             joined_ns: self.joined_ns,
             last_heard_ns: self.last_heard_ns.load(Ordering::Relaxed),
             round_trip_us: self.connection.rtt().as_micros() as u64,

@@ -4,6 +4,7 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    group::GroupHub,
     sent_states::SentStates,
     session::{Session, lock},
 };
@@ -30,6 +31,7 @@ pub(crate) struct Shared {
     pub(crate) events: SyncSender<LinkEvent>,
     pub(crate) inputs: InputWriter,
     pub(crate) sent_states: SentStates,
+    pub(crate) group: GroupHub,
     pub(crate) stopping: AtomicBool,
 }
 
