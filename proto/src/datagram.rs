@@ -1,7 +1,8 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    ConstraintPart, DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
+    ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample, Kind,
+    WrenchCommand,
     codec::{decode, encode_into},
     time::{TimeRequest, TimeResponse},
 };
@@ -27,6 +28,8 @@ pub enum Payload {
     Wrench(WrenchCommand),
     /// Part of a constraint set.
     Constraints(ConstraintPart),
+    /// Where the viewer's head is.
+    Head(HeadSample),
 }
 
 impl Payload {
@@ -40,6 +43,7 @@ impl Payload {
             Payload::Input(_) => Kind::Input,
             Payload::Wrench(_) => Kind::Wrench,
             Payload::Constraints(_) => Kind::Constraints,
+            Payload::Head(_) => Kind::Head,
         }
     }
 
@@ -53,6 +57,7 @@ impl Payload {
             Payload::Input(value) => encode_into(value, buffer),
             Payload::Wrench(value) => encode_into(value, buffer),
             Payload::Constraints(value) => encode_into(value, buffer),
+            Payload::Head(value) => encode_into(value, buffer),
         }
     }
 
@@ -67,6 +72,7 @@ impl Payload {
             Kind::Input => Payload::Input(decode(bytes)?),
             Kind::Wrench => Payload::Wrench(decode(bytes)?),
             Kind::Constraints => Payload::Constraints(decode(bytes)?),
+            Kind::Head => Payload::Head(decode(bytes)?),
         })
     }
 }

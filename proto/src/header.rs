@@ -40,6 +40,8 @@ pub enum Kind {
     Wrench,
     /// [`crate::ConstraintPart`], server to device bridge.
     Constraints,
+    /// [`crate::HeadSample`], head tracker to server.
+    Head,
 }
 
 impl Kind {
@@ -52,6 +54,7 @@ impl Kind {
             Kind::Input => 8,
             Kind::Wrench => 9,
             Kind::Constraints => 10,
+            Kind::Head => 11,
         }
     }
 
@@ -64,6 +67,7 @@ impl Kind {
             8 => Ok(Kind::Input),
             9 => Ok(Kind::Wrench),
             10 => Ok(Kind::Constraints),
+            11 => Ok(Kind::Head),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

@@ -8,8 +8,8 @@
 use proptest::prelude::*;
 use taut_proto::{
     ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, Group,
-    GroupMember, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role,
-    SceneDescription, Transport, WrenchCommand,
+    GroupMember, HeadSample, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal,
+    Role, SceneDescription, Transport, WrenchCommand,
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
     },
@@ -18,6 +18,7 @@ use taut_proto::{
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
     group::GroupSecret,
+    proof::Grant,
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
@@ -97,6 +98,14 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
         flags: 0,
     };
+    let head = HeadSample {
+        sample_time_ns: 1_000_000_000,
+        index: 43,
+        pose: PoseF64 {
+            position: [0.0, -1.25, 0.875],
+            rotation: [0.5, 0.5, 0.5, 0.5],
+        },
+    };
     let response = TimeResponse {
         client_sent: 17,
         server_received: 1017,
@@ -113,6 +122,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("input", Payload::Input(input)),
         ("wrench", Payload::Wrench(wrench)),
         ("constraints", Payload::Constraints(part())),
+        ("head", Payload::Head(head)),
     ]
 }
 
@@ -253,6 +263,12 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         transport: Transport::QuicDatagram,
         rate_hz: 1000,
         proof: [3; 32],
+        grant: Grant::Master,
+    };
+    let granted = Hello {
+        role: Role::Tracker,
+        grant: Grant::Node { issue: 2 },
+        ..hello.clone()
     };
     let welcome = Welcome {
         proof: [4; 32],
@@ -318,6 +334,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ),
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
         ("group", ControlMessage::Group(group())),
+        ("hello_granted", ControlMessage::Hello(granted)),
     ]
 }
 
@@ -502,6 +519,13 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 server_sent,
             })
         });
+    let head = (any::<(u64, u64)>(), pose64()).prop_map(|((sample_time_ns, index), pose)| {
+        Payload::Head(HeadSample {
+            sample_time_ns,
+            index,
+            pose,
+        })
+    });
     prop_oneof![
         any_hot().prop_map(Payload::Hot),
         any::<u64>().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
@@ -510,6 +534,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         input,
         wrench,
         any_part().prop_map(Payload::Constraints),
+        head,
     ]
 }
 
