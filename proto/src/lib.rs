@@ -3,13 +3,15 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`],
+//!   [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Every byte goes through [`codec`]: little-endian, fixed size integers, explicit limits, no number that is not finite.
 //! Poses are of a body's own frame; forces and torques are at the reference point, world axes; SI units.
 #![forbid(unsafe_code)]
 
+pub mod barrier;
 pub mod clock;
 pub mod codec;
 pub mod constraint_parts;
