@@ -22,13 +22,17 @@ mod readiness;
 pub mod server;
 pub mod transport;
 
-pub use client::{ClientLink, ClientOptions, ReceivedState, ReceivedWrench, connect};
+pub use client::{
+    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, ReceivedState, ReceivedWrench,
+    ReleasedState, connect,
+};
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_key_file};
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerLink, ServerOptions, serve,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
+    ServerLink, ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{ClientStats, ClusterKey, Role, Transport};
