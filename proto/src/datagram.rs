@@ -3,6 +3,7 @@
 use crate::{
     ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample, Kind,
     WrenchCommand,
+    barrier::{Arrive, Release},
     codec::{decode, encode_into},
     time::{TimeRequest, TimeResponse},
 };
@@ -20,6 +21,10 @@ pub enum Payload {
     TimeRequest(TimeRequest),
     /// Tells session time.
     TimeResponse(TimeResponse),
+    /// A frame is drawn.
+    Arrive(Arrive),
+    /// A frame is to be shown, the next to be drawn.
+    Release(Release),
     /// "Alive."
     Heartbeat,
     /// Device reading.
@@ -39,6 +44,8 @@ impl Payload {
             Payload::Hot(_) => Kind::Hot,
             Payload::TimeRequest(_) => Kind::TimeRequest,
             Payload::TimeResponse(_) => Kind::TimeResponse,
+            Payload::Arrive(_) => Kind::Arrive,
+            Payload::Release(_) => Kind::Release,
             Payload::Heartbeat => Kind::Heartbeat,
             Payload::Input(_) => Kind::Input,
             Payload::Wrench(_) => Kind::Wrench,
@@ -53,6 +60,8 @@ impl Payload {
             Payload::Hot(value) => encode_into(value, buffer),
             Payload::TimeRequest(value) => encode_into(value, buffer),
             Payload::TimeResponse(value) => encode_into(value, buffer),
+            Payload::Arrive(value) => encode_into(value, buffer),
+            Payload::Release(value) => encode_into(value, buffer),
             Payload::Heartbeat => Ok(0),
             Payload::Input(value) => encode_into(value, buffer),
             Payload::Wrench(value) => encode_into(value, buffer),
@@ -67,6 +76,8 @@ impl Payload {
             Kind::Hot => Payload::Hot(decode(bytes)?),
             Kind::TimeRequest => Payload::TimeRequest(decode(bytes)?),
             Kind::TimeResponse => Payload::TimeResponse(decode(bytes)?),
+            Kind::Arrive => Payload::Arrive(decode(bytes)?),
+            Kind::Release => Payload::Release(decode(bytes)?),
             Kind::Heartbeat if bytes.is_empty() => Payload::Heartbeat,
             Kind::Heartbeat => return Err(DecodeError::TrailingBytes { left: bytes.len() }),
             Kind::Input => Payload::Input(decode(bytes)?),

@@ -23,7 +23,7 @@ pub const MAX_DATAGRAM_BYTES: usize = 1150;
 /// Most bytes of a payload.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_DATAGRAM_BYTES - HEADER_BYTES - TAG_BYTES;
 
-/// What a datagram carries. Numbers 1, 2, 5 and 6 are kept for bulk state, events and the swap barrier.
+/// What a datagram carries. Numbers 1 and 2 are kept for bulk state and events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::HotState`], server to client.
@@ -32,6 +32,10 @@ pub enum Kind {
     TimeRequest,
     /// [`crate::time::TimeResponse`], server to client.
     TimeResponse,
+    /// [`crate::barrier::Arrive`], render node to the master of frames.
+    Arrive,
+    /// [`crate::barrier::Release`], master of frames to render nodes.
+    Release,
     /// No payload: opens the path and says "alive".
     Heartbeat,
     /// [`crate::InputSample`], device bridge to server.
@@ -50,6 +54,8 @@ impl Kind {
             Kind::Hot => 0,
             Kind::TimeRequest => 3,
             Kind::TimeResponse => 4,
+            Kind::Arrive => 5,
+            Kind::Release => 6,
             Kind::Heartbeat => 7,
             Kind::Input => 8,
             Kind::Wrench => 9,
@@ -63,6 +69,8 @@ impl Kind {
             0 => Ok(Kind::Hot),
             3 => Ok(Kind::TimeRequest),
             4 => Ok(Kind::TimeResponse),
+            5 => Ok(Kind::Arrive),
+            6 => Ok(Kind::Release),
             7 => Ok(Kind::Heartbeat),
             8 => Ok(Kind::Input),
             9 => Ok(Kind::Wrench),

@@ -4,6 +4,8 @@
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
 //!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`],
+//!   [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
@@ -12,6 +14,7 @@
 //! Poses are of a body's own frame; forces and torques are at the reference point, world axes; SI units.
 #![forbid(unsafe_code)]
 
+pub mod barrier;
 pub mod clock;
 pub mod codec;
 pub mod constraint_parts;

@@ -25,18 +25,21 @@ pub mod server;
 pub mod transport;
 
 pub use client::{
-    ClientLink, ClientOptions, GroupReceiver, ReceivedState, ReceivedWrench, Roster, connect,
+    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GroupReceiver, ReceivedState,
+    ReceivedWrench, ReleasedState, Roster, connect,
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerLink, ServerOptions, serve,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
+    ServerLink, ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{
-    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin, Transport,
+    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
+    Transport,
 };
 
 /// Default port of the control plane.

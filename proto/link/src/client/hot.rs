@@ -177,7 +177,8 @@ impl Hot {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether the session is at its end.
+    pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.connection.close_reason().is_some()
     }
 

@@ -1,7 +1,7 @@
 //! What arrives on the hot plane: states into a bounded queue, the newest wrench, constraint sets put together, time into the clock
 //! filter; everything else counted.
 
-use super::{ReceivedState, ReceivedWrench};
+use super::{ReceivedState, ReceivedWrench, frames::Frames};
 use crate::counters::ClientCounterCells;
 use std::{
     collections::VecDeque,
@@ -18,6 +18,7 @@ const MAX_QUEUED_STATES: usize = 256;
 
 pub(crate) struct Inbound {
     inner: Mutex<Inner>,
+    pub(crate) frames: Frames,
     /// Zero of this client's clock in the time exchange.
     start: Instant,
     pub(crate) counters: ClientCounterCells,
@@ -54,6 +55,7 @@ impl Inbound {
                     confirmed: None,
                 }),
             }),
+            frames: Frames::new(),
             start: Instant::now(),
             counters: ClientCounterCells::default(),
         }
@@ -78,7 +80,12 @@ impl Inbound {
             Some(gap) => counters.lost.add(gap),
             None => counters.lost.take_one(), // late: it was counted when it was overtaken
         }
-        inner.take(opened, received, self.local_ns(received), counters);
+        let local_ns = self.local_ns(received);
+        if let Payload::Release(release) = opened.payload {
+            drop(inner);
+            return self.frames.release(release, opened.state_hash, local_ns);
+        }
+        inner.take(opened, received, local_ns, counters);
     }
 
     /// Counts a datagram that does not open.
@@ -189,7 +196,11 @@ impl Inner {
             },
             Payload::Heartbeat => {}
             // The server has no business sending these.
-            Payload::Input(_) | Payload::Head(_) | Payload::TimeRequest(_) => counters.garbage.one(),
+            Payload::Input(_)
+            | Payload::Head(_)
+            | Payload::TimeRequest(_)
+            | Payload::Arrive(_) => counters.garbage.one(),
+            Payload::Release(_) => {} // taken before
         }
     }
 }

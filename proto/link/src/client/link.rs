@@ -1,6 +1,8 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
-use super::{GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes};
+use super::{
+    FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
+};
 use crate::{
     ClientCounters, LinkError,
     framing::{CLOSE_BYE, close_text, write_message},
@@ -84,6 +86,12 @@ impl ClientLink {
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
     pub fn drain_states(&self, out: &mut Vec<ReceivedState>) {
         self.hot.inbound.drain_states(out);
+    }
+
+    /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
+    /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
+    pub fn frame_gate(&self, period: Duration) -> FrameGate {
+        FrameGate::new(self.hot.clone(), self.session, period)
     }
 
     /// Session time now; `None` until the clock is locked, about 100 ms after joining.

@@ -7,6 +7,7 @@ use super::{
 use std::sync::Arc;
 use taut_proto::{
     ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
+    barrier::Newest,
     codec::encode_into,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     state::payload_hash,
@@ -53,9 +54,12 @@ impl Broadcaster {
             return report;
         };
         let payload = &self.payload[..length];
-        self.shared
-            .sent_states
-            .remember(state.tick, payload_hash(payload));
+        let hash = payload_hash(payload);
+        self.shared.sent_states.remember(state.tick, hash);
+        if let Some(frames) = &self.shared.frames {
+            let time_ns = state.sample_time_ns;
+            frames.offer(payload, Newest { hash, time_ns });
+        }
         self.shared
             .sessions
             .refresh(&mut self.sessions, &mut self.generation);

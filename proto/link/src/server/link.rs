@@ -1,8 +1,10 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
+    ServerOptions, accept,
     device_input::InputWriter,
+    frames::Frames,
     group::{self, GroupHub},
     receive,
     sent_states::SentStates,
@@ -80,6 +82,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         counters: CounterCells::default(),
         events: events_in,
         inputs: InputWriter::new(input),
+        frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
         group: GroupHub::new(epoch, None),
         stopping: AtomicBool::new(false),
@@ -126,6 +129,17 @@ impl ServerLink {
     /// A sender of states, for the broadcast thread.
     pub fn broadcaster(&self) -> Broadcaster {
         Broadcaster::new(self.shared.clone())
+    }
+
+    /// The leader of the render nodes' frames, for the frames thread; `None` where [`ServerOptions::frames`] is.
+    pub fn frame_master(&self) -> Option<FrameMaster> {
+        let leads = self.shared.frames.is_some();
+        leads.then(|| FrameMaster::new(self.shared.clone()))
+    }
+
+    /// How the frames of the render nodes went; `None` where they are not locked.
+    pub fn frame_report(&self) -> Option<FrameReport> {
+        self.shared.frames.as_ref().map(Frames::report)
     }
 
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.

@@ -5,7 +5,7 @@ use std::{
     net::{Ipv4Addr, SocketAddr},
     time::Duration,
 };
-use taut_proto::{ClusterKey, CouplingOffer};
+use taut_proto::{ClusterKey, CouplingOffer, barrier::MasterSettings};
 
 /// How to serve. Port 0 takes any free port.
 #[derive(Clone, Debug)]
@@ -24,12 +24,14 @@ pub struct ServerOptions {
     pub idle_timeout: Duration,
     /// The clock that the server's loops stamp with.
     pub clock: SessionClock,
+    /// How the frames of render nodes go together; `None`: each node draws on its own.
+    pub frames: Option<MasterSettings>,
     /// What a device bridge is told about coupling by itself.
     pub coupling: CouplingOffer,
 }
 
 impl ServerOptions {
-    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence, coupling at the server.
+    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence, coupling at the server, frames that nobody locks.
     pub fn new(key: ClusterKey) -> ServerOptions {
         ServerOptions {
             quic: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_QUIC_PORT)),
@@ -39,6 +41,7 @@ impl ServerOptions {
             max_clients: 32,
             idle_timeout: crate::transport::IDLE_TIMEOUT,
             clock: SessionClock::start_now(),
+            frames: None,
             coupling: CouplingOffer::AtServer {
                 reason: "it offers nothing else".to_owned(),
             },

@@ -71,6 +71,11 @@ pub(crate) fn receive(
             );
         }
         Payload::Heartbeat => {}
+        Payload::Arrive(arrive) if session.role == Role::Render => {
+            if let Some(frames) = &shared.frames {
+                frames.arrive(session, &arrive, now_ns, shared);
+            }
+        }
         Payload::Input(sample) if session.role == Role::Device => {
             let input = DeviceInput {
                 sample,
@@ -86,6 +91,8 @@ pub(crate) fn receive(
         Payload::Input(_) => counters.inputs_refused.one(),
         // A client has no business sending these.
         Payload::Hot(_)
+        | Payload::Arrive(_)
+        | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_) => counters.garbage.one(),

@@ -4,6 +4,7 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    frames::Frames,
     group::GroupHub,
     sent_states::SentStates,
     session::{Session, lock},
@@ -30,12 +31,17 @@ pub(crate) struct Shared {
     pub(crate) counters: CounterCells,
     pub(crate) events: SyncSender<LinkEvent>,
     pub(crate) inputs: InputWriter,
+    pub(crate) frames: Option<Frames>,
     pub(crate) sent_states: SentStates,
     pub(crate) group: GroupHub,
     pub(crate) stopping: AtomicBool,
 }
 
 impl Shared {
+    pub(crate) fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+
     /// Hands an event over, or counts that nobody takes them.
     pub(crate) fn tell(&self, event: LinkEvent) {
         if self.events.try_send(event).is_err() {
