@@ -20,6 +20,7 @@ pub mod datagram;
 pub mod header;
 pub mod input;
 pub mod key;
+pub mod membership;
 pub mod mesh_blob;
 mod octahedral;
 pub mod pose;

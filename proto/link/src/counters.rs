@@ -113,3 +113,21 @@ counters! {
         send_errors,
     }
 }
+
+counters! {
+    /// Where a client's meshes came from since it was started, over all its sessions.
+    MeshCounters, MeshCounterCells {
+        /// Meshes fetched from the server.
+        fetched,
+        /// Bytes of these.
+        fetched_bytes,
+        /// Meshes read from the cache on disk.
+        from_cache,
+        /// Bytes of these.
+        cache_bytes,
+        /// Files of the cache that were damaged, and removed.
+        damaged,
+        /// Meshes that the cache could not keep.
+        not_kept,
+    }
+}

@@ -7,7 +7,7 @@
 //!
 //! The server half is [`serve`]; the client half is [`connect`]. Both prove the cluster key to each other over the exporter of their TLS
 //! connection, and take the keys of the hot plane from it: one pair per session, so that only the device bridge's session can give
-//! device input. Nothing here makes a loop of the server wait: [`Broadcaster::send`] belongs in a thread of its own.
+//! device input. [`SupervisedLink`] and [`Rejoiner`] come back to a server that was gone. Nothing here makes a loop of the server wait: [`Broadcaster::send`] belongs in a thread of its own.
 //!
 //! Layout of the wire: crate `taut-proto`.
 
@@ -22,9 +22,13 @@ mod readiness;
 pub mod server;
 pub mod transport;
 
-pub use client::{ClientLink, ClientOptions, ReceivedState, ReceivedWrench, connect};
+pub use client::{
+    ClientLink, ClientOptions, GaveUp, LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache,
+    ReceivedState, ReceivedWrench, RejoinPolicy, Rejoiner, Renewal, SessionEnd, SupervisedLink,
+    connect,
+};
 pub use clock::SessionClock;
-pub use counters::{ClientCounters, Counters};
+pub use counters::{ClientCounters, Counters, MeshCounters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_key_file};
 pub use server::{

@@ -4,6 +4,7 @@ use super::{
     ClientLink, ClientOptions,
     hot::{Hot, Path},
     inbound::Inbound,
+    meshes::Meshes,
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
@@ -29,6 +30,15 @@ const RETRY_PERIOD: Duration = Duration::from_millis(200);
 ///
 /// Runs on the current tokio runtime, which must live as long as the link; over UDP, states arrive in a thread named `taut-states`.
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
+    let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
+    connect_with(options, meshes).await
+}
+
+/// The same with the meshes that earlier sessions brought.
+pub(crate) async fn connect_with(
+    options: ClientOptions,
+    meshes: Arc<Meshes>,
+) -> Result<ClientLink, LinkError> {
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
@@ -71,6 +81,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         path,
     ));
     hot.clone().start()?;
+    meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,
         endpoint,
@@ -78,6 +89,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         welcome.session,
         description,
         coupling,
+        meshes,
         send,
     ))
 }

@@ -4,9 +4,17 @@ mod connect;
 mod hot;
 mod inbound;
 mod link;
+mod mesh_cache;
 mod meshes;
 mod options;
+mod rejoiner;
+mod supervised;
+mod watch;
 
 pub use connect::connect;
-pub use link::ClientLink;
+pub use link::{ClientLink, SessionEnd};
+pub use mesh_cache::{MESH_CACHE_BYTES, MeshCache};
 pub use options::{ClientOptions, ReceivedState, ReceivedWrench};
+pub use rejoiner::{GaveUp, RejoinPolicy, Rejoiner};
+pub use supervised::{Renewal, SupervisedLink};
+pub use watch::{LinkHealth, LinkWatch};
