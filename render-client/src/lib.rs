@@ -14,6 +14,7 @@ pub mod error;
 mod hand;
 mod headless;
 pub mod hold;
+mod membership;
 mod mouse;
 pub mod normals;
 pub mod renderer;
@@ -27,4 +28,5 @@ mod window;
 
 pub use cli::{RenderArgs, run};
 pub use error::RenderError;
+pub use membership::MembershipArgs;
 pub use statistics::RenderReport;

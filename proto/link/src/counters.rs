@@ -79,6 +79,10 @@ counters! {
         refused,
         /// Clients refused for the wrong key.
         wrong_key,
+        /// Clients whose session was closed because they were silent.
+        evicted,
+        /// Control messages that were read later than they came, because there were too many.
+        control_delayed,
         /// Events dropped because nobody took them.
         events_dropped,
     }

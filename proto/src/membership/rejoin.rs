@@ -144,10 +144,7 @@ mod tests {
     #[test]
     fn a_slow_attempt_is_followed_by_the_next_without_a_pause() {
         let mut rejoin = Rejoin::new(RejoinSettings::default(), 0);
-        assert_eq!(
-            attempts(&mut rejoin, 0, 1000, 4000),
-            [0, 1000, 2000, 3000]
-        );
+        assert_eq!(attempts(&mut rejoin, 0, 1000, 4000), [0, 1000, 2000, 3000]);
     }
 
     #[test]

@@ -262,6 +262,7 @@ async fn expect(
             })
         }
         Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
+        Err(error @ ReadMessageError::Stalled) => Err(protocol(options, error.to_string())),
         Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
             server: options.server.clone(),
             reason: connection

@@ -116,6 +116,11 @@ impl ClientLink {
         self.hot.inbound.round_trip_ns().map(Duration::from_nanos)
     }
 
+    /// Round trip of the control plane, as QUIC measures it.
+    pub fn control_round_trip(&self) -> Duration {
+        self.hot.connection.rtt()
+    }
+
     /// Sends a device reading at once. Counts if [`crate::Role::Device`] joined; from any other role the server refuses it.
     pub fn send_input(&self, sample: &InputSample) {
         self.hot.send(&Payload::Input(*sample));

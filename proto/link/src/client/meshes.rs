@@ -106,7 +106,10 @@ impl Meshes {
                 return Err("its bytes have another hash".to_owned());
             }
             let mesh = MeshBlob::decode(&bytes).map_err(|error| error.to_string())?;
-            Ok((mesh, cache.and_then(|cache| cache.write(hash, &bytes).err())))
+            Ok((
+                mesh,
+                cache.and_then(|cache| cache.write(hash, &bytes).err()),
+            ))
         });
         let (mesh, not_kept) = decoded
             .await

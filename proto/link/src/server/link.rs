@@ -3,10 +3,10 @@
 use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
-    receive,
+    eviction, receive,
     sent_states::SentStates,
     session::lock,
-    shared::{Sessions, Shared},
+    shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
@@ -24,6 +24,7 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
+use taut_proto::membership::{Pace, SilenceLimits};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -42,6 +43,7 @@ pub struct ServerLink {
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
+    eviction: tokio::task::JoinHandle<()>,
 }
 
 /// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
@@ -79,6 +81,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: events_in,
         inputs: InputWriter::new(input),
         sent_states: SentStates::new(),
+        mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();
@@ -87,6 +90,9 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         .spawn(move || receive::run_udp(&of_thread))
         .map_err(|error| system("start the state thread", &error))?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
+    let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
+    let limits = SilenceLimits::OF_A_NODE.with_dead_after(node_timeout_ns);
+    let eviction = tokio::spawn(eviction::run(Arc::downgrade(&shared), limits));
     Ok(ServerLink {
         shared,
         endpoint,
@@ -95,6 +101,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
         udp_thread: Mutex::new(Some(udp_thread)),
+        eviction,
     })
 }
 
@@ -146,7 +153,10 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
     /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
-    pub async fn shutdown(self) {
+    pub async fn shutdown(mut self) {
+        // Nothing may hold the sockets for the length of a look.
+        self.eviction.abort();
+        let _ = (&mut self.eviction).await; // it was cancelled: that is no news
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
@@ -182,6 +192,7 @@ async fn freed(address: SocketAddr) {
 
 impl Drop for ServerLink {
     fn drop(&mut self) {
+        self.eviction.abort();
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }

@@ -4,6 +4,7 @@ mod accept;
 mod broadcaster;
 mod content;
 mod device_input;
+mod eviction;
 mod link;
 mod options;
 mod receive;
