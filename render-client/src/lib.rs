@@ -15,6 +15,7 @@ mod hand;
 mod headless;
 pub mod hold;
 mod mouse;
+pub mod node_status;
 pub mod normals;
 pub mod renderer;
 mod session;
