@@ -16,6 +16,7 @@ mod headless;
 pub mod hold;
 mod membership;
 mod mouse;
+pub mod node_status;
 pub mod normals;
 pub mod renderer;
 mod session;
