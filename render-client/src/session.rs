@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 use taut_link::{
-    ClientLink, ClientOptions, LinkHealth, MeshCounters, ReceivedState, RejoinPolicy, Renewal,
-    SessionEnd, SupervisedLink,
+    ClientLink, ClientOptions, MeshCounters, ReceivedState, RejoinPolicy, Renewal, SessionEnd,
+    SupervisedLink,
 };
 use taut_proto::state::HEAD_TRACKED;
 use taut_proto::{ClientStats, Role, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
+use crate::node_status::LinkHealth;
 use crate::stage::{Show, Stage};
 use crate::timeline::{Contact, Head, State, Timeline};
 
@@ -32,7 +33,7 @@ pub(crate) struct Session {
     received: Vec<ReceivedState>,
     /// States lost and received in earlier sessions.
     earlier: (u64, u64),
-    /// When the first session was joined, and how long the first state took from the start.
+    /// When the node began to join.
     began: Instant,
     stop: Arc<AtomicBool>,
 }
@@ -60,12 +61,12 @@ pub(crate) enum Turn {
 }
 
 impl Session {
-    /// Joins the server as `options.node`, and fetches what this node draws and what the server shows.
+    /// Joins the server as `options.node`, and fetches what this node draws. `None` if a signal came first.
     pub(crate) fn join(
         options: ClientOptions,
         policy: RejoinPolicy,
         overrides: Overrides,
-    ) -> Result<(Self, Stage, Show), RenderError> {
+    ) -> Result<Option<(Self, Stage, Show)>, RenderError> {
         debug_assert_eq!(options.role, Role::Render);
         let began = Instant::now();
         let system = |what, error: std::io::Error| RenderError::System {
@@ -84,7 +85,13 @@ impl Session {
         let drawn = Arc::new(Drawn::default());
         let (known, name, address) = (drawn.clone(), node.clone(), server.clone());
         let prepare = move |link: Arc<ClientLink>| {
-            prepare(link, known.clone(), name.clone(), address.clone(), overrides)
+            prepare(
+                link,
+                known.clone(),
+                name.clone(),
+                address.clone(),
+                overrides,
+            )
         };
         let joining = SupervisedLink::join(options, policy, prepare);
         let asked = stop.clone();
@@ -95,7 +102,7 @@ impl Session {
             }
         });
         let Some(joined) = joined else {
-            return Err(RenderError::Interrupted);
+            return Ok(None);
         };
         let (supervised, link, prepared) = joined?;
         // The first is always made: nothing was drawn before.
@@ -115,7 +122,7 @@ impl Session {
             began,
             stop,
         };
-        Ok((session, stage, show))
+        Ok(Some((session, stage, show)))
     }
 
     /// Takes over what happened to the link. Call it once per turn of the frame loop; costs the copy of a pointer.
@@ -135,9 +142,15 @@ impl Session {
         }
     }
 
-    /// How the link is.
+    /// How the link is, for the HUD.
     pub(crate) fn health(&self) -> LinkHealth {
-        self.supervised.health()
+        match self.supervised.health() {
+            taut_link::LinkHealth::Connected => LinkHealth::Connected,
+            taut_link::LinkHealth::Lost { since } => LinkHealth::Lost {
+                since_s: since.as_secs_f64(),
+            },
+            taut_link::LinkHealth::Rejoining => LinkHealth::Rejoining,
+        }
     }
 
     /// Sessions so far.
@@ -213,10 +226,8 @@ impl Session {
     /// Leaves the server.
     pub(crate) fn leave(self) {
         drop(self.supervised);
-        // The supervising task lets go of its link at once, but on another thread.
-        match Arc::into_inner(self.link) {
-            Some(link) => self.runtime.block_on(link.close()),
-            None => tracing::debug!("left without a goodbye"),
+        if self.link.is_closed().is_none() {
+            self.runtime.block_on(self.link.leave());
         }
         self.runtime.shutdown_background();
     }
@@ -256,7 +267,8 @@ async fn prepare(
     let built = tokio::task::spawn_blocking(move || {
         let node = description::find_node(&described, &node)?;
         let stage = description::stage(&described, node, &meshes, &overrides)?;
-        let show = description::show(&described.show);
+        let show = overrides.show;
+        let show = show.unwrap_or_else(|| description::show(&described.show));
         Ok(Prepared {
             stage: Some((stage, show)),
             description: described,

@@ -214,6 +214,11 @@ impl ClientLink {
 
     /// Says goodbye and leaves; reports sent before arrive first.
     pub async fn close(self) {
+        self.leave().await;
+    }
+
+    /// The same for a link that others share; they find it closed.
+    pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
             reason: "the node left".to_owned(),
         });

@@ -66,8 +66,8 @@ impl<T: Send + 'static> SupervisedLink<T> {
     ) -> Result<(SupervisedLink<T>, Arc<ClientLink>, T), E>
     where
         P: FnMut(Arc<ClientLink>) -> F + Send + 'static,
-        F: Future<Output = Result<T, E>> + Send,
-        E: From<LinkError> + Display + Send,
+        F: Future<Output = Result<T, E>> + Send + 'static,
+        E: From<LinkError> + Display + Send + 'static,
     {
         let mut rejoiner = Rejoiner::new(options, policy);
         let link = Arc::new(rejoiner.join().await?);
