@@ -3,9 +3,8 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`],
-//!   [`barrier`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`],
+//!   [`constraints::ConstraintPart`], [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
@@ -29,6 +28,7 @@ pub mod head;
 pub mod header;
 pub mod input;
 pub mod key;
+pub mod membership;
 pub mod mesh_blob;
 mod octahedral;
 pub mod pin;

@@ -79,6 +79,10 @@ counters! {
         refused,
         /// Clients refused for the wrong key.
         wrong_key,
+        /// Clients whose session was closed because they were silent.
+        evicted,
+        /// Control messages that were read later than they came, because there were too many.
+        control_delayed,
         /// Events dropped because nobody took them.
         events_dropped,
     }
@@ -111,5 +115,23 @@ counters! {
         packets_sent,
         /// Datagrams that the system did not take.
         send_errors,
+    }
+}
+
+counters! {
+    /// Where a client's meshes came from since it was started, over all its sessions.
+    MeshCounters, MeshCounterCells {
+        /// Meshes fetched from the server.
+        fetched,
+        /// Bytes of these.
+        fetched_bytes,
+        /// Meshes read from the cache on disk.
+        from_cache,
+        /// Bytes of these.
+        cache_bytes,
+        /// Files of the cache that were damaged, and removed.
+        damaged,
+        /// Meshes that the cache could not keep.
+        not_kept,
     }
 }

@@ -5,6 +5,7 @@ use super::{
     group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    meshes::Meshes,
     told,
 };
 use crate::{
@@ -35,6 +36,15 @@ const RETRY_PERIOD: Duration = Duration::from_millis(200);
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
     // Nobody is asked for what the key does not allow.
     options.key.secret_for(options.role, &options.node)?;
+    let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
+    connect_with(options, meshes).await
+}
+
+/// The same with the meshes that earlier sessions brought.
+pub(crate) async fn connect_with(
+    options: ClientOptions,
+    meshes: Arc<Meshes>,
+) -> Result<ClientLink, LinkError> {
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
@@ -80,6 +90,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
     ));
     hot.clone().start()?;
     tokio::spawn(told::listen(hot.clone(), recv));
+    meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,
         endpoint,
@@ -87,6 +98,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         welcome.session,
         description,
         coupling,
+        meshes,
         send,
     ))
 }
@@ -273,6 +285,7 @@ async fn expect(
             })
         }
         Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
+        Err(error @ ReadMessageError::Stalled) => Err(protocol(options, error.to_string())),
         Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
             server: options.server.clone(),
             reason: connection

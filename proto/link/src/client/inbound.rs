@@ -196,10 +196,9 @@ impl Inner {
             },
             Payload::Heartbeat => {}
             // The server has no business sending these.
-            Payload::Input(_)
-            | Payload::Head(_)
-            | Payload::TimeRequest(_)
-            | Payload::Arrive(_) => counters.garbage.one(),
+            Payload::Input(_) | Payload::Head(_) | Payload::TimeRequest(_) | Payload::Arrive(_) => {
+                counters.garbage.one()
+            }
             Payload::Release(_) => {} // taken before
         }
     }

@@ -4,7 +4,7 @@ use super::{
     FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
 };
 use crate::{
-    ClientCounters, LinkError,
+    ClientCounters, LinkError, MeshCounters, STOP_REASON,
     framing::{CLOSE_BYE, close_text, write_message},
 };
 use quinn::{Endpoint, SendStream};
@@ -24,6 +24,15 @@ const MAX_WAITING_MESSAGES: usize = 64;
 /// Time for the goodbye to arrive.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
 
+/// How a session ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SessionEnd {
+    /// The server said that it stops.
+    ServerStopped,
+    /// For another reason, one sentence.
+    Lost(String),
+}
+
 /// A joined session. Every method takes `&self`: share it by `Arc`. Dropping it leaves the session at once.
 pub struct ClientLink {
     server: String,
@@ -32,7 +41,7 @@ pub struct ClientLink {
     session: u16,
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
-    meshes: Meshes,
+    meshes: Arc<Meshes>,
     outbox: mpsc::Sender<ControlMessage>,
 }
 
@@ -45,6 +54,7 @@ impl ClientLink {
         session: u16,
         description: SceneDescription,
         coupling: Option<CouplingOffer>,
+        meshes: Arc<Meshes>,
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
@@ -56,7 +66,7 @@ impl ClientLink {
             session,
             description,
             coupling,
-            meshes: Meshes::default(),
+            meshes,
             outbox,
         }
     }
@@ -76,11 +86,16 @@ impl ClientLink {
         self.session
     }
 
-    /// The mesh of `hash`, from the server or, the second time, from memory. Its hash has been checked.
+    /// The mesh of `hash`, from memory, from the cache on disk, or from the server. Its hash has been checked.
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
         self.meshes
             .get(&self.hot.connection, &self.server, hash)
             .await
+    }
+
+    /// Where the meshes came from, over all sessions of this client.
+    pub fn mesh_counters(&self) -> MeshCounters {
+        self.meshes.counters()
     }
 
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
@@ -107,6 +122,11 @@ impl ClientLink {
     /// Smallest round trip of the hot plane lately; `None` before the first exchange.
     pub fn round_trip(&self) -> Option<Duration> {
         self.hot.inbound.round_trip_ns().map(Duration::from_nanos)
+    }
+
+    /// Round trip of the control plane, as QUIC measures it.
+    pub fn control_round_trip(&self) -> Duration {
+        self.hot.connection.rtt()
     }
 
     /// Sends a device reading at once. Counts if [`crate::Role::Device`] joined; from any other role the server refuses it.
@@ -197,6 +217,22 @@ impl ClientLink {
             .map(|error| close_text(&error, "the server"))
     }
 
+    /// How the session ended; `None` while it is open.
+    pub fn ended(&self) -> Option<SessionEnd> {
+        let reason = self.is_closed()?;
+        Some(if reason.contains(STOP_REASON) {
+            SessionEnd::ServerStopped
+        } else {
+            SessionEnd::Lost(reason)
+        })
+    }
+
+    /// Leaves at once, without waiting for anything: the server is gone, or this link is of no use any more.
+    pub fn abandon(&self) {
+        self.hot.stop();
+        self.hot.connection.close(CLOSE_BYE, b"the node left");
+    }
+
     /// Waits until the link is closed and returns why.
     pub async fn closed(&self) -> String {
         close_text(&self.hot.connection.closed().await, "the server")
@@ -204,6 +240,11 @@ impl ClientLink {
 
     /// Says goodbye and leaves; reports sent before arrive first.
     pub async fn close(self) {
+        self.leave().await;
+    }
+
+    /// The same for a link that others share; they find it closed.
+    pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
             reason: "the node left".to_owned(),
         });
@@ -228,8 +269,7 @@ impl ClientLink {
 
 impl Drop for ClientLink {
     fn drop(&mut self) {
-        self.hot.stop();
-        self.hot.connection.close(CLOSE_BYE, b"the node left");
+        self.abandon();
     }
 }
 

@@ -4,12 +4,13 @@ use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
     ServerOptions, accept,
     device_input::InputWriter,
+    eviction,
     frames::Frames,
     group::{self, GroupHub},
     receive,
     sent_states::SentStates,
     session::lock,
-    shared::{Sessions, Shared},
+    shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
@@ -27,6 +28,7 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
+use taut_proto::membership::{Pace, SilenceLimits};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -45,6 +47,7 @@ pub struct ServerLink {
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
+    eviction: tokio::task::JoinHandle<()>,
 }
 
 /// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
@@ -85,6 +88,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
         group: GroupHub::new(epoch, None),
+        mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();
@@ -94,6 +98,9 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         .map_err(|error| system("start the state thread", &error))?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
     tokio::spawn(group::run(shared.clone()));
+    let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
+    let limits = SilenceLimits::OF_A_NODE.with_dead_after(node_timeout_ns);
+    let eviction = tokio::spawn(eviction::run(Arc::downgrade(&shared), limits));
     Ok(ServerLink {
         shared,
         endpoint,
@@ -102,6 +109,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
         udp_thread: Mutex::new(Some(udp_thread)),
+        eviction,
     })
 }
 
@@ -169,7 +177,10 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
     /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
-    pub async fn shutdown(self) {
+    pub async fn shutdown(mut self) {
+        // Nothing may hold the sockets for the length of a look.
+        self.eviction.abort();
+        let _ = (&mut self.eviction).await; // it was cancelled: that is no news
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
@@ -205,6 +216,7 @@ async fn freed(address: SocketAddr) {
 
 impl Drop for ServerLink {
     fn drop(&mut self) {
+        self.eviction.abort();
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }

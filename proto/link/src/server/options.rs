@@ -5,7 +5,7 @@ use std::{
     net::{Ipv4Addr, SocketAddr},
     time::Duration,
 };
-use taut_proto::{ClusterKey, CouplingOffer, barrier::MasterSettings};
+use taut_proto::{ClusterKey, CouplingOffer, barrier::MasterSettings, membership::SilenceLimits};
 
 /// How to serve. Port 0 takes any free port.
 #[derive(Clone, Debug)]
@@ -20,8 +20,10 @@ pub struct ServerOptions {
     pub key: ClusterKey,
     /// Most clients at a time.
     pub max_clients: usize,
-    /// Silence after which a client counts as gone and its name is free.
+    /// Silence on the control plane after which a client counts as gone and its name is free.
     pub idle_timeout: Duration,
+    /// Silence on the hot plane after which a node that others wait for counts as gone: a render node, a device.
+    pub node_timeout: Duration,
     /// The clock that the server's loops stamp with.
     pub clock: SessionClock,
     /// How the frames of render nodes go together; `None`: each node draws on its own.
@@ -31,7 +33,7 @@ pub struct ServerOptions {
 }
 
 impl ServerOptions {
-    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence, coupling at the server, frames that nobody locks.
+    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence (0.5 s of a node), coupling at the server, frames that nobody locks.
     pub fn new(key: ClusterKey) -> ServerOptions {
         ServerOptions {
             quic: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_QUIC_PORT)),
@@ -40,6 +42,7 @@ impl ServerOptions {
             key,
             max_clients: 32,
             idle_timeout: crate::transport::IDLE_TIMEOUT,
+            node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),
             clock: SessionClock::start_now(),
             frames: None,
             coupling: CouplingOffer::AtServer {

@@ -18,7 +18,11 @@ use std::{
         mpsc::SyncSender,
     },
 };
-use taut_proto::{ClusterKey, Role, control::RefusalCode};
+use taut_proto::{
+    ClusterKey, Role,
+    control::RefusalCode,
+    membership::{Pace, SilenceLimits},
+};
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
@@ -34,8 +38,16 @@ pub(crate) struct Shared {
     pub(crate) frames: Option<Frames>,
     pub(crate) sent_states: SentStates,
     pub(crate) group: GroupHub,
+    /// How fast meshes go to all clients together.
+    pub(crate) mesh_pace: Mutex<Pace>,
     pub(crate) stopping: AtomicBool,
 }
+
+/// Bytes of meshes per second to all clients together: half of a gigabit link, so that the states of the others find room at every moment
+/// while a node joins. 10 MB take 0.16 s.
+pub(crate) const MESH_BYTES_PER_SECOND: u64 = 64 << 20;
+/// Bytes of meshes that may go at once: 2 ms of a gigabit link.
+pub(crate) const MESH_BURST_BYTES: u64 = 256 << 10;
 
 impl Shared {
     pub(crate) fn is_stopping(&self) -> bool {
@@ -71,9 +83,6 @@ struct Listed {
     sessions: Arc<[Arc<Session>]>,
     last_number: u16,
 }
-
-/// A silence after which a new client of the same name takes the place of the old one, ns. The hot plane speaks every 100 ms.
-const SUSPECT_NS: u64 = 500_000_000;
 
 impl Sessions {
     pub(crate) fn new(max_clients: usize) -> Sessions {
@@ -192,8 +201,9 @@ impl Sessions {
     }
 }
 
+/// Whether a new client of the same name takes the place of this one.
 fn silent(session: &Session, now_ns: u64) -> bool {
-    session
-        .last_heard_ns()
-        .is_some_and(|heard| now_ns.saturating_sub(heard) > SUSPECT_NS)
+    session.last_heard_ns().is_some_and(|heard| {
+        now_ns.saturating_sub(heard) > SilenceLimits::OF_A_NODE.suspect_after_ns
+    })
 }
