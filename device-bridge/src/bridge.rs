@@ -20,7 +20,7 @@ use std::time::Duration;
 use nalgebra::Point3;
 use taut_link::proto::control::LogLevel;
 use taut_link::proto::{CouplingOffer, SceneDescription};
-use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
+use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_join_key};
 use taut_spidar::Geometry;
 
 use crate::arm_switch::{self, ArmSwitch};
@@ -309,7 +309,7 @@ fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
         .clone()
         .or_else(|| std::env::var_os("TAUT_KEY_FILE").map(PathBuf::from))
         .ok_or(BridgeError::NoKey)?;
-    let key = read_key_file(&key_file)?;
+    let key = read_join_key(&key_file)?;
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;

@@ -24,6 +24,7 @@ pub mod head;
 pub mod header;
 pub mod input;
 pub mod key;
+pub mod limits;
 pub mod mesh_blob;
 mod octahedral;
 pub mod pin;

@@ -6,10 +6,7 @@ use std::{
     io::Write,
     path::{Path, PathBuf},
 };
-use taut_proto::{
-    ClusterKey, Credential, JoinKey,
-    credential::MAX_KEY_TEXT_BYTES,
-};
+use taut_proto::{ClusterKey, Credential, JoinKey, credential::MAX_KEY_TEXT_BYTES};
 
 /// Permission bits that no secret may have: everything for others, writing for the group. Reading by the group is left, so that a file of
 /// root's can be read by a service through its group.

@@ -30,11 +30,13 @@ pub use counters::{ClientCounters, Counters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerLink, ServerOptions, serve,
+    Broadcaster, ClientStatus, Content, DeviceInput, FloodLimits, HEAD_READERS, HeadInput,
+    HeadOutput, LinkEvent, ServerLink, ServerOptions, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{
-    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin, Transport,
+    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
+    Transport,
 };
 
 /// Default port of the control plane.

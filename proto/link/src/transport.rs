@@ -40,9 +40,8 @@ pub(crate) fn server_config(
         reason,
     };
     let private = PrivatePkcs8KeyDer::from(ed25519_pkcs8(&key.identity_seed()));
-    let signing =
-        rcgen::KeyPair::from_pkcs8_der_and_sign_algo(&private, &rcgen::PKCS_ED25519)
-            .map_err(|error| failed(error.to_string()))?;
+    let signing = rcgen::KeyPair::from_pkcs8_der_and_sign_algo(&private, &rcgen::PKCS_ED25519)
+        .map_err(|error| failed(error.to_string()))?;
     let certificate = rcgen::CertificateParams::new([SERVER_NAME.to_owned()])
         .and_then(|parameters| parameters.self_signed(&signing))
         .map_err(|error| failed(error.to_string()))?;

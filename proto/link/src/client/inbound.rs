@@ -178,7 +178,9 @@ impl Inner {
             },
             Payload::Heartbeat => {}
             // The server has no business sending these.
-            Payload::Input(_) | Payload::Head(_) | Payload::TimeRequest(_) => counters.garbage.one(),
+            Payload::Input(_) | Payload::Head(_) | Payload::TimeRequest(_) => {
+                counters.garbage.one()
+            }
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, HEAD_READERS, HeadOutput, LinkEvent,
+    ServerOptions, accept,
     device_input::InputWriter,
+    head_input::head_inputs,
     receive,
     sent_states::SentStates,
     session::lock,
@@ -24,6 +26,7 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
+use taut_proto::ServerPin;
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -41,6 +44,7 @@ pub struct ServerLink {
     udp_address: SocketAddr,
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
+    heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -59,7 +63,10 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
     let endpoint = quinn::Endpoint::new(
         quinn::EndpointConfig::default(),
-        Some(transport::server_config(options.idle_timeout)?),
+        Some(transport::server_config(
+            &options.key,
+            options.idle_timeout,
+        )?),
         quic_socket,
         Arc::new(quinn::TokioRuntime),
     )
@@ -67,8 +74,13 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
+    let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
+        policy: options.policy,
+        joins: Mutex::new(options.limits.guard()),
+        unknown: Mutex::new(options.limits.unknown()),
+        heads,
         clock: options.clock,
         epoch: random_epoch()?,
         content,
@@ -94,11 +106,17 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         udp_address,
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
+        heads: Mutex::new(Some(head_outputs)),
         udp_thread: Mutex::new(Some(udp_thread)),
     })
 }
 
 impl ServerLink {
+    /// What clients know this server by.
+    pub fn pin(&self) -> ServerPin {
+        self.shared.key.server_pin()
+    }
+
     /// Address of the control plane, with the port that was taken.
     pub fn quic_addr(&self) -> SocketAddr {
         self.quic_address
@@ -122,6 +140,11 @@ impl ServerLink {
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.
     pub fn device_inputs(&self) -> Option<triple_buffer::Output<Option<DeviceInput>>> {
         lock(&self.inputs).take()
+    }
+
+    /// Newest reading of the tracker on the viewer's head, for each reader. The first call takes them, later ones get `None`.
+    pub fn head_inputs(&self) -> Option<[HeadOutput; HEAD_READERS]> {
+        lock(&self.heads).take()
     }
 
     /// The clients that are in.
