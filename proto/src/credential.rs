@@ -310,6 +310,17 @@ impl JoinKey {
         }
     }
 
+    /// The one name that it is for; `None` if any will do.
+    pub fn node_name(&self) -> Option<&str> {
+        match self {
+            JoinKey::Credential(Credential {
+                holder: Holder::Node(node),
+                ..
+            }) => Some(node),
+            _ => None,
+        }
+    }
+
     /// What to join with as `role` under the name `node`.
     pub fn secret_for(&self, role: Role, node: &str) -> Result<(Grant, JoinSecret), NotAllowed> {
         let credential = match self {

@@ -28,6 +28,7 @@ pub mod head;
 pub mod header;
 pub mod input;
 pub mod key;
+pub mod limits;
 pub mod membership;
 pub mod mesh_blob;
 mod octahedral;

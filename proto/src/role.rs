@@ -15,7 +15,7 @@
 //!
 //! Everybody who is let in also gets the scene description: it holds screens and names, no geometry.
 
-use crate::codec::wire_tag;
+use crate::{codec::wire_tag, limits::Rate};
 use std::{fmt, str::FromStr};
 
 /// What a client is.
@@ -141,6 +141,29 @@ impl Role {
     /// Whether a workbench has at most one at a time.
     pub const fn is_single(self) -> bool {
         matches!(self, Role::Device | Role::Tracker)
+    }
+
+    /// Datagrams that one session may send: several times what an honest one does (1 kHz of input, an ARRIVE every half millisecond,
+    /// ten time requests a second), so that nobody meets it but who floods.
+    pub const fn datagram_rate(self) -> Rate {
+        match self {
+            Role::Device => Rate {
+                per_second: 10_000,
+                burst: 2_000,
+            },
+            Role::Render => Rate {
+                per_second: 5_000,
+                burst: 1_000,
+            },
+            Role::Tracker => Rate {
+                per_second: 3_000,
+                burst: 500,
+            },
+            Role::Operator | Role::Observer => Rate {
+                per_second: 200,
+                burst: 200,
+            },
+        }
     }
 
     /// Number in proofs, secrets and on the wire.

@@ -161,9 +161,10 @@ fn run_state(device: &DeviceState) -> RunState {
 }
 
 fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
-    let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
+    let pose = PoseF32::from_isometry(&head.pose(now));
+    let older = nanoseconds(sampled) as i64 - nanoseconds(head.read_at(now)) as i64;
     HeadState {
-        pose: PoseF32::from_isometry(&head.pose(now)),
+        pose,
         age_us: i32::try_from(older / 1000).unwrap_or(i32::MIN),
         eye_separation: head.eye_separation as f32,
         flags: if head.moves() { HEAD_TRACKED } else { 0 },
@@ -374,7 +375,7 @@ mod tests {
             eye_separation: 0.064,
             motion: crate::head::HeadMotion::Still,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,

@@ -93,6 +93,7 @@ pub fn session_setup(
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         announced_udp_port: None,
         key,
+        policy: network.admission.clone(),
         max_clients: network.max_clients,
     };
     let safety = safety(workbench, &built.settings);
@@ -151,6 +152,7 @@ fn head(viewer: &Viewer) -> HeadSource {
                 amplitude: *amplitude,
                 period: *period,
             }),
+            HeadTracking::Remote => HeadMotion::Remote,
             HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
                 source: vrpn_source(sensor),
                 mapping: sensor.mapping,

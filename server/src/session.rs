@@ -105,12 +105,13 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
+            policy: setup.link.policy,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
-        let [head, watched_head] = setup.head.start().map_err(|error| {
+        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
@@ -634,6 +635,7 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Arm { .. } => Severity::Info,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
+        LinkEvent::Forbidden { .. } => Severity::Warning,
         LinkEvent::Log { event, .. } => match event.level {
             LogLevel::Info => Severity::Info,
             LogLevel::Warning => Severity::Warning,

@@ -34,8 +34,8 @@ pub use counters::{ClientCounters, Counters, MeshCounters};
 pub use error::LinkError;
 pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
-    ServerLink, ServerOptions, Spread, serve,
+    Broadcaster, ClientStatus, Content, DeviceInput, FloodLimits, FrameMaster, FrameReport,
+    HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink, ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

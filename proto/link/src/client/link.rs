@@ -13,8 +13,8 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
-    SceneDescription, SessionTime,
+    ClientStats, ConstraintSet, CouplingOffer, HeadSample, InputSample, MeshBlob, MeshHash,
+    Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
 };
 use tokio::{sync::mpsc, time::timeout};
@@ -132,6 +132,11 @@ impl ClientLink {
     /// Sends a device reading at once. Counts if [`crate::Role::Device`] joined; from any other role the server refuses it.
     pub fn send_input(&self, sample: &InputSample) {
         self.hot.send(&Payload::Input(*sample));
+    }
+
+    /// Sends a reading of the viewer's head at once. Counts if [`crate::Role::Tracker`] joined; from any other role the server refuses it.
+    pub fn send_head(&self, sample: &HeadSample) {
+        self.hot.send(&Payload::Head(*sample));
     }
 
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.

@@ -6,7 +6,7 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
+    Act, ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
     barrier::Newest,
     codec::encode_into,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
@@ -64,7 +64,7 @@ impl Broadcaster {
             .sessions
             .refresh(&mut self.sessions, &mut self.generation);
         for session in self.sessions.iter() {
-            if !session.take_due(state.sample_time_ns) {
+            if !session.role.may(Act::GetStates) || !session.take_due(state.sample_time_ns) {
                 report.skipped += 1;
                 continue;
             }
@@ -93,7 +93,7 @@ impl Broadcaster {
             .refresh(&mut self.sessions, &mut self.generation);
         self.sessions
             .iter()
-            .find(|session| session.role == Role::Device)
+            .find(|session| session.role.may(Act::GetWrenches))
             .is_some_and(|session| session.send(payload, &self.shared) == Sent::Yes)
     }
 }

@@ -1,12 +1,13 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, LinkEvent,
-    ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, HEAD_READERS,
+    HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
     eviction,
     frames::Frames,
     group::{self, GroupHub},
+    head_input::head_inputs,
     receive,
     sent_states::SentStates,
     session::lock,
@@ -28,6 +29,7 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
+use taut_proto::ServerPin;
 use taut_proto::membership::{Pace, SilenceLimits};
 use tokio::time::{sleep, timeout};
 
@@ -46,6 +48,7 @@ pub struct ServerLink {
     udp_address: SocketAddr,
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
+    heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
     eviction: tokio::task::JoinHandle<()>,
 }
@@ -65,7 +68,10 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
     let endpoint = quinn::Endpoint::new(
         quinn::EndpointConfig::default(),
-        Some(transport::server_config(options.idle_timeout)?),
+        Some(transport::server_config(
+            &options.key,
+            options.idle_timeout,
+        )?),
         quic_socket,
         Arc::new(quinn::TokioRuntime),
     )
@@ -74,8 +80,13 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
     let epoch = random_epoch()?;
+    let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
+        policy: options.policy,
+        joins: Mutex::new(options.limits.guard()),
+        unknown: Mutex::new(options.limits.unknown()),
+        heads,
         clock: options.clock,
         epoch,
         content,
@@ -108,12 +119,18 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         udp_address,
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
+        heads: Mutex::new(Some(head_outputs)),
         udp_thread: Mutex::new(Some(udp_thread)),
         eviction,
     })
 }
 
 impl ServerLink {
+    /// What clients know this server by.
+    pub fn pin(&self) -> ServerPin {
+        self.shared.key.server_pin()
+    }
+
     /// Address of the control plane, with the port that was taken.
     pub fn quic_addr(&self) -> SocketAddr {
         self.quic_address
@@ -153,6 +170,11 @@ impl ServerLink {
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.
     pub fn device_inputs(&self) -> Option<triple_buffer::Output<Option<DeviceInput>>> {
         lock(&self.inputs).take()
+    }
+
+    /// Newest reading of the tracker on the viewer's head, for each reader. The first call takes them, later ones get `None`.
+    pub fn head_inputs(&self) -> Option<[HeadOutput; HEAD_READERS]> {
+        lock(&self.heads).take()
     }
 
     /// The clients that are in.

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_proto::JoinPolicy;
 
+use super::admission::admission;
 use super::dynamics::dynamics;
 use super::load::Workbench;
 use super::safety::safety;
@@ -303,7 +305,15 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
         let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
         section.complain(&node.at, text);
     }
+    let remote = section.boolean("remote_tracker").unwrap_or(false);
+    if let (true, Some(node)) = (remote, section.get("remote_tracker"))
+        && (tracker.is_some() || sway.is_some())
+    {
+        let text = "`remote_tracker` in [viewer] excludes `tracker` and `sway`; leave one out";
+        section.complain(&node.at, text);
+    }
     let tracking = match tracker {
+        None if remote => HeadTracking::Remote,
         Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
         None => sway.unwrap_or(HeadTracking::Fixed),
     };
@@ -437,6 +447,7 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             key_file: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
+            admission: JoinPolicy::default(),
         });
     };
     let transports = [
@@ -470,6 +481,7 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),
+        admission: admission(&section),
     };
     section.finish();
     Some(network)
