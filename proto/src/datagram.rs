@@ -5,6 +5,7 @@ use crate::{
     WrenchCommand,
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
+    events::EventAck,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -17,6 +18,8 @@ use crate::{
 pub enum Payload {
     /// State of the workbench.
     Hot(HotState),
+    /// "These events I have."
+    EventAck(EventAck),
     /// Asks for session time.
     TimeRequest(TimeRequest),
     /// Tells session time.
@@ -42,6 +45,7 @@ impl Payload {
     pub fn kind(&self) -> Kind {
         match self {
             Payload::Hot(_) => Kind::Hot,
+            Payload::EventAck(_) => Kind::EventAck,
             Payload::TimeRequest(_) => Kind::TimeRequest,
             Payload::TimeResponse(_) => Kind::TimeResponse,
             Payload::Arrive(_) => Kind::Arrive,
@@ -58,6 +62,7 @@ impl Payload {
     pub fn encode_into(&self, buffer: &mut [u8]) -> Result<usize, EncodeError> {
         match self {
             Payload::Hot(value) => encode_into(value, buffer),
+            Payload::EventAck(value) => encode_into(value, buffer),
             Payload::TimeRequest(value) => encode_into(value, buffer),
             Payload::TimeResponse(value) => encode_into(value, buffer),
             Payload::Arrive(value) => encode_into(value, buffer),
@@ -74,6 +79,7 @@ impl Payload {
     pub fn decode(kind: Kind, bytes: &[u8]) -> Result<Payload, DecodeError> {
         Ok(match kind {
             Kind::Hot => Payload::Hot(decode(bytes)?),
+            Kind::EventAck => Payload::EventAck(decode(bytes)?),
             Kind::TimeRequest => Payload::TimeRequest(decode(bytes)?),
             Kind::TimeResponse => Payload::TimeResponse(decode(bytes)?),
             Kind::Arrive => Payload::Arrive(decode(bytes)?),

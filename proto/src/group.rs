@@ -108,7 +108,8 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         Kind::Heartbeat => true,
         // Between nodes, when the server is gone; with the server they are under the pair's own key.
         Kind::Arrive | Kind::Release => sender != SERVER_SENDER,
-        Kind::TimeRequest
+        Kind::EventAck
+        | Kind::TimeRequest
         | Kind::TimeResponse
         | Kind::Input
         | Kind::Head

@@ -23,11 +23,13 @@ pub const MAX_DATAGRAM_BYTES: usize = 1150;
 /// Most bytes of a payload.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_DATAGRAM_BYTES - HEADER_BYTES - TAG_BYTES;
 
-/// What a datagram carries. Numbers 1 and 2 are kept for bulk state and events.
+/// What a datagram carries. Number 1 is kept for bulk state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::HotState`], server to client.
     Hot,
+    /// [`crate::events::EventAck`], client to server.
+    EventAck,
     /// [`crate::time::TimeRequest`], client to server.
     TimeRequest,
     /// [`crate::time::TimeResponse`], server to client.
@@ -52,6 +54,7 @@ impl Kind {
     fn code(self) -> u8 {
         match self {
             Kind::Hot => 0,
+            Kind::EventAck => 2,
             Kind::TimeRequest => 3,
             Kind::TimeResponse => 4,
             Kind::Arrive => 5,
@@ -67,6 +70,7 @@ impl Kind {
     fn from_code(tag: u8) -> Result<Kind, DecodeError> {
         match tag {
             0 => Ok(Kind::Hot),
+            2 => Ok(Kind::EventAck),
             3 => Ok(Kind::TimeRequest),
             4 => Ok(Kind::TimeResponse),
             5 => Ok(Kind::Arrive),

@@ -7,9 +7,9 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, Group,
-    GroupMember, HeadSample, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal,
-    Role, SceneDescription, Transport, WrenchCommand,
+    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, EventsTold,
+    Group, GroupMember, HeadSample, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64,
+    Refusal, Role, SceneDescription, Transport, WrenchCommand,
     barrier::{Arrive, MAX_MEMBERS, Release, ReleaseHead},
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
@@ -18,6 +18,7 @@ use taut_proto::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
+    events::EventAck,
     group::GroupSecret,
     proof::Grant,
     scene::{
@@ -126,6 +127,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("head", Payload::Head(head)),
         ("arrive", Payload::Arrive(arrive())),
         ("release", Payload::Release(release())),
+        ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
     ]
 }
 
@@ -370,6 +372,13 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
         ("group", ControlMessage::Group(group())),
         ("hello_granted", ControlMessage::Hello(granted)),
+        (
+            "events",
+            ControlMessage::Events(EventsTold {
+                after: 16,
+                records: hot().events.to_vec(),
+            }),
+        ),
     ]
 }
 

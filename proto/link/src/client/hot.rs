@@ -15,6 +15,7 @@ use std::{
 };
 use taut_proto::{
     Header, Payload,
+    events::EventAck,
     group::{SERVER_SENDER, is_grouped},
     header::MAX_DATAGRAM_BYTES,
     seal::Sealer,
@@ -138,6 +139,14 @@ impl Hot {
         match Header::parse(datagram) {
             Ok(header) if is_grouped(&header) => self.receive_grouped(datagram, received),
             _ => self.inbound.receive(datagram, received),
+        }
+        self.acknowledge();
+    }
+
+    /// Tells the server which events are here, if that is news.
+    pub(crate) fn acknowledge(&self) {
+        if let Some(newest) = self.inbound.acknowledgement() {
+            self.send(&Payload::EventAck(EventAck { newest }));
         }
     }
 

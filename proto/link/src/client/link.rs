@@ -16,6 +16,7 @@ use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, HeadSample, InputSample, MeshBlob, MeshHash,
     Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
+    state::EventRecord,
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -107,6 +108,18 @@ impl ClientLink {
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {
         FrameGate::new(self.hot.clone(), self.session, period)
+    }
+
+    /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most
+    /// the newest [`taut_proto::events::MAX_QUEUED`] wait.
+    pub fn drain_events(&self, out: &mut Vec<EventRecord>) {
+        self.hot.inbound.drain_events(out);
+    }
+
+    /// Events since the join that this client did not get: because its stream stood still for longer than the server keeps them, and because nobody
+    /// drained them in time.
+    pub fn events_lost(&self) -> (u64, u64) {
+        self.hot.inbound.events_lost()
     }
 
     /// Session time now; `None` until the clock is locked, about 100 ms after joining.

@@ -13,6 +13,10 @@ pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream) {
             Ok(ControlMessage::Group(group)) => {
                 hot.group.learn(group, hot.inbound.local_ns(Instant::now()));
             }
+            Ok(ControlMessage::Events(told)) => {
+                hot.inbound.told_events(&told);
+                hot.acknowledge();
+            }
             Ok(other) => break format!("the server sent {}", other.name()),
             Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
                 break error.to_string();

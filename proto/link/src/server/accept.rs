@@ -193,6 +193,7 @@ fn admit(
                     transport: hello.transport,
                     rate_hz: hello.rate_hz,
                     joined_ns: now_ns,
+                    after_event: shared.discrete.newest(),
                 };
                 Ok(Session::new(admitted, connection.clone(), keys))
             })?;

@@ -4,6 +4,7 @@ use super::{
     Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, HEAD_READERS,
     HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    events::EventHub,
     eviction,
     frames::Frames,
     group::{self, GroupHub},
@@ -100,6 +101,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         sent_states: SentStates::new(),
         group: GroupHub::new(epoch, None),
         mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
+        discrete: EventHub::default(),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();

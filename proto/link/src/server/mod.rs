@@ -5,6 +5,7 @@ mod broadcaster;
 mod content;
 mod device_input;
 mod downstream;
+mod events;
 mod eviction;
 mod frame_master;
 mod frame_report;

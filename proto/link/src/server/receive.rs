@@ -102,6 +102,7 @@ pub(crate) fn receive(
                 frames.arrive(session, &arrive, now_ns, shared);
             }
         }
+        Payload::EventAck(ack) => session.acknowledge(ack.newest),
         Payload::Input(sample) => {
             let input = DeviceInput {
                 sample,

@@ -4,6 +4,7 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    events::EventHub,
     frames::Frames,
     group::GroupHub,
     head_input::HeadWriter,
@@ -46,6 +47,7 @@ pub(crate) struct Shared {
     pub(crate) group: GroupHub,
     /// How fast meshes go to all clients together.
     pub(crate) mesh_pace: Mutex<Pace>,
+    pub(crate) discrete: EventHub,
     pub(crate) stopping: AtomicBool,
 }
 
