@@ -210,7 +210,9 @@ pub fn payload_of_every_kind() -> Vec<Payload> {
     let material = std::array::from_fn(|i| i as u8);
     let mut opener = Opener::new(&material, 0x0102_0304, 5);
     let golden = include_str!("../../../proto/tests/golden.txt");
-    let digits = golden.lines().filter_map(|line| line.strip_prefix("datagram/")?.split_once(' '));
+    let digits = golden
+        .lines()
+        .filter_map(|line| line.strip_prefix("datagram/")?.split_once(' '));
     let datagrams = digits.map(|(name, digits)| {
         let bytes: Vec<u8> = (0..digits.len() / 2)
             .filter_map(|i| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok())
@@ -245,7 +247,10 @@ pub fn attack(forgeries: u64, seed: u64) -> Attack {
     const KEPT: usize = 64;
     let payloads = payload_of_every_kind();
     let mut ways = [OneWay::new(seed, EPOCH, 7), OneWay::new(seed + 1, EPOCH, 0)];
-    let mut forgers = [Forger::new(seed + 2, EPOCH, 7), Forger::new(seed + 3, EPOCH, 0)];
+    let mut forgers = [
+        Forger::new(seed + 2, EPOCH, 7),
+        Forger::new(seed + 3, EPOCH, 0),
+    ];
     let mut seen = [Seen::default(), Seen::default()];
     let mut result = Attack::default();
     let mut buffer = [0; MAX_FORGED_BYTES];

@@ -160,15 +160,17 @@ fn between(treatment: Treatment) -> (UdpSocket, UdpSocket, Relay) {
     (server, client, relay)
 }
 
+/// Everything that comes until `done` and nothing more is there.
 fn numbers(socket: &UdpSocket, mut done: impl FnMut() -> bool) -> Vec<u32> {
     let (start, mut numbers, mut buffer) = (Instant::now(), Vec::new(), [0; 64]);
     loop {
+        let finished = done(); // before the look: what has passed by then is in the socket
         match socket.recv(&mut buffer) {
             Ok(4) => numbers.push(u32::from_le_bytes([
                 buffer[0], buffer[1], buffer[2], buffer[3],
             ])),
             Ok(other) => panic!("{other} bytes"),
-            Err(_) if done() => return numbers,
+            Err(_) if finished => return numbers,
             Err(_) => assert!(start.elapsed() < PATIENCE, "only {} came", numbers.len()),
         }
     }

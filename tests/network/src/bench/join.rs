@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use taut_link::{ClusterKey, Role, connect, serve};
 
-use super::{BenchError, Quantiles, client_options, content_with, server_options, state, wait_until};
+use super::{
+    BenchError, Quantiles, client_options, content_with, server_options, state, wait_until,
+};
 
 /// Triangles of the scene: 10 MB, at 24 bytes per triangle of a strip in single precision.
 const TRIANGLES: u32 = 417_000;

@@ -12,7 +12,9 @@ use taut_bridge::realtime::{Ticker, request_fifo};
 use taut_link::{ClusterKey, ReceivedState, Role, Transport, connect, serve};
 use taut_proto::{Payload, header::MAX_DATAGRAM_BYTES};
 
-use super::{BenchError, Quantiles, client_options, server_options, small_content, state, wait_until};
+use super::{
+    BenchError, Quantiles, client_options, server_options, small_content, state, wait_until,
+};
 use crate::forge::OneWay;
 
 /// Time between two datagrams of different ways.
@@ -53,8 +55,11 @@ pub fn measure(duration: Duration, full: bool) -> Result<Latency, BenchError> {
             let fifo = request_fifo(PRIORITY).is_granted();
             measure_here(duration, full, fifo)
         })?;
-    run.join()
-        .unwrap_or_else(|_| Err(BenchError::Missing("the measuring thread panicked".to_owned())))
+    run.join().unwrap_or_else(|_| {
+        Err(BenchError::Missing(
+            "the measuring thread panicked".to_owned(),
+        ))
+    })
 }
 
 fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, BenchError> {
@@ -117,7 +122,9 @@ fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, B
 
 /// From sampling to opened state, us.
 fn times(states: &[ReceivedState], zero: Instant, opening_us: f64) -> Vec<f64> {
-    let counted = states.iter().filter(|received| received.state.tick >= WARM_UP);
+    let counted = states
+        .iter()
+        .filter(|received| received.state.tick >= WARM_UP);
     let time = |received: &ReceivedState| {
         let arrived = received.received.saturating_duration_since(zero);
         arrived.as_secs_f64() * 1e6 - received.state.sample_time_ns as f64 * 1e-3 + opening_us
@@ -164,7 +171,10 @@ impl RawReceiver {
                 if taken.recv(&mut buffer).is_ok() {
                     let now = zero.elapsed().as_nanos() as f64;
                     let number = |at: usize| {
-                        buffer[at..at + 8].iter().rev().fold(0_u64, |n, byte| n << 8 | u64::from(*byte))
+                        buffer[at..at + 8]
+                            .iter()
+                            .rev()
+                            .fold(0_u64, |n, byte| n << 8 | u64::from(*byte))
                     };
                     if number(8) >= WARM_UP {
                         times.push((now - number(0) as f64) * 1e-3);

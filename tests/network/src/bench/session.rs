@@ -41,7 +41,12 @@ pub fn server_options(key: &ClusterKey) -> ServerOptions {
 
 /// A client of `server` that forgives a busy machine.
 #[must_use]
-pub fn client_options(server: &ServerLink, key: &ClusterKey, role: Role, node: &str) -> ClientOptions {
+pub fn client_options(
+    server: &ServerLink,
+    key: &ClusterKey,
+    role: Role,
+    node: &str,
+) -> ClientOptions {
     ClientOptions {
         idle_timeout: FORGIVING,
         connect_timeout: FORGIVING,

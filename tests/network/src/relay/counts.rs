@@ -75,7 +75,11 @@ impl Cells {
     }
 
     pub(super) fn sent(&self, taken: bool) {
-        add(if taken { &self.passed } else { &self.send_errors });
+        add(if taken {
+            &self.passed
+        } else {
+            &self.send_errors
+        });
     }
 }
 

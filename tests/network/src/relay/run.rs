@@ -191,7 +191,10 @@ impl Thread {
     /// Until something comes or arrives.
     fn wait(&self) {
         let now = Instant::now();
-        let arrivals = self.flows.iter().flat_map(|flow| [flow.up.next(), flow.down.next()]);
+        let arrivals = self
+            .flows
+            .iter()
+            .flat_map(|flow| [flow.up.next(), flow.down.next()]);
         let next = arrivals.flatten().min();
         let longest = next.map_or(STOP_CHECK, |next| next.saturating_duration_since(now));
         let longest = longest.min(STOP_CHECK);
@@ -199,7 +202,8 @@ impl Thread {
             tv_sec: longest.as_secs() as i64,
             tv_nsec: i64::from(longest.subsec_nanos()),
         };
-        let sockets = std::iter::once(&self.clients).chain(self.flows.iter().map(|flow| &flow.socket));
+        let sockets =
+            std::iter::once(&self.clients).chain(self.flows.iter().map(|flow| &flow.socket));
         let mut ready: Vec<_> = sockets.map(|s| PollFd::new(s, PollFlags::IN)).collect();
         if poll(&mut ready, Some(&timeout)).is_err() {
             std::thread::sleep(Duration::from_millis(1)); // a signal, or no memory: look again
@@ -231,7 +235,12 @@ impl Thread {
                     break;
                 };
                 let datagram = &buffer[..length];
-                let fate = decide(&mut flow.fates_down, datagram, &self.shared, &self.shared.down);
+                let fate = decide(
+                    &mut flow.fates_down,
+                    datagram,
+                    &self.shared,
+                    &self.shared.down,
+                );
                 flow.down.take(datagram, &fate, Instant::now());
             }
         }
@@ -242,10 +251,12 @@ impl Thread {
         let (shared, clients) = (&self.shared, &self.clients);
         for flow in &mut self.flows {
             let (socket, client) = (&flow.socket, flow.client);
-            flow.up
-                .deliver(now, |datagram| shared.up.sent(socket.send(datagram).is_ok()));
-            flow.down
-                .deliver(now, |datagram| shared.down.sent(clients.send_to(datagram, client).is_ok()));
+            flow.up.deliver(now, |datagram| {
+                shared.up.sent(socket.send(datagram).is_ok())
+            });
+            flow.down.deliver(now, |datagram| {
+                shared.down.sent(clients.send_to(datagram, client).is_ok())
+            });
         }
     }
 
@@ -263,7 +274,8 @@ impl Thread {
         socket.connect(self.server).ok()?;
         let treatment = self.treatments.get(number).or(self.treatments.last());
         let Treatment { up, down } = treatment.cloned().unwrap_or_default();
-        let fates = |impairment, direction| Fates::new(impairment, self.seed, number as u64, direction);
+        let fates =
+            |impairment, direction| Fates::new(impairment, self.seed, number as u64, direction);
         self.flows.push(Flow {
             client,
             socket,
