@@ -31,6 +31,7 @@ pub mod failure;
 pub mod finished_file;
 pub mod head;
 pub mod key;
+pub mod looking_on;
 pub mod loops;
 pub mod monitor;
 pub mod realtime;
