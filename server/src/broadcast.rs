@@ -20,6 +20,7 @@ use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 use crate::clock::{SessionClock, nanoseconds};
 use crate::edge_sets::EdgeSets;
 use crate::head::Head;
+use crate::looking_on::Outlets;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
@@ -50,6 +51,7 @@ pub fn run(
     mut states: StateWriter,
     mut broadcaster: Broadcaster,
     mut bridge_commands: Option<BridgeCommands>,
+    mut outlets: Outlets,
     clock: SessionClock,
     period: Duration,
     shutdown: &Shutdown,
@@ -69,6 +71,7 @@ pub fn run(
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
             let _ = broadcaster.send(state);
+            outlets.publish(state);
         }
     });
     if let Some(commands) = &mut bridge_commands {

@@ -19,6 +19,7 @@ use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
+use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
@@ -115,6 +116,7 @@ pub fn session_setup(
         head: head(&workbench.viewer),
         content,
         link,
+        looking_on: LookingOnSettings::of(workbench)?,
         realtime: realtime(workbench),
         monitor: monitor(&workbench.monitoring, overrides),
     })

@@ -6,7 +6,7 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    Act, ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
+    Act, ConstraintPart, HotState, Kind, Payload, WrenchCommand,
     barrier::Newest,
     codec::encode_into,
     events::is_newer,

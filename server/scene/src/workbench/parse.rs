@@ -11,6 +11,7 @@ use taut_proto::JoinPolicy;
 use super::admission::admission;
 use super::dynamics::dynamics;
 use super::load::Workbench;
+use super::looking_on::{observers, vrpn, zenoh};
 use super::safety::safety;
 use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
@@ -77,6 +78,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
+    let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
+    let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
+    let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
@@ -112,17 +116,20 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         realtime,
         safety,
         show,
+        vrpn,
+        observers,
+        zenoh,
         scene_at,
     })
 }
 
 /// Paths in the file are relative to it.
-struct Files<'d> {
+pub(super) struct Files<'d> {
     directory: &'d Path,
 }
 
 impl Files<'_> {
-    fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
+    pub(super) fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
         section.text(key).map(|text| self.directory.join(text))
     }
 
@@ -411,7 +418,7 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
 }
 
 /// An address to listen on.
-fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
+pub(super) fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     let Some(text) = section.text("bind") else {
         return (!section.has("bind")).then_some(default);
     };
@@ -429,7 +436,7 @@ fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     address.ok()
 }
 
-fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
+pub(super) fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
     section
         .integer(key, 0, i64::from(u16::MAX))
         .and_then(|n| u16::try_from(n).ok())
