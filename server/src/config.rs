@@ -94,6 +94,7 @@ pub fn session_setup(
         announced_udp_port: None,
         key,
         max_clients: network.max_clients,
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides

@@ -105,6 +105,7 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
+            node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
@@ -632,6 +633,7 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Left { .. }
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Log { event, .. } => match event.level {

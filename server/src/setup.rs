@@ -81,6 +81,8 @@ pub struct LinkSettings {
     pub key: ClusterKey,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone.
+    pub node_timeout: Duration,
 }
 
 /// Rates and scheduling.

@@ -426,6 +426,11 @@ fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
         .unwrap_or(default)
 }
 
+/// Silence after which a node counts as gone, s: ten of its signs of life.
+const NODE_TIMEOUT: f64 = 0.5;
+/// Longest that may be asked for, s.
+const MAX_NODE_TIMEOUT: f64 = 60.0;
+
 fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Network> {
     let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let Some(section) = section else {
@@ -437,6 +442,7 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             key_file: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
+            node_timeout: NODE_TIMEOUT,
         });
     };
     let transports = [
@@ -470,6 +476,11 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),
+        node_timeout: section.number_or(
+            "node_timeout",
+            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            NODE_TIMEOUT,
+        ),
     };
     section.finish();
     Some(network)

@@ -199,6 +199,8 @@ pub struct Network {
     pub broadcast_rate: f64,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone, s.
+    pub node_timeout: f64,
 }
 
 /// The rerun stream.
