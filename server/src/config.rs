@@ -96,6 +96,7 @@ pub fn session_setup(
         key,
         policy: network.admission.clone(),
         max_clients: network.max_clients,
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides

@@ -108,6 +108,7 @@ impl Session {
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
             policy: setup.link.policy,
+            node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
@@ -652,6 +653,7 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Left { .. }
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Forbidden { .. } => Severity::Warning,

@@ -86,6 +86,8 @@ pub struct LinkSettings {
     pub policy: JoinPolicy,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone.
+    pub node_timeout: Duration,
 }
 
 /// Rates and scheduling.

@@ -30,7 +30,7 @@ pub struct TestWorkbench {
 }
 
 impl TestWorkbench {
-    /// The shipped workbench on free ports of loopback, without monitor. `program` is the program under test. Waits
+    /// The shipped workbench on free ports of loopback, without monitor, patient with silent nodes. `program` is the program under test. Waits
     /// until no other test runs a workbench.
     ///
     /// # Panics
@@ -62,6 +62,8 @@ impl TestWorkbench {
             workbench.set(port, 0);
         }
         workbench.set("monitoring.enabled", false);
+        // A busy machine may starve a client for longer than a workbench would forgive.
+        workbench.set("network.node_timeout", 4.0);
         workbench
     }
 

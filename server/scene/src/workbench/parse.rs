@@ -443,6 +443,11 @@ pub(super) fn port(section: &Section<'_>, key: &'static str, default: u16) -> u1
         .unwrap_or(default)
 }
 
+/// Silence after which a node counts as gone, s: ten of its signs of life.
+const NODE_TIMEOUT: f64 = 0.5;
+/// Longest that may be asked for, s.
+const MAX_NODE_TIMEOUT: f64 = 60.0;
+
 fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Network> {
     let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let Some(section) = section else {
@@ -455,6 +460,7 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             broadcast_rate: 1000.0,
             max_clients: 16,
             admission: JoinPolicy::default(),
+            node_timeout: NODE_TIMEOUT,
         });
     };
     let transports = [
@@ -489,6 +495,11 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),
         admission: admission(&section),
+        node_timeout: section.number_or(
+            "node_timeout",
+            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            NODE_TIMEOUT,
+        ),
     };
     section.finish();
     Some(network)
