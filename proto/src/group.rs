@@ -96,7 +96,7 @@ impl Group {
 pub fn is_member(role: Role) -> bool {
     match role {
         Role::Render | Role::Observer | Role::Operator => true,
-        Role::Device => false,
+        Role::Device | Role::Tracker => false,
     }
 }
 
@@ -106,10 +106,13 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
     match kind {
         Kind::Hot => sender == SERVER_SENDER,
         Kind::Heartbeat => true,
+        // Between nodes, when the server is gone; with the server they are under the pair's own key.
+        Kind::Arrive | Kind::Release => sender != SERVER_SENDER,
         Kind::EventAck
         | Kind::TimeRequest
         | Kind::TimeResponse
         | Kind::Input
+        | Kind::Head
         | Kind::Wrench
         | Kind::Constraints => false,
     }

@@ -23,7 +23,7 @@ pub const MAX_DATAGRAM_BYTES: usize = 1150;
 /// Most bytes of a payload.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_DATAGRAM_BYTES - HEADER_BYTES - TAG_BYTES;
 
-/// What a datagram carries. Numbers 1, 5 and 6 are kept for bulk state and the swap barrier.
+/// What a datagram carries. Number 1 is kept for bulk state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::HotState`], server to client.
@@ -34,6 +34,10 @@ pub enum Kind {
     TimeRequest,
     /// [`crate::time::TimeResponse`], server to client.
     TimeResponse,
+    /// [`crate::barrier::Arrive`], render node to the master of frames.
+    Arrive,
+    /// [`crate::barrier::Release`], master of frames to render nodes.
+    Release,
     /// No payload: opens the path and says "alive".
     Heartbeat,
     /// [`crate::InputSample`], device bridge to server.
@@ -42,6 +46,8 @@ pub enum Kind {
     Wrench,
     /// [`crate::ConstraintPart`], server to device bridge.
     Constraints,
+    /// [`crate::HeadSample`], head tracker to server.
+    Head,
 }
 
 impl Kind {
@@ -51,10 +57,13 @@ impl Kind {
             Kind::EventAck => 2,
             Kind::TimeRequest => 3,
             Kind::TimeResponse => 4,
+            Kind::Arrive => 5,
+            Kind::Release => 6,
             Kind::Heartbeat => 7,
             Kind::Input => 8,
             Kind::Wrench => 9,
             Kind::Constraints => 10,
+            Kind::Head => 11,
         }
     }
 
@@ -64,10 +73,13 @@ impl Kind {
             2 => Ok(Kind::EventAck),
             3 => Ok(Kind::TimeRequest),
             4 => Ok(Kind::TimeResponse),
+            5 => Ok(Kind::Arrive),
+            6 => Ok(Kind::Release),
             7 => Ok(Kind::Heartbeat),
             8 => Ok(Kind::Input),
             9 => Ok(Kind::Wrench),
             10 => Ok(Kind::Constraints),
+            11 => Ok(Kind::Head),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

@@ -73,7 +73,7 @@ pub struct Opened {
     pub header: Header,
     /// Its payload.
     pub payload: Payload,
-    /// [`crate::state::payload_hash`] of the payload's bytes, for HOT; 0 for the others.
+    /// [`crate::state::payload_hash`] of the state's bytes, for HOT and RELEASE; 0 for the others.
     pub state_hash: u64,
     /// One past the highest sequence number seen before this one.
     pub expected: u64,
@@ -315,6 +315,7 @@ impl Opener {
         let payload = Payload::decode(header.kind, plain).map_err(OpenError::Payload);
         let state_hash = match header.kind {
             Kind::Hot => crate::state::payload_hash(plain),
+            Kind::Release => crate::state::payload_hash(crate::barrier::state_bytes(plain)),
             _ => 0,
         };
         self.roll_to(generation_of(header.sequence));

@@ -18,8 +18,9 @@ const LOOK_PERIOD: Duration = Duration::from_millis(10);
 
 /// Asks, and waits for the answer in the states; one sentence.
 pub async fn run(args: &ArmArgs) -> Result<&'static str, Failure> {
-    let key = key::read(args.key.as_deref())?;
-    let node = format!("arm-{}", std::process::id());
+    let key = key::read_to_join(args.key.as_deref())?;
+    let any_name = || format!("arm-{}", std::process::id());
+    let node = key.node_name().map_or_else(any_name, str::to_owned);
     let options = ClientOptions::new(&args.server, key, Role::Operator, node);
     let link = connect(options).await?;
     let mut answer = Answer::new(!args.off);

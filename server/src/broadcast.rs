@@ -20,6 +20,7 @@ use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 use crate::clock::{SessionClock, nanoseconds};
 use crate::edge_sets::EdgeSets;
 use crate::head::Head;
+use crate::looking_on::Outlets;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
@@ -50,6 +51,7 @@ pub fn run(
     mut states: StateWriter,
     mut broadcaster: Broadcaster,
     mut bridge_commands: Option<BridgeCommands>,
+    mut outlets: Outlets,
     clock: SessionClock,
     period: Duration,
     shutdown: &Shutdown,
@@ -69,6 +71,7 @@ pub fn run(
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
             let _ = broadcaster.send(state);
+            outlets.publish(state);
         }
     });
     if let Some(commands) = &mut bridge_commands {
@@ -165,9 +168,10 @@ fn run_state(device: &DeviceState) -> RunState {
 }
 
 fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
-    let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
+    let pose = PoseF32::from_isometry(&head.pose(now));
+    let older = nanoseconds(sampled) as i64 - nanoseconds(head.read_at(now)) as i64;
     HeadState {
-        pose: PoseF32::from_isometry(&head.pose(now)),
+        pose,
         age_us: i32::try_from(older / 1000).unwrap_or(i32::MIN),
         eye_separation: head.eye_separation as f32,
         flags: if head.moves() { HEAD_TRACKED } else { 0 },
@@ -387,7 +391,7 @@ mod tests {
             eye_separation: 0.064,
             motion: crate::head::HeadMotion::Still,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,

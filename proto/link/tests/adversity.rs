@@ -7,6 +7,19 @@ use support::{relay::Impairment, *};
 use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 
+/// A server whose hot plane is behind a relay.
+async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) {
+    let waiting = Waiting::new();
+    let server = server_with(ServerOptions {
+        announced_udp_port: Some(waiting.port()),
+        node_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    (server, relay)
+}
+
 /// Sends states until `client` has `count` of them.
 async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {
     let mut states = Vec::new();
@@ -158,7 +171,11 @@ fn murdered_client(server: &ServerLink, node: &str) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
-    let server = server_with(ServerOptions::loopback(key('a'))).await; // 1 s of silence
+    let server = server_with(ServerOptions {
+        node_timeout: FORGIVING, // it is QUIC that notices here, after 1 s of silence
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
     let survivor = client(&server, Role::Render, "right").await;
     let tick = take_states(&server, &survivor, 1, 20).await;
     tokio::task::block_in_place(|| murdered_client(&server, "left"));
@@ -188,8 +205,9 @@ async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_restarted_node_takes_the_place_of_its_silent_self() {
     let server = server_with(ServerOptions {
-        // QUIC alone would take a minute to notice; the client's own timeout is as long, see below.
+        // Nobody would notice for a minute; the client's own timeout is as long, see below.
         idle_timeout: Duration::from_secs(60),
+        node_timeout: Duration::from_secs(60),
         ..ServerOptions::loopback(key('a'))
     })
     .await;

@@ -1,5 +1,5 @@
 //! The hot plane of a client: a UDP socket with a thread, or QUIC datagrams with a task. Both receive, and both keep the path and the
-//! clock alive with time requests: 16 quick ones at join, then ten per second.
+//! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
 use super::{group::GroupEnd, inbound::Inbound, multicast};
 use crate::LinkError;
@@ -29,8 +29,8 @@ use tokio::sync::mpsc;
 const QUICK_REQUESTS: u32 = 16;
 /// Distance between these.
 const QUICK_PERIOD: Duration = Duration::from_millis(5);
-/// Distance between later ones: also the sign of life that the server expects.
-const PERIOD: Duration = Duration::from_millis(100);
+/// Distance between later ones: also the sign of life that the server expects, ten of which may be lost in a row.
+const PERIOD: Duration = Duration::from_millis(50);
 /// Longest that a send may take: the kernel's buffer is full then, and the datagram is given up.
 const SEND_TIMEOUT: Duration = Duration::from_millis(1);
 /// Shortest receive timeout: zero would mean "for ever".
@@ -235,6 +235,7 @@ impl Hot {
         self.stop.store(true, Ordering::Relaxed);
     }
 
+    /// Whether the session is at its end.
     pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.connection.close_reason().is_some()
     }

@@ -1,7 +1,7 @@
 //! What arrives on the hot plane: states into a bounded queue, the newest wrench, constraint sets put together, time into the clock
 //! filter; everything else counted.
 
-use super::{ReceivedState, ReceivedWrench};
+use super::{ReceivedState, ReceivedWrench, frames::Frames};
 use crate::counters::ClientCounterCells;
 use std::{
     collections::VecDeque,
@@ -20,6 +20,7 @@ const MAX_QUEUED_STATES: usize = 256;
 
 pub(crate) struct Inbound {
     inner: Mutex<Inner>,
+    pub(crate) frames: Frames,
     /// Zero of this client's clock in the time exchange.
     start: Instant,
     pub(crate) counters: ClientCounterCells,
@@ -64,6 +65,7 @@ impl Inbound {
                 events: EventInbox::default(),
                 acknowledged: None,
             }),
+            frames: Frames::new(),
             start: Instant::now(),
             counters: ClientCounterCells::default(),
         }
@@ -90,6 +92,10 @@ impl Inbound {
         }
         let local_ns = self.local_ns(received);
         inner.heard_ns = Some(local_ns);
+        if let Payload::Release(release) = opened.payload {
+            drop(inner);
+            return self.frames.release(release, opened.state_hash, local_ns);
+        }
         inner.take(opened, received, local_ns, counters);
     }
 
@@ -249,9 +255,12 @@ impl Inner {
             },
             Payload::Heartbeat => {}
             // The server has no business sending these.
-            Payload::Input(_) | Payload::TimeRequest(_) | Payload::EventAck(_) => {
-                counters.garbage.one()
-            }
+            Payload::Input(_)
+            | Payload::Head(_)
+            | Payload::TimeRequest(_)
+            | Payload::Arrive(_)
+            | Payload::EventAck(_) => counters.garbage.one(),
+            Payload::Release(_) => {} // taken before
         }
     }
 }

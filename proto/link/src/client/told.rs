@@ -19,7 +19,9 @@ pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream, all_states: bool
                 hot.acknowledge();
             }
             Ok(other) => break format!("the server sent {}", other.name()),
-            Err(ReadMessageError::Decode(error)) => break error.to_string(),
+            Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
+                break error.to_string();
+            }
             Err(ReadMessageError::Ended(_)) => return,
         }
     };

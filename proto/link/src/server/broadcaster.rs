@@ -6,7 +6,8 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
+    Act, ConstraintPart, HotState, Kind, Payload, WrenchCommand,
+    barrier::Newest,
     codec::encode_into,
     events::is_newer,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
@@ -64,9 +65,12 @@ impl Broadcaster {
             return report;
         };
         let payload = &self.payload[..length];
-        self.shared
-            .sent_states
-            .remember(state.tick, payload_hash(payload));
+        let hash = payload_hash(payload);
+        self.shared.sent_states.remember(state.tick, hash);
+        if let Some(frames) = &self.shared.frames {
+            let time_ns = state.sample_time_ns;
+            frames.offer(payload, Newest { hash, time_ns });
+        }
         // One datagram for all who hear the group; those who do not get their own.
         let to_group = self.shared.group.is_wanted();
         if to_group {
@@ -81,7 +85,8 @@ impl Broadcaster {
                 report.sent += 1;
                 continue;
             }
-            if !session.take_due(state.sample_time_ns, now_ns) {
+            let wanted = session.role.may(Act::GetStates);
+            if !wanted || !session.take_due(state.sample_time_ns, now_ns) {
                 report.skipped += 1;
                 continue;
             }
@@ -110,7 +115,7 @@ impl Broadcaster {
             .refresh(&mut self.sessions, &mut self.generation);
         self.sessions
             .iter()
-            .find(|session| session.role == Role::Device)
+            .find(|session| session.role.may(Act::GetWrenches))
             .is_some_and(|session| session.send(payload, &self.shared) == Sent::Yes)
     }
 }

@@ -1,6 +1,6 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-use super::{ClientStatus, shared::Shared};
+use super::{ClientStatus, rights::Rights, shared::Shared};
 use crate::counters::Cell;
 use std::{
     net::SocketAddr,
@@ -26,6 +26,8 @@ pub(crate) struct Session {
     pub(crate) rate_hz: u32,
     pub(crate) connection: quinn::Connection,
     pub(crate) joined_ns: u64,
+    /// What the gate remembers of it.
+    pub(crate) rights: Rights,
     /// Newest event when it was let in: those after it are for it.
     pub(crate) after_event: u32,
     sealer: Sealer,
@@ -80,6 +82,7 @@ impl Session {
             rate_hz: admitted.rate_hz,
             connection,
             joined_ns: admitted.joined_ns,
+            rights: Rights::new(admitted.role),
             after_event: admitted.after_event,
             sealer,
             opener: Mutex::new(opener),
@@ -257,6 +260,11 @@ impl Session {
     /// Where its states go, once its first authentic datagram came; for UDP only.
     pub(crate) fn udp_address(&self) -> Option<SocketAddr> {
         *lock(&self.udp_address)
+    }
+
+    /// Whether its newest datagram came from there.
+    pub(crate) fn is_at(&self, from: SocketAddr) -> bool {
+        *lock(&self.udp_address) == Some(from)
     }
 
     /// Session time of the last authentic datagram, ns; `None` if there was none yet.

@@ -95,6 +95,7 @@ pub fn content() -> Content {
 pub async fn server() -> ServerLink {
     let options = ServerOptions {
         idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     };
     server_with(options).await

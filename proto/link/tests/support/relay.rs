@@ -1,4 +1,4 @@
-//! A relay between one client and the server's UDP port that loses, doubles, delays and damages datagrams, by a seed.
+//! A relay between clients and the server's UDP port that loses, doubles, delays and damages datagrams, by a seed.
 
 use std::{
     collections::VecDeque,
@@ -116,55 +116,82 @@ fn run(
     seed: u64,
     seen: &Seen,
 ) {
-    let server_side = bind();
     let mut random = seed;
-    let mut client = None;
+    let mut lanes: Vec<Lane> = Vec::new();
     let mut buffer = [0; 2048];
-    let (mut held_up, mut held_down) = (Held::default(), Held::default());
     let delay = Duration::from_micros(impairment.delay_us);
-    let (mut going_up, mut going_down) = (UnderWay::new(delay), UnderWay::new(delay));
     while !seen.stop.load(Ordering::SeqCst) {
         let mut idle = true;
         if let Ok((length, from)) = client_side.recv_from(&mut buffer) {
             idle = false;
-            client = Some(from);
+            let known = lanes.iter().position(|lane| lane.client == from);
+            let index = known.unwrap_or_else(|| {
+                lanes.push(Lane::new(from, delay));
+                lanes.len() - 1
+            });
+            let lane = &mut lanes[index];
             seen.upstream
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(buffer[..length].to_vec());
+            let up = &mut lane.going_up;
             impair(
                 &buffer[..length],
                 impairment,
                 &mut random,
-                &mut held_up,
-                |datagram| going_up.push(datagram),
+                &mut lane.held_up,
+                |datagram| up.push(datagram),
             );
         }
-        if let Ok((length, _)) = server_side.recv_from(&mut buffer) {
-            idle = false;
-            let copies = impair(
-                &buffer[..length],
-                impairment,
-                &mut random,
-                &mut held_down,
-                |datagram| going_down.push(datagram),
-            );
-            match copies {
-                0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
-                2 => seen.doubled_down.fetch_add(1, Ordering::SeqCst),
-                _ => 0,
-            };
-        }
-        going_up.deliver(|datagram| {
-            let _ = server_side.send_to(datagram, server);
-        });
-        if let Some(client) = client {
-            going_down.deliver(|datagram| {
-                let _ = client_side.send_to(datagram, client);
+        for lane in &mut lanes {
+            if let Ok((length, _)) = lane.server_side.recv_from(&mut buffer) {
+                idle = false;
+                let down = &mut lane.going_down;
+                let copies = impair(
+                    &buffer[..length],
+                    impairment,
+                    &mut random,
+                    &mut lane.held_down,
+                    |datagram| down.push(datagram),
+                );
+                match copies {
+                    0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
+                    2 => seen.doubled_down.fetch_add(1, Ordering::SeqCst),
+                    _ => 0,
+                };
+            }
+            lane.going_up.deliver(|datagram| {
+                let _ = lane.server_side.send_to(datagram, server);
+            });
+            lane.going_down.deliver(|datagram| {
+                let _ = client_side.send_to(datagram, lane.client);
             });
         }
         if idle {
             std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+}
+
+/// One client's way through the relay.
+struct Lane {
+    client: SocketAddr,
+    server_side: UdpSocket,
+    held_up: Held,
+    held_down: Held,
+    going_up: UnderWay,
+    going_down: UnderWay,
+}
+
+impl Lane {
+    fn new(client: SocketAddr, delay: Duration) -> Lane {
+        Lane {
+            client,
+            server_side: bind(),
+            held_up: Held::default(),
+            held_down: Held::default(),
+            going_up: UnderWay::new(delay),
+            going_down: UnderWay::new(delay),
         }
     }
 }
