@@ -90,7 +90,7 @@ fn evict(shared: &Shared, session: &Session, silence: Duration) {
         session.connection.close(CLOSE_EVICTED, reason.as_bytes());
         shared.counters.evicted.one();
         shared.tell(LinkEvent::Left {
-            status: session.status(),
+            status: session.status(shared.clock.now_ns()),
             reason,
         });
     }
