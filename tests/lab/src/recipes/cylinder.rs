@@ -10,7 +10,7 @@ use super::bodies::{ball, force, ghost_time, smooth, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 
 /// Of the ball, m: the point that it stands for goes round at the cylinder's radius and this.
 const TIP: f64 = 1e-3;
@@ -61,14 +61,9 @@ fn recipe(radius: f64, speed: f64) -> Recipe {
     };
     let scene = Scene::new(world, 2.0 * TIP, speed.max(APPROACH_SPEED), device(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
+    let duration = begin + std::f64::consts::PI * radius / speed;
     Recipe {
-        name: "R12",
-        case: format!("radius {} mm, {speed} m/s", radius * 1e3),
-        about: "sliding on a cylinder: stale normals",
-        duration: begin + std::f64::consts::PI * radius / speed,
-        scene,
-        device: Box::new(device),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             let (depth, out) = place(time);
             let pushed = out * (stiffness * depth.max(0.0));
             force(pushed.x, pushed.y, pushed.z)
@@ -87,5 +82,12 @@ fn recipe(radius: f64, speed: f64) -> Recipe {
             lines.push(Line::at_most(Measure::DirectionMax, stale.to_degrees()));
             lines
         }),
+        ..Recipe::new(
+            ("R12", format!("radius {} mm, {speed} m/s", radius * 1e3)),
+            "sliding on a cylinder: stale normals",
+            scene,
+            duration,
+            device,
+        )
     }
 }
