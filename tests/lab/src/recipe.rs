@@ -120,7 +120,7 @@ pub struct Recipe {
     pub check_every: u32,
     /// Lines that this project's method is known not to keep.
     pub open: Vec<Open>,
-    answer: OnceLock<Answer>,
+    pub(crate) answer: OnceLock<Answer>,
 }
 
 impl Recipe {
