@@ -199,7 +199,11 @@ fn the_tuning_shown_is_the_best_of_those_tried() {
     for method in Method::ALL {
         let outcome = Outcome::of(&recipe, method, 300);
         let chosen = outcome.trials.iter().find(|t| t.tuning == outcome.tuning);
-        let least = outcome.trials.iter().map(|t| t.felt).fold(f64::INFINITY, f64::min);
+        let least = outcome
+            .trials
+            .iter()
+            .map(|t| t.felt)
+            .fold(f64::INFINITY, f64::min);
         if method.tunings().len() > 1 {
             assert_eq!(outcome.trials.len(), method.tunings().len());
             assert!(chosen.is_some_and(|t| t.felt <= least), "{method:?}");
@@ -211,7 +215,10 @@ fn the_tuning_shown_is_the_best_of_those_tried() {
 #[test]
 fn tables_are_the_same_in_every_run() {
     let run = || {
-        let mut rows: Vec<Row> = STUDIES.iter().flat_map(|s| (s.run)(Extent::Quick)).collect();
+        let mut rows: Vec<Row> = STUDIES
+            .iter()
+            .flat_map(|s| (s.run)(Extent::Quick))
+            .collect();
         for (name, case) in [
             ("R02", "ball on a plane"),
             ("R07", "ball in a corner"),

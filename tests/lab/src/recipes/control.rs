@@ -34,6 +34,14 @@ pub(super) fn run(name: &'static str, extent: Extent) -> Vec<Row> {
         .collect()
 }
 
+/// R09 with a sheet of no thickness needs meshes that are no solids.
+pub(super) fn sheet(_extent: Extent) -> Vec<Row> {
+    let row = Row::new("R09", "two-sided sheet of 0 mm", "all methods");
+    vec![row.out_of_scope(
+        "meshes are closed solids: a sheet without thickness is refused when it is loaded",
+    )]
+}
+
 /// R24 needs real sockets.
 pub(super) fn cluster(_extent: Extent) -> Vec<Row> {
     let row = Row::new("R24", "cluster", "all methods");

@@ -89,6 +89,7 @@ pub const STUDIES: &[Study] = &[
     Study { name: "R05", about: "near-parallel normals", run: oracles::near_parallel::run },
     Study { name: "R06", about: "V-groove", run: oracles::groove::run },
     Study { name: "R07", about: "corner of three planes", run: oracles::corner::run },
+    Study { name: "R09", about: "thin plate: a sheet of no thickness", run: control::sheet },
     Study { name: "R14", about: "a wall that arrives late", run: arrival::run },
     Study { name: "R15", about: "critical stiffness of a wall", run: |extent| control::run("R15", extent) },
     Study { name: "R16", about: "limit cycles of a quantised encoder", run: |extent| control::run("R16", extent) },
