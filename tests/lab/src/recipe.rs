@@ -29,6 +29,9 @@ impl Line {
 /// A length at a time, s, of a body at a pose.
 pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64>;
 
+/// A number of a whole run.
+pub type OfRun = Box<dyn Fn(&[Tick]) -> f64>;
+
 /// A number of one recipe alone, with its own limit.
 pub struct Probe {
     /// Name in tables and files.
@@ -36,7 +39,7 @@ pub struct Probe {
     /// Its unit.
     pub unit: &'static str,
     /// Of a whole run.
-    pub value: Box<dyn Fn(&[Tick]) -> f64>,
+    pub value: OfRun,
     /// Most that passes at a rate of updates, Hz; infinite where it is only shown.
     pub limit: Box<dyn Fn(u32) -> f64>,
 }

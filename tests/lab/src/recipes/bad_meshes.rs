@@ -79,6 +79,9 @@ pub(super) fn run(_extent: Extent) -> Vec<Row> {
     rows
 }
 
+/// Whether an error is the right one.
+type Named = fn(&MeshError) -> bool;
+
 /// What cannot be used, and the fault that must be named.
 fn refusals() -> Vec<Row> {
     let mut zero_area = plate();
@@ -117,7 +120,7 @@ fn refusals() -> Vec<Row> {
     inside_out.triangles.iter_mut().for_each(|t| t.swap(0, 1));
 
     let is_open = |e: &MeshError| matches!(e, MeshError::Open { .. });
-    let cases: [(&str, RawMesh, fn(&MeshError) -> bool); 6] = [
+    let cases: [(&str, RawMesh, Named); 6] = [
         ("zero area", zero_area, |e| {
             matches!(e, MeshError::ZeroArea { .. })
         }),
