@@ -22,6 +22,8 @@ use crate::method::{HapticMethod, Scene};
 
 /// Faces met in one update, at most: three planes hold a point, and leaving one for another takes a second look.
 const MAX_LEGS: u32 = 8;
+/// A way shorter than this is none, in rest distances.
+const SETTLED: f64 = 0.01;
 
 /// Where the point is, and what holds it.
 #[derive(Clone, Debug)]
@@ -142,19 +144,17 @@ impl HapticMethod for PointGodObject {
                 break;
             }
             let way = answer.acceleration;
+            if linear(&way).norm() <= SETTLED * self.settings.rest_distance {
+                break;
+            }
+            // Past the end of a face nothing holds it: the next leg leads to what does, within the same update.
             let share = self.free_share(&self.now.pose.clone(), &way);
             let moved = linear(&way) * share;
             self.now.pose = Pose::from_parts(
                 Translation3::from(self.now.pose.translation.vector + moved),
                 self.now.pose.rotation,
             );
-            let known = self.now.planes.len();
             self.now.planes = self.touched(&self.now.pose.clone());
-            let arrived = share >= 1.0;
-            let nothing_new = share <= 0.0 && self.now.planes.len() == known;
-            if arrived || nothing_new {
-                break;
-            }
         }
     }
 
