@@ -361,3 +361,25 @@ async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
         task.abort();
     }
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn who_is_turned_away_for_long_is_told_so() {
+    let server = server_with(ServerOptions {
+        limits: FloodLimits {
+            joins: JoinLimits {
+                at_once: 0,
+                ..JoinLimits::default()
+            },
+            ..FloodLimits::default()
+        },
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let error = error_of(ClientOptions {
+        connect_timeout: Duration::from_secs(1),
+        ..options(&server, Role::Render, "left")
+    })
+    .await;
+    assert!(matches!(error, LinkError::TurnedAway { .. }), "{error}");
+    assert!(server.counters().turned_away > 0);
+}
