@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::row::{Row, brief};
+use crate::bench::death::{self, Aftermath, Death};
 use crate::bench::{BenchError, age, isolation, join, latency, soak};
 use crate::forge::attack;
 use crate::relay::{Burst, Impairment};
@@ -17,6 +18,8 @@ pub struct Extent {
     pub forgeries: u64,
     /// Joins.
     pub joins: usize,
+    /// Deaths of each sort.
+    pub deaths: usize,
     /// Turns of the isolation runs, each without and with clients.
     pub turns: usize,
     /// Time of each, s.
@@ -41,7 +44,7 @@ pub struct Section {
 }
 
 /// All parts, in the order of the table.
-pub const SECTIONS: [Section; 7] = [
+pub const SECTIONS: [Section; 8] = [
     Section {
         name: "latency",
         about: "one-way latency, sealed UDP and QUIC datagrams beside raw UDP",
@@ -66,6 +69,11 @@ pub const SECTIONS: [Section; 7] = [
         name: "join",
         about: "time to join a scene of 10 MB",
         run: join_rows,
+    },
+    Section {
+        name: "death",
+        about: "a node that is killed or stopped, and the others",
+        run: death_rows,
     },
     Section {
         name: "soak",
@@ -253,6 +261,42 @@ fn join_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     )])
 }
 
+fn death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    /// Three frames at 60 Hz, ms.
+    const THREE_FRAMES_MS: f64 = 50.0;
+    let mut rows = Vec::new();
+    for (death, signal) in [(Death::Killed, "SIGKILL"), (Death::Stopped, "SIGSTOP")] {
+        let mut runs = Vec::new();
+        for _ in 0..extent.deaths {
+            runs.push(death::measure(&extent.this, death)?);
+        }
+        let worst = |of: fn(&Aftermath) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let times = format!("largest of {}", runs.len());
+        rows.push(Row::at_most(
+            format!("{signal} of a node: others' longest time without a state"),
+            worst(|run| run.longest_gap_ms),
+            THREE_FRAMES_MS,
+            "ms",
+            format!("{times}; {} states missed", worst(|run| run.missed as f64)),
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: let go by the server"),
+            worst(|run| run.let_go_s * 1e3),
+            600.0,
+            "ms",
+            &times,
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: joined again, from the start of its process"),
+            worst(|run| run.back_s),
+            1.0,
+            "s",
+            &times,
+        ));
+    }
+    Ok(rows)
+}
+
 fn soak_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let Some(seconds) = extent.soak_seconds else {
         let why = "--soak SECONDS runs it";
@@ -314,11 +358,6 @@ fn elsewhere(_: &Extent) -> Result<Vec<Row>, BenchError> {
         ),
         Row::unknown("equal state hash on released frames", "100 %", "not here"),
         Row::unknown(
-            "SIGKILL or SIGSTOP of a node",
-            "gap <= 3 frames, evicted <= 600 ms, back <= 1 s",
-            "not here",
-        ),
-        Row::unknown(
             "SIGKILL of the server",
             "clients back <= 2 s, zero force <= 120 ms",
             "not here",
@@ -339,6 +378,7 @@ impl Extent {
             seconds: 20.0,
             forgeries: 1_000_000,
             joins: 10,
+            deaths: 5,
             turns: 6,
             turn_seconds: 8.0,
             soak_seconds: None,
@@ -354,6 +394,7 @@ impl Extent {
             seconds: 1.0,
             forgeries: 20_000,
             joins: 1,
+            deaths: 1,
             turns: 1,
             turn_seconds: 2.0,
             soak_seconds: Some(3.0),
