@@ -19,6 +19,8 @@ use tokio::runtime::Runtime;
 
 use super::BenchError;
 
+/// The workbench file that is shipped.
+const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
 /// Longest wait for the program to serve or to end.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
@@ -189,9 +191,7 @@ impl Drop for Served {
 /// The shipped workbench on free ports, and a key; their paths.
 fn write_workbench(directory: &Path) -> Result<(PathBuf, PathBuf), BenchError> {
     let broken = || BenchError::Missing("the shipped workbench file is no TOML".to_owned());
-    let mut file: toml::Table = taut_scene::SHIPPED_WORKBENCH
-        .parse()
-        .map_err(|_| broken())?;
+    let mut file: toml::Table = SHIPPED_WORKBENCH.parse().map_err(|_| broken())?;
     file.insert("scene".to_owned(), "sphere-on-plane".into());
     let network = file.get_mut("network").and_then(toml::Value::as_table_mut);
     let network = network.ok_or_else(broken)?;
@@ -386,6 +386,34 @@ struct Stalled {
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
+/// Starts a client as a process of its own, and waits until it has joined.
+pub(super) fn start_client(
+    this: &Path,
+    server: &str,
+    key: &Path,
+    node: &str,
+    transport: &str,
+) -> Result<Child, BenchError> {
+    let mut child = Command::new(this)
+        .args(["--client", server, node, transport])
+        .arg(key)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let mut line = String::new();
+    if let Some(out) = child.stdout.take() {
+        BufReader::new(out).read_line(&mut line)?;
+    }
+    if line.trim() == "joined" {
+        return Ok(child);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    Err(BenchError::Missing(format!(
+        "a client did not join: {line}"
+    )))
+}
+
 impl Stalled {
     fn start(
         this: &Path,
@@ -394,23 +422,7 @@ impl Stalled {
         node: &str,
         transport: &str,
     ) -> Result<Stalled, BenchError> {
-        let mut child = Command::new(this)
-            .args(["--client", server, node, transport])
-            .arg(key)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
-        let mut line = String::new();
-        if let Some(out) = child.stdout.take() {
-            BufReader::new(out).read_line(&mut line)?;
-        }
-        if line.trim() != "joined" {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(BenchError::Missing(format!(
-                "a client did not join: {line}"
-            )));
-        }
+        let child = start_client(this, server, key, node, transport)?;
         let id = rustix::process::Pid::from_child(&child);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
