@@ -410,11 +410,6 @@ impl Session {
         &self.arm_switch
     }
 
-    /// The clock that everything in the session is stamped by.
-    pub fn clock(&self) -> SessionClock {
-        self.clock
-    }
-
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
