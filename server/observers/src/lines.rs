@@ -213,7 +213,7 @@ impl Hello {
 pub fn state_line(state: &HotState) -> String {
     written(&StateLine {
         r#type: "state",
-        t: state.sample_time_ns as f64 * 1e-9,
+        t: state.sample_time_ns as f64 / 1e9,
         tick: state.tick,
         scene_revision: state.scene_revision,
         run: match state.run {
