@@ -14,7 +14,7 @@ use tokio::runtime::Runtime;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 const SCENE: &str = "sphere-on-plane";
 /// Longest wait for a node that joins: a debug build on a busy machine.
-const JOIN_LIMIT: Duration = Duration::from_secs(30);
+const JOIN_LIMIT: Duration = Duration::from_secs(60);
 /// Longest gap between two frames of an undisturbed node: the processor draws ten a second, other nodes and tests have it too.
 const UNDISTURBED_MS: f64 = 2000.0;
 /// The watchdog's promise: no force that is older, as long as the loop is on time.
@@ -41,6 +41,13 @@ fn number_after(report: &str, words: &str) -> f64 {
     word.trim_end_matches([',', ';', '.'])
         .parse()
         .unwrap_or_else(|_| panic!("no number after \"{words}\" in: {report}"))
+}
+
+/// A workbench whose server logs who comes and goes.
+fn telling_workbench() -> TestWorkbench {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.log = Some("warn,taut=info");
+    workbench
 }
 
 fn draws(workbench: &TestWorkbench) -> bool {
@@ -87,7 +94,7 @@ fn leave(node: Process) -> String {
 
 #[test]
 fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes_on_drawing() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
+    let mut workbench = telling_workbench();
     if !draws(&workbench) {
         return;
     }
@@ -182,7 +189,7 @@ fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server,
 
 #[test]
 fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_next_one() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
+    let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
     let (mut server, bridge) = workbench_with_bridge(&mut workbench, &[]);
     let front = drawing.then(|| node(&workbench, "front", &server, &[]));
@@ -259,7 +266,7 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
 
 #[test]
 fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
+    let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
     let (server, bridge) = workbench_with_bridge(&mut workbench, &["--stay"]);
     let mut server = server;
@@ -293,7 +300,7 @@ fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
 
 #[test]
 fn a_node_that_starts_again_fetches_no_mesh_and_one_that_comes_to_another_scene_draws_that() {
-    let mut workbench = TestWorkbench::new(PROGRAM);
+    let mut workbench = telling_workbench();
     if !draws(&workbench) {
         return;
     }
