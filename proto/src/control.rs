@@ -14,13 +14,14 @@
 //! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, to a device bridge also `Coupling`, or
 //! `Refused`. There is no challenge:
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
+//! After that the server sends `Group` on the control stream at join and whenever the membership changes, to all but devices, and `Events` at join and whenever there are some.
 //! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
 
 pub use crate::role::Role;
 
 use crate::{
-    ClientStats, CouplingOffer, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION,
-    SceneDescription,
+    ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
+    PROTOCOL_VERSION, SceneDescription,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
     proof::Grant,
     version::MAGIC,
@@ -182,6 +183,8 @@ pub enum ControlMessage {
     Log(LogEvent),
     Bye(Bye),
     Arm(ArmRequest),
+    Group(Group),
+    Events(EventsTold),
 }
 
 impl ControlMessage {
@@ -199,6 +202,8 @@ impl ControlMessage {
             ControlMessage::Log(_) => "Log",
             ControlMessage::Bye(_) => "Bye",
             ControlMessage::Arm(_) => "Arm",
+            ControlMessage::Group(_) => "Group",
+            ControlMessage::Events(_) => "Events",
         }
     }
 
@@ -271,7 +276,8 @@ macro_rules! wire_messages {
 wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
-    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
+    Events(EventsTold) = 15,
 }
 
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });

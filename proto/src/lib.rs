@@ -3,7 +3,8 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`],
+//!   [`constraints::ConstraintPart`], [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
@@ -12,6 +13,7 @@
 //! Poses are of a body's own frame; forces and torques are at the reference point, world axes; SI units.
 #![forbid(unsafe_code)]
 
+pub mod barrier;
 pub mod clock;
 pub mod codec;
 pub mod constraint_parts;
@@ -20,11 +22,15 @@ pub mod control;
 pub mod coupling;
 pub mod credential;
 pub mod datagram;
+mod derive;
+pub mod events;
+pub mod group;
 pub mod head;
 pub mod header;
 pub mod input;
 pub mod key;
 pub mod limits;
+pub mod membership;
 pub mod mesh_blob;
 mod octahedral;
 pub mod pin;
@@ -51,6 +57,8 @@ pub use control::{ControlMessage, Refusal, Transport};
 pub use coupling::{CouplingOffer, EdgeCoupling};
 pub use credential::{Credential, Holder, JoinKey};
 pub use datagram::Payload;
+pub use events::{EventInbox, EventOutbox, EventsTold};
+pub use group::{Group, GroupMember, GroupOpener, GroupSealer};
 pub use head::HeadSample;
 pub use header::{Header, Kind};
 pub use input::InputSample;

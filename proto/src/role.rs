@@ -166,14 +166,6 @@ impl Role {
         }
     }
 
-    /// Control messages that one session may send.
-    pub const fn message_rate(self) -> Rate {
-        Rate {
-            per_second: 100,
-            burst: 200,
-        }
-    }
-
     /// Number in proofs, secrets and on the wire.
     pub(crate) const fn number(self) -> u8 {
         match self {

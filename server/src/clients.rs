@@ -68,6 +68,10 @@ impl ClientLedger {
                     transport_name(status.transport)
                 ))
             }
+            LinkEvent::Silent { node, silence } => Some(format!(
+                "{node} has been silent for {} ms",
+                silence.as_millis()
+            )),
             LinkEvent::Refused {
                 address,
                 node,

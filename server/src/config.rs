@@ -19,6 +19,7 @@ use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
+use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
@@ -95,6 +96,7 @@ pub fn session_setup(
         key,
         policy: network.admission.clone(),
         max_clients: network.max_clients,
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides
@@ -115,6 +117,7 @@ pub fn session_setup(
         head: head(&workbench.viewer),
         content,
         link,
+        looking_on: LookingOnSettings::of(workbench)?,
         realtime: realtime(workbench),
         monitor: monitor(&workbench.monitoring, overrides),
     })

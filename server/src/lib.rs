@@ -34,6 +34,7 @@ pub mod finished_file;
 pub mod head;
 pub mod key;
 pub mod keys;
+pub mod looking_on;
 pub mod loops;
 pub mod monitor;
 pub mod realtime;

@@ -12,6 +12,7 @@ use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
 
 use crate::head::HeadSource;
+use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -36,6 +37,8 @@ pub struct SessionSetup {
     pub content: Content,
     /// Addresses, key and limits of the network.
     pub link: LinkSettings,
+    /// Those who look on without taut's own client.
+    pub looking_on: LookingOnSettings,
     /// Rates and scheduling.
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.
@@ -83,6 +86,8 @@ pub struct LinkSettings {
     pub policy: JoinPolicy,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone.
+    pub node_timeout: Duration,
 }
 
 /// Rates and scheduling.

@@ -23,6 +23,13 @@ const DATAGRAM_SEND_BYTES: usize = 4800;
 const DATAGRAM_RECEIVE_BYTES: usize = 256 << 10;
 /// Bytes in flight before congestion control knows the path: the default of 12 kB holds back a 1 kHz stream at join.
 const INITIAL_WINDOW_BYTES: u64 = 256 << 10;
+/// Bytes of one stream that a client may send ahead of the server's reading: some dozen reports.
+const SERVER_STREAM_BYTES: u32 = 128 << 10;
+/// The same of all streams of a client together.
+const SERVER_CONNECTION_BYTES: u32 = 512 << 10;
+/// Round trip that a client assumes before it knows: its first packet is sent again after three of these, so that a server that has just
+/// started is reached soon. On a longer way a packet is sent twice for nothing.
+const INITIAL_ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Streams that a client may have open at once: control and meshes.
 const MAX_STREAMS: u32 = 32;
 /// Protocol name in TLS; the version is not in it, so that versions can refuse each other with a sentence.
@@ -55,8 +62,12 @@ pub(crate) fn server_config(
     tls.send_tls13_tickets = 0;
     tls.alpn_protocols = vec![ALPN.to_vec()];
     let crypto = QuicServerConfig::try_from(tls).map_err(|error| failed(error.to_string()))?;
+    let mut transport = transport(idle_timeout);
+    transport
+        .stream_receive_window(VarInt::from_u32(SERVER_STREAM_BYTES))
+        .receive_window(VarInt::from_u32(SERVER_CONNECTION_BYTES));
     let mut config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
-    config.transport_config(Arc::new(transport(idle_timeout)));
+    config.transport_config(Arc::new(transport));
     Ok(config)
 }
 
@@ -78,8 +89,10 @@ pub fn client_config(
     tls.resumption = rustls::client::Resumption::disabled();
     tls.alpn_protocols = vec![ALPN.to_vec()];
     let crypto = QuicClientConfig::try_from(tls).map_err(|error| failed(error.to_string()))?;
+    let mut transport = transport(idle_timeout);
+    transport.initial_rtt(INITIAL_ROUND_TRIP);
     let mut config = quinn::ClientConfig::new(Arc::new(crypto));
-    config.transport_config(Arc::new(transport(idle_timeout)));
+    config.transport_config(Arc::new(transport));
     Ok(config)
 }
 

@@ -2,8 +2,11 @@
 
 use super::{
     ClientLink, ClientOptions,
+    group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    meshes::Meshes,
+    told,
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
@@ -36,6 +39,15 @@ const RETRY_PERIOD: Duration = Duration::from_millis(200);
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
     // Nobody is asked for what the key does not allow.
     options.key.secret_for(options.role, &options.node)?;
+    let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
+    connect_with(options, meshes).await
+}
+
+/// The same with the meshes that earlier sessions brought.
+pub(crate) async fn connect_with(
+    options: ClientOptions,
+    meshes: Arc<Meshes>,
+) -> Result<ClientLink, LinkError> {
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
@@ -61,6 +73,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         description,
         coupling,
         send,
+        recv,
     } = match joining.await {
         Ok(Ok(joined)) => joined,
         Ok(Err(error)) => {
@@ -82,9 +95,12 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         connection,
         sealer,
         Inbound::new(opener, options.role),
+        GroupEnd::new(welcome.epoch, welcome.session),
         path,
     ));
     hot.clone().start()?;
+    tokio::spawn(told::listen(hot.clone(), recv));
+    meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,
         endpoint,
@@ -92,6 +108,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         welcome.session,
         description,
         coupling,
+        meshes,
         send,
     ))
 }
@@ -190,6 +207,8 @@ struct Joined {
     /// For a device bridge.
     coupling: Option<CouplingOffer>,
     send: SendStream,
+    /// What else the server tells.
+    recv: RecvStream,
 }
 
 /// Hello to scene, and to the coupling for a device bridge.
@@ -262,6 +281,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         description,
         coupling,
         send,
+        recv,
     })
 }
 
@@ -280,6 +300,7 @@ async fn expect(
             })
         }
         Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
+        Err(error @ ReadMessageError::Stalled) => Err(protocol(options, error.to_string())),
         Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
             server: options.server.clone(),
             reason: connection

@@ -1,6 +1,10 @@
 //! What a client is given, and what it receives.
 
-use std::time::{Duration, Instant};
+use super::MeshCache;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
 
 /// How to connect.
@@ -22,10 +26,12 @@ pub struct ClientOptions {
     pub connect_timeout: Duration,
     /// Silence after which the server counts as gone.
     pub idle_timeout: Duration,
+    /// Where meshes are kept on disk; `None`: nowhere.
+    pub mesh_cache: Option<Arc<MeshCache>>,
 }
 
 impl ClientOptions {
-    /// UDP, every state, 3 s to connect.
+    /// UDP, every state, 3 s to connect, no meshes on disk.
     pub fn new(
         server: impl Into<String>,
         key: impl Into<JoinKey>,
@@ -41,6 +47,7 @@ impl ClientOptions {
             rate_hz: 0,
             connect_timeout: Duration::from_secs(3),
             idle_timeout: crate::transport::IDLE_TIMEOUT,
+            mesh_cache: None,
         }
     }
 }

@@ -1,18 +1,18 @@
 //! How a client gets in, and its control plane while it is in.
 
 use super::{
-    LinkEvent,
+    LinkEvent, downstream,
     gate::{act_of_message, demand},
     joining::Joining,
     receive::receive,
-    session::{Admitted, Session},
+    session::{Admitted, Session, lock},
     shared::{Admission, Refused, Shared},
 };
 use crate::{
     binding,
     framing::{
         CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text,
-        read_message, write_message,
+        read_message, read_whole_message, write_message,
     },
 };
 use quinn::{Connection, RecvStream, SendStream};
@@ -24,10 +24,14 @@ use taut_proto::{
         Welcome,
     },
     limits::Attempt,
+    membership::Pace,
     proof::{Claim, Grant},
     revocation::ShutOut,
 };
-use tokio::{sync::Semaphore, time::timeout};
+use tokio::{
+    sync::Semaphore,
+    time::{sleep, timeout},
+};
 
 /// Clients that may be joining at once; more are turned away before any cryptography.
 const MAX_JOINING: usize = 64;
@@ -38,6 +42,17 @@ const CHECK_ADDRESSES_ABOVE: usize = 8;
 const JOIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Time for a refused client to read why.
 const REFUSAL_TIMEOUT: Duration = Duration::from_millis(500);
+/// Reports and log lines of a client that are read per second, and after a pause at once. A node reports once a second; a bridge in trouble
+/// logs some dozen lines.
+const MESSAGES_PER_SECOND: u64 = 100;
+/// See [`MESSAGES_PER_SECOND`].
+const MESSAGE_BURST: u64 = 256;
+/// Priority of a mesh's stream, below that of control, which has 0.
+const MESH_PRIORITY: i32 = -1;
+/// Bytes of a mesh that are written at a time: 1 ms at the pace of all meshes.
+const MESH_CHUNK_BYTES: usize = 64 << 10;
+/// Time for a client to take one of these.
+const STALL_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most bytes of a Hello: nobody has proven anything yet.
 const MAX_HELLO_BYTES: usize = 1024;
 
@@ -178,6 +193,7 @@ fn admit(
                     transport: hello.transport,
                     rate_hz: hello.rate_hz,
                     joined_ns: now_ns,
+                    after_event: shared.discrete.newest(),
                 };
                 Ok(Session::new(admitted, connection.clone(), keys))
             })?;
@@ -242,7 +258,7 @@ async fn refuse(
 async fn attend(
     shared: &Arc<Shared>,
     session: Arc<Session>,
-    _send: SendStream,
+    send: SendStream,
     mut recv: RecvStream,
 ) {
     shared.counters.joined.one();
@@ -254,6 +270,7 @@ async fn attend(
         reason = read_control(shared, &session, &mut recv) => reason,
         reason = serve_meshes(shared, &session) => reason,
         reason = read_datagrams(shared, &session) => reason,
+        reason = downstream::tell(shared, &session, send) => reason,
     };
     connection.close(CLOSE_BYE, b"");
     // A session that was replaced is gone already, and told.
@@ -268,19 +285,20 @@ async fn attend(
 
 /// Reports and log lines until the client says goodbye; returns why it ended.
 async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream) -> String {
+    let mut pace = Pace::new(MESSAGES_PER_SECOND, MESSAGE_BURST);
     loop {
-        let message = match read_message(recv, MAX_FRAME_BYTES).await {
+        let message = read_whole_message(recv, MAX_FRAME_BYTES).await;
+        at_pace(shared, &mut pace).await;
+        let message = match message {
             Ok(message) => message,
-            Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),
+            Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
+                return broken(session, &error.to_string());
+            }
             Err(ReadMessageError::Ended(_)) => {
                 let error = session.connection.closed().await;
                 return close_text(&error, "the node");
             }
         };
-        if !session.rights.take_message(shared.clock.now_ns()) {
-            shared.counters.flooded.one();
-            return broken(session, "a client sent too many messages");
-        }
         let Some(act) = act_of_message(&message) else {
             return broken(session, &format!("a client sent {}", message.name()));
         };
@@ -309,6 +327,17 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
     }
 }
 
+/// Waits until another message may be taken. Who sends faster is read later, and finds its stream full: it loses its own reports, and
+/// nobody else's.
+async fn at_pace(shared: &Shared, pace: &mut Pace) {
+    let now_ns = shared.clock.now_ns();
+    let at_ns = pace.book(now_ns, 1);
+    if at_ns > now_ns {
+        shared.counters.control_delayed.one();
+        sleep(Duration::from_nanos(at_ns - now_ns)).await;
+    }
+}
+
 fn broken(session: &Session, reason: &str) -> String {
     session.connection.close(CLOSE_PROTOCOL, reason.as_bytes());
     reason.to_owned()
@@ -332,10 +361,12 @@ async fn serve_meshes(shared: &Arc<Shared>, session: &Session) -> String {
 }
 
 async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream) {
-    let Ok(ControlMessage::MeshRequest(request)) = read_message(&mut recv, MAX_HELLO_BYTES).await
-    else {
+    let request = timeout(JOIN_TIMEOUT, read_message(&mut recv, MAX_HELLO_BYTES)).await;
+    let Ok(Ok(ControlMessage::MeshRequest(request))) = request else {
         return; // dropping the stream resets it
     };
+    // Everything else goes first. Fails only if the stream is gone, and then writing fails, too.
+    let _ = send.set_priority(MESH_PRIORITY);
     let mesh = shared.content.meshes.get(&request.hash);
     let header = MeshHeader {
         hash: request.hash,
@@ -348,11 +379,27 @@ async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream)
         return;
     }
     if let Some(bytes) = mesh
-        && send.write_all(bytes).await.is_err()
+        && write_paced(shared, &mut send, bytes).await.is_err()
     {
         return;
     }
     let _ = send.finish(); // fails only if the client is gone
+}
+
+/// Writes `bytes` at the pace that all meshes share; an error if the client is gone, or takes nothing for [`STALL_TIMEOUT`].
+async fn write_paced(shared: &Shared, send: &mut SendStream, bytes: &[u8]) -> Result<(), ()> {
+    for chunk in bytes.chunks(MESH_CHUNK_BYTES) {
+        let now_ns = shared.clock.now_ns();
+        let at_ns = lock(&shared.mesh_pace).book(now_ns, chunk.len() as u64);
+        if at_ns > now_ns {
+            sleep(Duration::from_nanos(at_ns - now_ns)).await;
+        }
+        match timeout(STALL_TIMEOUT, send.write_all(chunk)).await {
+            Ok(Ok(())) => {}
+            Ok(Err(_)) | Err(_) => return Err(()),
+        }
+    }
+    Ok(())
 }
 
 /// Hot plane over QUIC; a client on UDP sends none here.

@@ -8,10 +8,12 @@ use taut_proto::{Act, ControlMessage, Payload};
 /// What a client does by a datagram; `None` for what only a server sends.
 pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
     match payload {
-        Payload::TimeRequest(_) | Payload::Heartbeat => Some(Act::KeepPath),
+        Payload::TimeRequest(_) | Payload::Heartbeat | Payload::EventAck(_) => Some(Act::KeepPath),
         Payload::Input(_) => Some(Act::GiveInput),
         Payload::Head(_) => Some(Act::GiveHead),
+        Payload::Arrive(_) => Some(Act::KeepFrames),
         Payload::Hot(_)
+        | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_) => None,
@@ -31,6 +33,8 @@ pub(crate) fn act_of_message(message: &ControlMessage) -> Option<Act> {
         | ControlMessage::Welcome(_)
         | ControlMessage::Scene(_)
         | ControlMessage::Coupling(_)
+        | ControlMessage::Group(_)
+        | ControlMessage::Events(_)
         | ControlMessage::MeshRequest(_)
         | ControlMessage::MeshHeader(_) => None,
     }

@@ -1,14 +1,18 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, HEAD_READERS, HeadOutput, LinkEvent,
-    ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, HEAD_READERS,
+    HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    events::EventHub,
+    eviction,
+    frames::Frames,
+    group::{self, GroupHub},
     head_input::head_inputs,
     receive,
     sent_states::SentStates,
     session::lock,
-    shared::{Sessions, Shared},
+    shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
@@ -27,6 +31,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::ServerPin;
+use taut_proto::membership::{Pace, SilenceLimits};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -46,6 +51,7 @@ pub struct ServerLink {
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
     heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
+    eviction: tokio::task::JoinHandle<()>,
 }
 
 /// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
@@ -74,6 +80,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
+    let epoch = random_epoch()?;
     let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
@@ -82,7 +89,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         unknown: Mutex::new(options.limits.unknown()),
         heads,
         clock: options.clock,
-        epoch: random_epoch()?,
+        epoch,
         content,
         udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),
         udp,
@@ -90,7 +97,11 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         counters: CounterCells::default(),
         events: events_in,
         inputs: InputWriter::new(input),
+        frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
+        group: GroupHub::new(epoch, None),
+        mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
+        discrete: EventHub::default(),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();
@@ -99,6 +110,10 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         .spawn(move || receive::run_udp(&of_thread))
         .map_err(|error| system("start the state thread", &error))?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
+    tokio::spawn(group::run(shared.clone()));
+    let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
+    let limits = SilenceLimits::OF_A_NODE.with_dead_after(node_timeout_ns);
+    let eviction = tokio::spawn(eviction::run(Arc::downgrade(&shared), limits));
     Ok(ServerLink {
         shared,
         endpoint,
@@ -108,6 +123,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         inputs: Mutex::new(Some(output)),
         heads: Mutex::new(Some(head_outputs)),
         udp_thread: Mutex::new(Some(udp_thread)),
+        eviction,
     })
 }
 
@@ -137,9 +153,25 @@ impl ServerLink {
         self.shared.clock
     }
 
+    /// Incarnation of this server, in every datagram's header.
+    pub fn epoch(&self) -> u32 {
+        self.shared.epoch
+    }
+
     /// A sender of states, for the broadcast thread.
     pub fn broadcaster(&self) -> Broadcaster {
         Broadcaster::new(self.shared.clone())
+    }
+
+    /// The leader of the render nodes' frames, for the frames thread; `None` where [`ServerOptions::frames`] is.
+    pub fn frame_master(&self) -> Option<FrameMaster> {
+        let leads = self.shared.frames.is_some();
+        leads.then(|| FrameMaster::new(self.shared.clone()))
+    }
+
+    /// How the frames of the render nodes went; `None` where they are not locked.
+    pub fn frame_report(&self) -> Option<FrameReport> {
+        self.shared.frames.as_ref().map(Frames::report)
     }
 
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.
@@ -174,7 +206,10 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
     /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
-    pub async fn shutdown(self) {
+    pub async fn shutdown(mut self) {
+        // Nothing may hold the sockets for the length of a look.
+        self.eviction.abort();
+        let _ = (&mut self.eviction).await; // it was cancelled: that is no news
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
@@ -210,6 +245,7 @@ async fn freed(address: SocketAddr) {
 
 impl Drop for ServerLink {
     fn drop(&mut self) {
+        self.eviction.abort();
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }

@@ -6,7 +6,9 @@ use std::{
     net::{Ipv4Addr, SocketAddr},
     time::Duration,
 };
-use taut_proto::{ClusterKey, CouplingOffer, JoinPolicy};
+use taut_proto::{
+    ClusterKey, CouplingOffer, JoinPolicy, barrier::MasterSettings, membership::SilenceLimits,
+};
 
 /// How to serve. Port 0 takes any free port.
 #[derive(Clone, Debug)]
@@ -25,16 +27,20 @@ pub struct ServerOptions {
     pub limits: FloodLimits,
     /// Most clients at a time.
     pub max_clients: usize,
-    /// Silence after which a client counts as gone and its name is free.
+    /// Silence on the control plane after which a client counts as gone and its name is free.
     pub idle_timeout: Duration,
+    /// Silence on the hot plane after which a node that others wait for counts as gone: a render node, a device.
+    pub node_timeout: Duration,
     /// The clock that the server's loops stamp with.
     pub clock: SessionClock,
+    /// How the frames of render nodes go together; `None`: each node draws on its own.
+    pub frames: Option<MasterSettings>,
     /// What a device bridge is told about coupling by itself.
     pub coupling: CouplingOffer,
 }
 
 impl ServerOptions {
-    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence, coupling at the server.
+    /// Default ports on all IPv4 addresses, 32 clients, 1 s of silence (0.5 s of a node), coupling at the server, frames that nobody locks.
     pub fn new(key: ClusterKey) -> ServerOptions {
         ServerOptions {
             quic: SocketAddr::from((Ipv4Addr::UNSPECIFIED, DEFAULT_QUIC_PORT)),
@@ -45,7 +51,9 @@ impl ServerOptions {
             limits: FloodLimits::default(),
             max_clients: 32,
             idle_timeout: crate::transport::IDLE_TIMEOUT,
+            node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),
             clock: SessionClock::start_now(),
+            frames: None,
             coupling: CouplingOffer::AtServer {
                 reason: "it offers nothing else".to_owned(),
             },

@@ -71,7 +71,8 @@ pub(crate) fn receive(
     let opened = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,
         Err(OpenError::Header(error)) => return count_bad_header(shared, error),
-        Err(OpenError::Forged) => return counters.forged.one(),
+        // A group key proves a member, not this one: nothing under it is opened here.
+        Err(OpenError::Forged | OpenError::Misplaced) => return counters.forged.one(),
         Err(OpenError::Replayed) => return counters.replayed.one(),
         Err(OpenError::Payload(_)) => return counters.garbage.one(),
     };
@@ -96,6 +97,12 @@ pub(crate) fn receive(
                 shared,
             );
         }
+        Payload::Arrive(arrive) => {
+            if let Some(frames) = &shared.frames {
+                frames.arrive(session, &arrive, now_ns, shared);
+            }
+        }
+        Payload::EventAck(ack) => session.acknowledge(ack.newest),
         Payload::Input(sample) => {
             let input = DeviceInput {
                 sample,
@@ -122,6 +129,7 @@ pub(crate) fn receive(
         }
         Payload::Heartbeat
         | Payload::Hot(_)
+        | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_) => {}

@@ -10,7 +10,6 @@ use taut_proto::{Act, Role, limits::TokenBucket};
 pub(crate) struct Rights {
     role: Role,
     datagrams: Mutex<TokenBucket>,
-    messages: Mutex<TokenBucket>,
     /// Bits of the acts that were tried and told.
     forbidden: AtomicU16,
 }
@@ -20,7 +19,6 @@ impl Rights {
         Rights {
             role,
             datagrams: Mutex::default(),
-            messages: Mutex::default(),
             forbidden: AtomicU16::new(0),
         }
     }
@@ -28,11 +26,6 @@ impl Rights {
     /// Whether another datagram may be looked at now.
     pub(crate) fn take_datagram(&self, now_ns: u64) -> bool {
         lock(&self.datagrams).take(self.role.datagram_rate(), now_ns)
-    }
-
-    /// Whether another control message may be looked at now.
-    pub(crate) fn take_message(&self, now_ns: u64) -> bool {
-        lock(&self.messages).take(self.role.message_rate(), now_ns)
     }
 
     /// Notes a forbidden act; whether it is the first of its kind.

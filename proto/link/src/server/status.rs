@@ -1,6 +1,6 @@
 //! What the server knows of its clients, and what it tells of them.
 
-use std::net::SocketAddr;
+use std::{net::SocketAddr, time::Duration};
 use taut_proto::{Act, ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
 
 /// A client as the server sees it.
@@ -51,6 +51,13 @@ pub enum LinkEvent {
         status: ClientStatus,
         /// Why, one sentence.
         reason: String,
+    },
+    /// It has not been heard for a while, and may be gone.
+    Silent {
+        /// Its name.
+        node: String,
+        /// For how long.
+        silence: Duration,
     },
     /// It was not let in.
     Refused {

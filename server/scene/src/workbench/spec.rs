@@ -204,6 +204,8 @@ pub struct Network {
     pub max_clients: usize,
     /// Who may join, of those who can prove something.
     pub admission: JoinPolicy,
+    /// Silence after which a render node or a bridge counts as gone, s.
+    pub node_timeout: f64,
 }
 
 /// The rerun stream.
