@@ -391,7 +391,7 @@ mod tests {
             eye_separation: 0.064,
             motion: crate::head::HeadMotion::Still,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,

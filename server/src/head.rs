@@ -95,20 +95,12 @@ struct Tracked {
 }
 
 impl HeadSource {
-    /// The same without a network: a head that a tracker on it would move stays at rest.
-    ///
-    /// # Errors
-    /// As [`Self::start_with`].
-    pub fn start<const READERS: usize>(self) -> std::io::Result<[Head; READERS]> {
-        self.start_with(None)
-    }
-
     /// Starts to listen to the tracker, if there is one: a head for each reader. `remote` are the link's ends for a tracker on the network;
     /// without them such a head stays at rest.
     ///
     /// # Errors
     /// No thread or no socket can be had. A tracker that is not there yet is waited for.
-    pub fn start_with<const READERS: usize>(
+    pub fn start<const READERS: usize>(
         self,
         remote: Option<[HeadOutput; READERS]>,
     ) -> std::io::Result<[Head; READERS]> {
@@ -195,7 +187,7 @@ mod tests {
             eye_separation: 0.064,
             motion,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         head
     }
 
@@ -245,7 +237,7 @@ mod tests {
                 mapping: SensorMapping::identity(),
             })),
         };
-        let mut heads = source.start::<2>().expect("a thread");
+        let mut heads = source.start::<2>(None).expect("a thread");
         for head in &mut heads {
             assert!(head.moves());
             assert_eq!(head.pose(Duration::from_secs(1)), rest);

@@ -116,7 +116,7 @@ impl Session {
             LookingOn::start(&setup.looking_on, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
-        let [head, watched_head] = setup.head.start_with(link.head_inputs()).map_err(|error| {
+        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
