@@ -16,9 +16,7 @@ use taut_bridge::{
 use taut_link::proto::mesh_blob::Positions;
 use taut_link::proto::scene::{BodyDescription, ShowOptions};
 use taut_link::proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
-use taut_link::{
-    Content, ServerLink, ServerOptions, create_key_file, read_key_file, serve,
-};
+use taut_link::{Content, ServerLink, ServerOptions, create_key_file, read_key_file, serve};
 use tempfile::TempDir;
 
 /// Of the wall z < 0 that the server renders, in N/m.

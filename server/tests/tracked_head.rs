@@ -55,7 +55,7 @@ fn track_arguments(server: &str, key: &Path, trace: &Path) -> TrackArgs {
         format!("--server={server}"),
         format!("--key={}", key.display()),
         format!("--source=trace:{}", trace.display()),
-        "--duration=2".to_owned(),
+        "--duration=4".to_owned(),
     ];
     match Cli::try_parse_from(line).map(|cli| cli.command) {
         Ok(Some(Command::Track(args))) => args,
