@@ -17,7 +17,7 @@ use taut_proto::{InputSample, PoseF64, version::MAGIC};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
-use super::BenchError;
+use super::{BenchError, request_fifo};
 
 /// The workbench file that is shipped.
 const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
@@ -215,7 +215,7 @@ fn run(
     result: &mut Isolation,
 ) -> Result<(), BenchError> {
     let served = Served::start(program)?;
-    let crowd = crowded.then(|| Crowd::join(&served, this)).transpose()?;
+    let crowd = crowded.then(|| awake(&served, this)).transpose()?;
     std::thread::sleep(duration);
     let flooded = crowd.map_or(Ok(0), Crowd::leave)?;
     let report = served.stop()?;
@@ -239,6 +239,23 @@ fn run(
         result.alone.push(period);
     }
     Ok(())
+}
+
+/// The eight, with threads of the lowest real-time priority where the system grants it: on a loaded machine they would be thrown out for their
+/// silence. The program, started before, does not inherit it.
+fn awake(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+    const PRIORITY: u8 = 1;
+    std::thread::scope(|scope| {
+        let joined = std::thread::Builder::new()
+            .name("crowd".to_owned())
+            .spawn_scoped(scope, || {
+                let _ = request_fifo(PRIORITY);
+                Crowd::join(served, this)
+            })?;
+        joined
+            .join()
+            .unwrap_or_else(|_| Err(BenchError::Missing("a client panicked".to_owned())))
+    })
 }
 
 /// The eight.
