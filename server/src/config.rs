@@ -94,7 +94,9 @@ pub fn session_setup(
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         announced_udp_port: None,
         key,
+        policy: network.admission.clone(),
         max_clients: network.max_clients,
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides
@@ -153,6 +155,7 @@ fn head(viewer: &Viewer) -> HeadSource {
                 amplitude: *amplitude,
                 period: *period,
             }),
+            HeadTracking::Remote => HeadMotion::Remote,
             HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
                 source: vrpn_source(sensor),
                 mapping: sensor.mapping,

@@ -107,6 +107,8 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
+            policy: setup.link.policy,
+            node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
@@ -114,7 +116,7 @@ impl Session {
             LookingOn::start(&setup.looking_on, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
-        let [head, watched_head] = setup.head.start().map_err(|error| {
+        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
@@ -651,8 +653,10 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Left { .. }
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
+        LinkEvent::Forbidden { .. } => Severity::Warning,
         LinkEvent::Log { event, .. } => match event.level {
             LogLevel::Info => Severity::Info,
             LogLevel::Warning => Severity::Warning,

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
-use taut_link::{ClusterKey, Content};
+use taut_link::{ClusterKey, Content, JoinPolicy};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
 
@@ -82,8 +82,12 @@ pub struct LinkSettings {
     pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
+    /// Who is let in, of those who can prove something.
+    pub policy: JoinPolicy,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone.
+    pub node_timeout: Duration,
 }
 
 /// Rates and scheduling.

@@ -22,7 +22,7 @@ pub use document::Document;
 pub use files::{
     DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file,
 };
-pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, write_ply};
+pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{

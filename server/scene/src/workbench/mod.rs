@@ -1,5 +1,6 @@
 //! The workbench: screens, nodes, viewer, device, network, monitoring, real time.
 
+mod admission;
 mod dynamics;
 mod load;
 mod looking_on;

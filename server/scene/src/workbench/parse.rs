@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_proto::JoinPolicy;
 
+use super::admission::admission;
 use super::dynamics::dynamics;
 use super::load::Workbench;
 use super::looking_on::{observers, vrpn, zenoh};
@@ -310,7 +312,15 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
         let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
         section.complain(&node.at, text);
     }
+    let remote = section.boolean("remote_tracker").unwrap_or(false);
+    if let (true, Some(node)) = (remote, section.get("remote_tracker"))
+        && (tracker.is_some() || sway.is_some())
+    {
+        let text = "`remote_tracker` in [viewer] excludes `tracker` and `sway`; leave one out";
+        section.complain(&node.at, text);
+    }
     let tracking = match tracker {
+        None if remote => HeadTracking::Remote,
         Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
         None => sway.unwrap_or(HeadTracking::Fixed),
     };
@@ -433,6 +443,11 @@ pub(super) fn port(section: &Section<'_>, key: &'static str, default: u16) -> u1
         .unwrap_or(default)
 }
 
+/// Silence after which a node counts as gone, s: ten of its signs of life.
+const NODE_TIMEOUT: f64 = 0.5;
+/// Longest that may be asked for, s.
+const MAX_NODE_TIMEOUT: f64 = 60.0;
+
 fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Network> {
     let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let Some(section) = section else {
@@ -444,6 +459,8 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             key_file: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
+            admission: JoinPolicy::default(),
+            node_timeout: NODE_TIMEOUT,
         });
     };
     let transports = [
@@ -477,6 +494,12 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),
+        admission: admission(&section),
+        node_timeout: section.number_or(
+            "node_timeout",
+            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            NODE_TIMEOUT,
+        ),
     };
     section.finish();
     Some(network)
