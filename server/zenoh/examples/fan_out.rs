@@ -437,10 +437,6 @@ impl Counter {
             })?;
         Ok(Self { address, bytes })
     }
-
-    fn bytes(&self) -> u64 {
-        self.bytes.load(Ordering::Relaxed)
-    }
 }
 
 fn pass(mut from: TcpStream, mut to: TcpStream, count: &AtomicU64) {
