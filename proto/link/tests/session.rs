@@ -80,13 +80,13 @@ async fn a_node_that_joins_late_gets_everything() {
     })
     .await;
 
-    let late = client(&server, Role::Observer, "late").await;
+    let late = client(&server, Role::Render, "late").await;
     assert_eq!(late.description(), first.description());
     let hash = late.description().obstacles[0].mesh;
     let mesh = late
         .mesh(hash)
         .await
-        .unwrap_or_else(|error| panic!("{error}"));
+        .unwrap_or_else(|error| panic!("{error}: {:?}", late.is_closed()));
     assert_eq!(mesh.triangles().len(), 27_000);
     let (mut of_first, mut of_late) = (Vec::new(), Vec::new());
     broadcast_until(&mut broadcaster, tick, || {

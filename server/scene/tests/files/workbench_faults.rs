@@ -78,6 +78,12 @@ fn every_fault_names_file_line_and_key() {
             "[network] does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
         ),
         (
+            "node_timeout = 0.5 ",
+            "node_timeout = 0 ",
+            "node_timeout",
+            "`node_timeout` in [network] is 0, but must be greater than zero and at most 60",
+        ),
+        (
             "bind = \"127.0.0.1\"",
             "bind = \"here\"",
             "\"here\"",
