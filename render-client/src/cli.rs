@@ -230,6 +230,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         .to_owned(),
         adapter,
         frames: statistics.frames,
+        locked_frames: statistics.locked_frames,
         stale_frames: statistics.stale_frames,
         fps: statistics.fps(),
         pose_age_ms,

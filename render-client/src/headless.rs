@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::canvas::Canvas;
 use crate::error::RenderError;
+use crate::pacing::Pacer;
 use crate::session::{Ending, Session};
 use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
@@ -24,7 +25,7 @@ pub(crate) struct Plan {
     pub(crate) show: Show,
 }
 
-/// Draws until the plan, the server or a signal ends it: each distinct state once.
+/// Draws until the plan, the server or a signal ends it: the frames of the barrier, or each distinct state once.
 pub(crate) fn run(
     session: &mut Session,
     canvas: &mut Canvas,
@@ -41,6 +42,7 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut next_frame = start;
     let mut last_drawn = None;
+    let mut pacer = Pacer::new(session, plan.frame_time);
     loop {
         if session.interrupted() {
             return Ok(Ended::Interrupted);
@@ -61,9 +63,29 @@ pub(crate) fn run(
         }
 
         session.take_states(timeline);
+        let now_ns = session.now_ns();
+        if let Some((taken_ns, latched)) =
+            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns)?)))
+        {
+            canvas.draw(&latched, plan.show, plan.out.is_some())?;
+            pacer.wait();
+            let late = pacer.shown();
+            let shown_ns = session.now_ns().unwrap_or(taken_ns);
+            statistics.frame(&latched, taken_ns, shown_ns);
+            statistics.swap(late);
+            if finish(canvas, statistics, plan)? {
+                return Ok(Ended::Frames);
+            }
+            last_drawn = None;
+            next_frame = Instant::now();
+            continue; // the barrier keeps the rhythm
+        }
+
+        // No barrier: each distinct state once, at this node's own rate.
         let due = Instant::now() >= next_frame;
-        let now_ns = session.now_ns().filter(|_| due);
-        let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
+        let latched = now_ns
+            .filter(|_| due)
+            .and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
         if let Some((taken_ns, latched)) = latched {
             let drawn = Some((latched.state.time_ns, latched.stale));
             if drawn != last_drawn {
@@ -71,11 +93,7 @@ pub(crate) fn run(
                 canvas.draw(&latched, plan.show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
-                write_pictures(canvas, plan, statistics.frames)?;
-                if plan
-                    .frames
-                    .is_some_and(|frames| statistics.frames >= frames)
-                {
+                if finish(canvas, statistics, plan)? {
                     return Ok(Ended::Frames);
                 }
             }
@@ -91,6 +109,13 @@ pub(crate) fn run(
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
     }
+}
+
+/// Writes the frame's pictures; whether it was the last.
+fn finish(canvas: &Canvas, statistics: &Statistics, plan: &Plan) -> Result<bool, RenderError> {
+    write_pictures(canvas, plan, statistics.frames)?;
+    let enough = |frames| statistics.frames >= frames;
+    Ok(plan.frames.is_some_and(enough))
 }
 
 /// Writes `NODE-SCREEN[-left|-right]-00001.png` and so on.

@@ -16,6 +16,7 @@ mod headless;
 pub mod hold;
 mod mouse;
 pub mod normals;
+mod pacing;
 pub mod renderer;
 mod session;
 pub mod stage;

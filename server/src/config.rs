@@ -18,6 +18,7 @@ use taut_scene::{
 use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
+use crate::frames;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
@@ -94,6 +95,7 @@ pub fn session_setup(
         announced_udp_port: None,
         key,
         max_clients: network.max_clients,
+        frames: frames::settings(&workbench.frames),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides

@@ -27,6 +27,7 @@ use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
+use crate::frames::FramesReport;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
@@ -105,6 +106,7 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
+            frames: setup.link.frames,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
@@ -187,6 +189,7 @@ impl Session {
         session.start_god_object(loops.god_object, loops.coupling_waker, &setup.realtime)?;
         session.start_checker(checker, loops.observers.checker)?;
         session.start_broadcast(states, broadcaster, bridge_commands, &setup.realtime)?;
+        session.start_frames(&setup.realtime)?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.enforce(setup.realtime.policy)?;
         session.tell_start(&opening);
@@ -296,6 +299,20 @@ impl Session {
                     &shutdown,
                 );
             },
+        )
+    }
+
+    /// The barrier of the render nodes' frames, where the workbench wants one.
+    fn start_frames(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let Some(mut master) = self.link.as_ref().and_then(ServerLink::frame_master) else {
+            return Ok(());
+        };
+        let shutdown = self.shutdown.clone();
+        self.start_thread(
+            "frames",
+            Scheduling::Fifo(realtime.broadcast_priority),
+            None,
+            move || master.run(&|| shutdown.is_asked()),
         )
     }
 
@@ -512,6 +529,7 @@ impl Session {
                 + counters.replayed
                 + counters.inputs_refused;
         }
+        let frames = self.link.as_ref().and_then(ServerLink::frame_report);
         let mut failure = self
             .shutdown
             .failure()
@@ -533,6 +551,7 @@ impl Session {
         }
         report.realtime = self.ledger.report();
         (report.clients, report.observers) = self.clients.reports();
+        report.frames = frames.map(|measured| FramesReport::new(&measured, &mut report.clients));
         (report, failure)
     }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
+use taut_link::proto::barrier::MasterSettings;
 use taut_link::{ClusterKey, Content};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
@@ -81,6 +82,8 @@ pub struct LinkSettings {
     pub key: ClusterKey,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// How the frames of the render nodes go together; `None`: each by itself.
+    pub frames: Option<MasterSettings>,
 }
 
 /// Rates and scheduling.

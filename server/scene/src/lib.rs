@@ -37,9 +37,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
-    RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
-    VrpnSensor, Window, Workbench,
+    Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Monitoring, Network, Node, Passivity,
+    RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind,
+    Viewer, VrpnSensor, Window, Workbench,
 };
 
 /// Why a scene could not be used.

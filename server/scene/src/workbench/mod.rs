@@ -1,6 +1,7 @@
-//! The workbench: screens, nodes, viewer, device, network, monitoring, real time.
+//! The workbench: screens, nodes, viewer, device, network, frames, monitoring, real time.
 
 mod dynamics;
+mod frames;
 mod load;
 mod parse;
 mod safety;
@@ -8,6 +9,7 @@ mod spec;
 mod tracker;
 
 pub use dynamics::DeviceDynamics;
+pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,

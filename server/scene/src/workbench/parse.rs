@@ -8,6 +8,7 @@ use god_object::Pose;
 use nalgebra::Point3;
 
 use super::dynamics::dynamics;
+use super::frames::frames;
 use super::load::Workbench;
 use super::safety::safety;
 use super::spec::{
@@ -71,6 +72,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
     let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
+    let frames = table(&root, "frames", frames).unwrap_or_default();
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
@@ -106,6 +108,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         device,
         dynamics,
         network,
+        frames,
         monitoring,
         realtime,
         safety,
