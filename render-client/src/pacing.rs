@@ -12,9 +12,10 @@ use crate::timeline::{Latched, STALE_AFTER_NS};
 /// This node's way through the barrier.
 pub(crate) struct Pacer {
     gate: FrameGate,
-    period: Duration,
     /// When the frame that waits to be shown was planned.
     planned: Option<Instant>,
+    /// As last written to the log.
+    told: FrameStatus,
 }
 
 impl Pacer {
@@ -22,21 +23,17 @@ impl Pacer {
     pub(crate) fn new(session: &Session, period: Duration) -> Self {
         Self {
             gate: session.frame_gate(period),
-            period,
             planned: None,
+            told: FrameStatus::default(),
         }
-    }
-
-    /// Takes part in a new session.
-    #[allow(dead_code, reason = "for a session that is taken up again")]
-    pub(crate) fn renew(&mut self, session: &Session) {
-        *self = Self::new(session, self.period);
     }
 
     /// The frame to draw now, the same on all nodes, whatever this one lost on the way; then [`Self::wait`]. `None` where there is no barrier:
     /// draw what is newest, when it suits.
     pub(crate) fn next(&mut self, now_ns: u64) -> Option<Latched> {
-        let FrameTurn::Draw(released) = self.gate.turn() else {
+        let turn = self.gate.turn();
+        self.log();
+        let FrameTurn::Draw(released) = turn else {
             return None;
         };
         let Some(state) = read_state(&released.state, released.state_hash) else {
@@ -72,5 +69,20 @@ impl Pacer {
     /// How this node stands among the others.
     pub(crate) fn status(&self) -> FrameStatus {
         self.gate.status()
+    }
+
+    /// Writes to the log when that changes.
+    fn log(&mut self) {
+        let status = self.status();
+        let differs = |of: fn(&FrameStatus) -> (bool, u32)| of(&status) != of(&self.told);
+        if !differs(|status| (status.synchronised, status.members)) {
+            return;
+        }
+        if status.synchronised {
+            tracing::info!(nodes = status.members, "frames are shown together");
+        } else {
+            tracing::info!("frames are shown by this node alone");
+        }
+        self.told = status;
     }
 }

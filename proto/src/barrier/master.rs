@@ -100,6 +100,8 @@ pub struct Master {
     settings: MasterSettings,
     newest: ReleaseHead,
     members: ArrayVec<Member, MAX_MEMBERS>,
+    /// Some node was waited for when the open frame was begun: what comes until its end does not change whom it waits for.
+    in_step: bool,
     /// When the open frame, that after the newest released one, could be begun.
     opened_ns: u64,
     /// When it is to be shown at the earliest.
@@ -128,6 +130,7 @@ impl Master {
                 ..ReleaseHead::default()
             },
             members: ArrayVec::new(),
+            in_step: false,
             opened_ns: 0,
             due_ns: 0,
             last_deadline_ns: 0,
@@ -241,8 +244,7 @@ impl Master {
             return None;
         }
         let open = self.newest.frame + 1;
-        let in_step = self.is_in_step();
-        let counts = |m: &Member| match in_step {
+        let counts = |m: &Member| match self.in_step {
             true => m.is_waited_for(),
             false => m.state != NodeState::Joining,
         };
@@ -286,15 +288,10 @@ impl Master {
     pub fn patience_ns(&self) -> u64 {
         let period = self.period_ns();
         let patience = (period + period / 2).max((2 * period).min(MAX_PATIENCE_NS));
-        match self.is_in_step() {
+        match self.in_step {
             true => patience,
             false => patience.max(LOOSE_PATIENCE_NS),
         }
-    }
-
-    /// Whether any node is waited for.
-    fn is_in_step(&self) -> bool {
-        self.members.iter().any(Member::is_waited_for)
     }
 
     fn lead_ns(&self) -> u64 {
@@ -361,6 +358,7 @@ impl Master {
             Swap::Immediate => 0,
             Swap::Scheduled => self.due_ns.max(now_ns + LEAD_NS),
         };
+        self.in_step = self.members.iter().any(Member::is_waited_for);
         let period_ns = self.period_ns();
         self.last_deadline_ns = deadline_ns;
         self.opened_ns = swap_ns.max(now_ns);
