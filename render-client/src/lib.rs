@@ -14,7 +14,9 @@ pub mod error;
 mod hand;
 mod headless;
 pub mod hold;
+mod membership;
 mod mouse;
+pub mod node_status;
 pub mod normals;
 mod pacing;
 pub mod renderer;
@@ -28,4 +30,5 @@ mod window;
 
 pub use cli::{RenderArgs, run};
 pub use error::RenderError;
+pub use membership::MembershipArgs;
 pub use statistics::RenderReport;

@@ -230,7 +230,7 @@ async fn a_bad_network_costs_time_but_never_truth() {
         doubled: 100,
         swapped: 100,
         damaged: 50,
-        delay_us: 0,
+        ..Impairment::default()
     };
     let leader = Leader::start(Some(Swap::Immediate), Some(impairment)).await;
     let shown = Shown::default();

@@ -81,6 +81,9 @@ impl FrameGate {
 
     /// What to draw now; the barrier hears from this node meanwhile. Does not wait.
     pub fn turn(&mut self) -> FrameTurn {
+        if self.hot.is_over() {
+            return FrameTurn::Free; // whoever led is not there any more
+        }
         let began = Instant::now();
         let now_ns = self.hot.inbound.local_ns(began);
         let turn = self.hot.inbound.frames.with(|part| {

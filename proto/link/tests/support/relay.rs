@@ -15,6 +15,8 @@ use std::{
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Impairment {
     pub lost: u64,
+    /// The first of twenty that are lost in a row.
+    pub bursts: u64,
     pub doubled: u64,
     /// Held back until the next one has passed.
     pub swapped: u64,
@@ -175,8 +177,8 @@ fn run(
 struct Lane {
     client: SocketAddr,
     server_side: UdpSocket,
-    held_up: Option<Vec<u8>>,
-    held_down: Option<Vec<u8>>,
+    held_up: Held,
+    held_down: Held,
     going_up: UnderWay,
     going_down: UnderWay,
 }
@@ -186,8 +188,8 @@ impl Lane {
         Lane {
             client,
             server_side: bind(),
-            held_up: None,
-            held_down: None,
+            held_up: Held::default(),
+            held_down: Held::default(),
             going_up: UnderWay::new(delay),
             going_down: UnderWay::new(delay),
         }
@@ -224,16 +226,31 @@ impl UnderWay {
     }
 }
 
+/// Datagrams lost in a row.
+const BURST: u32 = 21;
+
+/// What one direction remembers.
+#[derive(Default)]
+struct Held {
+    /// Passes after the next one.
+    datagram: Option<Vec<u8>>,
+    burst_left: u32,
+}
+
 /// Passes `datagram` on as the dice fall; returns how many intact copies pass, now or after the next one.
 fn impair(
     datagram: &[u8],
     impairment: Impairment,
     random: &mut u64,
-    held: &mut Option<Vec<u8>>,
+    held: &mut Held,
     mut pass: impl FnMut(&[u8]),
 ) -> usize {
     let mut roll = |thousandths: u64| next(random) % 1000 < thousandths;
-    if roll(impairment.lost) {
+    if held.burst_left == 0 && roll(impairment.bursts) {
+        held.burst_left = BURST;
+    }
+    held.burst_left = held.burst_left.saturating_sub(1);
+    if held.burst_left > 0 || roll(impairment.lost) {
         return 0;
     }
     if roll(impairment.damaged) {
@@ -243,8 +260,8 @@ fn impair(
         pass(&damaged);
     }
     let mut roll = |thousandths: u64| next(random) % 1000 < thousandths;
-    if held.is_none() && roll(impairment.swapped) {
-        *held = Some(datagram.to_vec());
+    if held.datagram.is_none() && roll(impairment.swapped) {
+        held.datagram = Some(datagram.to_vec());
         return 1;
     }
     let doubled = roll(impairment.doubled);
@@ -252,7 +269,7 @@ fn impair(
     if doubled {
         pass(datagram);
     }
-    if let Some(earlier) = held.take() {
+    if let Some(earlier) = held.datagram.take() {
         pass(&earlier);
     }
     1 + usize::from(doubled)

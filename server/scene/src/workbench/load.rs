@@ -6,6 +6,7 @@ use god_object::Pose;
 
 use super::dynamics::DeviceDynamics;
 use super::frames::Frames;
+use super::looking_on::{ObserverStream, Vrpn, Zenoh};
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
@@ -47,6 +48,12 @@ pub struct Workbench {
     pub safety: Safety,
     /// What is drawn beside the bodies.
     pub show: Show,
+    /// The VRPN server.
+    pub vrpn: Vrpn,
+    /// JSON lines for browsers and scripts.
+    pub observers: ObserverStream,
+    /// Publication through Zenoh routers.
+    pub zenoh: Zenoh,
     pub(super) scene_at: At,
 }
 

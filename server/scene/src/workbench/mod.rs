@@ -1,8 +1,10 @@
 //! The workbench: screens, nodes, viewer, device, network, frames, monitoring, real time.
 
+mod admission;
 mod dynamics;
 mod frames;
 mod load;
+mod looking_on;
 mod parse;
 mod safety;
 mod spec;
@@ -11,6 +13,7 @@ mod tracker;
 pub use dynamics::DeviceDynamics;
 pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
+pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
     Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
