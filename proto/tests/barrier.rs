@@ -158,6 +158,31 @@ fn a_node_that_is_made_for_slow_frames_slows_everybody_but_not_beyond_a_second()
 }
 
 #[test]
+fn nodes_that_are_all_too_slow_are_shown_together_still() {
+    let mut master = Master::new(settings(Swap::Immediate), 0, 1, 1);
+    for session in [1, 2] {
+        let _ = master.arrive(MS, session, &Arrive::default());
+    }
+    let mut last = release_when_due(&mut master);
+    for _ in 0..20 {
+        let frame = released(&master) + 1;
+        let _ = master.arrive(last + 80 * MS, 1, &arrived(frame));
+        let _ = master.arrive(last + 100 * MS, 2, &arrived(frame));
+        // Nobody is in step before five frames: until then each waits for both, as long as they take.
+        let in_step = master.members().any(|m| m.state == NodeState::Synced);
+        if in_step {
+            break;
+        }
+        let now = last + 100 * MS;
+        assert!(master.poll(now, Newest::default()).is_some());
+        assert_eq!(master.newest().map(|newest| newest.late), Some(0));
+        last = now;
+    }
+    let states: Vec<_> = master.members().map(|m| m.state).collect();
+    assert_eq!(states, [NodeState::Synced, NodeState::Synced]);
+}
+
+#[test]
 fn swaps_are_compared_when_all_have_told() {
     let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
     let shown = released(&master);

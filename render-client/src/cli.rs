@@ -245,6 +245,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         transport: args.transport.name().to_owned(),
         adapter,
         frames: statistics.frames,
+        locked_frames: statistics.locked_frames,
         stale_frames: statistics.stale_frames,
         fps: statistics.fps(),
         pose_age_ms,

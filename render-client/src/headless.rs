@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use crate::canvas::Canvas;
 use crate::error::RenderError;
 use crate::node_status::LinkHealth;
+use crate::pacing::Pacer;
 use crate::session::{Session, Turn};
 use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
@@ -25,7 +26,7 @@ pub(crate) struct Plan {
     pub(crate) show: Show,
 }
 
-/// Draws until the plan, the server or a signal ends it: each distinct state once.
+/// Draws until the plan, the server or a signal ends it: the frames of the barrier, or each distinct state once.
 pub(crate) fn run(
     session: &mut Session,
     canvas: &mut Canvas,
@@ -42,6 +43,7 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut next_frame = start;
     let mut last_drawn = None;
+    let mut pacer = Pacer::new(session, plan.frame_time);
     let mut show = plan.show;
     loop {
         if session.interrupted() {
@@ -54,6 +56,7 @@ pub(crate) fn run(
                     canvas.restage(scene.0);
                     show = scene.1;
                 }
+                pacer = Pacer::new(session, plan.frame_time);
                 last_drawn = None;
             }
             Turn::Told => return Ok(Ended::ServerStopped),
@@ -71,9 +74,29 @@ pub(crate) fn run(
         }
 
         session.take_states(timeline);
+        let now_ns = session.now_ns();
+        if let Some((taken_ns, latched)) =
+            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns)?)))
+        {
+            canvas.draw(&latched, show, plan.out.is_some())?;
+            pacer.wait();
+            let late = pacer.shown();
+            let shown_ns = session.now_ns().unwrap_or(taken_ns);
+            statistics.frame(&latched, taken_ns, shown_ns);
+            statistics.swap(late);
+            if finish(canvas, statistics, plan)? {
+                return Ok(Ended::Frames);
+            }
+            last_drawn = None;
+            next_frame = Instant::now();
+            continue; // the barrier keeps the rhythm
+        }
+
+        // No barrier: each distinct state once, at this node's own rate.
         let due = Instant::now() >= next_frame;
-        let now_ns = session.now_ns().filter(|_| due);
-        let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
+        let latched = now_ns
+            .filter(|_| due)
+            .and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
         if let Some((taken_ns, latched)) = latched {
             let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
             if drawn != last_drawn {
@@ -81,11 +104,7 @@ pub(crate) fn run(
                 canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
-                write_pictures(canvas, plan, statistics.frames)?;
-                if plan
-                    .frames
-                    .is_some_and(|frames| statistics.frames >= frames)
-                {
+                if finish(canvas, statistics, plan)? {
                     return Ok(Ended::Frames);
                 }
             }
@@ -101,6 +120,13 @@ pub(crate) fn run(
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
     }
+}
+
+/// Writes the frame's pictures; whether it was the last.
+fn finish(canvas: &Canvas, statistics: &Statistics, plan: &Plan) -> Result<bool, RenderError> {
+    write_pictures(canvas, plan, statistics.frames)?;
+    let enough = |frames| statistics.frames >= frames;
+    Ok(plan.frames.is_some_and(enough))
 }
 
 /// What the screen says of the link, to the second: a picture is drawn again when that changes.

@@ -18,6 +18,7 @@ mod membership;
 mod mouse;
 pub mod node_status;
 pub mod normals;
+mod pacing;
 pub mod renderer;
 mod session;
 pub mod stage;

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 use taut_link::{
-    ClientLink, ClientOptions, MeshCounters, ReceivedState, RejoinPolicy, Renewal, SessionEnd,
-    SupervisedLink,
+    ClientLink, ClientOptions, FrameGate, MeshCounters, ReceivedState, RejoinPolicy, Renewal,
+    SessionEnd, SupervisedLink,
 };
 use taut_proto::state::HEAD_TRACKED;
-use taut_proto::{ClientStats, Role, SceneDescription};
+use taut_proto::{ClientStats, HotState, Role, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
@@ -180,10 +180,15 @@ impl Session {
         for state in self
             .received
             .drain(..)
-            .filter_map(|received| read_state(&received))
+            .filter_map(|received| read_state(&received.state, received.state_hash))
         {
             timeline.push(state);
         }
+    }
+
+    /// This node's part in the barrier of frames, made for frames at least `period` apart.
+    pub(crate) fn frame_gate(&self, period: std::time::Duration) -> FrameGate {
+        self.link.frame_gate(period)
     }
 
     /// Session time in nanoseconds; `None` until the clock is known.
@@ -324,8 +329,7 @@ fn watch_signals(
 
 /// A received state as the timeline keeps it; `None` where it names no god-object, or a pose that
 /// is not a rigid motion: better an older picture than a wrong one.
-fn read_state(received: &ReceivedState) -> Option<State> {
-    let hot = &received.state;
+pub(crate) fn read_state(hot: &HotState, state_hash: u64) -> Option<State> {
     let tool = hot.tools.first()?;
     let bodies = hot
         .bodies
@@ -341,7 +345,7 @@ fn read_state(received: &ReceivedState) -> Option<State> {
     let vector = |v: [f32; 3]| Vector3::from(v).cast::<f64>();
     Some(State {
         time_ns: hot.sample_time_ns,
-        source: (hot.tick, received.state_hash),
+        source: (hot.tick, state_hash),
         god_object: tool.god_object.to_isometry()?,
         device: tool.device.to_isometry()?,
         force: vector(tool.force),

@@ -59,6 +59,8 @@ pub struct RenderReport {
     pub adapter: String,
     /// Frames drawn, each on all screens of the node.
     pub frames: u64,
+    /// Of these, frames that the barrier released: shown when all nodes showed them.
+    pub locked_frames: u64,
     /// Frames that showed a state so old that it was marked as stale.
     pub stale_frames: u64,
     /// Frames per second between the first and the last.
@@ -121,6 +123,10 @@ pub(crate) struct Statistics {
     /// Since the start.
     ages: Ages,
     since_report: Ages,
+    /// How late after the planned moment frames were shown, in microseconds.
+    swaps_since_report: Histogram<u64>,
+    /// Frames that the barrier released.
+    pub(crate) locked_frames: u64,
     frames_at_report: u64,
     drawn: Vec<DrawnState>,
     first_frame: Option<Instant>,
@@ -136,6 +142,8 @@ impl Statistics {
             stale_frames: 0,
             ages: Ages::new(),
             since_report: Ages::new(),
+            swaps_since_report: histogram(),
+            locked_frames: 0,
             frames_at_report: 0,
             drawn: Vec::with_capacity(MAX_DRAWN),
             first_frame: None,
@@ -163,6 +171,16 @@ impl Statistics {
         }
     }
 
+    /// Counts that the barrier released the frame, and how late it was shown, where a moment was planned.
+    pub(crate) fn swap(&mut self, late: Option<Duration>) {
+        let Some(late) = late else {
+            return;
+        };
+        self.locked_frames += 1;
+        let late_us = u64::try_from(late.as_micros()).unwrap_or(u64::MAX);
+        self.swaps_since_report.saturating_record(late_us);
+    }
+
     /// The report that is due, if one is, else (with `last`) the one at the end.
     pub(crate) fn report(&mut self, last: bool) -> Option<ClientStats> {
         let elapsed = self.last_report.elapsed();
@@ -181,10 +199,13 @@ impl Statistics {
             drawn_age_ms_p50: ms(drawn.value_at_quantile(0.5)),
             drawn_age_ms_p99: ms(drawn.value_at_quantile(0.99)),
             drawn_age_ms_max: ms(drawn.max()),
+            swap_skew_ms_p50: ms(self.swaps_since_report.value_at_quantile(0.5)),
+            swap_skew_ms_max: ms(self.swaps_since_report.max()),
             drawn: std::mem::take(&mut self.drawn),
             ..Default::default()
         };
         self.since_report.reset();
+        self.swaps_since_report.reset();
         self.frames_at_report = self.frames;
         self.last_report = Instant::now();
         Some(stats)

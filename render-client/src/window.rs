@@ -20,6 +20,7 @@ use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::headless::shown;
 use crate::mouse::{self, Mouse, Pointed};
+use crate::pacing::Pacer;
 use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
 use crate::session::{Session, Turn};
 use crate::stage::{Show, Stage};
@@ -27,6 +28,9 @@ use crate::statistics::{Ended, Statistics};
 use crate::stereo::Picture;
 use crate::timeline::Timeline;
 use crate::view::Eyes;
+
+/// Nothing to draw yet: how soon to look again.
+const MOMENT: Duration = Duration::from_millis(2);
 
 /// When to end and how fast to draw.
 #[derive(Clone, Debug)]
@@ -69,6 +73,7 @@ pub(crate) fn run(
         screen: None,
         start: Instant::now(),
         next_frame: Instant::now(),
+        pacer: None,
         last_drawn: None,
         result: None,
     };
@@ -99,6 +104,8 @@ struct App<'a> {
     screen: Option<Display>,
     start: Instant,
     next_frame: Instant,
+    /// From the first frame on.
+    pacer: Option<Pacer>,
     last_drawn: Option<(u64, bool, Option<u64>)>,
     result: Option<Result<Ended, RenderError>>,
 }
@@ -264,6 +271,7 @@ impl App<'_> {
                     self.show = scene.1;
                     self.restage(events, scene.0)?;
                 }
+                self.pacer = None;
                 self.last_drawn = None;
             }
             Turn::Told => return Ok(Some(Ended::ServerStopped)),
@@ -279,22 +287,31 @@ impl App<'_> {
         if let Some(stats) = self.statistics.report(false) {
             self.session.report(stats);
         }
-        let now = Instant::now();
-        if now < self.next_frame {
-            return Ok(None);
-        }
-        self.next_frame = (self.next_frame + self.plan.frame_time).max(now);
         self.session.take_states(self.timeline);
-        let Some(taken_ns) = self.session.now_ns() else {
+        let (Some(taken_ns), Some(screen)) = (self.session.now_ns(), &mut self.screen) else {
+            self.next_frame = Instant::now() + MOMENT;
             return Ok(None);
         };
-        let (Some(latched), Some(screen)) = (self.timeline.latch(taken_ns), &mut self.screen)
-        else {
+        let (session, frame_time) = (&*self.session, self.plan.frame_time);
+        let pacer = self
+            .pacer
+            .get_or_insert_with(|| Pacer::new(session, frame_time));
+        let released = pacer.next(taken_ns);
+        let locked = released.is_some();
+        let now = Instant::now();
+        if locked {
+            self.next_frame = now; // the barrier keeps the rhythm
+        } else if now < self.next_frame {
+            return Ok(None);
+        } else {
+            self.next_frame = (self.next_frame + frame_time).max(now);
+        }
+        let Some(latched) = released.or_else(|| self.timeline.latch(taken_ns)) else {
             return Ok(None);
         };
         let link = shown(self.session.health());
         let drawn = Some((latched.state.time_ns, latched.stale, link));
-        if drawn == self.last_drawn {
+        if drawn == self.last_drawn && !locked {
             return Ok(None);
         }
         let Display {
@@ -321,15 +338,24 @@ impl App<'_> {
             renderer.draw(gpu, &mut encoder, screen, &eyes, &pane.target, &view);
             textures.push((pane, texture));
         }
-        if textures.is_empty() {
+        if textures.is_empty() && !locked {
             return Ok(None); // all windows are hidden
         }
         gpu.queue.submit([encoder.finish()]);
+        if locked {
+            // All pictures of all nodes are drawn before any is shown.
+            gpu.finish()?;
+            pacer.wait();
+        }
         for (pane, texture) in textures {
             pane.window.pre_present_notify();
             gpu.queue.present(texture);
         }
-        gpu.finish()?;
+        if locked {
+            self.statistics.swap(pacer.shown());
+        } else {
+            gpu.finish()?;
+        }
         self.last_drawn = drawn;
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
         self.statistics.frame(&latched, taken_ns, drawn_ns);

@@ -11,6 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use taut_link::{Content, ServerLink, ServerOptions, create_key_file, serve};
+use taut_proto::barrier::{MasterSettings, Swap};
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
     BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
@@ -31,6 +32,7 @@ struct Server {
     folder: tempfile::TempDir,
     stop: Arc<AtomicBool>,
     sender: Option<JoinHandle<()>>,
+    leader: Option<JoinHandle<()>>,
 }
 
 fn blob(mesh: &TriangleMesh) -> MeshBlob {
@@ -110,10 +112,18 @@ fn content() -> Content {
 
 impl Server {
     fn start() -> Self {
+        Self::start_with(None)
+    }
+
+    /// With a barrier of frames, if `frames` says how they go.
+    fn start_with(frames: Option<MasterSettings>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let key = create_key_file(&folder.path().join("key")).expect("a key");
         let runtime = tokio::runtime::Runtime::new().expect("a runtime");
-        let options = ServerOptions::loopback(key);
+        let options = ServerOptions {
+            frames,
+            ..ServerOptions::loopback(key)
+        };
         let link = runtime.block_on(serve(options, content())).expect("serves");
         let stop = Arc::new(AtomicBool::new(false));
         let (mut broadcaster, clock) = (link.broadcaster(), link.clock());
@@ -140,6 +150,12 @@ impl Server {
         let sender = std::thread::Builder::new()
             .name("sender".to_owned())
             .spawn(send);
+        let leader = link.frame_master().map(|mut master| {
+            let stopped = Arc::clone(&stop);
+            let lead = move || master.run(&|| stopped.load(Ordering::Relaxed));
+            let leader = std::thread::Builder::new().name("frames".to_owned());
+            leader.spawn(lead).expect("a thread")
+        });
         Self {
             address: link.quic_addr().to_string(),
             runtime,
@@ -147,6 +163,7 @@ impl Server {
             folder,
             stop,
             sender: Some(sender.expect("a thread")),
+            leader,
         }
     }
 
@@ -183,6 +200,9 @@ impl Server {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(sender) = self.sender.take() {
             sender.join().expect("the sender ends");
+        }
+        if let Some(leader) = self.leader.take() {
+            leader.join().expect("the leader ends");
         }
         self.runtime.block_on(self.link.shutdown());
     }
@@ -309,6 +329,41 @@ fn a_node_ends_in_good_order_when_the_server_says_that_it_stops() {
     server.stop();
     let report = node.join().expect("no panic").expect("a good end");
     assert_eq!(report.ended, Ended::ServerStopped);
+}
+
+/// One node with two screens, one with two pictures of a screen: each is one member, and all frames show what was released for them.
+#[test]
+fn nodes_show_the_frames_that_the_barrier_releases() {
+    if !can_draw() {
+        return;
+    }
+    for swap in [Swap::Immediate, Swap::Scheduled] {
+        let server = Server::start_with(Some(MasterSettings {
+            swap,
+            period_ns: 16_666_667,
+        }));
+        let nodes = ["both", "pair"].map(|node| {
+            start(RenderArgs {
+                fps: Some(8.0), // what software can do beside other tests: everybody's rate, because the slowest's is
+                ..server.args(node)
+            })
+        });
+        let frames = || server.link.frame_report().unwrap_or_default();
+        wait_for("frames that both nodes showed in time", || {
+            frames().skew.count >= 3
+        });
+        let measured = frames();
+        assert_eq!(measured.counts.mismatches, 0, "{measured:?}");
+        assert!(measured.counts.compared >= 6, "{measured:?}");
+        assert_eq!(measured.nodes.len(), 2, "{measured:?}");
+        server.stop();
+        for node in nodes {
+            let report = node.join().expect("no panic").expect("a good end");
+            assert_eq!(report.ended, Ended::ServerStopped);
+            assert!(report.locked_frames >= 3, "{report:?}");
+            assert!(report.locked_frames <= report.frames);
+        }
+    }
 }
 
 #[test]

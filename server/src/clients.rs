@@ -8,8 +8,6 @@ use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
 use crate::report::ClientReport;
 use crate::timing::{Distribution, distribution_of};
 
-const MICROSECONDS_PER_MILLISECOND: f64 = 1e3;
-
 /// Every client that ever was there, by name.
 #[derive(Debug, Default)]
 pub struct ClientLedger {
@@ -25,8 +23,6 @@ struct ClientRecord {
     state_hash_mismatches: u64,
     pose_ages: AgesMs,
     drawn_ages: AgesMs,
-    skew_medians_us: Vec<f64>,
-    skew_max_us: f64,
 }
 
 /// One age, of all reports of a client.
@@ -135,12 +131,6 @@ impl ClientLedger {
             stats.drawn_age_ms_p99,
             stats.drawn_age_ms_max,
         );
-        client
-            .skew_medians_us
-            .push(f64::from(stats.swap_skew_ms_p50) * MICROSECONDS_PER_MILLISECOND);
-        client.skew_max_us = client
-            .skew_max_us
-            .max(f64::from(stats.swap_skew_ms_max) * MICROSECONDS_PER_MILLISECOND);
     }
 
     /// One report per render node or bridge, in the order in which they joined, and the number of observers.
@@ -166,8 +156,6 @@ impl ClientRecord {
             state_hash_mismatches: 0,
             pose_ages: AgesMs::default(),
             drawn_ages: AgesMs::default(),
-            skew_medians_us: Vec::new(),
-            skew_max_us: 0.0,
         }
     }
 
@@ -188,8 +176,7 @@ impl ClientRecord {
             fps: f64::from(self.newest.fps),
             pose_age_ms: of_ages(&self.pose_ages),
             drawn_age_ms: of_ages(&self.drawn_ages),
-            swap_skew_us: (self.skew_max_us > 0.0)
-                .then(|| of_reports(&self.skew_medians_us, self.skew_max_us, self.skew_max_us)),
+            swap_skew_us: None, // the barrier's own measure: `frames::FramesReport::new`
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,
         }

@@ -19,6 +19,7 @@ use taut_scene::{
 use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
+use crate::frames;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
@@ -102,6 +103,7 @@ pub fn session_setup(
         }),
         policy: network.admission.clone(),
         max_clients: network.max_clients,
+        frames: frames::settings(&workbench.frames),
         node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);

@@ -31,6 +31,7 @@ pub mod doctor_device;
 pub mod edge_sets;
 pub mod failure;
 pub mod finished_file;
+pub mod frames;
 pub mod head;
 pub mod key;
 pub mod keys;

@@ -6,6 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::frames::FramesReport;
 use crate::timing::{Bin, Distribution};
 
 /// What `taut demo` and `taut serve` measured.
@@ -57,6 +58,8 @@ pub struct SessionReport {
     pub solver_fallbacks: u64,
     /// Samples that the monitor had no room for.
     pub monitor_dropped: u64,
+    /// How the frames of the render nodes went; `null` where each node draws by itself.
+    pub frames: Option<FramesReport>,
     /// One entry per client that was there, render nodes and bridges.
     pub clients: Vec<ClientReport>,
     /// Clients that looked on as observers.
@@ -87,7 +90,7 @@ pub struct ClientReport {
     pub pose_age_ms: Distribution,
     /// Age of the same pose when that frame was finished.
     pub drawn_age_ms: Distribution,
-    /// Difference of the swap times between nodes; `null` where frames are not locked, since nothing is measured then.
+    /// How much later this node called its swaps than the first node of the same frame; `null` where frames are not locked, or it was alone.
     pub swap_skew_us: Option<Distribution>,
     /// Datagrams that never arrived.
     pub packets_lost: u64,
@@ -227,6 +230,9 @@ impl fmt::Display for SessionReport {
             "safety events       {}, energy injected {:.2e} J",
             self.safety_events, self.energy_injected_j
         )?;
+        if let Some(frames) = &self.frames {
+            writeln!(f, "frames              {frames}")?;
+        }
         write_obstacles(
             f,
             self.energy_from_obstacles_j,
@@ -401,6 +407,7 @@ mod tests {
                 "energy_from_obstacles_j",
                 "energy_generated_j",
                 "obstacle_blocked_updates",
+                "frames",
                 "clients",
                 "observers",
             ],

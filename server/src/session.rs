@@ -27,6 +27,7 @@ use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
+use crate::frames::FramesReport;
 use crate::looking_on::{LookingOn, Outlets};
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
@@ -108,6 +109,7 @@ impl Session {
             announced_udp_port: setup.link.announced_udp_port,
             multicast: setup.link.multicast,
             max_clients: setup.link.max_clients,
+            frames: setup.link.frames,
             policy: setup.link.policy,
             node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
@@ -201,6 +203,7 @@ impl Session {
             outlets,
             &setup.realtime,
         )?;
+        session.start_frames(&setup.realtime)?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.enforce(setup.realtime.policy)?;
         session.tell_start(&opening);
@@ -312,6 +315,20 @@ impl Session {
                     &shutdown,
                 );
             },
+        )
+    }
+
+    /// The barrier of the render nodes' frames, where the workbench wants one.
+    fn start_frames(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let Some(mut master) = self.link.as_ref().and_then(ServerLink::frame_master) else {
+            return Ok(());
+        };
+        let shutdown = self.shutdown.clone();
+        self.start_thread(
+            "frames",
+            Scheduling::Fifo(realtime.broadcast_priority),
+            None,
+            move || master.run(&|| shutdown.is_asked()),
         )
     }
 
@@ -538,6 +555,7 @@ impl Session {
                 + counters.replayed
                 + counters.inputs_refused;
         }
+        let frames = self.link.as_ref().and_then(ServerLink::frame_report);
         let mut failure = self
             .shutdown
             .failure()
@@ -559,6 +577,7 @@ impl Session {
         }
         report.realtime = self.ledger.report();
         (report.clients, report.observers) = self.clients.reports();
+        report.frames = frames.map(|measured| FramesReport::new(&measured, &mut report.clients));
         (report, failure)
     }
 

@@ -7,6 +7,8 @@ use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
+use taut_link::proto::barrier::MasterSettings;
+use taut_link::{ClusterKey, Content, JoinPolicy};
 use taut_link::{ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
@@ -88,6 +90,8 @@ pub struct LinkSettings {
     pub policy: JoinPolicy,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// How the frames of the render nodes go together; `None`: each by itself.
+    pub frames: Option<MasterSettings>,
     /// Silence after which a render node or a bridge counts as gone.
     pub node_timeout: Duration,
 }

@@ -10,7 +10,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// How long the demo runs, s.
 const DURATION_S: u64 = 12;
 /// The keys of the report that scripts rely on.
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 17] = [
     "duration_s",
     "haptics_hz",
     "haptics_period_us",
@@ -25,6 +25,7 @@ const KEYS: [&str; 16] = [
     "packets_sent",
     "safety_events",
     "energy_injected_j",
+    "frames",
     "clients",
     "observers",
 ];
@@ -123,6 +124,21 @@ fn the_demo_brings_everything_up_and_reports_it() {
         assert!(age > 0.0 && age <= 50.0, "poses {age} ms old");
         let drawn = client["drawn_age_ms"]["p50"].as_f64().expect("a number");
         assert!(drawn > age, "drawn after {drawn} ms, taken after {age} ms");
+    }
+    // Both nodes drew what was released for each frame, and swapped some together.
+    let frames = &report["frames"];
+    println!("{frames}");
+    assert!(frames["compared"].as_u64() >= Some(20), "{frames}");
+    assert_eq!(frames["mismatches"], 0);
+    assert!(
+        frames["swap_skew_us"]["count"].as_u64() > Some(0),
+        "{frames}"
+    );
+    for client in clients {
+        assert!(
+            client["swap_skew_us"]["count"].as_u64() > Some(0),
+            "{client}"
+        );
     }
     assert!(
         report["packets_sent"].as_u64() > Some(1000 * DURATION_S),

@@ -136,7 +136,7 @@ impl Screen {
                 assert_eq!(released.state.hash(), Ok(released.state_hash));
                 std::thread::sleep(Duration::from_millis(draws_ms));
                 gate.arrive();
-                if gate.wait() {
+                if gate.wait().is_some() {
                     assert!(released.frame > last, "{} after {last}", released.frame);
                     last = released.frame;
                     gate.swapped(Instant::now());

@@ -6,7 +6,8 @@
 //! | D      | `patience_ns` | ns   | drawing time after which nobody is waited for                      |
 //!
 //! Frame N is released when its time has come and every node that is waited for has arrived, and at the latest D after it could be begun,
-//! D = max(1.5 P, min(2 P, 25 ms)).
+//! D = max(1.5 P, min(2 P, 25 ms)). Where no node is waited for, because all are new or were late, all are, up to 250 ms: nobody is held up
+//! who was in step, and slow nodes find together.
 
 use super::{
     Arrive, FrameSkew, LEAD_NS, MAX_MEMBERS, MAX_MISSES, MemberStatus, NodeState, ReleaseHead,
@@ -18,6 +19,8 @@ use arrayvec::ArrayVec;
 
 /// Longest that a frame waits for a node that is behind, whatever the period is, ns.
 const MAX_PATIENCE_NS: u64 = 25_000_000;
+/// Longest that a frame waits where nobody is in step, ns.
+const LOOSE_PATIENCE_NS: u64 = 250_000_000;
 /// Longest period that a node may ask for, ns: nobody holds the others up for longer.
 const MAX_PERIOD_NS: u64 = 1_000_000_000;
 /// Released frames whose state is remembered, to compare with what nodes say they drew.
@@ -97,6 +100,8 @@ pub struct Master {
     settings: MasterSettings,
     newest: ReleaseHead,
     members: ArrayVec<Member, MAX_MEMBERS>,
+    /// Some node was waited for when the open frame was begun: what comes until its end does not change whom it waits for.
+    in_step: bool,
     /// When the open frame, that after the newest released one, could be begun.
     opened_ns: u64,
     /// When it is to be shown at the earliest.
@@ -125,6 +130,7 @@ impl Master {
                 ..ReleaseHead::default()
             },
             members: ArrayVec::new(),
+            in_step: false,
             opened_ns: 0,
             due_ns: 0,
             last_deadline_ns: 0,
@@ -238,7 +244,11 @@ impl Master {
             return None;
         }
         let open = self.newest.frame + 1;
-        let missing = |m: &Member| m.is_waited_for() && m.arrived < open;
+        let counts = |m: &Member| match self.in_step {
+            true => m.is_waited_for(),
+            false => m.state != NodeState::Joining,
+        };
+        let missing = |m: &Member| counts(m) && m.arrived < open;
         let due_ns = self.due_ns.saturating_sub(self.lead_ns());
         Some(if self.members.iter().any(missing) {
             due_ns.max(self.opened_ns + self.patience_ns())
@@ -274,10 +284,14 @@ impl Master {
         self.settings.period_ns.max(slowest)
     }
 
-    /// D.
+    /// D, longer while nobody is in step.
     pub fn patience_ns(&self) -> u64 {
         let period = self.period_ns();
-        (period + period / 2).max((2 * period).min(MAX_PATIENCE_NS))
+        let patience = (period + period / 2).max((2 * period).min(MAX_PATIENCE_NS));
+        match self.in_step {
+            true => patience,
+            false => patience.max(LOOSE_PATIENCE_NS),
+        }
     }
 
     fn lead_ns(&self) -> u64 {
@@ -317,13 +331,12 @@ impl Master {
         let ready_ns = self
             .arrival_ns
             .max(self.due_ns.saturating_sub(self.lead_ns()));
+        let deadline_ns = self.opened_ns + self.patience_ns();
         let mut expected = ArrayVec::new();
         let mut late = ArrayVec::<u16, MAX_MEMBERS>::new();
         for member in &mut self.members {
             if member.arrived == frame {
-                if member.is_waited_for() {
-                    expected.push(member.session); // MAX_MEMBERS at most, as below
-                }
+                expected.push(member.session); // MAX_MEMBERS at most, as below
             } else {
                 late.push(member.session);
                 self.counts.lapses += u64::from(member.is_waited_for());
@@ -345,8 +358,9 @@ impl Master {
             Swap::Immediate => 0,
             Swap::Scheduled => self.due_ns.max(now_ns + LEAD_NS),
         };
+        self.in_step = self.members.iter().any(Member::is_waited_for);
         let period_ns = self.period_ns();
-        self.last_deadline_ns = self.opened_ns + self.patience_ns();
+        self.last_deadline_ns = deadline_ns;
         self.opened_ns = swap_ns.max(now_ns);
         // Keep the rhythm; after a hitch do not hurry.
         self.due_ns = (self.due_ns + period_ns).max(self.opened_ns + period_ns / 2);

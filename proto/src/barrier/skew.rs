@@ -26,7 +26,7 @@ pub struct FrameSkew {
     pub overhead_ns: u64,
     /// Age of the frame's state at the last swap call, ns.
     pub age_ns: u64,
-    /// Each node that was waited for, in order of telling.
+    /// Each node that the frame was released for in time, in order of telling.
     pub swaps: ArrayVec<NodeSwap, MAX_MEMBERS>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Swaps {
 #[derive(Clone, Debug)]
 pub(super) struct OpenFrame {
     pub(super) frame: u64,
-    /// Nodes that were waited for and came.
+    /// Nodes that had arrived when it was released.
     pub(super) expected: ArrayVec<u16, MAX_MEMBERS>,
     /// When it could be shown: session time, ns.
     pub(super) ready_ns: u64,

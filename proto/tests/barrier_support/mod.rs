@@ -165,6 +165,7 @@ struct Reign {
     state: Newest,
     /// What the newest RELEASE carried.
     sent: Newest,
+    allowed: u64,
     /// When that was.
     last: Option<u64>,
     /// When the second copy of the newest RELEASE.
@@ -219,6 +220,7 @@ impl World {
             master: Master::new(self.settings(), SERVER, 1, 1),
             state: Newest::default(),
             sent: Newest::default(),
+            allowed: 0,
             last: None,
             again: None,
         };
@@ -318,6 +320,7 @@ impl World {
                         master,
                         state: screen.tuple,
                         sent: screen.tuple,
+                        allowed: 0,
                         last: None,
                         again: None,
                     });
@@ -386,6 +389,8 @@ impl Reign {
     }
 
     fn lead(&mut self, now: u64, network: &mut Network, seen: &mut Seen) {
+        // The longest patience since the last release.
+        self.allowed = self.allowed.max(self.master.patience_ns());
         if self.master.wake_ns().is_none() {
             self.last = None; // nobody is there: nobody waits
         }
@@ -395,8 +400,8 @@ impl Reign {
             .map(|(head, _)| head.clone());
         if let Some(head) = &fresh {
             self.sent = self.state;
+            let allowed = std::mem::replace(&mut self.allowed, 0) + LEAD_NS + STEP;
             if let Some(last) = self.last.replace(now) {
-                let allowed = self.master.patience_ns() + LEAD_NS + STEP;
                 seen.overdue = seen.overdue.max((now - last).saturating_sub(allowed));
             }
             self.again = Some(now + REPEAT_NS);

@@ -37,9 +37,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, ObserverStream, Passivity,
-    RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind,
-    Viewer, Vrpn, VrpnSensor, Window, Workbench, Zenoh,
+    Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Monitoring, Network, Node,
+    ObserverStream, Passivity, RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen,
+    Show, Stereo, TransportKind, Viewer, Vrpn, VrpnSensor, Window, Workbench, Zenoh,
 };
 
 /// Why a scene could not be used.

@@ -81,6 +81,9 @@ impl FrameGate {
 
     /// What to draw now; the barrier hears from this node meanwhile. Does not wait.
     pub fn turn(&mut self) -> FrameTurn {
+        if self.hot.is_over() {
+            return FrameTurn::Free; // whoever led is not there any more
+        }
         let began = Instant::now();
         let now_ns = self.hot.inbound.local_ns(began);
         let turn = self.hot.inbound.frames.with(|part| {
@@ -130,14 +133,14 @@ impl FrameGate {
         self.send(message.flatten());
     }
 
-    /// Waits until the drawn frame is to be shown, and tells the master again and again until then; `false` if the barrier is gone, so
-    /// that there is nothing to wait for. Then show the frame, and call [`FrameGate::swapped`].
+    /// Waits until the drawn frame is to be shown, and tells the master again and again until then. Show it at once, and call
+    /// [`FrameGate::swapped`]. Returns the moment that was planned; `None` if the barrier is gone, so that there is nothing to wait for.
     ///
     /// Ends after half a second without a release, or three frames where they are slow.
-    pub fn wait(&mut self) -> bool {
+    pub fn wait(&mut self) -> Option<Instant> {
         loop {
             if self.hot.is_over() {
-                return false;
+                return None;
             }
             let now_ns = self.hot.inbound.local_ns(Instant::now());
             let mut message = None;
@@ -160,10 +163,9 @@ impl FrameGate {
             });
             match found {
                 Some(Some(swap_ns)) => {
-                    self.sleep_until(swap_ns);
-                    return true;
+                    return Some(self.sleep_until(swap_ns));
                 }
-                Some(None) => return false,
+                Some(None) => return None,
                 None => self.send(message),
             }
         }
@@ -206,15 +208,15 @@ impl FrameGate {
         }
     }
 
-    /// Sleeps, then spins, until a session time; returns at once where it is 0, over, not known or implausible.
-    fn sleep_until(&self, swap_ns: u64) {
+    /// Sleeps, then spins, until a session time, and tells it on this machine's clock; at once where it is 0, over, not known or implausible.
+    fn sleep_until(&self, swap_ns: u64) -> Instant {
         let now = Instant::now();
         let left = match self.session_ns(now) {
             0 => Duration::ZERO,
             now_ns => Duration::from_nanos(swap_ns.saturating_sub(now_ns)),
         };
         if left > FARTHEST_SWAP {
-            return;
+            return now;
         }
         let swap = now + left;
         if let Some(sleep) = left.checked_sub(SPIN) {
@@ -223,6 +225,7 @@ impl FrameGate {
         while Instant::now() < swap {
             std::hint::spin_loop();
         }
+        swap
     }
 }
 

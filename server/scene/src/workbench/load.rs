@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use god_object::Pose;
 
 use super::dynamics::DeviceDynamics;
+use super::frames::Frames;
 use super::looking_on::{ObserverStream, Vrpn, Zenoh};
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
@@ -37,6 +38,8 @@ pub struct Workbench {
     pub dynamics: Option<DeviceDynamics>,
     /// The network.
     pub network: Network,
+    /// Frames of the render nodes.
+    pub frames: Frames,
     /// The rerun stream.
     pub monitoring: Monitoring,
     /// Scheduling.

@@ -1,7 +1,8 @@
-//! The workbench: screens, nodes, viewer, device, network, monitoring, real time.
+//! The workbench: screens, nodes, viewer, device, network, frames, monitoring, real time.
 
 mod admission;
 mod dynamics;
+mod frames;
 mod load;
 mod looking_on;
 mod parse;
@@ -10,6 +11,7 @@ mod spec;
 mod tracker;
 
 pub use dynamics::DeviceDynamics;
+pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use spec::{

@@ -10,6 +10,7 @@ use taut_proto::JoinPolicy;
 
 use super::admission::admission;
 use super::dynamics::dynamics;
+use super::frames::frames;
 use super::load::Workbench;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::safety::safety;
@@ -76,6 +77,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
     let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
+    let frames = table(&root, "frames", frames).unwrap_or_default();
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
@@ -114,6 +116,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         device,
         dynamics,
         network,
+        frames,
         monitoring,
         realtime,
         safety,

@@ -90,6 +90,24 @@ fn every_fault_names_file_line_and_key() {
             "`bind` in [network] is \"here\", which is no address; write one such as \"0.0.0.0\"",
         ),
         (
+            "swap = \"immediate\"",
+            "swap = \"imediate\"",
+            "\"imediate\"",
+            "`swap` in [frames] is \"imediate\", but must be \"immediate\", \"scheduled\" or \"off\"; did you mean `immediate`?",
+        ),
+        (
+            "rate = 60 ",
+            "rate = 0 ",
+            "rate = 0 ",
+            "`rate` in [frames] is 0, but must be greater than zero and at most 1000",
+        ),
+        (
+            "rate = 60 ",
+            "rat = 60 ",
+            "rat = 60 ",
+            "unknown key `rat` in [frames]; did you mean `rate`?",
+        ),
+        (
             "mode = \"waive\"",
             "mode = \"wave\"",
             "\"wave\"",

@@ -1,0 +1,84 @@
+//! Two render nodes as processes show the frames that the server releases: the same states, and swaps that are compared.
+
+use std::time::Duration;
+
+use taut_tests::workbench::TestWorkbench;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
+/// Frames per second that each node is made for: what software draws beside other tests.
+const RATE: &str = "8";
+/// Frames that each node shows.
+const FRAMES: &str = "40";
+/// Longest wait for these, on a machine that is busy with other tests.
+const FRAMES_LIMIT: Duration = Duration::from_secs(60);
+
+/// The report of a server whose two nodes have shown their frames; `None`, said aloud, without an adapter.
+fn frames_of_two_nodes(swap: &str) -> Option<serde_json::Value> {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    if let Err(reason) = workbench.adapter() {
+        println!("skipped: {reason}");
+        return None;
+    }
+    workbench.set("scene", "sphere-on-plane");
+    workbench.set("frames.swap", swap);
+    let server = workbench.serve(&[]);
+    let nodes = ["front", "table"].map(|node| {
+        workbench.join(
+            "render",
+            node,
+            &server,
+            &[
+                "--headless",
+                "--width",
+                "120",
+                "--height",
+                "80",
+                "--fps",
+                RATE,
+                "--frames",
+                FRAMES,
+            ],
+        )
+    });
+    for node in nodes {
+        let ended = node.end(FRAMES_LIMIT);
+        assert!(ended.status.success(), "{}: {}", ended.status, ended.stderr);
+    }
+    Some(server.stop())
+}
+
+#[test]
+fn two_nodes_show_equal_states_and_their_swaps_are_compared() {
+    for swap in ["immediate", "scheduled"] {
+        let Some(report) = frames_of_two_nodes(swap) else {
+            return;
+        };
+        let frames = &report["frames"];
+        println!("{swap}: {frames}");
+        assert!(frames["compared"].as_u64() >= Some(40), "{frames}");
+        assert_eq!(frames["mismatches"], 0, "{frames}");
+        assert!(
+            frames["swap_skew_us"]["count"].as_u64() > Some(0),
+            "{frames}"
+        );
+        for client in report["clients"].as_array().expect("a list") {
+            assert_eq!(client["state_hash_mismatches"], 0, "{client}");
+            assert!(
+                client["swap_skew_us"]["count"].as_u64() > Some(0),
+                "{client}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nodes_that_are_not_locked_have_no_skew() {
+    let Some(report) = frames_of_two_nodes("off") else {
+        return;
+    };
+    assert_eq!(report["frames"], serde_json::Value::Null);
+    for client in report["clients"].as_array().expect("a list") {
+        assert_eq!(client["swap_skew_us"], serde_json::Value::Null);
+        assert!(client["frames"].as_u64() >= Some(10), "{client}");
+    }
+}
