@@ -300,9 +300,9 @@ fn a_server_that_stops_in_good_order_ends_the_bridge_without_an_error() {
 }
 
 #[test]
-fn a_lost_server_ends_the_bridge_with_a_sentence_and_code_1() {
+fn a_server_that_stays_lost_ends_the_bridge_with_a_sentence_and_code_1() {
     let mut workbench = Workbench::start();
-    let bridge = run_in_background(workbench.args(&["--duration", "60"]));
+    let bridge = run_in_background(workbench.args(&["--duration", "60", "--give-up", "1"]));
     workbench.wait_for_inputs(50);
     workbench.vanish();
     let error = bridge
@@ -319,7 +319,7 @@ fn a_lost_server_ends_the_bridge_with_a_sentence_and_code_1() {
 }
 
 #[test]
-fn a_bridge_told_to_reconnect_comes_back_to_a_new_server() {
+fn a_bridge_told_to_stay_comes_back_to_a_new_server() {
     let mut workbench = Workbench::start();
     let args = workbench.args(&[]);
     let bridge = Command::new(env!("CARGO_BIN_EXE_taut-bridge"))
@@ -378,6 +378,7 @@ fn a_wrong_key_and_bad_files_are_refused_with_code_2() {
     refused(&["--path", "no/such/path.csv"], "no/such/path.csv");
     refused(&["--rate", "0"], "--rate is 0");
     refused(&["--duration", "NaN"], "--duration is NaN");
+    refused(&["--give-up", "NaN"], "--give-up is NaN");
     let open = workbench.file("open.csv", REACH);
     let open = open.to_str().expect("a plain path");
     refused(&["--path", open, "--loop"], "repeat the first pose");

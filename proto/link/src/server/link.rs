@@ -153,11 +153,6 @@ impl ServerLink {
         self.shared.clock
     }
 
-    /// Incarnation of this server, in every datagram's header.
-    pub fn epoch(&self) -> u32 {
-        self.shared.epoch
-    }
-
     /// A sender of states, for the broadcast thread.
     pub fn broadcaster(&self) -> Broadcaster {
         Broadcaster::new(self.shared.clone())
