@@ -22,7 +22,7 @@ use taut_link::proto::control::LogLevel;
 use taut_link::proto::membership::Liveness;
 use taut_link::proto::{CouplingOffer, SceneDescription};
 use taut_link::{
-    ClientLink, ClientOptions, LinkError, LinkWatch, RejoinPolicy, Rejoiner, Role, read_key_file,
+    ClientLink, ClientOptions, LinkError, LinkWatch, RejoinPolicy, Rejoiner, Role, read_join_key,
 };
 use taut_spidar::Geometry;
 
@@ -383,7 +383,7 @@ fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
         .clone()
         .or_else(|| std::env::var_os("TAUT_KEY_FILE").map(PathBuf::from))
         .ok_or(BridgeError::NoKey)?;
-    let key = read_key_file(&key_file)?;
+    let key = read_join_key(&key_file)?;
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;

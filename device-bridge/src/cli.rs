@@ -21,7 +21,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "H:P")]
     pub server: String,
 
-    /// File of the cluster key; without it the one that the environment variable TAUT_KEY_FILE names.
+    /// File of the device's credential, or of the cluster key; without it the one that the environment variable TAUT_KEY_FILE names.
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
 

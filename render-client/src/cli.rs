@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use taut_link::{ClientOptions, Role, Transport, read_key_file};
+use taut_link::{ClientOptions, Role, Transport, read_join_key};
 
 use crate::canvas::Canvas;
 use crate::description::Overrides;
@@ -41,7 +41,7 @@ pub struct RenderArgs {
     /// Name of this node in the server's workbench file.
     #[arg(long, value_name = "NAME")]
     pub node: String,
-    /// File with the cluster key, copied from the server.
+    /// File with this node's credential, or with the cluster key, copied from the server.
     #[arg(long, value_name = "FILE", env = "TAUT_KEY_FILE")]
     pub key: PathBuf,
     /// How states travel to this node.
@@ -167,7 +167,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     };
     let fps = fps.unwrap_or(default_fps);
     let frame_time = Duration::from_secs_f64(1.0 / fps);
-    let key = read_key_file(&args.key)?;
+    let key = read_join_key(&args.key)?;
     let mut options =
         ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
     options.transport = args.transport.into();

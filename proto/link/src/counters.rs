@@ -73,6 +73,10 @@ counters! {
         inputs_refused,
         /// Device readings overtaken by newer ones.
         inputs_late,
+        /// Readings of the viewer's head taken.
+        heads,
+        /// Readings of the viewer's head refused: no pose, or overtaken.
+        heads_refused,
         /// Clients let in.
         joined,
         /// Clients refused, for whatever reason.
@@ -83,6 +87,16 @@ counters! {
         evicted,
         /// Control messages that were read later than they came, because there were too many.
         control_delayed,
+        /// Clients refused because their credential is revoked or their role closed.
+        shut_out,
+        /// Attempts to join that were turned away before TLS: too many, too soon after wrong proofs, or too many at once.
+        turned_away,
+        /// Attempts to join that first had to prove their address.
+        address_checks,
+        /// What clients tried that their role may not.
+        forbidden,
+        /// Datagrams dropped unopened: of unknown sources beyond their rate, or of a client beyond its.
+        flooded,
         /// Events dropped because nobody took them.
         events_dropped,
     }

@@ -3,10 +3,7 @@
 mod support;
 
 use std::{net::UdpSocket, time::Duration};
-use support::{
-    relay::{Impairment, Relay, Waiting},
-    *,
-};
+use support::{relay::Impairment, *};
 use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 
@@ -77,7 +74,7 @@ async fn garbage_is_counted_and_has_no_effect() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
-    let (server, relay) = behind_relay(Impairment::default(), 1).await;
+    let (server, relay) = behind_relay(Impairment::default(), 1, |options| options).await;
     let Some(mut inputs) = server.device_inputs() else {
         panic!("the first taker gets the inputs");
     };
@@ -118,12 +115,13 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
 async fn a_bad_network_costs_states_but_never_order_or_truth() {
     let impairment = Impairment {
         lost: 50,
+        bursts: 0,
         doubled: 50,
         swapped: 50,
         damaged: 50,
         delay_us: 0,
     };
-    let (server, relay) = behind_relay(impairment, 2).await;
+    let (server, relay) = behind_relay(impairment, 2, |options| options).await;
     let client = client(&server, Role::Render, "left").await;
     take_states(&server, &client, 1, 600).await; // asserts order and equality with what was sent
 

@@ -1,6 +1,8 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
-use super::{ReceivedState, ReceivedWrench, hot::Hot, meshes::Meshes};
+use super::{
+    FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
+};
 use crate::{
     ClientCounters, LinkError, MeshCounters, STOP_REASON,
     framing::{CLOSE_BYE, close_text, write_message},
@@ -11,9 +13,10 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
-    SceneDescription, SessionTime,
+    ClientStats, ConstraintSet, CouplingOffer, HeadSample, InputSample, MeshBlob, MeshHash,
+    Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
+    state::EventRecord,
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -101,6 +104,24 @@ impl ClientLink {
         self.hot.inbound.drain_states(out);
     }
 
+    /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
+    /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
+    pub fn frame_gate(&self, period: Duration) -> FrameGate {
+        FrameGate::new(self.hot.clone(), self.session, period)
+    }
+
+    /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most
+    /// the newest [`taut_proto::events::MAX_QUEUED`] wait.
+    pub fn drain_events(&self, out: &mut Vec<EventRecord>) {
+        self.hot.inbound.drain_events(out);
+    }
+
+    /// Events since the join that this client did not get: because its stream stood still for longer than the server keeps them, and because nobody
+    /// drained them in time.
+    pub fn events_lost(&self) -> (u64, u64) {
+        self.hot.inbound.events_lost()
+    }
+
     /// Session time now; `None` until the clock is locked, about 100 ms after joining.
     pub fn session_now(&self) -> Option<SessionTime> {
         self.session_at(Instant::now())
@@ -126,6 +147,11 @@ impl ClientLink {
         self.hot.send(&Payload::Input(*sample));
     }
 
+    /// Sends a reading of the viewer's head at once. Counts if [`crate::Role::Tracker`] joined; from any other role the server refuses it.
+    pub fn send_head(&self, sample: &HeadSample) {
+        self.hot.send(&Payload::Head(*sample));
+    }
+
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.
     pub fn latest_wrench(&self) -> Option<ReceivedWrench> {
         self.hot.inbound.latest_wrench()
@@ -138,6 +164,24 @@ impl ClientLink {
     /// `out` must be of this session: a set is known by its sequence number.
     pub fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
         self.hot.inbound.newest_set(out)
+    }
+
+    /// Who is in, as the server told it last; `None` until it did, a moment after joining, and always for a device bridge.
+    pub fn roster(&self) -> Option<Arc<Roster>> {
+        self.hot.group.roster()
+    }
+
+    /// Sends `payload` from node to node under the group key, at once; `false` if the member's address or the key is not known (yet), if a group key
+    /// may not carry it, or if the system did not take it. Over UDP only. No allocation.
+    ///
+    /// It proves to the receiver that a member sent it, not which one: see [`taut_proto::group`].
+    pub fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        self.hot.send_to_member(member, payload)
+    }
+
+    /// Sets who takes what other members send with [`ClientLink::send_to_member`]; `false` if there is one already.
+    pub fn on_group_datagram(&self, receiver: GroupReceiver) -> bool {
+        self.hot.group.set_receiver(receiver)
     }
 
     /// Sends a report, waiting while earlier ones are not away yet.

@@ -1,6 +1,9 @@
 //! Client half of a session.
 
 mod connect;
+mod frame_gate;
+mod frames;
+mod group;
 mod hot;
 mod inbound;
 mod link;
@@ -9,9 +12,12 @@ mod meshes;
 mod options;
 mod rejoiner;
 mod supervised;
+mod told;
 mod watch;
 
 pub use connect::connect;
+pub use frame_gate::{FrameGate, FrameStatus, FrameTurn, ReleasedState};
+pub use group::{GroupReceiver, Roster};
 pub use link::{ClientLink, SessionEnd};
 pub use mesh_cache::{MESH_CACHE_BYTES, MeshCache};
 pub use options::{ClientOptions, ReceivedState, ReceivedWrench};

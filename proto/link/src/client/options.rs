@@ -5,15 +5,15 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use taut_proto::{ClusterKey, HotState, Role, Transport, WrenchCommand};
+use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
 
 /// How to connect.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
     /// `host:port`, name or number, IPv4 or IPv6 (in brackets); without port, the default one.
     pub server: String,
-    /// The cluster key.
-    pub key: ClusterKey,
+    /// The cluster key, or a credential for this role and name.
+    pub key: JoinKey,
     /// What this client is.
     pub role: Role,
     /// Its name, unique in the workbench.
@@ -34,13 +34,13 @@ impl ClientOptions {
     /// UDP, every state, 3 s to connect, no meshes on disk.
     pub fn new(
         server: impl Into<String>,
-        key: ClusterKey,
+        key: impl Into<JoinKey>,
         role: Role,
         node: impl Into<String>,
     ) -> ClientOptions {
         ClientOptions {
             server: server.into(),
-            key,
+            key: key.into(),
             role,
             node: node.into(),
             transport: Transport::Udp,

@@ -1,7 +1,9 @@
 //! How a client gets in, and its control plane while it is in.
 
 use super::{
-    LinkEvent,
+    LinkEvent, downstream,
+    gate::{act_of_message, demand},
+    joining::Joining,
     receive::receive,
     session::{Admitted, Session, lock},
     shared::{Admission, Refused, Shared},
@@ -16,12 +18,15 @@ use crate::{
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
-    DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
+    Act, DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
     control::{
         ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
         Welcome,
     },
+    limits::Attempt,
     membership::Pace,
+    proof::{Claim, Grant},
+    revocation::ShutOut,
 };
 use tokio::{
     sync::Semaphore,
@@ -30,6 +35,9 @@ use tokio::{
 
 /// Clients that may be joining at once; more are turned away before any cryptography.
 const MAX_JOINING: usize = 64;
+/// Clients joining at once above which an address must first prove that it receives what is sent to it (QUIC Retry): whoever names the
+/// addresses of others cannot keep them out.
+const CHECK_ADDRESSES_ABOVE: usize = 8;
 /// Time for a client to join.
 const JOIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Time for a refused client to read why.
@@ -54,14 +62,22 @@ const MAX_HELLO_BYTES: usize = 1024;
 pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
     let joining = Arc::new(Semaphore::new(MAX_JOINING));
     while let Some(incoming) = endpoint.accept().await {
-        let Ok(permit) = joining.clone().try_acquire_owned() else {
+        let busy = MAX_JOINING - joining.available_permits() >= CHECK_ADDRESSES_ABOVE;
+        if busy && !incoming.remote_address_validated() && incoming.may_retry() {
+            shared.counters.address_checks.one();
+            let _ = incoming.retry(); // fails only where it may not be asked for
+            continue;
+        }
+        let attempt = Joining::begin(&shared, incoming.remote_address().ip());
+        let (Some(attempt), Ok(permit)) = (attempt, joining.clone().try_acquire_owned()) else {
+            shared.counters.turned_away.one();
             shared.counters.refused.one();
             incoming.refuse();
             continue;
         };
         let shared = shared.clone();
         tokio::spawn(async move {
-            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming)).await;
+            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming, attempt)).await;
             drop(permit);
             if let Ok(Some((session, send, recv))) = joined {
                 attend(&shared, session, send, recv).await;
@@ -74,6 +90,7 @@ pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
 async fn join(
     shared: &Arc<Shared>,
     incoming: quinn::Incoming,
+    mut attempt: Joining,
 ) -> Option<(Arc<Session>, SendStream, RecvStream)> {
     let connection = incoming.await.ok()?;
     let (mut send, mut recv) = connection.accept_bi().await.ok()?;
@@ -94,8 +111,15 @@ async fn join(
         Err(error) => Err((RefusalCode::BadHello, error.to_string())),
     };
     let (session, welcome) = match outcome {
-        Ok(admitted) => admitted,
+        Ok(admitted) => {
+            attempt.came_to(Attempt::Proven);
+            admitted
+        }
         Err((code, text)) => {
+            if code == RefusalCode::WrongKey {
+                attempt.came_to(Attempt::WrongProof);
+            }
+            drop(attempt); // it is over for the limits before the client has read why
             refuse(shared, &connection, send, node, code, text).await;
             return None;
         }
@@ -104,7 +128,7 @@ async fn join(
         .await
         .is_ok();
     welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
-    if session.role == Role::Device {
+    if session.role.may(Act::GetWrenches) {
         welcomed = welcomed && send.write_all(&shared.content.coupling).await.is_ok();
     }
     if !welcomed {
@@ -122,21 +146,40 @@ fn admit(
 ) -> Result<(Arc<Session>, Welcome), Refused> {
     let bad = |text: String| (RefusalCode::BadHello, text);
     let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
-    if !shared
-        .key
-        .verify_client(&hello.proof, &binding, hello.role, &hello.node)
-    {
+    let claim = Claim {
+        role: hello.role,
+        node: &hello.node,
+        grant: hello.grant,
+    };
+    let secret = shared.key.join_secret(claim.role, claim.node, claim.grant);
+    if !secret.verify_client(&hello.proof, &binding, claim) {
         shared.counters.wrong_key.one();
-        let text =
-            "it does not hold the same cluster key: give this node the server's key file (--key)";
+        let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
         return Err((RefusalCode::WrongKey, text.to_owned()));
     }
+    shared.policy.check(claim).map_err(|shut_out| {
+        shared.counters.shut_out.one();
+        let code = match shut_out {
+            ShutOut::Role(_) => RefusalCode::RoleClosed,
+            ShutOut::Revoked(_) => RefusalCode::Revoked,
+        };
+        (code, shut_out.to_string())
+    })?;
     let printable = hello.node.chars().all(|c| !c.is_control());
     if hello.node.trim().is_empty() || hello.node.len() > MAX_NODE_NAME_BYTES || !printable {
         let text = format!(
             "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
         );
         return Err(bad(text));
+    }
+    // Who may choose his name must not take a screen's.
+    let is_any_node = matches!(hello.grant, Grant::AnyNode { .. });
+    if is_any_node && hello.role != Role::Render && shared.content.nodes.contains(&hello.node) {
+        let text = format!(
+            "\"{}\" is a render node of the workbench: choose another name (--node)",
+            hello.node
+        );
+        return Err((RefusalCode::NameTaken, text));
     }
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
@@ -152,6 +195,7 @@ fn admit(
                     transport: hello.transport,
                     rate_hz: hello.rate_hz,
                     joined_ns: now_ns,
+                    after_event: shared.discrete.newest(),
                 };
                 Ok(Session::new(admitted, connection.clone(), keys))
             })?;
@@ -167,7 +211,7 @@ fn admit(
         });
     }
     let welcome = Welcome {
-        proof: shared.key.server_proof(&binding, hello.role, &hello.node),
+        proof: secret.server_proof(&binding, claim),
         session: session.number,
         epoch: shared.epoch,
         udp_port: shared.udp_port,
@@ -216,7 +260,7 @@ async fn refuse(
 async fn attend(
     shared: &Arc<Shared>,
     session: Arc<Session>,
-    _send: SendStream,
+    send: SendStream,
     mut recv: RecvStream,
 ) {
     shared.counters.joined.one();
@@ -226,8 +270,9 @@ async fn attend(
     let connection = &session.connection;
     let reason = tokio::select! {
         reason = read_control(shared, &session, &mut recv) => reason,
-        reason = serve_meshes(shared, connection) => reason,
+        reason = serve_meshes(shared, &session) => reason,
         reason = read_datagrams(shared, &session) => reason,
+        reason = downstream::tell(shared, &session, send) => reason,
     };
     connection.close(CLOSE_BYE, b"");
     // A session that was replaced is gone already, and told.
@@ -246,26 +291,8 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
     loop {
         let message = read_whole_message(recv, MAX_FRAME_BYTES, MESSAGE_TIMEOUT).await;
         at_pace(shared, &mut pace).await;
-        match message {
-            Ok(ControlMessage::Stats(stats)) => {
-                session.report(stats.clone(), shared);
-                shared.tell(LinkEvent::Stats {
-                    node: session.node.clone(),
-                    stats,
-                });
-            }
-            Ok(ControlMessage::Log(event)) => shared.tell(LinkEvent::Log {
-                node: session.node.clone(),
-                event,
-            }),
-            Ok(ControlMessage::Arm(request)) if session.role == Role::Operator => {
-                shared.tell(LinkEvent::Arm {
-                    node: session.node.clone(),
-                    arm: request.arm,
-                });
-            }
-            Ok(ControlMessage::Bye(bye)) => return bye.reason,
-            Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
+        let message = match message {
+            Ok(message) => message,
             Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
                 return broken(session, &error.to_string());
             }
@@ -273,6 +300,31 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 let error = session.connection.closed().await;
                 return close_text(&error, "the node");
             }
+        };
+        let Some(act) = act_of_message(&message) else {
+            return broken(session, &format!("a client sent {}", message.name()));
+        };
+        if let Err(reason) = demand(shared, session, act) {
+            return reason;
+        }
+        match message {
+            ControlMessage::Stats(stats) => {
+                session.report(stats.clone(), shared);
+                shared.tell(LinkEvent::Stats {
+                    node: session.node.clone(),
+                    stats,
+                });
+            }
+            ControlMessage::Log(event) => shared.tell(LinkEvent::Log {
+                node: session.node.clone(),
+                event,
+            }),
+            ControlMessage::Arm(request) => shared.tell(LinkEvent::Arm {
+                node: session.node.clone(),
+                arm: request.arm,
+            }),
+            ControlMessage::Bye(bye) => return bye.reason,
+            other => return broken(session, &format!("a client sent {}", other.name())),
         }
     }
 }
@@ -294,10 +346,13 @@ fn broken(session: &Session, reason: &str) -> String {
 }
 
 /// One stream per mesh, until the connection ends.
-async fn serve_meshes(shared: &Arc<Shared>, connection: &Connection) -> String {
+async fn serve_meshes(shared: &Arc<Shared>, session: &Session) -> String {
     loop {
-        match connection.accept_bi().await {
+        match session.connection.accept_bi().await {
             Ok((send, recv)) => {
+                if let Err(reason) = demand(shared, session, Act::GetMeshes) {
+                    return reason;
+                }
                 let shared = shared.clone();
                 // Ends with the connection; the number of streams is limited by the transport.
                 tokio::spawn(async move { serve_mesh(&shared, send, recv).await });

@@ -4,6 +4,10 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    events::EventHub,
+    frames::Frames,
+    group::GroupHub,
+    head_input::HeadWriter,
     sent_states::SentStates,
     session::{Session, lock},
 };
@@ -17,13 +21,17 @@ use std::{
     },
 };
 use taut_proto::{
-    ClusterKey, Role,
+    ClusterKey, JoinPolicy, Role,
     control::RefusalCode,
+    limits::{JoinGuard, UnknownSources},
     membership::{Pace, SilenceLimits},
 };
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
+    pub(crate) policy: JoinPolicy,
+    pub(crate) joins: Mutex<JoinGuard>,
+    pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,
     pub(crate) epoch: u32,
     pub(crate) content: EncodedContent,
@@ -33,9 +41,13 @@ pub(crate) struct Shared {
     pub(crate) counters: CounterCells,
     pub(crate) events: SyncSender<LinkEvent>,
     pub(crate) inputs: InputWriter,
+    pub(crate) frames: Option<Frames>,
+    pub(crate) heads: HeadWriter,
     pub(crate) sent_states: SentStates,
+    pub(crate) group: GroupHub,
     /// How fast meshes go to all clients together.
     pub(crate) mesh_pace: Mutex<Pace>,
+    pub(crate) discrete: EventHub,
     pub(crate) stopping: AtomicBool,
 }
 
@@ -46,6 +58,10 @@ pub(crate) const MESH_BYTES_PER_SECOND: u64 = 64 << 20;
 pub(crate) const MESH_BURST_BYTES: u64 = 256 << 10;
 
 impl Shared {
+    pub(crate) fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+
     /// Hands an event over, or counts that nobody takes them.
     pub(crate) fn tell(&self, event: LinkEvent) {
         if self.events.try_send(event).is_err() {
@@ -123,12 +139,13 @@ impl Sessions {
         let rival = list
             .sessions
             .iter()
-            .find(|other| {
-                other.node == node || (role == Role::Device && other.role == Role::Device)
-            })
+            .find(|other| other.node == node || (role.is_single() && other.role == role))
             .cloned();
         let replaced = match rival {
-            Some(rival) if rival.node == node && silent(&rival, now_ns) => Some(rival),
+            // Another role does not inherit a name: an observer must not push a render node out.
+            Some(rival) if rival.node == node && rival.role == role && silent(&rival, now_ns) => {
+                Some(rival)
+            }
             Some(rival) if rival.node == node => {
                 let text = format!(
                     "a node named \"{node}\" is connected already (from {}): give this one another name (--node)",
@@ -138,11 +155,16 @@ impl Sessions {
             }
             Some(rival) => {
                 let text = format!(
-                    "the device bridge \"{}\" is connected already (from {}): stop it first",
+                    "the {} \"{}\" is connected already (from {}): stop it first",
+                    role.title(),
                     rival.node,
                     rival.connection.remote_address()
                 );
-                return Err((RefusalCode::DeviceTaken, text));
+                let code = match role {
+                    Role::Tracker => RefusalCode::TrackerTaken,
+                    _ => RefusalCode::DeviceTaken,
+                };
+                return Err((code, text));
             }
             None => None,
         };

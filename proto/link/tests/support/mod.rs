@@ -158,6 +158,23 @@ pub fn input(index: u64) -> InputSample {
     }
 }
 
+/// A server whose hot plane is behind a relay.
+pub async fn behind_relay(
+    impairment: relay::Impairment,
+    seed: u64,
+    options: impl FnOnce(ServerOptions) -> ServerOptions,
+) -> (ServerLink, relay::Relay) {
+    let waiting = relay::Waiting::new();
+    let server = server_with(options(ServerOptions {
+        announced_udp_port: Some(waiting.port()),
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    }))
+    .await;
+    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    (server, relay)
+}
+
 /// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.
 pub async fn broadcast_until(
     broadcaster: &mut Broadcaster,
