@@ -191,7 +191,7 @@ async fn the_newest_reading_of_the_head_reaches_both_readers() {
         tracker.send_head(&head(index));
         wait_until("its arrival", || {
             let counters = server.counters();
-            counters.heads + counters.heads_refused >= index.min(3).max(1)
+            counters.heads + counters.heads_refused >= index.clamp(1, 3)
                 || counters.heads + counters.heads_refused == 2
         })
         .await;

@@ -5,6 +5,7 @@ use super::{
     group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    link::AtJoin,
     meshes::Meshes,
     told,
 };
@@ -95,9 +96,11 @@ pub(crate) async fn connect_with(
         options.server,
         endpoint,
         hot,
-        welcome.session,
-        description,
-        coupling,
+        AtJoin {
+            session: welcome.session,
+            description,
+            coupling,
+        },
         meshes,
         send,
     ))
