@@ -16,9 +16,7 @@ use taut_bridge::{
 use taut_link::proto::mesh_blob::Positions;
 use taut_link::proto::scene::{BodyDescription, ShowOptions};
 use taut_link::proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
-use taut_link::{
-    ClusterKey, Content, ServerLink, ServerOptions, create_key_file, read_key_file, serve,
-};
+use taut_link::{Content, ServerLink, ServerOptions, create_key_file, read_key_file, serve};
 use tempfile::TempDir;
 
 /// Of the wall z < 0 that the server renders, in N/m.
@@ -369,13 +367,13 @@ fn a_wrong_key_and_bad_files_are_refused_with_code_2() {
         assert_eq!(error.exit_code(), 2, "{error}");
         assert!(error.to_string().contains(part), "{error}");
     };
-    let other = ClusterKey::generate().expect("a key").to_hex();
-    let other = workbench.file("other", &other);
+    let other = workbench.folder.path().join("other");
+    create_key_file(&other).expect("another key");
     let mut args = workbench.args(&[]);
     args.key = Some(other);
     let error = run(&args).expect_err("the wrong key");
     assert_eq!(error.exit_code(), 2);
-    assert!(error.to_string().contains("key"), "{error}");
+    assert!(error.to_string().contains("fingerprint"), "{error}");
 
     refused(&["--path", "no/such/path.csv"], "no/such/path.csv");
     refused(&["--rate", "0"], "--rate is 0");
