@@ -199,6 +199,7 @@ impl Rejoiner {
                 ..
             } => self.policy.stay || self.start.elapsed() < NAME_PATIENCE,
             LinkError::Unreachable { .. }
+            | LinkError::TurnedAway { .. }
             | LinkError::UnknownHost { .. }
             | LinkError::Closed { .. }
             | LinkError::Refused {
