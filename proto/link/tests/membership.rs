@@ -332,7 +332,7 @@ async fn meshes_come_from_the_disk_the_second_time_and_a_damaged_one_is_fetched_
         let cache = MeshCache::open(folder.path()).unwrap_or_else(|error| panic!("{error}"));
         let options = ClientOptions {
             mesh_cache: Some(Arc::new(cache)),
-            ..options(&server, Role::Observer, "o")
+            ..options(&server, Role::Render, "left") // who only watches gets no meshes
         };
         let link = connect(options)
             .await

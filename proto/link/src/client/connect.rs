@@ -5,6 +5,7 @@ use super::{
     group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    link::AtJoin,
     meshes::Meshes,
     told,
 };
@@ -105,9 +106,11 @@ pub(crate) async fn connect_with(
         options.server,
         endpoint,
         hot,
-        welcome.session,
-        description,
-        coupling,
+        AtJoin {
+            session: welcome.session,
+            description,
+            coupling,
+        },
         meshes,
         send,
     ))

@@ -46,15 +46,21 @@ pub struct ClientLink {
     outbox: mpsc::Sender<ControlMessage>,
 }
 
+/// What the server tells at join.
+pub(crate) struct AtJoin {
+    pub(crate) session: u16,
+    pub(crate) description: SceneDescription,
+    /// For a device bridge.
+    pub(crate) coupling: Option<CouplingOffer>,
+}
+
 impl ClientLink {
     /// Must be called on a tokio runtime: starts the task that writes reports.
     pub(crate) fn new(
         server: String,
         endpoint: Endpoint,
         hot: Arc<Hot>,
-        session: u16,
-        description: SceneDescription,
-        coupling: Option<CouplingOffer>,
+        told: AtJoin,
         meshes: Arc<Meshes>,
         send: SendStream,
     ) -> ClientLink {
@@ -65,9 +71,9 @@ impl ClientLink {
             server,
             endpoint,
             hot,
-            session,
-            description,
-            coupling,
+            session: told.session,
+            description: told.description,
+            coupling: told.coupling,
             meshes,
             outbox,
         }

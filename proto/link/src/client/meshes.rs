@@ -60,16 +60,16 @@ impl Meshes {
         if let Some(mesh) = self.lock().get(&hash) {
             return Ok(mesh.clone());
         }
-        let mesh = match self.from_cache(hash).await {
+        let mesh = match self.read_cached(hash).await {
             Some(mesh) => mesh,
-            None => self.from_server(connection, server, hash).await?,
+            None => self.fetch_checked(connection, server, hash).await?,
         };
         let mesh = Arc::new(mesh);
         self.lock().insert(hash, mesh.clone());
         Ok(mesh)
     }
 
-    async fn from_cache(&self, hash: MeshHash) -> Option<MeshBlob> {
+    async fn read_cached(&self, hash: MeshHash) -> Option<MeshBlob> {
         let cache = self.cache.clone()?;
         // Reading, hashing and decoding a large mesh takes milliseconds that the network's tasks must not wait.
         let read = tokio::task::spawn_blocking(move || match cache.read(hash) {
@@ -91,7 +91,7 @@ impl Meshes {
         Some(mesh)
     }
 
-    async fn from_server(
+    async fn fetch_checked(
         &self,
         connection: &Connection,
         server: &str,
