@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::canvas::Canvas;
 use crate::error::RenderError;
+use crate::node_status::{FrameMode, LinkHealth};
 use crate::session::{Ending, Session};
 use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
@@ -22,6 +23,8 @@ pub(crate) struct Plan {
     /// Where pictures are written, and what their names begin with.
     pub(crate) out: Option<(PathBuf, String)>,
     pub(crate) show: Show,
+    /// Name of the node.
+    pub(crate) node: String,
 }
 
 /// Draws until the plan, the server or a signal ends it: each distinct state once.
@@ -64,10 +67,17 @@ pub(crate) fn run(
         let due = Instant::now() >= next_frame;
         let now_ns = session.now_ns().filter(|_| due);
         let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
-        if let Some((taken_ns, latched)) = latched {
+        if let Some((taken_ns, mut latched)) = latched {
             let drawn = Some((latched.state.time_ns, latched.stale));
             if drawn != last_drawn {
                 last_drawn = drawn;
+                canvas.set_status(statistics.status(
+                    &plan.node,
+                    LinkHealth::Connected,
+                    FrameMode::Free,
+                ));
+                // Off-screen a picture is looked at when it is done.
+                latched.state.head = timeline.head_at(taken_ns).or(latched.state.head);
                 canvas.draw(&latched, plan.show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);

@@ -83,6 +83,12 @@ impl Session {
             .is_ok_and(|node| node.window.fullscreen)
     }
 
+    /// The monitors that the node's windows cover, in order: names or numbers.
+    pub(crate) fn monitors(&self) -> Vec<String> {
+        description::find_node(self.link.description(), &self.node)
+            .map_or_else(|_| Vec::new(), |node| node.monitors.clone())
+    }
+
     /// Moves the states that have arrived to the timeline.
     pub(crate) fn take_states(&mut self, timeline: &mut Timeline) {
         self.link.drain_states(&mut self.received);
@@ -193,6 +199,9 @@ fn read_state(received: &ReceivedState) -> Option<State> {
         Some(Head {
             pose: hot.head.pose.to_isometry()?,
             eye_separation: f64::from(hot.head.eye_separation),
+            sample_ns: hot
+                .sample_time_ns
+                .saturating_add_signed(-1000 * i64::from(hot.head.age_us)),
         })
     };
     let vector = |v: [f32; 3]| Vector3::from(v).cast::<f64>();

@@ -90,6 +90,18 @@ fn every_fault_names_file_line_and_key() {
             "`eye_separation` in [viewer] is 64, but must be between 0 and 0.2",
         ),
         (
+            "eye_separation = 0.064",
+            "separation_scale = 2.0",
+            "separation_scale = 2.0",
+            "`separation_scale` in [viewer] is 2, but must be between 0 and 1",
+        ),
+        (
+            "height = 427, fullscreen = false }",
+            "height = 427, monitor = [0, true] }",
+            "monitor = [0, true]",
+            "`monitor` in [[node]].window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
+        ),
+        (
             "near = 0.05",
             "near = 50.0",
             "[viewer]",
