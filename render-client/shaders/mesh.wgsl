@@ -45,10 +45,14 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, inst
     return fragment;
 }
 
-@fragment
-fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+fn seen(in: Fragment) -> vec4<f32> {
     let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss.xy);
     return vec4(shown(mix(light, in.colour.rgb, in.gloss.z)), 1.0);
+}
+
+@fragment
+fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+    return seen(in);
 }
 
 // The same where near things fade away: dithered, so that they still hide what is behind them.
@@ -58,5 +62,5 @@ fn fading(in: Fragment) -> @location(0) vec4<f32> {
     if near_share(in.clip) <= 0.999 * dither(in.clip.xy) {
         discard;
     }
-    return fragment(in);
+    return seen(in);
 }

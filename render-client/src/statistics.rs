@@ -255,11 +255,13 @@ impl std::fmt::Display for RenderReport {
             drawn_age_ms: drawn,
             packets_lost,
             packets_received,
+            adapter,
+            present_timing,
             ..
         } = self;
         write!(
             f,
-            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost",
+            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost; drawn with {adapter}; times of presentation: {present_timing}",
             age.p50, age.max, drawn.p50
         )
     }
