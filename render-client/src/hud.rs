@@ -28,8 +28,8 @@ const MARGIN: f32 = 0.6;
 pub const MAX_MARKS: usize = 512;
 
 const WHITE: [f32; 4] = [1.0, 1.0, 1.0, 1.0];
-const DARK: [f32; 4] = [0.012, 0.014, 0.018, 0.72];
-const DARKEST: [f32; 4] = [0.008, 0.008, 0.010, 0.90];
+const DARK: [f32; 4] = [0.012, 0.014, 0.018, 0.86];
+const DARKEST: [f32; 4] = [0.008, 0.008, 0.010, 0.92];
 
 /// What is written over the pictures of a node.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -297,6 +297,19 @@ mod tests {
                     -1.0 <= x && x < right && right <= 1.0 && -1.0 <= y && y < top && top <= 1.0;
                 assert!(inside, "{x} {y} {right} {top} at shape {shape}");
             }
+        }
+    }
+
+    #[test]
+    fn text_has_contrast_even_over_a_white_picture() {
+        // Source: WCAG 2.1, 1.4.3: 4.5 to 1 for text of any size.
+        let luminance = |[r, g, b]: [f32; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+        for [r, g, b, opacity] in [DARK, DARKEST] {
+            let over_white = [r, g, b].map(|c| opacity * c + (1.0 - opacity));
+            let [red, green, blue, _] = WHITE;
+            let text = luminance([red, green, blue]);
+            let contrast = (text + 0.05) / (luminance(over_white) + 0.05);
+            assert!(contrast >= 4.5, "{contrast}");
         }
     }
 

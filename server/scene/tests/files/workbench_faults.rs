@@ -217,3 +217,31 @@ fn overrides_reach_every_key() {
     assert_eq!(workbench.network.quic_port, 0);
     assert_eq!(workbench.nodes[1].stereo, taut_scene::Stereo::Mono);
 }
+
+#[test]
+fn monitors_comfort_and_hud_are_read_and_are_off_by_default() {
+    let parse = |text: &str| Workbench::parse("w.toml", text, Path::new("")).expect("valid");
+    let shipped = parse(SHIPPED_WORKBENCH);
+    assert!(shipped.nodes[0].window.monitors.is_empty() && !shipped.show.hud);
+    assert_eq!(shipped.viewer.separation_scale, 1.0);
+    assert_eq!(shipped.viewer.nearest_disparity, 0.0);
+    for (written, read) in [
+        ("\"DP-1\"", vec!["DP-1"]),
+        ("1", vec!["1"]),
+        ("[\"DP-1\", 0]", vec!["DP-1", "0"]),
+    ] {
+        let text = SHIPPED_WORKBENCH
+            .replacen("fullscreen = false", &format!("monitor = {written}"), 1)
+            .replacen(
+                "near = 0.05",
+                "nearest_disparity_deg = 4\nseparation_scale = 0.5\nnear = 0.05",
+                1,
+            )
+            .replacen("hud = false", "hud = true", 1);
+        let changed = parse(&text);
+        assert_eq!(changed.nodes[0].window.monitors, read);
+        assert_eq!(changed.viewer.separation_scale, 0.5);
+        assert!((changed.viewer.nearest_disparity - 4f64.to_radians()).abs() < 1e-12);
+        assert!(changed.show.hud);
+    }
+}
