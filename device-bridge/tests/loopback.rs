@@ -332,7 +332,7 @@ fn a_bridge_told_to_reconnect_comes_back_to_a_new_server() {
             &args.server,
             "--duration",
             "60",
-            "--reconnect",
+            "--stay",
             "--json",
         ])
         .env("TAUT_KEY_FILE", args.key.as_ref().expect("given"))

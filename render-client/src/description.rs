@@ -26,6 +26,9 @@ pub(crate) struct Overrides {
     pub(crate) height: Option<u32>,
     pub(crate) stereo: Option<Stereo>,
     pub(crate) headless: bool,
+    pub(crate) show: Option<Show>,
+    /// Show the HUD, whatever `show` and the server say.
+    pub(crate) hud: bool,
 }
 
 /// The description of the node named `node`.

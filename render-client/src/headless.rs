@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::canvas::Canvas;
 use crate::error::RenderError;
 use crate::node_status::{FrameMode, LinkHealth};
-use crate::session::{Ending, Session};
+use crate::session::{Session, Turn};
 use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
 use crate::timeline::Timeline;
@@ -44,15 +44,24 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut next_frame = start;
     let mut last_drawn = None;
+    let mut show = plan.show;
     loop {
         if session.interrupted() {
             return Ok(Ended::Interrupted);
         }
-        match session.ending() {
-            Some(Ending::Told) => return Ok(Ended::ServerStopped),
-            Some(Ending::Lost(reason)) => return Err(session.lost(reason)),
-            None => {}
+        match session.turn(timeline) {
+            Turn::Same => {}
+            Turn::Renewed(other) => {
+                if let Some(scene) = other {
+                    canvas.restage(scene.0);
+                    show = scene.1;
+                }
+                last_drawn = None;
+            }
+            Turn::Told => return Ok(Ended::ServerStopped),
+            Turn::Lost(reason) => return Err(session.lost(reason)),
         }
+        let link = session.health();
         if plan
             .duration
             .is_some_and(|duration| start.elapsed() >= duration)
@@ -68,17 +77,13 @@ pub(crate) fn run(
         let now_ns = session.now_ns().filter(|_| due);
         let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
         if let Some((taken_ns, mut latched)) = latched {
-            let drawn = Some((latched.state.time_ns, latched.stale));
+            let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
             if drawn != last_drawn {
                 last_drawn = drawn;
-                canvas.set_status(statistics.status(
-                    &plan.node,
-                    LinkHealth::Connected,
-                    FrameMode::Free,
-                ));
+                canvas.set_status(statistics.status(&plan.node, link, FrameMode::Free));
                 // Off-screen a picture is looked at when it is done.
                 latched.state.head = timeline.head_at(taken_ns).or(latched.state.head);
-                canvas.draw(&latched, plan.show, plan.out.is_some())?;
+                canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
                 write_pictures(canvas, plan, statistics.frames)?;
@@ -100,6 +105,14 @@ pub(crate) fn run(
             left
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
+    }
+}
+
+/// What the screen says of the link, to the second: a picture is drawn again when that changes.
+pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
+    match link {
+        LinkHealth::Connected | LinkHealth::Rejoining => None,
+        LinkHealth::Lost { since_s } => Some(since_s as u64),
     }
 }
 

@@ -17,6 +17,7 @@ pub mod head_prediction;
 mod headless;
 pub mod hold;
 pub mod hud;
+mod membership;
 mod monitor;
 mod mouse;
 pub mod node_status;
@@ -32,4 +33,5 @@ mod window;
 
 pub use cli::{RenderArgs, run};
 pub use error::RenderError;
+pub use membership::MembershipArgs;
 pub use statistics::RenderReport;

@@ -91,6 +91,12 @@ impl Timeline {
         }
     }
 
+    /// Forgets all states: those of a new session are of another clock.
+    pub fn clear(&mut self) {
+        self.states.clear();
+        self.heads = HeadPredictor::default();
+    }
+
     /// Takes a received state in; any order, duplicates and those older than all kept are dropped.
     pub fn push(&mut self, mut state: State) {
         let head_ns = state.head.map_or(state.time_ns, |head| head.sample_ns);

@@ -21,7 +21,7 @@ use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::TriangleMesh;
 use taut_render::statistics::Ended;
-use taut_render::{RenderError, RenderReport};
+use taut_render::{MembershipArgs, RenderError, RenderReport};
 
 /// A server that sends 500 states per second until it is stopped.
 struct Server {
@@ -175,6 +175,10 @@ impl Server {
             hud: false,
             display_ms: 8.0,
             delay_ms: 2.0,
+            membership: MembershipArgs {
+                no_mesh_cache: true,
+                ..MembershipArgs::default()
+            },
         }
     }
 

@@ -52,6 +52,8 @@ impl From<taut_link::LinkError> for Failure {
             | E::UnknownHost { .. }
             | E::Unreachable { .. }
             | E::WrongKey { .. }
+            | E::WrongServer { .. }
+            | E::NotAllowed { .. }
             | E::WrongVersion { .. }
             | E::Refused { .. }
             | E::Protocol { .. }

@@ -63,6 +63,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
             terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
         }
     }
+    for line in session.looking_on().lines() {
+        terminal.say(&line);
+    }
     for line in &session.realtime().waived {
         terminal.say(&format!("not in force: {line}"));
     }

@@ -82,6 +82,8 @@ impl Process {
             .env_remove("TAUT_LOG")
             .env_remove("DISPLAY")
             .env_remove("WAYLAND_DISPLAY");
+        // Nothing is kept from one test for another.
+        command.env("XDG_CACHE_HOME", directory.join("cache"));
         // Drivers complain aloud where a login session has not set it.
         command.env("XDG_RUNTIME_DIR", directory);
         command
@@ -147,6 +149,16 @@ impl Process {
     /// Asks it to end as Ctrl-C does.
     pub fn interrupt(&self) {
         signal(self.child.id() as i32, libc::SIGINT);
+    }
+
+    /// Stops it as a starved or suspended machine would; [`Process::resume`] lets it go on.
+    pub fn pause(&self) {
+        signal(self.child.id() as i32, libc::SIGSTOP);
+    }
+
+    /// Lets it go on after [`Process::pause`].
+    pub fn resume(&self) {
+        signal(self.child.id() as i32, libc::SIGCONT);
     }
 
     /// Kills it alone, at once, as a crash would: no goodbye.

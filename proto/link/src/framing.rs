@@ -1,6 +1,7 @@
 //! Control messages on QUIC streams, and the codes and sentences with which connections end.
 
 use quinn::{ConnectionError, ReadExactError, RecvStream, SendStream, VarInt};
+use std::time::Duration;
 use taut_proto::{
     DecodeError, EncodeError,
     control::{ControlMessage, LENGTH_BYTES},
@@ -14,8 +15,13 @@ pub(crate) const CLOSE_STOPPING: VarInt = VarInt::from_u32(1);
 pub(crate) const CLOSE_REFUSED: VarInt = VarInt::from_u32(2);
 /// A silent client's place went to a new one of its name.
 pub(crate) const CLOSE_REPLACED: VarInt = VarInt::from_u32(3);
+/// The client was silent for too long.
+pub(crate) const CLOSE_EVICTED: VarInt = VarInt::from_u32(5);
 /// The peer broke the protocol.
 pub(crate) const CLOSE_PROTOCOL: VarInt = VarInt::from_u32(4);
+
+/// Time for a message to come, once it has begun.
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Why no message came.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +32,9 @@ pub(crate) enum ReadMessageError {
     /// The bytes are no message.
     #[error(transparent)]
     Decode(#[from] DecodeError),
+    /// A message was begun and not ended in time.
+    #[error("a message stopped on the way")]
+    Stalled,
 }
 
 /// Why no message went.
@@ -44,9 +53,32 @@ pub(crate) async fn read_message(
     stream: &mut RecvStream,
     max: usize,
 ) -> Result<ControlMessage, ReadMessageError> {
+    let length = read_length(stream, max).await?;
+    read_body(stream, length).await
+}
+
+/// The same from a client that is in: it may be silent between messages, but not within one.
+pub(crate) async fn read_whole_message(
+    stream: &mut RecvStream,
+    max: usize,
+) -> Result<ControlMessage, ReadMessageError> {
+    let length = read_length(stream, max).await?;
+    match tokio::time::timeout(MESSAGE_TIMEOUT, read_body(stream, length)).await {
+        Ok(read) => read,
+        Err(_) => Err(ReadMessageError::Stalled),
+    }
+}
+
+async fn read_length(stream: &mut RecvStream, max: usize) -> Result<usize, ReadMessageError> {
     let mut length = [0; LENGTH_BYTES];
     read_exact(stream, &mut length).await?;
-    let length = ControlMessage::frame_length(length, max)?;
+    Ok(ControlMessage::frame_length(length, max)?)
+}
+
+async fn read_body(
+    stream: &mut RecvStream,
+    length: usize,
+) -> Result<ControlMessage, ReadMessageError> {
     let mut body = Vec::new();
     while body.len() < length {
         let chunk = stream

@@ -99,7 +99,7 @@ fn every_fault_names_file_line_and_key() {
             "height = 427, fullscreen = false }",
             "height = 427, monitor = [0, true] }",
             "monitor = [0, true]",
-            "`monitor` in [[node]].window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
+            "`monitor` in [[node]] window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
         ),
         (
             "near = 0.05",
