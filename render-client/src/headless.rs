@@ -111,7 +111,8 @@ pub(crate) fn run(
 /// What the screen says of the link, to the second: a picture is drawn again when that changes.
 pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
     match link {
-        LinkHealth::Connected | LinkHealth::Rejoining => None,
+        LinkHealth::Connected => None,
+        LinkHealth::Rejoining => Some(u64::MAX), // no second of a loss: another text
         LinkHealth::Lost { since_s } => Some(since_s as u64),
     }
 }
