@@ -65,6 +65,8 @@ fn content() -> Content {
             eye_separation: 0.063,
             near: 0.1,
             far: 10.0,
+            separation_scale: 1.0,
+            nearest_disparity: 0.0,
             show: ShowOptions::default(),
         },
         meshes: vec![mesh],

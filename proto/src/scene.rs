@@ -34,6 +34,10 @@ pub struct SceneDescription {
     pub near: f64,
     /// Far clipping distance, m.
     pub far: f64,
+    /// Factor on `eye_separation` with which pictures are drawn, 0 to 1: below 1 the world is flatter and easier on the eyes.
+    pub separation_scale: f64,
+    /// Most that anything may stand out towards the viewer, as an angle between the eyes, rad; 0 is no limit.
+    pub nearest_disparity: f64,
     /// What is drawn besides the scene.
     pub show: ShowOptions,
 }
@@ -75,6 +79,9 @@ pub struct NodeDescription {
     pub stereo: Stereo,
     /// Its window.
     pub window: WindowDescription,
+    /// Which monitors its windows cover, in the order of the windows: an output's name such as DP-1, or its number from 0.
+    /// Windows past the end take the monitors that follow.
+    pub monitors: Vec<String>,
 }
 
 /// How two eyes reach a screen.
@@ -112,6 +119,8 @@ pub struct ShowOptions {
     pub contacts: bool,
     /// The force.
     pub force: bool,
+    /// Lines of text about the node: its link, its frames, the age of what it draws.
+    pub hud: bool,
 }
 
 wire_struct!(SceneDescription {
@@ -128,6 +137,8 @@ wire_struct!(SceneDescription {
     eye_separation,
     near,
     far,
+    separation_scale,
+    nearest_disparity,
     show,
 });
 wire_struct!(BodyDescription {
@@ -146,7 +157,8 @@ wire_struct!(NodeDescription {
     name,
     screens,
     stereo,
-    window
+    window,
+    monitors
 });
 wire_struct!(WindowDescription {
     width,
@@ -156,6 +168,7 @@ wire_struct!(WindowDescription {
 wire_struct!(ShowOptions {
     ghost,
     contacts,
-    force
+    force,
+    hud
 });
 wire_tag!(Stereo, "stereo mode" { Mono = 0, SideBySide = 1, TopBottom = 2, Anaglyph = 3, TwoWindows = 4 });

@@ -23,6 +23,7 @@ fn main() -> anyhow::Result<()> {
                 ghost: true,
                 contacts: true,
                 force: true,
+                hud: true,
             },
         ),
         ("sbs", Stereo::SideBySide, Show::default()),

@@ -14,11 +14,6 @@ fn vertex(@builtin(vertex_index) index: u32) -> Fragment {
     return fragment;
 }
 
-// A threshold between 0 and 1 that differs from pixel to pixel: spreads the steps of 8-bit colours.
-fn dither(pixel: vec2<f32>) -> f32 {
-    return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
-}
-
 @fragment
 fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let far = frame.workbench_from_clip * vec4(in.place, 1.0, 1.0);

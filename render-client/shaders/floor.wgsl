@@ -36,5 +36,5 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
     let light = MATT_SHARE * colour * falling_light(in.position, normal).rgb;
     let alpha = 1.0 - smoothstep(0.35, 1.0, from_middle);
-    return vec4(shown(light), alpha);
+    return vec4(shown(light), alpha * near_share(in.clip));
 }

@@ -8,17 +8,17 @@ struct Frame {
     eye: vec4<f32>,          // xyz; w: 1 when the state is stale
     key: vec4<f32>,          // unit, to the light; w: size of a shadow texel, m
     floor: vec4<f32>,        // centre; w: radius, m
-    grid: vec4<f32>,         // x: spacing of the lines, m
+    grid: vec4<f32>,         // x: spacing of the lines, m; y, z: nearer is not drawn, farther is drawn whole, m
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
 
-const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.75;
+const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.40; // a light colour facing it stays below the bend of the tone curve
 const FILL_COLOUR = vec3<f32>(0.62, 0.76, 1.0) * 0.26;
 const FILL_DIRECTION = vec3<f32>(0.80, -0.52, 0.30); // unit, to the light: low, from the right
-const SKY_COLOUR = vec3<f32>(0.44, 0.52, 0.64) * 0.55;
+const SKY_COLOUR = vec3<f32>(0.44, 0.52, 0.64) * 0.62;
 const MATT_SHARE = 0.80;         // of the light, the rest goes into the shine
 const GROUND_COLOUR = vec3<f32>(0.30, 0.27, 0.25) * 0.40;
 
@@ -85,6 +85,17 @@ fn shown(light: vec3<f32>) -> vec3<f32> {
     let colour = tone(light);
     let grey = vec3(dot(colour, vec3(0.2126, 0.7152, 0.0722))) * vec3(0.75, 0.78, 0.85);
     return mix(colour, grey, 0.8 * frame.eye.w);
+}
+
+// A threshold between 0 and 1 that differs from pixel to pixel: spreads the steps of 8-bit colours.
+fn dither(pixel: vec2<f32>) -> f32 {
+    return fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
+}
+
+// Share of a fragment that is drawn: less than 1 only for what comes too near for comfort.
+fn near_share(clip: vec4<f32>) -> f32 {
+    let away = 1.0 / clip.w; // along the screen's normal, m
+    return clamp((away - frame.grid.y) / max(frame.grid.z - frame.grid.y, 1e-6), 0.0, 1.0);
 }
 
 // The far surroundings in one direction: the same from both screens at their common edge.

@@ -17,8 +17,17 @@ struct Fragment {
     @location(3) gloss: vec4<f32>,
 }
 
+// A unit vector out of its place on the octahedron |x| + |y| + |z| = 1, folded out to a square.
+// Source: Cigolle et al. 2014, "A survey of efficient representations for independent unit vectors".
+fn unfolded(place: vec2<f32>) -> vec3<f32> {
+    let height = 1.0 - abs(place.x) - abs(place.y);
+    let back = max(-height, 0.0);
+    return vec3(place - select(vec2(-back), vec2(back), place >= vec2(0.0)), height);
+}
+
 @vertex
-fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>, instance: Instance) -> Fragment {
+fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, instance: Instance) -> Fragment {
+    let normal = unfolded(folded); // its length does not matter
     let model = mat4x4(instance.model_x, instance.model_y, instance.model_z, instance.model_w);
     let place = model * vec4(position, 1.0);
     // For a rotation times a scale along its axes the inverse transpose divides by scale squared.
@@ -36,8 +45,22 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>, inst
     return fragment;
 }
 
-@fragment
-fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+fn seen(in: Fragment) -> vec4<f32> {
     let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss.xy);
     return vec4(shown(mix(light, in.colour.rgb, in.gloss.z)), 1.0);
+}
+
+@fragment
+fn fragment(in: Fragment) -> @location(0) vec4<f32> {
+    return seen(in);
+}
+
+// The same where near things fade away: dithered, so that they still hide what is behind them.
+// Apart, because a fragment that may be dropped is not drawn as fast.
+@fragment
+fn fading(in: Fragment) -> @location(0) vec4<f32> {
+    if near_share(in.clip) <= 0.999 * dither(in.clip.xy) {
+        discard;
+    }
+    return seen(in);
 }

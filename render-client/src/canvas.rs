@@ -3,6 +3,8 @@
 use image::RgbaImage;
 
 use crate::error::RenderError;
+use crate::hud::Overlay;
+use crate::node_status::NodeStatus;
 use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
 use crate::stage::{Show, Stage};
 use crate::timeline::Latched;
@@ -15,6 +17,7 @@ pub struct Canvas {
     stage: Stage,
     renderer: Renderer,
     sheets: Vec<Sheet>,
+    status: NodeStatus,
 }
 
 /// One picture.
@@ -36,6 +39,7 @@ impl Canvas {
             stage,
             renderer,
             sheets,
+            status: NodeStatus::default(),
         }
     }
 
@@ -62,6 +66,11 @@ impl Canvas {
         (renderer, sheets)
     }
 
+    /// Sets what the pictures to come say of the node.
+    pub fn set_status(&mut self, status: NodeStatus) {
+        self.status = status;
+    }
+
     /// The stage that is drawn.
     pub fn stage(&self) -> &Stage {
         &self.stage
@@ -70,6 +79,11 @@ impl Canvas {
     /// The device that draws.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// What draws.
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
     }
 
     /// Draws a state on all screens and waits until that is done.
@@ -81,11 +95,12 @@ impl Canvas {
             stage,
             renderer,
             sheets,
+            status,
         } = self;
         renderer.set_state(gpu, stage, latched, show);
+        renderer.set_overlay(Overlay::of(status, latched.stale, show.hud));
         let eyes = eyes_of(stage, latched);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        renderer.draw_shadow(&mut encoder);
         for sheet in sheets.iter() {
             let screen = &stage.screens[sheet.screen].screen;
             let view = sheet.image.view();
@@ -108,10 +123,12 @@ impl Canvas {
     }
 }
 
-/// The eyes of the tracked head, or of the viewer that the workbench declares.
+/// The eyes that pictures are drawn for: of the tracked head, or of the viewer that the workbench
+/// declares, their separation scaled for comfort.
 pub(crate) fn eyes_of(stage: &Stage, latched: &Latched) -> Eyes {
+    let scale = stage.comfort.separation_scale;
     match &latched.state.head {
-        Some(head) => Eyes::of_head(&head.pose, head.eye_separation),
-        None => Eyes::of_head(&stage.head, stage.eye_separation),
+        Some(head) => Eyes::of_head(&head.pose, scale * head.eye_separation),
+        None => Eyes::of_head(&stage.head, scale * stage.eye_separation),
     }
 }

@@ -11,7 +11,7 @@ use crate::description::Overrides;
 use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::membership::MembershipArgs;
-use crate::renderer::Gpu;
+use crate::renderer::{Gpu, GpuChoice};
 use crate::session::Session;
 use crate::stage::Show;
 use crate::statistics::{Ended, RenderReport, Statistics};
@@ -31,6 +31,9 @@ const WINDOW_FPS: f64 = 120.0;
 
 /// Longest delay of the picture, in milliseconds: as far as states are kept at 1 kHz.
 const MAX_DELAY_MS: f64 = 200.0;
+
+/// From handing a picture over to its light, in milliseconds: half a frame of 60 Hz.
+const DISPLAY_MS: f64 = 8.0;
 
 /// One node of the render cluster.
 #[derive(Args, Clone, Debug)]
@@ -78,9 +81,22 @@ pub struct RenderArgs {
     /// Height of a view in pixels.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub height: Option<u32>,
-    /// Which monitor the first full-screen window covers, from 0; further windows take the next.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub monitor: usize,
+    /// Monitors of the windows in order, by name (DP-1) or number from 0, whatever the server says; further windows take
+    /// the next.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub monitor: Vec<String>,
+    /// Cover the monitors, whatever the server says.
+    #[arg(long, conflicts_with = "headless")]
+    pub fullscreen: bool,
+    /// Graphics adapter by number or part of its name [default: the best; `taut doctor` lists them].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub gpu: Option<String>,
+    /// Write text about the node over the pictures, whatever the server says.
+    #[arg(long)]
+    pub hud: bool,
+    /// Time from handing a picture over to its light, for which a tracked head is predicted: display and half a frame.
+    #[arg(long, value_name = "MS", default_value_t = DISPLAY_MS)]
+    pub display_ms: f64,
     /// Draw the world of this many milliseconds ago, so that late states can be interpolated.
     #[arg(long, value_name = "MS", default_value_t = 2.0)]
     pub delay_ms: f64,
@@ -152,11 +168,16 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         .transpose()?;
     let duration = duration.map(Duration::from_secs_f64);
 
+    let display_ns = (1e6 * within("--display-ms", args.display_ms, 0.0, MAX_DELAY_MS)?) as u64;
+    let choice = args
+        .gpu
+        .as_ref()
+        .map_or_else(GpuChoice::default, GpuChoice::named);
     let policy = args.membership.policy()?;
 
     // Without an adapter there is no use in joining the server.
     let gpu = if args.headless {
-        Some(Gpu::open()?)
+        Some(Gpu::open_with(&choice)?)
     } else {
         None
     };
@@ -178,6 +199,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         stereo: args.stereo.map(Stereo::from),
         headless: args.headless,
         show: args.show.as_deref().map(listed),
+        hud: args.hud,
     };
     let Some((mut session, stage, show)) = Session::join(options, policy, overrides)? else {
         return Ok(RenderReport::of_nothing(&args));
@@ -186,7 +208,10 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let mut timeline = Timeline::new(delay_ns);
     let mut statistics = Statistics::new();
     let ended = if let Some(gpu) = gpu {
-        let adapter = gpu.summary().to_string();
+        let drawn_with = DrawnWith {
+            adapter: gpu.summary().to_string(),
+            present_timing: "no window".to_owned(),
+        };
         let mut canvas = Canvas::new(gpu, stage);
         let plan = headless::Plan {
             frames: args.frames,
@@ -194,6 +219,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             frame_time,
             out: args.out.clone().map(|folder| (folder, args.node.clone())),
             show,
+            node: args.node.clone(),
         };
         headless::run(
             &mut session,
@@ -202,7 +228,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             &mut statistics,
             &plan,
         )
-        .map(|ended| (ended, adapter))
+        .map(|ended| (ended, drawn_with))
     } else {
         let plan = window::Plan {
             frames: args.frames,
@@ -212,9 +238,16 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
                 Some(_) => frame_time,
                 None => Duration::from_secs_f64(1.0 / SOFTWARE_FPS),
             },
-            fullscreen: session.fullscreen(),
-            monitor: args.monitor,
+            fullscreen: args.fullscreen || session.fullscreen(),
+            monitors: if args.monitor.is_empty() {
+                session.monitors()
+            } else {
+                args.monitor.clone()
+            },
+            gpu: choice,
+            display_ns,
             show,
+            node: args.node.clone(),
         };
         let hand = if args.hold {
             Some(Hand::join(&args, &stage)?)
@@ -238,12 +271,13 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let (sessions, meshes) = (session.sessions(), session.meshes());
     let to_first_frame_ms = statistics.first_frame_after(session.began());
     session.leave();
-    let (ended, adapter) = ended?;
+    let (ended, drawn_with) = ended?;
     let (pose_age_ms, drawn_age_ms) = statistics.ages();
     Ok(RenderReport {
         node: args.node,
         transport: args.transport.name().to_owned(),
-        adapter,
+        adapter: drawn_with.adapter,
+        present_timing: drawn_with.present_timing,
         frames: statistics.frames,
         locked_frames: statistics.locked_frames,
         stale_frames: statistics.stale_frames,
@@ -260,6 +294,13 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     })
 }
 
+/// What drew, for the report.
+#[derive(Clone, Debug)]
+pub(crate) struct DrawnWith {
+    pub(crate) adapter: String,
+    pub(crate) present_timing: String,
+}
+
 impl RenderReport {
     /// Of a node that was asked to end before there was a server.
     fn of_nothing(args: &RenderArgs) -> Self {
@@ -267,6 +308,7 @@ impl RenderReport {
             node: args.node.clone(),
             transport: args.transport.name().to_owned(),
             adapter: String::new(),
+            present_timing: String::new(),
             frames: 0,
             stale_frames: 0,
             fps: 0.0,
@@ -306,6 +348,7 @@ fn listed(list: &[ShowArg]) -> Show {
         ghost: list.contains(&ShowArg::Ghost),
         contacts: list.contains(&ShowArg::Contacts),
         force: list.contains(&ShowArg::Force),
+        hud: false,
     }
 }
 

@@ -6,6 +6,7 @@ use nalgebra::{Point3, Similarity3};
 use taut_proto::scene::{BodyDescription, NodeDescription, SceneDescription, ScreenDescription};
 use taut_proto::{MeshBlob, PoseF64, scene};
 
+use crate::comfort::Comfort;
 use crate::error::RenderError;
 use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
 use crate::stereo::Stereo;
@@ -26,6 +27,8 @@ pub(crate) struct Overrides {
     pub(crate) stereo: Option<Stereo>,
     pub(crate) headless: bool,
     pub(crate) show: Option<Show>,
+    /// Show the HUD, whatever `show` and the server say.
+    pub(crate) hud: bool,
 }
 
 /// The description of the node named `node`.
@@ -73,6 +76,14 @@ pub(crate) fn stage(
             "it is to be cut off at {near} m and {far} m from the eye"
         )));
     }
+    let (scale, disparity) = (description.separation_scale, description.nearest_disparity);
+    let scales = (0.0..=1.0).contains(&scale);
+    let limits = disparity.is_finite() && disparity >= 0.0;
+    if !(scales && limits) {
+        return Err(bad(format!(
+            "its separation_scale is {scale} and its nearest_disparity {disparity} rad"
+        )));
+    }
     let origin = pose(&description.scene_origin, "the scene on the workbench")?;
     let body = |id, mesh, described: &BodyDescription| -> Result<StageBody, RenderError> {
         let [red, green, blue, _] = described.colour;
@@ -100,6 +111,10 @@ pub(crate) fn stage(
         screens: screens.collect::<Result<_, _>>()?,
         head: pose(&description.viewer, "the viewer")?,
         eye_separation: description.eye_separation,
+        comfort: Comfort {
+            separation_scale: scale,
+            nearest_disparity: (disparity > 0.0).then_some(disparity),
+        },
         clip_planes: ClipPlanes {
             near: description.near,
             far: description.far,
@@ -123,6 +138,7 @@ pub(crate) fn show(options: &scene::ShowOptions) -> Show {
         ghost: options.ghost,
         contacts: options.contacts,
         force: options.force,
+        hud: options.hud,
     }
 }
 

@@ -18,13 +18,33 @@ pub enum RenderError {
     NoGpu,
     /// There is an adapter, and it does not work.
     #[error(
-        "the graphics adapter {adapter} cannot be used: {reason}; update its driver, or take another with WGPU_ADAPTER_NAME"
+        "the graphics adapter {adapter} cannot be used: {reason}; update its driver, or take another with --gpu"
     )]
     Gpu {
         /// Name of the adapter.
         adapter: String,
         /// What it said.
         reason: String,
+    },
+    /// No adapter is the one asked for.
+    #[error(
+        "there is no graphics adapter \"{wanted}\"; this machine has {known}: give a number or a part of a name with --gpu"
+    )]
+    UnknownGpu {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        known: String,
+    },
+    /// No monitor is the one asked for.
+    #[error(
+        "there is no monitor \"{wanted}\"; this machine has {known}: correct `monitor` in the workbench file or --monitor"
+    )]
+    UnknownMonitor {
+        /// What was asked for.
+        wanted: String,
+        /// What there is.
+        known: String,
     },
     /// Windows were asked for where there is no display.
     #[error(
@@ -127,6 +147,7 @@ impl RenderError {
         match self {
             Self::Option { .. } | Self::UnknownNode { .. } | Self::UnknownScreen { .. } => 2,
             Self::BadScreen { .. } | Self::BadScene { .. } | Self::MeshCache { .. } => 2,
+            Self::UnknownGpu { .. } | Self::UnknownMonitor { .. } => 2,
             // A wrong key, a name that does not resolve, a server that does not answer.
             Self::Link(error) => match error {
                 LinkError::Closed { .. } | LinkError::System { .. } => 1,

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::canvas::Canvas;
 use crate::error::RenderError;
-use crate::node_status::LinkHealth;
+use crate::node_status::{FrameMode, LinkHealth};
 use crate::pacing::Pacer;
 use crate::session::{Session, Turn};
 use crate::stage::Show;
@@ -24,6 +24,8 @@ pub(crate) struct Plan {
     /// Where pictures are written, and what their names begin with.
     pub(crate) out: Option<(PathBuf, String)>,
     pub(crate) show: Show,
+    /// Name of the node.
+    pub(crate) node: String,
 }
 
 /// Draws until the plan, the server or a signal ends it: the frames of the barrier, or each distinct state once.
@@ -78,6 +80,7 @@ pub(crate) fn run(
         if let Some((taken_ns, latched)) =
             now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns)?)))
         {
+            canvas.set_status(statistics.status(&plan.node, link, pacer.mode()));
             canvas.draw(&latched, show, plan.out.is_some())?;
             pacer.wait();
             let late = pacer.shown();
@@ -97,10 +100,13 @@ pub(crate) fn run(
         let latched = now_ns
             .filter(|_| due)
             .and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
-        if let Some((taken_ns, latched)) = latched {
+        if let Some((taken_ns, mut latched)) = latched {
             let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
             if drawn != last_drawn {
                 last_drawn = drawn;
+                canvas.set_status(statistics.status(&plan.node, link, FrameMode::Free));
+                // Off-screen a picture is looked at when it is done.
+                latched.state.head = timeline.head_at(taken_ns).or(latched.state.head);
                 canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
@@ -132,7 +138,8 @@ fn finish(canvas: &Canvas, statistics: &Statistics, plan: &Plan) -> Result<bool,
 /// What the screen says of the link, to the second: a picture is drawn again when that changes.
 pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
     match link {
-        LinkHealth::Connected | LinkHealth::Rejoining => None,
+        LinkHealth::Connected => None,
+        LinkHealth::Rejoining => Some(u64::MAX), // no second of a loss: another text
         LinkHealth::Lost { since_s } => Some(since_s as u64),
     }
 }

@@ -9,12 +9,16 @@
 
 pub mod canvas;
 pub mod cli;
+pub mod comfort;
 mod description;
 pub mod error;
 mod hand;
+pub mod head_prediction;
 mod headless;
 pub mod hold;
+pub mod hud;
 mod membership;
+mod monitor;
 mod mouse;
 pub mod node_status;
 pub mod normals;

@@ -39,18 +39,15 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
         .collect();
 
     // Which faces meet at a place, with their angles there.
-    let mut around: Vec<Vec<(u32, f32)>> = vec![Vec::new(); mesh.vertices.len()];
-    for (face, triangle) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            let [here, next, last] = [0, 1, 2].map(|i| corner(triangle[(k + i) % 3]));
-            let angle = (next - here).angle(&(last - here));
-            let weight = if angle.is_finite() { angle } else { 0.0 };
-            around[welded[triangle[k] as usize] as usize].push((face as u32, weight));
-        }
-    }
+    let around = Around::new(&triangles, &welded, |[here, next, last]| {
+        let angle = (corner(next) - corner(here)).angle(&(corner(last) - corner(here)));
+        if angle.is_finite() { angle } else { 0.0 }
+    });
 
     let smooth = CREASE_DEGREES.to_radians().cos();
-    let mut places: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
+    // The shaded vertices of a place as a list: the newest, and before each the one before it.
+    let mut newest = vec![NONE; mesh.vertices.len()];
+    let mut before: Vec<u32> = Vec::with_capacity(mesh.vertices.len());
     let mut shaded = Shaded {
         vertices: Vec::with_capacity(mesh.vertices.len()),
         indices: Vec::with_capacity(3 * triangles.len()),
@@ -58,7 +55,8 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
     for (triangle, own) in triangles.iter().zip(&faces) {
         for &vertex in triangle {
             let place = welded[vertex as usize];
-            let sum = around[place as usize]
+            let sum = around
+                .faces(place)
                 .iter()
                 .filter(|(face, _)| faces[*face as usize].dot(own) >= smooth)
                 .map(|(face, weight)| faces[*face as usize] * *weight)
@@ -69,17 +67,59 @@ pub fn shade(mesh: &TriangleMesh) -> Shaded {
                 *own
             }
             .into();
-            let key = (place, normal.map(f32::to_bits));
-            let index = *places.entry(key).or_insert_with(|| {
-                shaded
-                    .vertices
-                    .push((mesh.vertices[place as usize], normal));
-                (shaded.vertices.len() - 1) as u32
-            });
+            let mut index = newest[place as usize];
+            while index != NONE && shaded.vertices[index as usize].1 != normal {
+                index = before[index as usize];
+            }
+            if index == NONE {
+                index = shaded.vertices.len() as u32;
+                let vertex = (mesh.vertices[place as usize], normal);
+                shaded.vertices.push(vertex);
+                before.push(std::mem::replace(&mut newest[place as usize], index));
+            }
             shaded.indices.push(index);
         }
     }
     shaded
+}
+
+/// The end of a list.
+const NONE: u32 = u32::MAX;
+
+/// The faces that meet at each place, with their weights, in one piece of memory.
+struct Around {
+    /// Where the faces of a place begin; one more at the end.
+    starts: Vec<u32>,
+    faces: Vec<(u32, f32)>,
+}
+
+impl Around {
+    /// `weight` of a corner, which comes first, of a triangle.
+    fn new(triangles: &[[u32; 3]], place: &[u32], weight: impl Fn([u32; 3]) -> f32) -> Self {
+        let mut starts = vec![0; place.len() + 1];
+        for vertex in triangles.iter().flatten() {
+            starts[place[*vertex as usize] as usize + 1] += 1;
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut free = starts.clone();
+        let mut faces = vec![(0, 0.0); 3 * triangles.len()];
+        for (face, triangle) in triangles.iter().enumerate() {
+            for k in 0..3 {
+                let corner = [0, 1, 2].map(|i| triangle[(k + i) % 3]);
+                let slot = &mut free[place[corner[0] as usize] as usize];
+                faces[*slot as usize] = (face as u32, weight(corner));
+                *slot += 1;
+            }
+        }
+        Self { starts, faces }
+    }
+
+    fn faces(&self, place: u32) -> &[(u32, f32)] {
+        let place = place as usize;
+        &self.faces[self.starts[place] as usize..self.starts[place + 1] as usize]
+    }
 }
 
 /// For each vertex the first vertex at exactly the same place: files such as STL repeat them.

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use taut_link::{FrameGate, FrameStatus, FrameTurn};
 
+use crate::node_status::FrameMode;
 use crate::session::{Session, read_state};
 use crate::timeline::{Latched, STALE_AFTER_NS};
 
@@ -69,6 +70,19 @@ impl Pacer {
     /// How this node stands among the others.
     pub(crate) fn status(&self) -> FrameStatus {
         self.gate.status()
+    }
+
+    /// The same for the HUD.
+    pub(crate) fn mode(&self) -> FrameMode {
+        let status = self.status();
+        if status.synchronised {
+            FrameMode::Synchronised {
+                late: status.late,
+                members: status.members,
+            }
+        } else {
+            FrameMode::Free
+        }
     }
 
     /// Writes to the log when that changes.

@@ -174,6 +174,12 @@ impl Session {
             .is_ok_and(|node| node.window.fullscreen)
     }
 
+    /// The monitors that the node's windows cover, in order: names or numbers.
+    pub(crate) fn monitors(&self) -> Vec<String> {
+        description::find_node(self.link.description(), &self.node)
+            .map_or_else(|_| Vec::new(), |node| node.monitors.clone())
+    }
+
     /// Moves the states that have arrived to the timeline.
     pub(crate) fn take_states(&mut self, timeline: &mut Timeline) {
         self.link.drain_states(&mut self.received);
@@ -273,7 +279,8 @@ async fn prepare(
         let node = description::find_node(&described, &node)?;
         let stage = description::stage(&described, node, &meshes, &overrides)?;
         let show = overrides.show;
-        let show = show.unwrap_or_else(|| description::show(&described.show));
+        let mut show = show.unwrap_or_else(|| description::show(&described.show));
+        show.hud |= described.show.hud || overrides.hud;
         Ok(Prepared {
             stage: Some((stage, show)),
             description: described,
@@ -340,6 +347,9 @@ pub(crate) fn read_state(hot: &HotState, state_hash: u64) -> Option<State> {
         Some(Head {
             pose: hot.head.pose.to_isometry()?,
             eye_separation: f64::from(hot.head.eye_separation),
+            sample_ns: hot
+                .sample_time_ns
+                .saturating_add_signed(-1000 * i64::from(hot.head.age_us)),
         })
     };
     let vector = |v: [f32; 3]| Vector3::from(v).cast::<f64>();

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3};
 
+use crate::comfort::Comfort;
 use crate::stereo::Stereo;
 use crate::view::{ClipPlanes, Screen};
 
@@ -20,6 +21,8 @@ pub struct Stage {
     pub head: Isometry3<f64>,
     /// Distance between the viewer's eyes, in metres.
     pub eye_separation: f64,
+    /// How stereo is eased.
+    pub comfort: Comfort,
     /// What is nearer to the eye or farther from it than these is not drawn.
     pub clip_planes: ClipPlanes,
     /// Places the scene on the workbench.
@@ -80,6 +83,8 @@ pub struct Show {
     pub contacts: bool,
     /// The force on the hand as an arrow.
     pub force: bool,
+    /// Text about the node.
+    pub hud: bool,
 }
 
 /// A sphere around something.

@@ -7,6 +7,7 @@ use taut_link::MeshCounters;
 use taut_proto::ClientStats;
 use taut_proto::stats::DrawnState;
 
+use crate::node_status::{FrameMode, LinkHealth, NodeStatus};
 use crate::timeline::Latched;
 
 /// Time between two reports to the server.
@@ -57,6 +58,8 @@ pub struct RenderReport {
     pub transport: String,
     /// The adapter that drew.
     pub adapter: String,
+    /// What can be known of the time at which pictures are on the screen.
+    pub present_timing: String,
     /// Frames drawn, each on all screens of the node.
     pub frames: u64,
     /// Of these, frames that the barrier released: shown when all nodes showed them.
@@ -131,6 +134,8 @@ pub(crate) struct Statistics {
     drawn: Vec<DrawnState>,
     first_frame: Option<Instant>,
     last_frame: Option<Instant>,
+    /// Frames per second over the last frames, and the age of the last one's state, in milliseconds.
+    recent: (f64, f64),
     longest_gap: Duration,
     last_report: Instant,
 }
@@ -148,6 +153,7 @@ impl Statistics {
             drawn: Vec::with_capacity(MAX_DRAWN),
             first_frame: None,
             last_frame: None,
+            recent: (0.0, 0.0),
             longest_gap: Duration::ZERO,
             last_report: Instant::now(),
         }
@@ -165,6 +171,12 @@ impl Statistics {
             self.drawn.push(DrawnState { tick, state_hash });
         }
         let now = Instant::now();
+        let age_ms = drawn_ns.saturating_sub(shown.sample_ns) as f64 * 1e-6;
+        let fps = match self.last_frame {
+            Some(last) => smoothed(self.recent.0, now.duration_since(last).as_secs_f64()),
+            None => 0.0,
+        };
+        self.recent = (fps, age_ms);
         self.first_frame.get_or_insert(now);
         if let Some(last) = self.last_frame.replace(now) {
             self.longest_gap = self.longest_gap.max(now.saturating_duration_since(last));
@@ -211,6 +223,20 @@ impl Statistics {
         Some(stats)
     }
 
+    /// What the HUD says of the frames drawn so far.
+    pub(crate) fn status(&self, node: &str, link: LinkHealth, frames: FrameMode) -> NodeStatus {
+        let (fps, pose_age_ms) = self.recent;
+        NodeStatus {
+            node: node.to_owned(),
+            link,
+            frames,
+            frame: self.frames,
+            fps,
+            pose_age_ms,
+            swap_skew_us: None,
+        }
+    }
+
     /// Frames per second between the first and the last frame.
     pub(crate) fn fps(&self) -> f64 {
         match (self.first_frame, self.last_frame) {
@@ -241,6 +267,13 @@ impl Statistics {
     }
 }
 
+/// Frames per second of before and a frame that took `seconds`: a mean over about a second.
+fn smoothed(fps: f64, seconds: f64) -> f64 {
+    let seconds = seconds.max(1e-6);
+    let share = seconds.min(1.0);
+    fps + (1.0 / seconds - fps) * if fps > 0.0 { share } else { 1.0 }
+}
+
 fn histogram() -> Histogram<u64> {
     // Three significant figures over a fixed range: constants that hdrhistogram takes.
     Histogram::new_with_bounds(1, MAX_AGE_US, 3).unwrap_or_else(|_| unreachable!("constant bounds"))
@@ -267,6 +300,8 @@ impl std::fmt::Display for RenderReport {
             drawn_age_ms: drawn,
             packets_lost,
             packets_received,
+            adapter,
+            present_timing,
             sessions,
             longest_gap_ms,
             to_first_frame_ms,
@@ -275,7 +310,7 @@ impl std::fmt::Display for RenderReport {
         } = self;
         write!(
             f,
-            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost",
+            "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost; drawn with {adapter}; times of presentation: {present_timing}",
             age.p50, age.max, drawn.p50
         )?;
         if let Some(first) = to_first_frame_ms {
@@ -343,6 +378,20 @@ mod tests {
         let mut statistics = Statistics::new();
         statistics.frame(&shown(9_000_000), 4_000_000, 5_000_000);
         assert_eq!(statistics.ages().0.max, 0.0);
+    }
+
+    #[test]
+    fn frames_per_second_follow_a_change_within_seconds() {
+        let mut fps = 0.0;
+        for _ in 0..10 {
+            fps = smoothed(fps, 1.0 / 60.0);
+        }
+        assert!((fps - 60.0).abs() < 1e-9);
+        for _ in 0..90 {
+            fps = smoothed(fps, 1.0 / 30.0);
+        }
+        assert!((30.0..32.0).contains(&fps), "{fps}");
+        assert!(smoothed(fps, 0.0).is_finite());
     }
 
     #[test]

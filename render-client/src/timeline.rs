@@ -3,14 +3,15 @@
 //! Between two received ticks the poses are interpolated (lerp, slerp). They are never
 //! extrapolated: a god-object rests on a surface most of the time, and one step further along its
 //! last motion it would be drawn inside that surface. Past the newest state the newest is held,
-//! and called stale after [`STALE_AFTER_NS`]. The head has no velocity on the wire yet, so it is
-//! predicted constant: the newest head is used.
+//! and called stale after [`STALE_AFTER_NS`]. Only the head is predicted ([`crate::head_prediction`]).
 //!
 //! Source: CLUSTER.md §3.4 of the project's design.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::head_prediction::HeadPredictor;
 
 /// Age of the newest state, in nanoseconds, past which the picture is called stale.
 pub const STALE_AFTER_NS: u64 = 250_000_000;
@@ -46,6 +47,8 @@ pub struct Head {
     pub pose: Isometry3<f64>,
     /// Distance between the eyes, in metres.
     pub eye_separation: f64,
+    /// When it was there: session time in nanoseconds.
+    pub sample_ns: u64,
 }
 
 /// One contact.
@@ -74,6 +77,7 @@ pub struct Latched {
 #[derive(Clone, Debug)]
 pub struct Timeline {
     states: VecDeque<State>,
+    heads: HeadPredictor,
     delay_ns: u64,
 }
 
@@ -82,6 +86,7 @@ impl Timeline {
     pub fn new(delay_ns: u64) -> Self {
         Self {
             states: VecDeque::with_capacity(CAPACITY),
+            heads: HeadPredictor::default(),
             delay_ns,
         }
     }
@@ -89,10 +94,13 @@ impl Timeline {
     /// Forgets all states: those of a new session are of another clock.
     pub fn clear(&mut self) {
         self.states.clear();
+        self.heads = HeadPredictor::default();
     }
 
     /// Takes a received state in; any order, duplicates and those older than all kept are dropped.
     pub fn push(&mut self, mut state: State) {
+        let head_ns = state.head.map_or(state.time_ns, |head| head.sample_ns);
+        self.heads.push(head_ns, state.head.as_ref());
         let after = self
             .states
             .partition_point(|kept| kept.time_ns < state.time_ns);
@@ -113,6 +121,14 @@ impl Timeline {
         } else {
             self.states.insert(after, state);
         }
+    }
+
+    /// The tracked head when a picture reaches the eye, at session time `photon_ns`; `None` while it is not tracked.
+    ///
+    /// To be asked as late as can be, right before the picture is drawn. Pictures that several nodes show
+    /// at once need one head for all of them, not each node's own.
+    pub fn head_at(&self, photon_ns: u64) -> Option<Head> {
+        self.heads.at(photon_ns)
     }
 
     /// Session time of the newest state.
@@ -288,6 +304,7 @@ mod tests {
         let head = Head {
             pose: Isometry3::translation(0.0, 0.0, 1.0),
             eye_separation: 0.06,
+            sample_ns: 13 * MS,
         };
         newest.head = Some(head);
         timeline.push(newest);

@@ -1,7 +1,7 @@
 //! Draws in windows: one for each picture of each screen of the node.
 //!
 //! All windows of a frame show the same state and are submitted together. Keys: Esc ends, F covers
-//! the monitor, G, C and V show or hide the device ghost, the contacts and the force. A window that
+//! the monitor, G, C, V and H show or hide the device ghost, the contacts, the force and the HUD. A window that
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 use std::sync::Arc;
@@ -13,15 +13,19 @@ use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::canvas::eyes_of;
+use crate::cli::DrawnWith;
 use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::headless::shown;
+use crate::hud::Overlay;
+use crate::monitor;
 use crate::mouse::{self, Mouse, Pointed};
 use crate::pacing::Pacer;
-use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
+use crate::renderer::{Gpu, GpuChoice, PictureTarget, Renderer, new_instance};
 use crate::session::{Session, Turn};
 use crate::stage::{Show, Stage};
 use crate::statistics::{Ended, Statistics};
@@ -41,9 +45,14 @@ pub(crate) struct Plan {
     /// Least time between frames where the processor draws.
     pub(crate) software_frame_time: Duration,
     pub(crate) fullscreen: bool,
-    /// The monitor of the first window; the others follow.
-    pub(crate) monitor: usize,
+    /// The monitors of the windows in order, by name or number.
+    pub(crate) monitors: Vec<String>,
+    pub(crate) gpu: GpuChoice,
+    /// From handing a picture over to its light, in nanoseconds.
+    pub(crate) display_ns: u64,
     pub(crate) show: Show,
+    /// Name of the node.
+    pub(crate) node: String,
 }
 
 /// Draws until the plan, the user, the server or a signal ends it; says what drew.
@@ -54,7 +63,7 @@ pub(crate) fn run(
     statistics: &mut Statistics,
     plan: Plan,
     hand: Option<Hand>,
-) -> Result<(Ended, String), RenderError> {
+) -> Result<(Ended, DrawnWith), RenderError> {
     let no_display = |error: winit::error::EventLoopError| RenderError::NoDisplay {
         reason: error.to_string(),
     };
@@ -78,13 +87,15 @@ pub(crate) fn run(
         result: None,
     };
     events.run_app(&mut app).map_err(no_display)?;
-    let adapter = app
-        .screen
-        .map_or_else(String::new, |screen| screen.gpu.summary().to_string());
+    let gpu = app.screen.as_ref().map(|screen| &screen.gpu);
+    let drawn_with = DrawnWith {
+        adapter: gpu.map_or_else(String::new, |gpu| gpu.summary().to_string()),
+        present_timing: gpu.map_or("no window", Gpu::present_timing).to_owned(),
+    };
     match app.result {
-        Some(Ok(ended)) => Ok((ended, adapter)),
+        Some(Ok(ended)) => Ok((ended, drawn_with)),
         Some(Err(error)) => Err(error),
-        None => Ok((Ended::Closed, adapter)),
+        None => Ok((Ended::Closed, drawn_with)),
     }
 }
 
@@ -198,6 +209,7 @@ impl App<'_> {
             KeyCode::KeyG => self.show.ghost = !self.show.ghost,
             KeyCode::KeyC => self.show.contacts = !self.show.contacts,
             KeyCode::KeyV => self.show.force = !self.show.force,
+            KeyCode::KeyH => self.show.hud = !self.show.hud,
             KeyCode::KeyP | KeyCode::KeyR => self.let_go_or_return(code),
             _ => {}
         }
@@ -306,10 +318,11 @@ impl App<'_> {
         } else {
             self.next_frame = (self.next_frame + frame_time).max(now);
         }
-        let Some(latched) = released.or_else(|| self.timeline.latch(taken_ns)) else {
+        let Some(mut latched) = released.or_else(|| self.timeline.latch(taken_ns)) else {
             return Ok(None);
         };
-        let link = shown(self.session.health());
+        let health = self.session.health();
+        let link = shown(health);
         let drawn = Some((latched.state.time_ns, latched.stale, link));
         if drawn == self.last_drawn && !locked {
             return Ok(None);
@@ -320,11 +333,21 @@ impl App<'_> {
             panes,
         } = screen;
         renderer.set_state(gpu, &self.stage, &latched, self.show);
+        let status = self
+            .statistics
+            .status(&self.plan.node, health, pacer.mode());
+        renderer.set_overlay(Overlay::of(&status, latched.stale, self.show.hud));
+        if !locked {
+            // As late as can be: the head where it will be when the picture lights up. Screens that are shown together are drawn for
+            // one head, that of their frame: a line across their edge would break otherwise.
+            self.session.take_states(self.timeline);
+            let photon_ns = self.session.now_ns().unwrap_or(taken_ns) + self.plan.display_ns;
+            latched.state.head = self.timeline.head_at(photon_ns).or(latched.state.head);
+        }
         let eyes = eyes_of(&self.stage, &latched);
         self.eyes = eyes;
         self.god_object = latched.state.god_object;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        renderer.draw_shadow(&mut encoder);
         let mut textures = Vec::with_capacity(panes.len());
         for pane in panes.iter() {
             let Some(texture) = pane.texture(gpu)? else {
@@ -383,18 +406,24 @@ impl Display {
             reason: error.to_string(),
         };
         let instance = new_instance(Some(events.owned_display_handle()));
+        let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
+        let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
         let mut opened = Vec::new();
         let mut below = 0;
         for (index, screen) in stage.screens.iter().enumerate() {
             for picture in screen.stereo.pictures() {
                 let (width, height) = screen.pixels;
                 // On one monitor the windows stand in a column, the first screen above.
-                let monitor = events.available_monitors().nth(plan.monitor + opened.len());
-                let cover = || Fullscreen::Borderless(monitor);
+                let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
+                let monitor = place.and_then(|place| monitors.get(place).cloned());
+                // A monitor that was asked for is where the window opens, even if it does not cover it.
+                let named = monitor.as_ref().filter(|_| !plan.monitors.is_empty());
+                let corner = named.map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
+                let cover = || Fullscreen::Borderless(monitor.clone());
                 let attributes = Window::default_attributes()
                     .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
                     .with_inner_size(PhysicalSize::new(width, height))
-                    .with_position(PhysicalPosition::new(0, below))
+                    .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
                     .with_fullscreen(plan.fullscreen.then(cover));
                 below += height;
                 let window = events
@@ -407,7 +436,11 @@ impl Display {
                 opened.push((index, picture, window, surface));
             }
         }
-        let gpu = Gpu::open_for(instance, opened.first().map(|(.., surface)| surface))?;
+        let gpu = Gpu::open_for(
+            instance,
+            opened.first().map(|(.., surface)| surface),
+            &plan.gpu,
+        )?;
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
         for (screen, picture, window, surface) in opened {

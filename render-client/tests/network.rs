@@ -70,6 +70,7 @@ fn content() -> Content {
         name: name.to_owned(),
         screens: screens.iter().map(|s| (*s).to_owned()).collect(),
         stereo,
+        monitors: Vec::new(),
         window: WindowDescription {
             width: 640,
             height: 480,
@@ -102,6 +103,8 @@ fn content() -> Content {
         eye_separation: 0.065,
         near: 0.05,
         far: 10.0,
+        separation_scale: 1.0,
+        nearest_disparity: 0.0,
         show: ShowOptions::default(),
     };
     Content {
@@ -183,7 +186,11 @@ impl Server {
             stereo: None,
             width: Some(120),
             height: None,
-            monitor: 0,
+            monitor: Vec::new(),
+            fullscreen: false,
+            gpu: None,
+            hud: false,
+            display_ms: 8.0,
             delay_ms: 2.0,
             membership: MembershipArgs {
                 no_mesh_cache: true,

@@ -365,3 +365,100 @@ fn an_eye_behind_a_screen_gets_a_black_picture_and_no_error() {
     assert!(pictures[1].pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]));
     assert!(pictures[0].pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]));
 }
+
+#[test]
+fn shadows_of_what_stands_are_drawn_again_only_when_it_moves() {
+    let Some(mut canvas) = canvas(peg_in_hole(PIXELS, Stereo::Mono)) else {
+        return;
+    };
+    let mut draw = |hand: f64, obstacle: Option<f64>| {
+        let mut latched = state(Isometry3::translation(0.0, -0.042 + hand, 0.0));
+        let moved = obstacle.map(|x| (0, Isometry3::translation(x, 0.0, 0.0)));
+        latched.state.bodies.extend(moved);
+        canvas.draw(&latched, Show::default(), true).expect("drawn");
+        let pictures = canvas.images().expect("read back");
+        let picture = pictures[1].1.clone();
+        (canvas.renderer().standing_shadow_passes(), picture)
+    };
+    let (first, _) = draw(0.0, None);
+    assert_eq!(first, 1);
+    assert_eq!(draw(0.0, None).0, first);
+    // The hand moves a little: the light stays where it is, and so do the shadows of what stands.
+    let (passes, picture) = draw(1e-4, None);
+    assert_eq!(passes, first);
+    let (passes, moved) = draw(1e-4, Some(2e-3));
+    assert_eq!(passes, first + 1);
+    assert_ne!(moved, picture);
+    // Back again, by another way: the same picture.
+    let (passes, back) = draw(1e-4, None);
+    assert_eq!(passes, first + 2);
+    assert_eq!(back, picture);
+}
+
+#[test]
+fn text_is_at_the_same_place_for_both_eyes_and_readable_in_red_and_cyan() {
+    let mut latched = state(Isometry3::translation(0.0, -0.042, 0.0));
+    let hud = Show {
+        hud: true,
+        ..Show::default()
+    };
+    latched.stale = true; // the banner, too
+    let white = |image: &RgbaImage, from: u32, to: u32| -> Vec<(u32, u32)> {
+        let bright = |p: &image::Rgba<u8>| p.0[..3].iter().all(|&value| value > 200);
+        let pixels = image.enumerate_pixels();
+        pixels
+            .filter(|(x, _, p)| (from..to).contains(x) && bright(p))
+            .map(|(x, y, _)| (x - from, y))
+            .collect()
+    };
+    let (width, height) = PIXELS;
+    for stereo in [Stereo::TwoWindows, Stereo::SideBySide, Stereo::Anaglyph] {
+        let Some(pictures) = draw(peg_in_hole(PIXELS, stereo), &latched, hud) else {
+            return;
+        };
+        let (left, right) = match stereo {
+            Stereo::SideBySide => (
+                white(&pictures[0], 0, width),
+                white(&pictures[0], width, 2 * width),
+            ),
+            Stereo::TwoWindows => (white(&pictures[0], 0, width), white(&pictures[1], 0, width)),
+            // Both eyes' text lies exactly over each other: it is white, not red and cyan.
+            _ => (white(&pictures[0], 0, width), white(&pictures[0], 0, width)),
+        };
+        assert!(
+            left.len() > 300,
+            "{} white pixels in {stereo:?}",
+            left.len()
+        );
+        assert_eq!(left, right, "{stereo:?}");
+        let upper = left.iter().filter(|(_, y)| *y < height / 3).count();
+        let middle = left
+            .iter()
+            .filter(|(_, y)| y.abs_diff(height / 2) < height / 6)
+            .count();
+        assert!(upper > 50 && middle > 100, "{upper} {middle}");
+    }
+}
+
+#[test]
+fn what_stands_out_further_than_the_limit_fades_away_and_the_rest_stays() {
+    let drawn = |y: f64, limit: Option<f64>| {
+        let mut stage = one_body(shapes::sphere(0.08, 32));
+        stage.screens[0].stereo = Stereo::TwoWindows;
+        stage.comfort.nearest_disparity = limit.map(f64::to_radians);
+        let pictures = draw(
+            stage,
+            &state(Isometry3::translation(0.0, y, 0.6)),
+            Show::default(),
+        )?;
+        Some(orange(&pictures[0]).2)
+    };
+    // The eyes are 1.2 m from the wall and 65 mm apart: one degree is reached at 0.91 m from them.
+    let Some(free) = drawn(-0.5, None) else {
+        return;
+    };
+    assert!(free > 200);
+    assert_eq!(drawn(-0.5, Some(1.0)), Some(0));
+    assert_eq!(drawn(-0.5, Some(8.0)), Some(free));
+    assert_eq!(drawn(0.1, Some(1.0)), drawn(0.1, None));
+}

@@ -64,10 +64,13 @@ pub fn content(
         eye_separation: viewer.eye_separation,
         near: viewer.near,
         far: viewer.far,
+        separation_scale: viewer.separation_scale,
+        nearest_disparity: viewer.nearest_disparity,
         show: ShowOptions {
             ghost: workbench.show.ghost,
             contacts: workbench.show.contacts,
             force: workbench.show.force,
+            hud: workbench.show.hud,
         },
     };
     Ok(Content {
@@ -119,5 +122,6 @@ fn node(node: &taut_scene::Node) -> NodeDescription {
             height: node.window.height,
             fullscreen: node.window.fullscreen,
         },
+        monitors: node.window.monitors.clone(),
     }
 }

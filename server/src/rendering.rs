@@ -42,7 +42,7 @@ pub fn run(_args: RenderArgs) -> Result<(), crate::failure::Failure> {
 pub fn adapter() -> Option<Result<String, String>> {
     let gpu = taut_render::renderer::Gpu::open();
     Some(
-        gpu.map(|gpu| gpu.summary().to_string())
+        gpu.map(|gpu| gpu.chosen())
             .map_err(|error| error.to_string()),
     )
 }

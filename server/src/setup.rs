@@ -8,7 +8,6 @@ use std::time::Duration;
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
-use taut_link::{ClusterKey, Content, JoinPolicy};
 use taut_link::{ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;

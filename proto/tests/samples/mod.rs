@@ -276,15 +276,19 @@ pub fn scene() -> SceneDescription {
                 height: 480,
                 fullscreen: true,
             },
+            monitors: vec!["DP-1".to_owned(), "1".to_owned()],
         }],
         viewer: PoseF64::IDENTITY,
         eye_separation: 0.0625,
         near: 0.125,
         far: 8.0,
+        separation_scale: 0.75,
+        nearest_disparity: 0.0625,
         show: ShowOptions {
             ghost: true,
             contacts: false,
             force: true,
+            hud: true,
         },
     }
 }
@@ -751,9 +755,10 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         prop::collection::vec(".{0,9}", 0..4),
         stereo,
         any::<(u32, u32, bool)>(),
+        prop::collection::vec(".{0,9}", 0..3),
     )
         .prop_map(
-            |(name, screens, stereo, (width, height, fullscreen))| NodeDescription {
+            |(name, screens, stereo, (width, height, fullscreen), monitors)| NodeDescription {
                 name,
                 screens,
                 stereo,
@@ -762,6 +767,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                     height,
                     fullscreen,
                 },
+                monitors,
             },
         );
     let lists = (
@@ -770,9 +776,9 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         prop::collection::vec(node, 0..4),
     );
     let numbers = (
-        prop::array::uniform5(finite64()),
+        prop::array::uniform6(finite64()),
         prop::array::uniform3(finite64()),
-        any::<(u32, bool, bool, bool)>(),
+        any::<(u32, bool, bool, bool, bool)>(),
     );
     (".{0,40}", body(), lists, (pose64(), pose64()), numbers).prop_map(
         |(
@@ -780,9 +786,16 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             god_object,
             (obstacles, screens, nodes),
             (scene_origin, viewer),
-            (scalars, reference_point, (revision, ghost, contacts, force)),
+            (scalars, reference_point, (revision, ghost, contacts, force, hud)),
         )| {
-            let [display_scale, eye_separation, near, far, _] = scalars;
+            let [
+                display_scale,
+                eye_separation,
+                near,
+                far,
+                separation_scale,
+                nearest_disparity,
+            ] = scalars;
             SceneDescription {
                 name,
                 revision,
@@ -797,10 +810,13 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                 eye_separation,
                 near,
                 far,
+                separation_scale,
+                nearest_disparity,
                 show: ShowOptions {
                     ghost,
                     contacts,
                     force,
+                    hud,
                 },
             }
         },

@@ -1,4 +1,4 @@
-//! Puts the drawn things together: once per state the instances and the shadow map, then each
+//! Puts the drawn things together: once per state the instances, and the shadow map where it changed; then each
 //! picture of each screen.
 
 use nalgebra::{Isometry3, Point3};
@@ -7,14 +7,17 @@ use super::anaglyph::Anaglyph;
 use super::frame::{Floor, FrameUniform, KeyLight};
 use super::gpu::Gpu;
 use super::mesh::{Batch, Instance, MeshBuffers};
+use super::overlay::OverlayPipeline;
 use super::picture::{PictureTarget, ViewTarget};
 use super::pipeline::{FrameLayout, Output};
 use super::shadow::ShadowMap;
 use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
+use crate::comfort::Comfort;
+use crate::hud::Overlay;
 use crate::stage::{Bounds, Show, Stage, StageBody};
 use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
-use crate::view::{ClipPlanes, Eyes, Screen};
+use crate::view::{ClipPlanes, Eye, Eyes, Screen};
 
 /// Everything on the graphics card that does not depend on the size of a picture.
 #[derive(Debug)]
@@ -30,7 +33,20 @@ pub struct Renderer {
     instances: wgpu::Buffer,
     floor: Floor,
     clip_planes: ClipPlanes,
+    comfort: Comfort,
+    text: OverlayPipeline,
+    overlay: Overlay,
     plan: Plan,
+    shadowed: Option<Shadowed>,
+    shadow_passes: u64,
+}
+
+/// What the shadow map shows.
+#[derive(Debug, PartialEq)]
+struct Shadowed {
+    light: KeyLight,
+    standing: Vec<Instance>,
+    moving: Instance,
 }
 
 #[derive(Debug)]
@@ -65,7 +81,12 @@ impl Renderer {
         let pipelines = Pipelines {
             background: background::pipeline(device, &layout, output),
             floor: floor::pipeline(device, &layout, output),
-            mesh: mesh::pipeline(device, &layout, output),
+            mesh: mesh::pipeline(
+                device,
+                &layout,
+                output,
+                stage.comfort.nearest_disparity.is_some(),
+            ),
             ghost: ghost::pipeline(device, &layout, output),
         };
         let mut meshes: Vec<MeshBuffers> = stage
@@ -98,6 +119,11 @@ impl Renderer {
             instances,
             floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
             clip_planes: stage.clip_planes,
+            comfort: stage.comfort,
+            text: OverlayPipeline::new(gpu, output),
+            overlay: Overlay::default(),
+            shadowed: None,
+            shadow_passes: 0,
             plan: Plan {
                 light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
                 stale: true,
@@ -120,7 +146,23 @@ impl Renderer {
         PictureTarget::new(gpu, picture, size, *output, layout, shadow, anaglyph)
     }
 
-    /// Takes the state that the next submission draws.
+    /// Size of all meshes on the graphics card, in bytes.
+    pub fn mesh_bytes(&self) -> u64 {
+        self.meshes.iter().map(MeshBuffers::bytes).sum()
+    }
+
+    /// Takes the text that the pictures to come show.
+    pub fn set_overlay(&mut self, overlay: Overlay) {
+        self.overlay = overlay;
+    }
+
+    /// How often the shadows of the obstacles have been drawn: once for each state in which one of them, or the light
+    /// that is fitted to all bodies, had moved.
+    pub fn standing_shadow_passes(&self) -> u64 {
+        self.shadow_passes
+    }
+
+    /// Takes the state that the next submission draws; draws its shadow map if a shadow moved.
     pub fn set_state(&mut self, gpu: &Gpu, stage: &Stage, latched: &Latched, show: Show) {
         let state = &latched.state;
         let mut list = InstanceList::default();
@@ -161,14 +203,38 @@ impl Renderer {
         };
         gpu.queue
             .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
-        self.shadow.aim(&gpu.queue, &self.plan.light);
+        let shadowed = Shadowed {
+            light: self.plan.light,
+            moving: list.instances[0],
+            standing: list.instances[1..self.plan.casters.len()].to_vec(),
+        };
+        self.draw_shadow(gpu, shadowed);
     }
 
-    /// Draws the shadow map of the state: once per state, before its pictures.
-    pub fn draw_shadow(&self, encoder: &mut wgpu::CommandEncoder) {
-        let mut pass = self.shadow.begin(encoder);
-        pass.set_vertex_buffer(1, self.instances.slice(..));
-        self.draw_batches(&mut pass, &self.plan.casters);
+    /// Brings the shadow map up to date: what stands only if it or the light moved.
+    fn draw_shadow(&mut self, gpu: &Gpu, wanted: Shadowed) {
+        let has = self.shadowed.as_ref();
+        if has == Some(&wanted) {
+            return;
+        }
+        let stands =
+            has.is_some_and(|has| has.light == wanted.light && has.standing == wanted.standing);
+        self.shadow.aim(&gpu.queue, &self.plan.light);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let (moving, standing) = self.plan.casters.split_at(1);
+        if !stands {
+            let mut pass = self.shadow.begin_standing(&mut encoder);
+            pass.set_vertex_buffer(1, self.instances.slice(..));
+            self.draw_batches(&mut pass, standing);
+            self.shadow_passes += 1;
+        }
+        {
+            let mut pass = self.shadow.begin_moving(&mut encoder);
+            pass.set_vertex_buffer(1, self.instances.slice(..));
+            self.draw_batches(&mut pass, moving);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        self.shadowed = Some(wanted);
     }
 
     /// Draws one picture of one screen to `target`.
@@ -183,19 +249,29 @@ impl Renderer {
     ) {
         let sees = |view: &ViewTarget| self.set_view(gpu, screen, eyes, view);
         let seen: Vec<bool> = picture.views.iter().map(sees).collect();
+        let marks = self
+            .overlay
+            .marks((screen.width() / screen.height()) as f32);
+        let letters = picture.overlay.set(&gpu.queue, &marks);
+        let draw_eye = |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: bool| {
+            enter(pass, picture, view);
+            if seen {
+                self.draw_view(pass, view);
+            }
+            if letters > 0 {
+                self.text.draw(pass, &picture.overlay, letters);
+            }
+        };
         if let Some(combined) = &picture.anaglyph {
             for (view, seen) in picture.views.iter().zip(&seen) {
                 let own = view.own.as_ref().unwrap_or(target);
-                let mut pass = begin(encoder, picture, own);
-                if *seen {
-                    self.draw_view(&mut pass, picture, view);
-                }
+                draw_eye(&mut begin(encoder, picture, own), view, *seen);
             }
             self.anaglyph.draw(encoder, combined, target);
         } else {
             let mut pass = begin(encoder, picture, target);
-            for (view, _) in picture.views.iter().zip(&seen).filter(|(_, seen)| **seen) {
-                self.draw_view(&mut pass, picture, view);
+            for (view, seen) in picture.views.iter().zip(&seen) {
+                draw_eye(&mut pass, view, *seen);
             }
         }
     }
@@ -207,21 +283,18 @@ impl Renderer {
             return false;
         };
         let Plan { light, stale, .. } = &self.plan;
-        let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale);
+        let separation = match view.eye {
+            Eye::Middle => 0.0,
+            Eye::Left | Eye::Right => (eyes.right - eyes.left).norm(),
+        };
+        let fade = self.comfort.near_fade(separation, screen.distance(&eye));
+        let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale, &fade);
         gpu.queue
             .write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
         true
     }
 
-    fn draw_view(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        picture: &PictureTarget,
-        view: &ViewTarget,
-    ) {
-        let [x, y, width, height] = pixels_of(view, picture.size);
-        pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
-        pass.set_scissor_rect(x, y, width, height);
+    fn draw_view(&self, pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget) {
         pass.set_bind_group(0, &view.group, &[]);
 
         pass.set_pipeline(&self.pipelines.mesh);
@@ -300,6 +373,13 @@ fn lowest_point(stage: &Stage) -> f64 {
     };
     let lowest = standing.iter().map(height).fold(f64::INFINITY, f64::min);
     if lowest.is_finite() { lowest } else { 0.0 }
+}
+
+/// Confines what follows to the pixels of a view.
+fn enter(pass: &mut wgpu::RenderPass<'_>, picture: &PictureTarget, view: &ViewTarget) {
+    let [x, y, width, height] = pixels_of(view, picture.size);
+    pass.set_viewport(x as f32, y as f32, width as f32, height as f32, 0.0, 1.0);
+    pass.set_scissor_rect(x, y, width, height);
 }
 
 /// The pixels of a view: left, top, width, height; at least one pixel each way.

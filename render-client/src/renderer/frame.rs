@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix4, Orthographic3, Point3, Vector3};
 
+use crate::comfort::NearFade;
 use crate::stage::Bounds;
 
 /// Mirrors `struct Frame` of frame.wgsl; matrices column by column.
@@ -19,7 +20,7 @@ pub(crate) struct FrameUniform {
 }
 
 /// The key light: directional, its shadow map fitted to a sphere.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct KeyLight {
     pub(crate) shadow_from_workbench: Matrix4<f64>,
     pub(crate) to_light: Vector3<f64>,
@@ -45,23 +46,27 @@ const SHADOW_REACH: f64 = 6.0;
 /// The fitted radius grows in steps of this ratio, so that shadow edges do not crawl as bodies move.
 const FIT_STEP: f64 = 1.25;
 
+/// The middle of the map moves in steps of this share of its radius, a whole number of texels: in between the
+/// light stays as it is, and what stands need not be drawn again.
+const SNAP: f64 = 0.125;
+
 impl KeyLight {
     /// Fits the shadow map of `texels` × `texels` to what casts shadows.
     pub(crate) fn fit(casters: &Bounds, texels: u32) -> Self {
         let to_light = TO_KEY_LIGHT / TO_KEY_LIGHT.norm();
         let least = casters.radius.max(f64::MIN_POSITIVE);
+        // Snapping moves the middle by up to half a step along each axis.
+        let least = least / (1.0 - 0.5 * SNAP * 3f64.sqrt());
         let radius = FIT_STEP.powf(least.log(FIT_STEP).ceil()).max(1e-6);
         let texel = 2.0 * radius / f64::from(texels);
 
         let forward = -to_light;
         let across = Vector3::z().cross(&to_light).normalize();
         let upward = to_light.cross(&across);
-        // The middle of the map snaps to whole texels, for the same reason as the radius.
-        let snapped =
-            |axis: &Vector3<f64>| (casters.center.coords.dot(axis) / texel).round() * texel;
-        let middle = across * snapped(&across)
-            + upward * snapped(&upward)
-            + forward * casters.center.coords.dot(&forward);
+        let step = SNAP * radius;
+        let snapped = |axis: &Vector3<f64>| (casters.center.coords.dot(axis) / step).round() * step;
+        let middle =
+            across * snapped(&across) + upward * snapped(&upward) + forward * snapped(&forward);
         let eye = Point3::from(middle - forward * radius);
         let view = Matrix4::look_at_rh(&eye, &(eye + forward), &upward);
         let planes =
@@ -110,6 +115,7 @@ impl FrameUniform {
         key: &KeyLight,
         floor: &Floor,
         stale: bool,
+        fade: &NearFade,
     ) -> Self {
         let columns = |m: &Matrix4<f64>| -> [[f32; 4]; 4] { m.cast::<f32>().into() };
         let inverse = clip_from_workbench
@@ -123,7 +129,12 @@ impl FrameUniform {
             eye: vector(&eye.coords, f64::from(u8::from(stale))),
             key: vector(&key.to_light, key.texel),
             floor: vector(&floor.center.coords, floor.radius),
-            grid: [floor.spacing as f32, 0.0, 0.0, 0.0],
+            grid: [
+                floor.spacing as f32,
+                fade.nothing as f32,
+                fade.everything as f32,
+                0.0,
+            ],
         }
     }
 }

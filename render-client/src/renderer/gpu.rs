@@ -13,6 +13,28 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// The device's queue.
     pub queue: wgpu::Queue,
+    /// Why this adapter.
+    reason: String,
+    others: Vec<AdapterSummary>,
+}
+
+/// Which adapter to draw with: by number (in the order of the list that errors and `taut doctor` print) or by a part of
+/// its name; the best one where nothing is said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GpuChoice(Option<String>);
+
+impl Default for GpuChoice {
+    /// What the variable WGPU_ADAPTER_NAME says, as in other programs of wgpu; else the best.
+    fn default() -> Self {
+        Self(std::env::var("WGPU_ADAPTER_NAME").ok())
+    }
+}
+
+impl GpuChoice {
+    /// The adapter of this number or name.
+    pub fn named(wanted: impl Into<String>) -> Self {
+        Self(Some(wanted.into()))
+    }
 }
 
 /// What to tell people of the adapter.
@@ -66,26 +88,37 @@ fn descriptor(display: Option<Display>) -> wgpu::InstanceDescriptor {
 impl Gpu {
     /// Opens the best adapter for drawing off-screen.
     pub fn open() -> Result<Self, RenderError> {
-        Self::open_for(new_instance(None), None)
+        Self::open_with(&GpuChoice::default())
     }
 
-    /// Opens the best adapter that can show pictures on `surface`, or any where none is given.
+    /// Opens the adapter chosen for drawing off-screen.
+    pub fn open_with(choice: &GpuChoice) -> Result<Self, RenderError> {
+        Self::open_for(new_instance(None), None, choice)
+    }
+
+    /// Opens the adapter chosen; it must be able to show pictures on `surface`, where one is given.
     pub(crate) fn open_for(
         instance: wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
+        choice: &GpuChoice,
     ) -> Result<Self, RenderError> {
-        let wanted = std::env::var("WGPU_ADAPTER_NAME")
-            .ok()
-            .map(|name| name.to_lowercase());
         let mut adapters = adapters(&instance);
-        adapters.retain(|adapter| surface.is_none_or(|s| adapter.is_surface_supported(s)));
-        if let Some(wanted) = wanted {
-            adapters.retain(|adapter| adapter.get_info().name.to_lowercase().contains(&wanted));
-        }
-        let adapter = adapters
+        let offers: Vec<Offer> = adapters
+            .iter()
+            .map(|adapter| Offer {
+                summary: summary(&adapter.get_info()),
+                rank: rank(&adapter.get_info()),
+                shows: surface.is_none_or(|s| adapter.is_surface_supported(s)),
+            })
+            .collect();
+        let (place, reason) = choose(choice, &offers)?;
+        let others = offers
             .into_iter()
-            .min_by_key(rank)
-            .ok_or(RenderError::NoGpu)?;
+            .map(|offer| offer.summary)
+            .enumerate()
+            .filter(|(other, _)| *other != place);
+        let others: Vec<AdapterSummary> = others.map(|(_, summary)| summary).collect();
+        let adapter = adapters.swap_remove(place);
 
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("taut-render"),
@@ -104,25 +137,43 @@ impl Gpu {
             adapter,
             device,
             queue,
+            reason,
+            others,
         };
-        tracing::info!(adapter = %gpu.summary(), "drawing");
+        tracing::info!("drawing with {}", gpu.chosen());
         Ok(gpu)
     }
 
     /// What to tell people of the adapter.
     pub fn summary(&self) -> AdapterSummary {
-        let info = self.adapter.get_info();
-        AdapterSummary {
-            kind: match info.device_type {
-                wgpu::DeviceType::DiscreteGpu => "discrete",
-                wgpu::DeviceType::IntegratedGpu => "integrated",
-                wgpu::DeviceType::VirtualGpu => "virtual",
-                wgpu::DeviceType::Cpu => "software",
-                wgpu::DeviceType::Other => "of unknown kind",
-            }
-            .to_owned(),
-            backend: format!("{:?}", info.backend),
-            name: info.name,
+        summary(&self.adapter.get_info())
+    }
+
+    /// The other adapters of this machine.
+    pub fn others(&self) -> &[AdapterSummary] {
+        &self.others
+    }
+
+    /// Which adapter was taken, why, and which others there are, as a sentence's end.
+    pub fn chosen(&self) -> String {
+        let others: Vec<String> = self.others.iter().map(AdapterSummary::to_string).collect();
+        let also = match others.as_slice() {
+            [] => "there is no other".to_owned(),
+            others => format!("also there: {}", others.join(", ")),
+        };
+        format!("{}: {}; {also}", self.summary(), self.reason)
+    }
+
+    /// What can be known of the time at which a picture is on the screen.
+    ///
+    /// wgpu hands the times of VK_GOOGLE_display_timing to unsafe code only, which this crate is without: where the
+    /// driver has them, this says so, and none is read.
+    pub fn present_timing(&self) -> &'static str {
+        let offered = wgpu::Features::VULKAN_GOOGLE_DISPLAY_TIMING;
+        if self.adapter.features().contains(offered) {
+            "offered by the driver, not read: wgpu has no safe access to it"
+        } else {
+            "not offered by the driver"
         }
     }
 
@@ -163,19 +214,180 @@ impl Gpu {
     }
 }
 
-/// Order of preference, the best first: hardware before software, Vulkan before GL.
-fn rank(adapter: &wgpu::Adapter) -> (u8, u8) {
-    let info = adapter.get_info();
+/// An adapter that could be taken.
+#[derive(Clone, Debug)]
+struct Offer {
+    summary: AdapterSummary,
+    rank: Rank,
+    /// It can show pictures where they are wanted.
+    shows: bool,
+}
+
+/// The place of the adapter to take, and why it.
+fn choose(choice: &GpuChoice, offers: &[Offer]) -> Result<(usize, String), RenderError> {
+    let best = |fits: &dyn Fn(usize, &Offer) -> bool| {
+        let fitting = offers
+            .iter()
+            .enumerate()
+            .filter(|(i, offer)| fits(*i, offer));
+        fitting.min_by_key(|(_, offer)| offer.rank).map(|(i, _)| i)
+    };
+    let Some(wanted) = &choice.0 else {
+        let place = best(&|_, offer| offer.shows).ok_or(RenderError::NoGpu)?;
+        let offer = &offers[place];
+        let alone = offers.iter().filter(|offer| offer.shows).count() == 1;
+        let reason = match (alone, offer.rank.0) {
+            (true, _) => "the only one that can draw here".to_owned(),
+            (_, KindRank::Discrete) => "a card of its own comes first".to_owned(),
+            (_, KindRank::Software) => "there is no better".to_owned(),
+            _ => "there is no card of its own".to_owned(),
+        };
+        return Ok((place, reason));
+    };
+    if offers.is_empty() {
+        return Err(RenderError::NoGpu);
+    }
+    let lower = wanted.to_lowercase();
+    let number: Option<usize> = wanted.parse().ok();
+    let named = |i: usize, offer: &Offer| match number {
+        Some(number) => number == i,
+        None => offer.summary.name.to_lowercase().contains(&lower),
+    };
+    if let Some(place) = best(&|i, offer| named(i, offer) && offer.shows) {
+        return Ok((place, "asked for".to_owned()));
+    }
+    if let Some(place) = best(&named) {
+        return Err(RenderError::Gpu {
+            adapter: offers[place].summary.name.clone(),
+            reason: "it cannot show pictures in this window".to_owned(),
+        });
+    }
+    let list = offers.iter().enumerate();
+    let list: Vec<String> = list
+        .map(|(i, offer)| format!("{i} {}", offer.summary))
+        .collect();
+    Err(RenderError::UnknownGpu {
+        wanted: wanted.clone(),
+        known: list.join(", "),
+    })
+}
+
+fn summary(info: &wgpu::AdapterInfo) -> AdapterSummary {
+    AdapterSummary {
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "of unknown kind",
+        }
+        .to_owned(),
+        backend: format!("{:?}", info.backend),
+        name: info.name.clone(),
+    }
+}
+
+/// Kinds of adapters, the best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum KindRank {
+    Discrete,
+    Integrated,
+    Virtual,
+    Unknown,
+    Software,
+}
+
+/// Order of preference: hardware before software, then Vulkan before GL.
+type Rank = (KindRank, u8);
+
+fn rank(info: &wgpu::AdapterInfo) -> Rank {
     let kind = match info.device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
+        wgpu::DeviceType::DiscreteGpu => KindRank::Discrete,
+        wgpu::DeviceType::IntegratedGpu => KindRank::Integrated,
+        wgpu::DeviceType::VirtualGpu => KindRank::Virtual,
+        wgpu::DeviceType::Other => KindRank::Unknown,
+        wgpu::DeviceType::Cpu => KindRank::Software,
     };
     let backend = match info.backend {
         wgpu::Backend::Gl => 1,
         _ => 0,
     };
     (kind, backend)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn offer(name: &str, kind: KindRank, shows: bool) -> Offer {
+        Offer {
+            summary: AdapterSummary {
+                name: name.to_owned(),
+                backend: "Vulkan".to_owned(),
+                kind: format!("{kind:?}").to_lowercase(),
+            },
+            rank: (kind, 0),
+            shows,
+        }
+    }
+
+    fn laptop() -> Vec<Offer> {
+        vec![
+            offer("llvmpipe (LLVM 15)", KindRank::Software, true),
+            offer("Intel(R) Arc", KindRank::Integrated, true),
+            offer("NVIDIA RTX A2000", KindRank::Discrete, true),
+        ]
+    }
+
+    fn asked(wanted: &str) -> GpuChoice {
+        GpuChoice::named(wanted)
+    }
+
+    #[test]
+    fn a_card_of_its_own_is_taken_before_all_others() {
+        let (place, reason) = choose(&GpuChoice(None), &laptop()).expect("one");
+        assert_eq!(
+            (place, reason.as_str()),
+            (2, "a card of its own comes first")
+        );
+        let mut closed = laptop();
+        closed[2].shows = false;
+        let (place, reason) = choose(&GpuChoice(None), &closed).expect("one");
+        assert_eq!((place, reason.as_str()), (1, "there is no card of its own"));
+    }
+
+    #[test]
+    fn an_adapter_is_asked_for_by_number_or_by_part_of_its_name() {
+        for (wanted, place) in [("0", 0), ("intel", 1), ("A2000", 2), ("LLVM", 0)] {
+            assert_eq!(choose(&asked(wanted), &laptop()).expect("there").0, place);
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_refused_with_what_is() {
+        for wanted in ["3", "radeon"] {
+            let error = choose(&asked(wanted), &laptop())
+                .expect_err("unknown")
+                .to_string();
+            for part in [
+                wanted,
+                "0 llvmpipe",
+                "1 Intel(R) Arc (integrated",
+                "2 NVIDIA",
+            ] {
+                assert!(error.contains(part), "{part} in {error}");
+            }
+        }
+        assert!(matches!(choose(&asked("0"), &[]), Err(RenderError::NoGpu)));
+        assert!(matches!(
+            choose(&GpuChoice(None), &[]),
+            Err(RenderError::NoGpu)
+        ));
+        let mut closed = laptop();
+        closed[2].shows = false;
+        let error = choose(&asked("nvidia"), &closed)
+            .expect_err("cannot show")
+            .to_string();
+        assert!(error.contains("cannot show pictures"), "{error}");
+    }
 }

@@ -12,6 +12,7 @@ mod god_object;
 mod gpu;
 mod mesh;
 mod obstacles;
+mod overlay;
 mod picture;
 mod pipeline;
 mod shadow;
@@ -19,5 +20,5 @@ pub mod shapes;
 
 pub use draw::Renderer;
 pub(crate) use gpu::new_instance;
-pub use gpu::{AdapterSummary, Gpu};
+pub use gpu::{AdapterSummary, Gpu, GpuChoice};
 pub use picture::{OffScreen, PictureTarget};

@@ -2,6 +2,7 @@
 
 use super::anaglyph::Anaglyph;
 use super::gpu::Gpu;
+use super::overlay::OverlayQuads;
 use super::pipeline::{DEPTH, FrameLayout, Output, attachment};
 use super::shadow::ShadowMap;
 use crate::error::RenderError;
@@ -18,6 +19,7 @@ pub struct PictureTarget {
     pub(crate) views: Vec<ViewTarget>,
     /// Combines the views when they lie over each other.
     pub(crate) anaglyph: Option<wgpu::BindGroup>,
+    pub(crate) overlay: OverlayQuads,
 }
 
 /// One eye's part of a picture.
@@ -87,6 +89,7 @@ impl PictureTarget {
             depth: view_of(attachment(device, "depth", size, depth, only_drawn)),
             views,
             anaglyph: combined,
+            overlay: OverlayQuads::new(device),
         }
     }
 }

@@ -1,4 +1,7 @@
 //! The shadow map of the key light: depth of god-object and obstacles as the light sees them.
+//!
+//! What stands keeps a map of its own. While only the god-object moves, that map is copied and the
+//! god-object drawn into the copy; while nothing moves, nothing is drawn.
 
 use super::frame::KeyLight;
 use super::mesh::buffer_layouts;
@@ -9,6 +12,9 @@ use super::pipeline::{DEPTH, Output, attachment, shader};
 pub(crate) struct ShadowMap {
     pub(crate) view: wgpu::TextureView,
     pub(crate) sampler: wgpu::Sampler,
+    map: wgpu::Texture,
+    standing: wgpu::Texture,
+    standing_view: wgpu::TextureView,
     pipeline: wgpu::RenderPipeline,
     uniform: wgpu::Buffer,
     group: wgpu::BindGroup,
@@ -24,13 +30,10 @@ impl ShadowMap {
             samples: 1,
         };
         let size = (Self::TEXELS, Self::TEXELS);
-        let map = attachment(
-            device,
-            "shadow map",
-            size,
-            single,
-            wgpu::TextureUsages::TEXTURE_BINDING,
-        );
+        let shown = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let map = attachment(device, "shadow map", size, single, shown);
+        let copied = wgpu::TextureUsages::COPY_SRC;
+        let standing = attachment(device, "standing shadow map", size, single, copied);
         let pipeline = pipeline(device);
         let uniform = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("shadow"),
@@ -48,6 +51,9 @@ impl ShadowMap {
         });
         Self {
             view: map.create_view(&Default::default()),
+            map,
+            standing_view: standing.create_view(&Default::default()),
+            standing,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("shadow"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -67,15 +73,40 @@ impl ShadowMap {
         queue.write_buffer(&self.uniform, 0, bytemuck::cast_slice(&columns));
     }
 
-    /// Begins the pass; the caller sets the instances and draws what casts.
-    pub(crate) fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::RenderPass<'a> {
+    /// Begins the pass of what stands; the caller sets the instances and draws.
+    pub(crate) fn begin_standing<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+    ) -> wgpu::RenderPass<'a> {
+        self.begin(encoder, &self.standing_view, wgpu::LoadOp::Clear(1.0))
+    }
+
+    /// Begins the pass of what moves, over what stands.
+    pub(crate) fn begin_moving<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+    ) -> wgpu::RenderPass<'a> {
+        encoder.copy_texture_to_texture(
+            self.standing.as_image_copy(),
+            self.map.as_image_copy(),
+            self.map.size(),
+        );
+        self.begin(encoder, &self.view, wgpu::LoadOp::Load)
+    }
+
+    fn begin<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        view: &wgpu::TextureView,
+        load: wgpu::LoadOp<f32>,
+    ) -> wgpu::RenderPass<'a> {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shadow"),
             color_attachments: &[],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.view,
+                view,
                 depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
+                    load,
                     store: wgpu::StoreOp::Store,
                 }),
                 stencil_ops: None,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use taut_render::canvas::Canvas;
+use taut_render::comfort::Comfort;
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::stereo::Stereo;
@@ -47,6 +48,7 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
             .collect(),
         head: Isometry3::translation(0.12, -1.1, 0.85),
         eye_separation: 0.065,
+        comfort: Comfort::default(),
         clip_planes: ClipPlanes {
             near: 0.02,
             far: 20.0,

@@ -79,11 +79,14 @@ pub fn content() -> Content {
                 height: 480,
                 fullscreen: false,
             },
+            monitors: vec![],
         }],
         viewer: PoseF64::IDENTITY,
         eye_separation: 0.064,
         near: 0.05,
         far: 10.0,
+        separation_scale: 1.0,
+        nearest_disparity: 0.0,
         show: ShowOptions::default(),
     };
     Content {

@@ -294,6 +294,33 @@ impl<'a> Section<'a> {
         Some(texts)
     }
 
+    /// A name or a number from 0, or an array of them: outputs by name or by number.
+    pub(crate) fn names_or_numbers(&self, key: &'static str) -> Option<Vec<String>> {
+        const WANTED: &str = "a name in quotes, a number from 0, or an array of these";
+        let node = self.get(key)?;
+        let items = match &node.value {
+            Value::Array(items) => items.as_slice(),
+            _ => std::slice::from_ref(node),
+        };
+        let mut names = Vec::new();
+        for item in items {
+            match &item.value {
+                Value::Text(text) if !text.is_empty() => names.push(text.clone()),
+                Value::Integer(number) if *number >= 0 => names.push(number.to_string()),
+                Value::Text(_) => {
+                    let text = format!("`{key}` in {} is empty, but must be {WANTED}", self.name);
+                    self.complain(&item.at, text);
+                    return None;
+                }
+                _ => {
+                    self.wrong_kind(key, item, WANTED);
+                    return None;
+                }
+            }
+        }
+        Some(names)
+    }
+
     /// A table.
     pub(crate) fn section(&self, key: &'static str) -> Option<Section<'a>> {
         let node = self.get(key)?;

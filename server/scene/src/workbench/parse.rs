@@ -27,6 +27,8 @@ use crate::scene::{HandPreset, pose_of, shipped_scene_text};
 const MIN_SCREEN_EDGE: f64 = 0.01;
 /// Largest cosine between the edges of a screen: half a degree from square, more than a careful tape measure errs by.
 const SQUARENESS: f64 = 8.7e-3;
+/// Largest limit on what stands out from a screen, degrees: nobody fuses more.
+const MAX_DISPARITY_DEG: f64 = 30.0;
 /// Largest window side, pixels.
 const MAX_PIXELS: i64 = 16_384;
 /// Fastest stream or loop, 1/s.
@@ -249,12 +251,14 @@ fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
                 width: pixels("width", 1280),
                 height: pixels("height", 800),
                 fullscreen: window.boolean("fullscreen").unwrap_or(false),
+                monitors: window.names_or_numbers("monitor").unwrap_or_default(),
             }
         });
         let window = window.unwrap_or(Window {
             width: 1280,
             height: 800,
             fullscreen: false,
+            monitors: Vec::new(),
         });
         section.finish();
         if let Some(name) = name {
@@ -303,6 +307,10 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
     });
     let near = section.number_or("near", Range::Positive, 0.05);
     let far = section.number_or("far", Range::Positive, 20.0);
+    let separation_scale = section.number_or("separation_scale", Range::UpTo(1.0), 1.0);
+    let nearest_disparity = section
+        .number_or("nearest_disparity_deg", Range::UpTo(MAX_DISPARITY_DEG), 0.0)
+        .to_radians();
     if near >= far {
         section.complain(
             section.at(),
@@ -335,6 +343,8 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
         tracking,
         near,
         far,
+        separation_scale,
+        nearest_disparity,
     })
 }
 
@@ -658,5 +668,6 @@ fn show(section: &Section<'_>) -> Show {
         ghost: wanted("ghost"),
         contacts: wanted("contacts"),
         force: wanted("force"),
+        hud: wanted("hud"),
     }
 }

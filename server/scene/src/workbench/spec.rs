@@ -50,8 +50,8 @@ impl Stereo {
     ];
 }
 
-/// A node's window, one per screen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A node's windows: one per screen, or two with a window per eye.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Window {
     /// Pixels.
     pub width: u32,
@@ -59,6 +59,9 @@ pub struct Window {
     pub height: u32,
     /// Without frame, over the whole output.
     pub fullscreen: bool,
+    /// The output of each window in order: its name such as DP-1, or its number from 0. Windows past the end take the
+    /// outputs that follow.
+    pub monitors: Vec<String>,
 }
 
 /// One render client.
@@ -120,6 +123,10 @@ pub struct Viewer {
     pub near: f64,
     /// Far clip plane, m.
     pub far: f64,
+    /// Factor on `eye_separation` with which pictures are drawn.
+    pub separation_scale: f64,
+    /// Most that anything may stand out from a screen, as an angle between the eyes, rad; 0 is no limit.
+    pub nearest_disparity: f64,
 }
 
 /// The haptic device.
@@ -340,4 +347,6 @@ pub struct Show {
     pub contacts: bool,
     /// The force arrow.
     pub force: bool,
+    /// Lines of text about the node.
+    pub hud: bool,
 }

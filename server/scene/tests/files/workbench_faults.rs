@@ -126,6 +126,18 @@ fn every_fault_names_file_line_and_key() {
             "`eye_separation` in [viewer] is 64, but must be between 0 and 0.2",
         ),
         (
+            "eye_separation = 0.064",
+            "separation_scale = 2.0",
+            "separation_scale = 2.0",
+            "`separation_scale` in [viewer] is 2, but must be between 0 and 1",
+        ),
+        (
+            "height = 427, fullscreen = false }",
+            "height = 427, monitor = [0, true] }",
+            "monitor = [0, true]",
+            "`monitor` in [[node]] window is a truth value, but must be a name in quotes, a number from 0, or an array of these",
+        ),
+        (
             "near = 0.05",
             "near = 50.0",
             "[viewer]",
@@ -265,4 +277,32 @@ fn multicast_leaves_from_the_interface_that_is_listened_on_or_named() {
     ];
     let network = parse(&named).unwrap().network;
     assert_eq!(network.multicast_interface.to_string(), "192.168.1.5");
+}
+
+#[test]
+fn monitors_comfort_and_hud_are_read_and_are_off_by_default() {
+    let parse = |text: &str| Workbench::parse("w.toml", text, Path::new("")).expect("valid");
+    let shipped = parse(SHIPPED_WORKBENCH);
+    assert!(shipped.nodes[0].window.monitors.is_empty() && !shipped.show.hud);
+    assert_eq!(shipped.viewer.separation_scale, 1.0);
+    assert_eq!(shipped.viewer.nearest_disparity, 0.0);
+    for (written, read) in [
+        ("\"DP-1\"", vec!["DP-1"]),
+        ("1", vec!["1"]),
+        ("[\"DP-1\", 0]", vec!["DP-1", "0"]),
+    ] {
+        let text = SHIPPED_WORKBENCH
+            .replacen("fullscreen = false", &format!("monitor = {written}"), 1)
+            .replacen(
+                "near = 0.05",
+                "nearest_disparity_deg = 4\nseparation_scale = 0.5\nnear = 0.05",
+                1,
+            )
+            .replacen("hud = false", "hud = true", 1);
+        let changed = parse(&text);
+        assert_eq!(changed.nodes[0].window.monitors, read);
+        assert_eq!(changed.viewer.separation_scale, 0.5);
+        assert!((changed.viewer.nearest_disparity - 4f64.to_radians()).abs() < 1e-12);
+        assert!(changed.show.hud);
+    }
 }

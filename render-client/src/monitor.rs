@@ -1,0 +1,75 @@
+//! Which monitor each window covers.
+
+use crate::error::RenderError;
+
+/// The place, among the monitors there are, of window number `window`; `None` leaves it to the window system.
+///
+/// `wanted` names monitors in the order of the windows, by name (`DP-1`) or by number from 0. A window past its end
+/// takes the monitor after that of the window before it, if there is one.
+pub(crate) fn of_window(
+    window: usize,
+    wanted: &[String],
+    known: &[Option<String>],
+) -> Result<Option<usize>, RenderError> {
+    let Some(last) = wanted.len().checked_sub(1) else {
+        return Ok((window < known.len()).then_some(window));
+    };
+    let place = place_of(&wanted[window.min(last)], known)? + window.saturating_sub(last);
+    Ok((place < known.len()).then_some(place))
+}
+
+fn place_of(wanted: &str, known: &[Option<String>]) -> Result<usize, RenderError> {
+    let named = known
+        .iter()
+        .position(|name| name.as_deref() == Some(wanted));
+    let numbered = || wanted.parse().ok().filter(|place| *place < known.len());
+    named.or_else(numbered).ok_or_else(|| {
+        let name = |(place, name): (usize, &Option<String>)| match name {
+            Some(name) => format!("{place} \"{name}\""),
+            None => format!("{place} without a name"),
+        };
+        let list: Vec<String> = known.iter().enumerate().map(name).collect();
+        RenderError::UnknownMonitor {
+            wanted: wanted.to_owned(),
+            known: if list.is_empty() {
+                "none that the window system names".to_owned()
+            } else {
+                list.join(", ")
+            },
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known() -> Vec<Option<String>> {
+        vec![Some("eDP-1".into()), Some("DP-1".into()), None]
+    }
+
+    fn place(window: usize, wanted: &[&str]) -> Result<Option<usize>, RenderError> {
+        let wanted: Vec<String> = wanted.iter().map(|&name| name.to_owned()).collect();
+        of_window(window, &wanted, &known())
+    }
+
+    #[test]
+    fn windows_cover_the_monitors_named_then_those_that_follow() {
+        assert_eq!(place(0, &["DP-1"]).expect("known"), Some(1));
+        assert_eq!(place(1, &["DP-1"]).expect("known"), Some(2));
+        assert_eq!(place(2, &["DP-1"]).expect("none is left"), None);
+        assert_eq!(place(1, &["2", "eDP-1"]).expect("known"), Some(0));
+        assert_eq!(place(1, &[]).expect("in order"), Some(1));
+        assert_eq!(place(5, &[]).expect("none is left"), None);
+    }
+
+    #[test]
+    fn a_monitor_that_is_not_there_is_refused_with_those_that_are() {
+        for wanted in ["HDMI-1", "3"] {
+            let error = place(0, &[wanted]).expect_err("unknown").to_string();
+            for part in [wanted, "0 \"eDP-1\"", "1 \"DP-1\"", "2 without a name"] {
+                assert!(error.contains(part), "{part} in {error}");
+            }
+        }
+    }
+}
