@@ -28,7 +28,7 @@ mod vrpn_reports;
 mod vrpn_server;
 
 pub use event_lines::EventLines;
-pub use feed::{StateFeed, StateOutlet, state_channel};
+pub use feed::{Fresh, MAX_WAITING, StateFeed, StateOutlet, state_channel};
 pub use lines::{Hello, Naming};
 #[cfg(feature = "servers")]
 pub use stream_server::{StreamServer, StreamSettings};

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use taut_proto::HotState;
 use tokio::sync::watch;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
-use crate::feed::StateFeed;
+use crate::feed::{Fresh, StateFeed};
 
 /// A state that did not change is told again this often, so that both ends notice when the other is gone.
 const REPEAT_PERIOD: Duration = Duration::from_secs(1);
@@ -19,15 +18,15 @@ impl StateFeed {
         mut self,
         rate: f64,
         to: watch::Sender<Option<Arc<T>>>,
-        mut each: impl FnMut(&HotState) -> T,
+        mut each: impl FnMut(Fresh<'_>) -> T,
     ) {
         let mut ticks = interval(Duration::from_secs_f64(rate.recip()));
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut told = Instant::now();
         loop {
             ticks.tick().await;
-            if let Some(state) = self.fresh() {
-                to.send_replace(Some(Arc::new(each(state))));
+            if let Some(fresh) = self.fresh() {
+                to.send_replace(Some(Arc::new(each(fresh))));
             } else if told.elapsed() >= REPEAT_PERIOD {
                 to.send_modify(|_| {});
             } else {

@@ -87,7 +87,7 @@ impl StreamServer {
     ///
     /// # Errors
     /// The address cannot be had, or no thread.
-    pub fn start(settings: StreamSettings, hello: &Hello, mut feed: StateFeed) -> io::Result<Self> {
+    pub fn start(settings: StreamSettings, hello: &Hello, feed: StateFeed) -> io::Result<Self> {
         let runtime = runtime()?;
         let guard = runtime.enter();
         let listener = listen(settings.address)?;
@@ -105,17 +105,13 @@ impl StreamServer {
             max_observers: settings.max_observers,
         };
         let mut trail = EventLines::new(settings.naming);
-        // The first state only says where the trail of events begins.
-        if let Some(state) = feed.fresh() {
-            trail.take(state);
-        }
         let service = Service::start("observers", runtime, move |_| async move {
-            let pump = feed.pump(settings.rate, sender, move |state| {
-                for line in trail.take(state) {
+            let pump = feed.pump(settings.rate, sender, move |fresh| {
+                for line in trail.take(fresh) {
                     // An error means that nobody listens.
                     let _ = events.send(line.into());
                 }
-                state_line(state).into()
+                state_line(fresh.state).into()
             });
             tokio::join!(pump, accept(listener, &shared));
         })?;

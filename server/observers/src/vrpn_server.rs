@@ -97,7 +97,7 @@ impl VrpnServer {
         };
         let service = Service::start("vrpn", runtime, move |_| async move {
             tokio::join!(
-                feed.pump(rate, sender, HotState::clone),
+                feed.pump(rate, sender, |fresh| fresh.state.clone()),
                 accept(listener, &shared),
                 call_back(&shared),
             );

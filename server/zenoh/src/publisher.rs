@@ -204,8 +204,9 @@ impl Work {
         let mut payload = Vec::new();
         let mut deadline = Instant::now();
         while !self.stop.load(Ordering::Relaxed) {
-            if let Some(state) = feed.fresh() {
-                for line in self.trail.take(state) {
+            if let Some(fresh) = feed.fresh() {
+                let state = fresh.state;
+                for line in self.trail.take(fresh) {
                     events.put(line).wait()?;
                 }
                 states.put(state_line(state)).wait()?;
