@@ -60,7 +60,7 @@ fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
 struct Due {
     garbage: u64,
     wrong_version: u64,
-    /// Forged or replayed.
+    /// Forged, replayed, or dropped unopened beyond a session's rate.
     refused: u64,
 }
 
@@ -145,7 +145,8 @@ fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket(
         Due {
             garbage: now.garbage - before.garbage,
             wrong_version: now.wrong_version - before.wrong_version,
-            refused: now.forged + now.replayed - before.forged - before.replayed,
+            refused: now.forged + now.replayed + now.flooded
+                - (before.forged + before.replayed + before.flooded),
         }
     };
     for number in 0..FORGERIES_SENT {
