@@ -213,7 +213,7 @@ impl Hello {
 pub fn state_line(state: &HotState) -> String {
     written(&StateLine {
         r#type: "state",
-        t: state.sample_time_ns as f64 * 1e-9,
+        t: state.sample_time_ns as f64 / 1e9,
         tick: state.tick,
         scene_revision: state.scene_revision,
         run: match state.run {
@@ -222,7 +222,7 @@ pub fn state_line(state: &HotState) -> String {
             RunState::Paused => "paused",
             RunState::Fault => "fault",
         },
-        constraint_age: f64::from(state.constraint_age_us) * 1e-6,
+        constraint_age: f64::from(state.constraint_age_us) / 1e6,
         tools: state.tools.iter().map(tool).collect(),
         head: head(&state.head),
         bodies: state.bodies.iter().map(body).collect(),
@@ -258,7 +258,7 @@ fn tool(tool: &ToolState) -> Tool<'_> {
 fn head(head: &HeadState) -> Head {
     Head {
         pose: single(&head.pose),
-        age: f64::from(head.age_us) * 1e-6,
+        age: f64::from(head.age_us) / 1e6,
         eye_separation: head.eye_separation,
         tracked: head.flags & HEAD_TRACKED != 0,
     }

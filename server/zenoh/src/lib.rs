@@ -22,5 +22,9 @@
 #[cfg(feature = "zenoh")]
 mod publisher;
 
+/// Zenoh itself, for those who receive.
+#[cfg(feature = "zenoh")]
+pub use zenoh;
+
 #[cfg(feature = "zenoh")]
 pub use publisher::{ZenohError, ZenohPublisher, ZenohSettings};
