@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use god_object::{Pose, Vector6};
-use taut_proto::ClusterKey;
+use taut_proto::{ClusterKey, Credential, Holder, JoinKey, Role};
 use taut_recording::{
     FORMAT, ForceRecord, Lost, Manifest, Recorder, Recording, SceneOrigin, UpdateRecord,
 };
@@ -28,6 +28,19 @@ pub(crate) fn key_file(bytes: &[u8]) {
     };
     if let Ok(key) = ClusterKey::parse(text) {
         assert_eq!(key.to_hex(), text.trim().to_ascii_lowercase());
+    }
+}
+
+/// What a node joins by, a key or a credential: a credential that is read is written as the same.
+pub(crate) fn join_key(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    if let Ok(JoinKey::Credential(credential)) = JoinKey::parse(text) {
+        let again = Credential::parse(&credential.to_text());
+        let again = again.unwrap_or_else(|error| panic!("written and not read: {error}"));
+        assert_eq!(again.to_text(), credential.to_text());
+        assert_eq!(again.fingerprint(), credential.fingerprint());
     }
 }
 
@@ -205,6 +218,17 @@ fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
 pub(crate) fn key_seeds() -> Vec<Vec<u8>> {
     let digits = "0123456789abcdefABCDEF".repeat(3)[..64].to_owned();
     vec![digits.clone().into(), format!(" {digits}\n").into()]
+}
+
+pub(crate) fn join_key_seeds() -> Vec<Vec<u8>> {
+    let mut seeds = key_seeds();
+    let key = ClusterKey::parse(&"5a".repeat(32));
+    let key = key.unwrap_or_else(|error| panic!("{error}"));
+    for (role, holder) in [(Role::Render, "left"), (Role::Device, "bridge-2")] {
+        let holder = Holder::of(holder).unwrap_or_else(|error| panic!("{error}"));
+        seeds.push(key.credential(role, holder, 3).to_text().into_bytes());
+    }
+    seeds
 }
 
 pub(crate) fn scene_seeds() -> Vec<Vec<u8>> {

@@ -32,7 +32,7 @@ pub struct Decoder {
 pub const FIXED_MEMORY: usize = 4 << 20;
 
 /// All of them.
-pub const DECODERS: [Decoder; 19] = [
+pub const DECODERS: [Decoder; 21] = [
     decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
     decoder("payload", wire::payload, wire::payload_seeds, 1),
     decoder("opener", wire::opener, wire::datagram_seeds, 1),
@@ -51,11 +51,18 @@ pub const DECODERS: [Decoder; 19] = [
         64,
     ),
     decoder(
+        "vrpn_server",
+        peripherals::vrpn_server,
+        peripherals::vrpn_seeds,
+        64,
+    ),
+    decoder(
         "space_mouse",
         peripherals::space_mouse,
         peripherals::space_mouse_seeds,
         1,
     ),
+    decoder("join_key", files::join_key, files::join_key_seeds, 1),
     decoder("key_file", files::key_file, files::key_seeds, 1),
     decoder("scene_toml", files::scene_toml, files::scene_seeds, 1024),
     decoder(

@@ -4,8 +4,8 @@ use std::net::{Ipv4Addr, SocketAddrV4};
 
 use taut_bridge::{CapState, Report};
 use taut_vrpn::{
-    Client, Event, Header, MAX_LISTED_SENDERS, PoseReport, SensorMapping, Stamp, VelocityReport,
-    description, message,
+    Client, Event, Header, MAX_LISTED_SENDERS, MAX_PENDING_BYTES, PoseReport, SensorMapping,
+    ServerSession, Stamp, VelocityReport, callback_address, description, message,
 };
 
 /// Most chunks that a stream comes in.
@@ -38,6 +38,24 @@ pub(crate) fn vrpn_client(bytes: &[u8]) {
         }
     }
     let _ = client.outgoing();
+}
+
+/// A client's stream to a VRPN server, cut as in [`vrpn_client`], and then as a datagram that asks to be dialled.
+pub(crate) fn vrpn_server(bytes: &[u8]) {
+    let Some((chunk, stream)) = bytes.split_first() else {
+        return;
+    };
+    let mut session = ServerSession::new(DEVICE, Ipv4Addr::LOCALHOST);
+    let size = usize::from(*chunk).max(stream.len() / MAX_CHUNKS + 1);
+    for chunk in stream.chunks(size) {
+        if session.receive(chunk, Stamp::default()).is_err() {
+            break;
+        }
+    }
+    assert!(session.pending().len() <= 2 * MAX_PENDING_BYTES);
+    let mut datagram = Vec::new();
+    let _ = session.take_datagram(&mut datagram);
+    let _ = callback_address(stream, Ipv4Addr::LOCALHOST);
 }
 
 /// Reports of at most 16 bytes, one after the other.

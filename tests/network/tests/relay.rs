@@ -186,7 +186,7 @@ fn what_passes_arrives_in_order_both_ways_and_the_counters_add_up() {
         ..Impairment::default()
     };
     let (server, client, relay) = between(Treatment::both_ways(plan));
-    let count = 500_u32;
+    let count = 200_u32; // fewer than a socket holds: nobody reads meanwhile
     for number in 0..count {
         client.send(&number.to_le_bytes()).expect("sent");
         std::thread::sleep(Duration::from_micros(100));
@@ -204,7 +204,7 @@ fn what_passes_arrives_in_order_both_ways_and_the_counters_add_up() {
         counts.lost > 0 && counts.doubled > 0 && counts.send_errors == 0,
         "{counts:?}"
     );
-    assert_eq!(relay.upstream().len(), 500);
+    assert_eq!(relay.upstream().len(), 200);
 
     // The relay's port towards the server is where answers go.
     client.send(&count.to_le_bytes()).expect("sent");

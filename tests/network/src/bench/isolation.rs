@@ -25,6 +25,8 @@ const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml"
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
 const STALL: Duration = Duration::from_millis(700);
+/// Silence that the program forgives a node, s.
+const NODE_TIMEOUT_S: f64 = 5.0;
 /// Time that a stalled client runs between two stalls: enough to answer for its connection.
 const BREATH: Duration = Duration::from_millis(60);
 /// Datagrams per second of each flood.
@@ -198,6 +200,8 @@ fn write_workbench(directory: &Path) -> Result<(PathBuf, PathBuf), BenchError> {
     for port in ["quic_port", "udp_port"] {
         network.insert(port.to_owned(), 0.into());
     }
+    // A stalled client is to stay: what it does to the loop is the question.
+    network.insert("node_timeout".to_owned(), NODE_TIMEOUT_S.into());
     let (config, key) = (
         directory.join("workbench.toml"),
         directory.join("cluster.key"),

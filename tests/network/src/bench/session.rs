@@ -35,6 +35,7 @@ pub enum BenchError {
 pub fn server_options(key: &ClusterKey) -> ServerOptions {
     ServerOptions {
         idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key.clone())
     }
 }

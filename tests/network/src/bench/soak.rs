@@ -3,15 +3,18 @@
 //! What must hold all the time: states are those that were sent, in order; nothing forged is accepted; whoever vanished is let go;
 //! memory does not grow with the number of clients that have come and gone.
 
-use std::net::UdpSocket;
+use std::net::{SocketAddr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use taut_link::{
-    ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerOptions, Transport, connect, serve,
+    Broadcaster, ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerOptions,
+    SessionClock, Transport, connect, serve,
 };
 
 use super::{BenchError, Ticker, resident_bytes, server_options, small_content, state};
-use crate::forge::{FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
+use crate::forge::{FORGERIES, Forger, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
 use crate::random::Random;
 use crate::relay::{Burst, Direction, Impairment, RelayCounts, Treatment, Waiting};
 
@@ -22,7 +25,7 @@ const EVENT_PERIOD: Duration = Duration::from_millis(100);
 /// Silence after which the server lets a client go.
 const IDLE: Duration = Duration::from_secs(2);
 /// Share of the run after which memory is taken as the level to compare with.
-const WARM_SHARE: f64 = 0.3;
+const WARM_SHARE: f64 = 0.5;
 
 /// What came of a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,6 +78,7 @@ pub fn run(duration: Duration, seed: u64) -> Result<Soak, BenchError> {
     let waiting = Waiting::bind()?;
     let options = ServerOptions {
         idle_timeout: IDLE,
+        node_timeout: IDLE,
         announced_udp_port: Some(waiting.address().port()),
         ..server_options(&key)
     };
@@ -93,39 +97,23 @@ pub fn run(duration: Duration, seed: u64) -> Result<Soak, BenchError> {
     };
     let (mut random, mut result) = (Random::new(seed), Soak::default());
     let mut members = Vec::<Member>::new();
-    let mut broadcaster = server.broadcaster();
-    let thief = UdpSocket::bind("127.0.0.1:0")?;
-    let mut forger = Forger::new(seed, 0, 1);
-    let payloads = payload_of_every_kind();
-    let genuine = crate::forge::OneWay::new(seed, 0, 1);
-    let seen = Seen {
-        taken: vec![genuine.genuine(&payloads[0])],
-        coming: genuine.genuine(&payloads[0]),
-        other_way: genuine.genuine(&payloads[0]),
+    let stop = Arc::new(AtomicBool::new(false));
+    let attack = Attack {
+        broadcaster: server.broadcaster(),
+        clock,
+        target: server.udp_addr(),
+        stop: stop.clone(),
     };
-    let mut ticker = Ticker::new(Duration::from_millis(1));
+    let attack = std::thread::Builder::new()
+        .name("states".to_owned())
+        .spawn(move || attack.run(seed))?;
     let (start, mut last_event, mut warm) = (Instant::now(), Instant::now(), false);
-    let mut buffer = [0; MAX_FORGED_BYTES];
     while start.elapsed() < duration {
-        ticker.wait();
-        result.states += 1;
-        let _ = broadcaster.send(&state(
-            result.states,
-            clock.now_ns(),
-            result.states % 2 == 0,
-        ));
-        let forgery = FORGERIES[random.below(FORGERIES.len())];
-        if forgery != Forgery::Replayed {
-            let payload = &payloads[random.below(payloads.len())];
-            let length = forger.forge(forgery, &seen, payload, &mut buffer);
-            result.forged += u64::from(thief.send_to(&buffer[..length], server.udp_addr()).is_ok());
-        }
-        if result.states % 8 == 0 {
-            members
-                .iter_mut()
-                .for_each(|member| take(member, &mut result));
-            members.retain(|member| member.link.is_closed().is_none());
-        }
+        std::thread::sleep(Duration::from_millis(5));
+        members
+            .iter_mut()
+            .for_each(|member| take(member, &mut result));
+        members.retain(|member| member.link.is_closed().is_none());
         while server.try_event().is_some() {}
         if !warm && start.elapsed().as_secs_f64() > WARM_SHARE * duration.as_secs_f64() {
             warm = true;
@@ -166,6 +154,10 @@ pub fn run(duration: Duration, seed: u64) -> Result<Soak, BenchError> {
         }
     }
     drop(members);
+    stop.store(true, Ordering::Relaxed);
+    let sent = attack.join();
+    let sent = sent.map_err(|_| BenchError::Missing("the sending thread panicked".to_owned()))?;
+    (result.states, result.forged) = sent?;
     let gone = super::wait_until("the last client to be let go", || {
         server.clients().is_empty()
     });
@@ -175,6 +167,42 @@ pub fn run(duration: Duration, seed: u64) -> Result<Soak, BenchError> {
     result.server = server.counters();
     result.relay = [Direction::Down, Direction::Up].map(|way| relay.counts(way));
     Ok(result)
+}
+
+/// Sends a state per millisecond, and beside each a forgery to the server's own port.
+struct Attack {
+    broadcaster: Broadcaster,
+    clock: SessionClock,
+    target: SocketAddr,
+    stop: Arc<AtomicBool>,
+}
+
+impl Attack {
+    /// Until told to stop; how many states and forgeries.
+    fn run(mut self, seed: u64) -> Result<(u64, u64), BenchError> {
+        let thief = UdpSocket::bind("127.0.0.1:0")?;
+        let (mut forger, mut random) = (Forger::new(seed, 0, 1), Random::new(seed + 1));
+        let payloads = payload_of_every_kind();
+        let genuine = crate::forge::OneWay::new(seed, 0, 1);
+        let seen = Seen {
+            taken: vec![genuine.genuine(&payloads[0])],
+            coming: genuine.genuine(&payloads[0]),
+            other_way: genuine.genuine(&payloads[0]),
+        };
+        let mut ticker = Ticker::new(Duration::from_millis(1));
+        let (mut states, mut forged, mut buffer) = (0, 0, [0; MAX_FORGED_BYTES]);
+        while !self.stop.load(Ordering::Relaxed) {
+            ticker.wait();
+            states += 1;
+            let state = state(states, self.clock.now_ns(), states % 2 == 0);
+            let _ = self.broadcaster.send(&state);
+            let forgery = FORGERIES[random.below(FORGERIES.len())];
+            let payload = &payloads[random.below(payloads.len())];
+            let length = forger.forge(forgery, &seen, payload, &mut buffer);
+            forged += u64::from(thief.send_to(&buffer[..length], self.target).is_ok());
+        }
+        Ok((states, forged))
+    }
 }
 
 /// A wireless network on a bad day.

@@ -325,7 +325,8 @@ fn soak_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     };
     let run = soak::run(Duration::from_secs_f64(seconds), 21)?;
     let server = &run.server;
-    let forged_counted = server.garbage + server.wrong_version + server.forged + server.replayed;
+    let forged_counted =
+        server.garbage + server.wrong_version + server.forged + server.replayed + server.flooded;
     let [before, after] = run.memory.map(|bytes| bytes as f64 / (1 << 20) as f64);
     Ok(vec![
         Row::invariant(
