@@ -15,12 +15,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nalgebra::Point3;
 use taut_link::proto::control::LogLevel;
+use taut_link::proto::membership::Liveness;
 use taut_link::proto::{CouplingOffer, SceneDescription};
-use taut_link::{ClientLink, ClientOptions, LinkError, Role, STOP_REASON, connect, read_key_file};
+use taut_link::{
+    ClientLink, ClientOptions, LinkError, LinkWatch, RejoinPolicy, Rejoiner, Role, read_join_key,
+};
 use taut_spidar::Geometry;
 
 use crate::arm_switch::{self, ArmSwitch};
@@ -42,9 +45,6 @@ use crate::trace_file::{TraceFileError, read_trace, via_points};
 
 /// How often the watching thread looks.
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
-
-/// Between attempts to reconnect: doubles from the first to the last.
-const BACK_OFF: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(1));
 
 /// States per second for a client that draws nothing: the fewest.
 const STATE_RATE_HZ: u32 = 1;
@@ -129,12 +129,28 @@ pub enum BridgeError {
         /// What the system says.
         cause: std::io::Error,
     },
+    /// The end was asked for before there was a server.
+    #[error("no server was there at {server} until the end")]
+    NeverJoined {
+        /// As given.
+        server: String,
+    },
+    /// The server came back with a scene in which the device stands elsewhere.
+    #[error(
+        "the server {server} came back with another scene ({scene}): the force is zero; start this bridge again, so that the device finds its place in it"
+    )]
+    OtherScene {
+        /// As given.
+        server: String,
+        /// Name of the scene.
+        scene: String,
+    },
     /// The device loop panicked.
     #[error("the device loop broke down; report this, with the lines above")]
     LoopBroke,
     /// The server went away while the bridge ran.
     #[error(
-        "the server {server} was lost ({reason}): the force is zero; start it again, or use --reconnect"
+        "the server {server} was lost ({reason}): the force is zero; start it again, or let this bridge wait longer (--give-up)"
     )]
     ServerLost {
         /// As given.
@@ -151,13 +167,15 @@ impl BridgeError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Thread { .. } | Self::LoopBroke | Self::ServerLost { .. } => 1,
+            Self::Thread { .. } | Self::LoopBroke | Self::NeverJoined { .. } => 1,
+            Self::ServerLost { .. } | Self::OtherScene { .. } => 1,
             _ => 2,
         }
     }
 }
 
-/// Runs a bridge until `--duration`, a signal, the end of its trace, or that of the server.
+/// Runs a bridge until `--duration`, a signal, the end of its trace, or until the server says that it stops. A server that is lost ends it
+/// only with `--give-up`: until then the force is zero and it tries to join again.
 ///
 /// # Errors
 /// [`BridgeError`]: bad input is found before anything is started.
@@ -213,21 +231,73 @@ fn run_loop(
         })?;
     runtime.spawn(stop_on_signal(Arc::clone(&stop)));
 
-    let first = runtime.block_on(connect(options.clone()))?;
+    let deadline = args
+        .duration
+        .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds));
+    let over = Over { stop, deadline };
+    let mut rejoiner = Rejoiner::new(options, policy(args));
+    let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
+        return Err(BridgeError::NeverJoined {
+            server: args.server.clone(),
+        });
+    };
+    let first = first?;
     let bridge = build(first.description())?;
     let mut run = Run {
         safety: *bridge.port().settings(),
         wishes,
         args,
-        options,
+        scene: first.description().clone(),
+        rejoiner,
         runtime,
-        stop,
-        deadline: args
-            .duration
-            .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds)),
+        over,
         totals: Totals::new(),
     };
     run.sessions(first, bridge)
+}
+
+/// What the bridge does without a server.
+fn policy(args: &BridgeArgs) -> RejoinPolicy {
+    RejoinPolicy {
+        stay: args.stay,
+        give_up: args
+            .give_up
+            .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
+        ..RejoinPolicy::default()
+    }
+}
+
+/// When the bridge is to end.
+struct Over {
+    stop: Arc<AtomicBool>,
+    /// On the monotonic clock.
+    deadline: Option<Duration>,
+}
+
+impl Over {
+    fn is_asked(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    fn is_now(&self) -> bool {
+        self.is_asked()
+            || self
+                .deadline
+                .is_some_and(|deadline| monotonic_now() >= deadline)
+    }
+
+    /// The outcome of `work`; `None` if the end comes first.
+    async fn or<T>(&self, work: impl Future<Output = T>) -> Option<T> {
+        let ended = async {
+            while !self.is_now() {
+                tokio::time::sleep(WATCH_PERIOD).await;
+            }
+        };
+        tokio::select! {
+            outcome = work => Some(outcome),
+            () = ended => None,
+        }
+    }
 }
 
 /// What moves the device: read and checked before anything is started.
@@ -276,6 +346,10 @@ fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
         let valid = (0.0..=1e9).contains(&seconds);
         in_range("--duration", seconds, valid, "0 to 1e9 s")?;
     }
+    if let Some(seconds) = args.give_up {
+        let valid = (0.0..=1e9).contains(&seconds);
+        in_range("--give-up", seconds, valid, "0 to 1e9 s")?;
+    }
 
     let motion = match (&args.device, &args.path) {
         (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
@@ -309,7 +383,7 @@ fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
         .clone()
         .or_else(|| std::env::var_os("TAUT_KEY_FILE").map(PathBuf::from))
         .ok_or(BridgeError::NoKey)?;
-    let key = read_key_file(&key_file)?;
+    let key = read_join_key(&key_file)?;
     let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
     options.transport = args.transport;
     options.rate_hz = STATE_RATE_HZ;
@@ -444,11 +518,11 @@ enum SessionEnd {
 /// A bridge at work.
 struct Run<'a> {
     args: &'a BridgeArgs,
-    options: ClientOptions,
+    /// Of the first session: the device was placed in it.
+    scene: SceneDescription,
+    rejoiner: Rejoiner,
     runtime: tokio::runtime::Runtime,
-    stop: Arc<AtomicBool>,
-    /// On the monotonic clock.
-    deadline: Option<Duration>,
+    over: Over,
     safety: SafetySettings,
     wishes: Arc<ArmSwitch>,
     totals: Totals,
@@ -472,54 +546,50 @@ impl Run<'_> {
                 SessionEnd::Duration => return Ok(self.report(&bridge, "done")),
                 SessionEnd::Signal => return Ok(self.report(&bridge, "stopped by a signal")),
                 SessionEnd::TraceEnded => return Ok(self.report(&bridge, "the trace ended")),
-                SessionEnd::ServerStopped if self.args.reconnect => {
+                SessionEnd::ServerStopped if self.args.stay => {
                     tracing::info!("the server stopped: the force is zero; waiting for it");
-                    link = self.reconnect();
+                    link = self.join_again("it stopped", &bridge)?;
                 }
                 SessionEnd::ServerStopped => {
                     tracing::info!("the server stopped: the force is zero");
                     return Ok(self.report(&bridge, "the server stopped"));
                 }
-                SessionEnd::ServerLost(reason) if self.args.reconnect => {
+                SessionEnd::ServerLost(reason) => {
                     tracing::warn!(
                         "the server was lost ({reason}): the force is zero; trying again"
                     );
-                    link = self.reconnect();
-                }
-                SessionEnd::ServerLost(reason) => {
-                    let report = self.report(&bridge, &format!("the server was lost: {reason}"));
-                    return Err(BridgeError::ServerLost {
-                        server: self.args.server.clone(),
-                        reason,
-                        report: Box::new(report),
-                    });
+                    link = self.join_again(&reason, &bridge)?;
                 }
             }
         }
     }
 
-    /// Tries until it succeeds; None when the time is up or a signal came.
-    fn reconnect(&self) -> Option<ClientLink> {
-        let mut pause = BACK_OFF.0;
-        while !self.is_over() {
-            match self.runtime.block_on(connect(self.options.clone())) {
-                Ok(link) => return Some(link),
-                Err(error) => tracing::warn!("{error}"),
+    /// Joins again; `None` if the end comes first.
+    fn join_again(
+        &mut self,
+        reason: &str,
+        bridge: &BridgeLoop,
+    ) -> Result<Option<ClientLink>, BridgeError> {
+        let joined = self.runtime.block_on(self.over.or(self.rejoiner.rejoin()));
+        match joined {
+            None => Ok(None),
+            Some(Err(_gave_up)) => {
+                let report = self.report(bridge, &format!("the server was lost: {reason}"));
+                Err(BridgeError::ServerLost {
+                    server: self.args.server.clone(),
+                    reason: reason.to_owned(),
+                    report: Box::new(report),
+                })
             }
-            let until = monotonic_now() + pause;
-            while monotonic_now() < until && !self.is_over() {
-                thread::sleep(WATCH_PERIOD);
+            Some(Ok(link)) if same_place(&self.scene, link.description()) => {
+                tracing::info!("joined again: the force comes back as after any silence");
+                Ok(Some(link))
             }
-            pause = (pause * 2).min(BACK_OFF.1);
+            Some(Ok(link)) => Err(BridgeError::OtherScene {
+                server: self.args.server.clone(),
+                scene: link.description().name.clone(),
+            }),
         }
-        None
-    }
-
-    fn is_over(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-            || self
-                .deadline
-                .is_some_and(|deadline| monotonic_now() >= deadline)
     }
 
     /// Runs the device loop on `link` until something ends it; gives the loop back.
@@ -553,10 +623,11 @@ impl Run<'_> {
                 cause,
             })?;
 
+        let mut watch = LinkWatch::new(Instant::now(), self.rejoiner.policy().dead_after);
         let mut end = None;
         while end.is_none() && !thread.is_finished() {
             thread::sleep(WATCH_PERIOD);
-            end = self.session_end(&link, &notices);
+            end = self.session_end(&link, &mut watch, &notices);
         }
         if matches!(
             end,
@@ -575,8 +646,8 @@ impl Run<'_> {
         self.totals.packets.packets_sent += seen.packets_sent;
         self.totals.packets.packets_received += seen.packets_received;
         self.totals.packets.lost += seen.lost;
-        if let Some(link) = Arc::into_inner(link) {
-            self.runtime.block_on(link.close());
+        if link.is_closed().is_none() {
+            self.runtime.block_on(link.leave());
         }
         let end = end.unwrap_or(match bridge.fault() {
             Some(DeviceFault::Ended) => SessionEnd::TraceEnded,
@@ -588,21 +659,25 @@ impl Run<'_> {
     fn session_end(
         &self,
         link: &ClientLink,
+        watch: &mut LinkWatch,
         notices: &Receiver<SafetyEvent>,
     ) -> Option<SessionEnd> {
         tell(link, notices);
-        if self.stop.load(Ordering::Relaxed) {
-            Some(SessionEnd::Signal)
-        } else if self.is_over() {
-            Some(SessionEnd::Duration)
-        } else {
-            link.is_closed().map(|reason| {
-                if reason.contains(STOP_REASON) {
-                    SessionEnd::ServerStopped
-                } else {
-                    SessionEnd::ServerLost(reason)
-                }
-            })
+        let silent = watch.look(link, Instant::now()) == Liveness::Dead;
+        if self.over.is_asked() {
+            return Some(SessionEnd::Signal);
+        }
+        if self.over.is_now() {
+            return Some(SessionEnd::Duration);
+        }
+        match link.ended() {
+            Some(taut_link::SessionEnd::ServerStopped) => Some(SessionEnd::ServerStopped),
+            Some(taut_link::SessionEnd::Lost(reason)) => Some(SessionEnd::ServerLost(reason)),
+            None if silent => {
+                link.abandon();
+                Some(SessionEnd::ServerLost("it fell silent".to_owned()))
+            }
+            None => None,
         }
     }
 
@@ -629,6 +704,7 @@ impl Run<'_> {
             packets_lost: totals.packets.lost,
             energy_injected_j: bridge.port().energy().injected(),
             energy_delivered_j: bridge.port().energy().delivered(),
+            max_force_age_ms: stats.max_force_age.as_secs_f64() * 1e3,
             max_force_n: stats.max_force,
             max_torque_n_m: stats.max_torque,
             safety_events: stats.safety_events,
@@ -637,6 +713,14 @@ impl Run<'_> {
             realtime: totals.realtime.iter().map(ToString::to_string).collect(),
         }
     }
+}
+
+/// Whether the device stands in both scenes alike.
+fn same_place(before: &SceneDescription, now: &SceneDescription) -> bool {
+    before.reference_point == now.reference_point
+        && before.scene_origin == now.scene_origin
+        && before.display_scale == now.display_scale
+        && before.god_object.pose == now.god_object.pose
 }
 
 /// Logs what the device loop noticed, here and at the server.

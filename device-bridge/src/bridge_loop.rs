@@ -50,6 +50,8 @@ pub(crate) struct TickStats {
     pub(crate) wrench_age: Durations,
     /// From reading the device to holding the wrench that answers it.
     pub(crate) round_trip: Durations,
+    /// Longest that a force outlived what it came from.
+    pub(crate) max_force_age: Duration,
     pub(crate) max_force: f64,
     pub(crate) max_torque: f64,
 }
@@ -63,6 +65,8 @@ pub(crate) struct BridgeLoop {
     /// When reading i was taken, at i modulo the length.
     sent: [Duration; REMEMBERED_TICKS],
     newest: Option<Arrival>,
+    /// When what the force comes from last arrived in this session: a command, or a constraint set.
+    heard: Option<Duration>,
     /// The coupling, where it is here and not at the server.
     edge: Option<Box<EdgeCoupler>>,
 }
@@ -81,12 +85,14 @@ impl BridgeLoop {
                 faulty_ticks: 0,
                 wrench_age: Durations::new(),
                 round_trip: Durations::new(),
+                max_force_age: Duration::ZERO,
                 max_force: 0.0,
                 max_torque: 0.0,
             },
             next_index: 1,
             sent: [Duration::ZERO; REMEMBERED_TICKS],
             newest: None,
+            heard: None,
             edge: None,
         }
     }
@@ -113,6 +119,7 @@ impl BridgeLoop {
     /// is computed here.
     pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
         self.newest = None;
+        self.heard = None;
         self.edge = edge.map(Box::new);
         self.port.restart();
     }
@@ -128,6 +135,7 @@ impl BridgeLoop {
         let Some(edge) = &mut self.edge else {
             return;
         };
+        self.heard = self.heard.max(Some(received));
         let new = edge.sequence() != Some(set.head.sequence);
         match edge.take(set, received) {
             Ok(()) if new => {
@@ -167,6 +175,12 @@ impl BridgeLoop {
         let wrench = &report.wrench;
         self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
         self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
+        if let Some(heard) = self.heard
+            && *wrench != Vector6::zeros()
+        {
+            let age = now.saturating_sub(heard);
+            self.stats.max_force_age = self.stats.max_force_age.max(age);
+        }
         self.stats.safety_events += report
             .events
             .iter()
@@ -207,6 +221,9 @@ impl BridgeLoop {
             return;
         };
         self.newest = Some(arrival);
+        if self.edge.is_none() {
+            self.heard = self.heard.max(Some(arrival.received));
+        }
         self.stats.wrenches += 1;
         if session_ns > 0 {
             let age = session_ns.saturating_sub(arrival.command.time_ns);

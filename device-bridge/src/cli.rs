@@ -21,7 +21,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "H:P")]
     pub server: String,
 
-    /// File of the cluster key; without it the one that the environment variable TAUT_KEY_FILE names.
+    /// File of the device's credential, or of the cluster key; without it the one that the environment variable TAUT_KEY_FILE names.
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
 
@@ -67,9 +67,13 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "WHERE", value_enum)]
     pub coupling: Option<CouplingChoice>,
 
-    /// When the server is lost, try again until --duration is over instead of ending.
-    #[arg(long)]
-    pub reconnect: bool,
+    /// Stay when the server stops, and wait for one that is not there yet: for a bridge that runs as a service.
+    #[arg(long, alias = "reconnect")]
+    pub stay: bool,
+
+    /// End when there was no server for this many seconds [default: a bridge whose link is lost tries for ever, without force].
+    #[arg(long, value_name = "S")]
+    pub give_up: Option<f64>,
 
     /// Real-time priority of the device loop, 1 to 99; 0 asks for no real time at all.
     #[arg(long, value_name = "P", default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=99))]

@@ -93,6 +93,9 @@ pub struct BridgeReport {
     pub energy_injected_j: f64,
     /// Net energy given to the hand, J.
     pub energy_delivered_j: f64,
+    /// Longest that a force outlived the arrival of the command or constraint set that it came from, ms: after a silence the force is gone
+    /// within 120 ms, as long as the loop itself is on time.
+    pub max_force_age_ms: f64,
     /// Largest force rendered, N.
     pub max_force_n: f64,
     /// Largest torque rendered, N m.
@@ -140,9 +143,10 @@ impl fmt::Display for BridgeReport {
         }
         writeln!(
             out,
-            "largest force {:.2} N, torque {:.3} N m; energy injected {:.2e} J; {} safety event(s), {} faulty tick(s)",
+            "largest force {:.2} N, torque {:.3} N m, at most {:.0} ms older than its command; energy injected {:.2e} J; {} safety event(s), {} faulty tick(s)",
             self.max_force_n,
             self.max_torque_n_m,
+            self.max_force_age_ms,
             self.energy_injected_j,
             self.safety_events,
             self.faulty_ticks,

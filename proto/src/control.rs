@@ -14,12 +14,16 @@
 //! Join: the client opens the control stream and sends `Hello`; the server answers `Welcome` and `Scene`, to a device bridge also `Coupling`, or
 //! `Refused`. There is no challenge:
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
+//! After that the server sends `Group` on the control stream at join and whenever the membership changes, to all but devices, and `Events` at join and whenever there are some.
 //! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
 
+pub use crate::role::Role;
+
 use crate::{
-    ClientStats, CouplingOffer, DecodeError, EncodeError, MeshHash, PROTOCOL_VERSION,
-    SceneDescription,
+    ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
+    PROTOCOL_VERSION, SceneDescription,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
+    proof::Grant,
     version::MAGIC,
 };
 
@@ -31,19 +35,6 @@ pub const PREFIX_BYTES: usize = 4;
 pub const MAX_FRAME_BYTES: usize = MAX_VALUE_BYTES;
 /// Most bytes of a node name.
 pub const MAX_NODE_NAME_BYTES: usize = 64;
-
-/// What a client is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Role {
-    /// Draws screens of the workbench.
-    Render,
-    /// The device bridge: the only one whose INPUT counts; one at a time.
-    Device,
-    /// Watches.
-    Observer,
-    /// Watches and operates: records traces.
-    Operator,
-}
 
 /// How states reach a client.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -58,7 +49,7 @@ pub enum Transport {
 /// Why a client was not let in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum RefusalCode {
-    /// The proof of the cluster key does not verify.
+    /// The proof of the key does not verify.
     WrongKey,
     /// Another protocol version.
     WrongVersion,
@@ -72,6 +63,12 @@ pub enum RefusalCode {
     BadHello,
     /// The server stops.
     Stopping,
+    /// There is a head tracker already.
+    TrackerTaken,
+    /// The credential is revoked.
+    Revoked,
+    /// The role is not let in.
+    RoleClosed,
 }
 
 /// First message of a client.
@@ -85,14 +82,16 @@ pub struct Hello {
     pub transport: Transport,
     /// Most states per second that it wants; 0 for all.
     pub rate_hz: u32,
-    /// [`crate::key::ClusterKey::client_proof`].
+    /// [`crate::proof::JoinSecret::client_proof`].
     pub proof: [u8; 32],
+    /// By what right it joins: which secret the proof is of.
+    pub grant: Grant,
 }
 
 /// The server lets the client in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Welcome {
-    /// [`crate::key::ClusterKey::server_proof`].
+    /// [`crate::proof::JoinSecret::server_proof`].
     pub proof: [u8; 32],
     /// Session number: the client's `sender` in datagram headers.
     pub session: u16,
@@ -184,6 +183,8 @@ pub enum ControlMessage {
     Log(LogEvent),
     Bye(Bye),
     Arm(ArmRequest),
+    Group(Group),
+    Events(EventsTold),
 }
 
 impl ControlMessage {
@@ -201,6 +202,8 @@ impl ControlMessage {
             ControlMessage::Log(_) => "Log",
             ControlMessage::Bye(_) => "Bye",
             ControlMessage::Arm(_) => "Arm",
+            ControlMessage::Group(_) => "Group",
+            ControlMessage::Events(_) => "Events",
         }
     }
 
@@ -273,19 +276,20 @@ macro_rules! wire_messages {
 wire_messages! {
     Refused(Refusal) = 0, Hello(Hello) = 1, Welcome(Welcome) = 2, Scene(SceneDescription) = 3, MeshRequest(MeshRequest) = 4,
     MeshHeader(MeshHeader) = 5, Stats(ClientStats) = 6, Log(LogEvent) = 7, Bye(Bye) = 8,
-    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10,
+    Coupling(CouplingOffer) = 9, Arm(ArmRequest) = 10, Group(Group) = 14,
+    Events(EventsTold) = 15,
 }
 
-wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3 });
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
-wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6 });
+wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
 wire_struct!(Hello {
     node,
     role,
     transport,
     rate_hz,
-    proof
+    proof,
+    grant
 });
 wire_struct!(Welcome {
     proof,

@@ -1,8 +1,11 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    ConstraintPart, DecodeError, EncodeError, HotState, InputSample, Kind, WrenchCommand,
+    ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample, Kind,
+    WrenchCommand,
+    barrier::{Arrive, Release},
     codec::{decode, encode_into},
+    events::EventAck,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -15,10 +18,16 @@ use crate::{
 pub enum Payload {
     /// State of the workbench.
     Hot(HotState),
+    /// "These events I have."
+    EventAck(EventAck),
     /// Asks for session time.
     TimeRequest(TimeRequest),
     /// Tells session time.
     TimeResponse(TimeResponse),
+    /// A frame is drawn.
+    Arrive(Arrive),
+    /// A frame is to be shown, the next to be drawn.
+    Release(Release),
     /// "Alive."
     Heartbeat,
     /// Device reading.
@@ -27,6 +36,8 @@ pub enum Payload {
     Wrench(WrenchCommand),
     /// Part of a constraint set.
     Constraints(ConstraintPart),
+    /// Where the viewer's head is.
+    Head(HeadSample),
 }
 
 impl Payload {
@@ -34,12 +45,16 @@ impl Payload {
     pub fn kind(&self) -> Kind {
         match self {
             Payload::Hot(_) => Kind::Hot,
+            Payload::EventAck(_) => Kind::EventAck,
             Payload::TimeRequest(_) => Kind::TimeRequest,
             Payload::TimeResponse(_) => Kind::TimeResponse,
+            Payload::Arrive(_) => Kind::Arrive,
+            Payload::Release(_) => Kind::Release,
             Payload::Heartbeat => Kind::Heartbeat,
             Payload::Input(_) => Kind::Input,
             Payload::Wrench(_) => Kind::Wrench,
             Payload::Constraints(_) => Kind::Constraints,
+            Payload::Head(_) => Kind::Head,
         }
     }
 
@@ -47,12 +62,16 @@ impl Payload {
     pub fn encode_into(&self, buffer: &mut [u8]) -> Result<usize, EncodeError> {
         match self {
             Payload::Hot(value) => encode_into(value, buffer),
+            Payload::EventAck(value) => encode_into(value, buffer),
             Payload::TimeRequest(value) => encode_into(value, buffer),
             Payload::TimeResponse(value) => encode_into(value, buffer),
+            Payload::Arrive(value) => encode_into(value, buffer),
+            Payload::Release(value) => encode_into(value, buffer),
             Payload::Heartbeat => Ok(0),
             Payload::Input(value) => encode_into(value, buffer),
             Payload::Wrench(value) => encode_into(value, buffer),
             Payload::Constraints(value) => encode_into(value, buffer),
+            Payload::Head(value) => encode_into(value, buffer),
         }
     }
 
@@ -60,13 +79,17 @@ impl Payload {
     pub fn decode(kind: Kind, bytes: &[u8]) -> Result<Payload, DecodeError> {
         Ok(match kind {
             Kind::Hot => Payload::Hot(decode(bytes)?),
+            Kind::EventAck => Payload::EventAck(decode(bytes)?),
             Kind::TimeRequest => Payload::TimeRequest(decode(bytes)?),
             Kind::TimeResponse => Payload::TimeResponse(decode(bytes)?),
+            Kind::Arrive => Payload::Arrive(decode(bytes)?),
+            Kind::Release => Payload::Release(decode(bytes)?),
             Kind::Heartbeat if bytes.is_empty() => Payload::Heartbeat,
             Kind::Heartbeat => return Err(DecodeError::TrailingBytes { left: bytes.len() }),
             Kind::Input => Payload::Input(decode(bytes)?),
             Kind::Wrench => Payload::Wrench(decode(bytes)?),
             Kind::Constraints => Payload::Constraints(decode(bytes)?),
+            Kind::Head => Payload::Head(decode(bytes)?),
         })
     }
 }

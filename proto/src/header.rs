@@ -7,7 +7,7 @@
 //! | 3      | kind     | 1     | [`Kind`]                                                 |
 //! | 4      | epoch    | 4     | incarnation of the server                                |
 //! | 8      | sender   | 2     | session number of the client; 0 is the server            |
-//! | 10     | flags    | 2     | reserved for the run, see [`Header::flags`]              |
+//! | 10     | flags    | 2     | under which key, see [`Header::flags`]                   |
 //! | 12     | sequence | 8     | per session and direction, strictly increasing; the nonce |
 //! | 20     | length   | 2     | payload bytes, without the tag                           |
 //! | 22     | reserved | 2     | 0                                                        |
@@ -23,15 +23,21 @@ pub const MAX_DATAGRAM_BYTES: usize = 1150;
 /// Most bytes of a payload.
 pub const MAX_PAYLOAD_BYTES: usize = MAX_DATAGRAM_BYTES - HEADER_BYTES - TAG_BYTES;
 
-/// What a datagram carries. Numbers 1, 2, 5 and 6 are kept for bulk state, events and the swap barrier.
+/// What a datagram carries. Number 1 is kept for bulk state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::HotState`], server to client.
     Hot,
+    /// [`crate::events::EventAck`], client to server.
+    EventAck,
     /// [`crate::time::TimeRequest`], client to server.
     TimeRequest,
     /// [`crate::time::TimeResponse`], server to client.
     TimeResponse,
+    /// [`crate::barrier::Arrive`], render node to the master of frames.
+    Arrive,
+    /// [`crate::barrier::Release`], master of frames to render nodes.
+    Release,
     /// No payload: opens the path and says "alive".
     Heartbeat,
     /// [`crate::InputSample`], device bridge to server.
@@ -40,30 +46,40 @@ pub enum Kind {
     Wrench,
     /// [`crate::ConstraintPart`], server to device bridge.
     Constraints,
+    /// [`crate::HeadSample`], head tracker to server.
+    Head,
 }
 
 impl Kind {
     fn code(self) -> u8 {
         match self {
             Kind::Hot => 0,
+            Kind::EventAck => 2,
             Kind::TimeRequest => 3,
             Kind::TimeResponse => 4,
+            Kind::Arrive => 5,
+            Kind::Release => 6,
             Kind::Heartbeat => 7,
             Kind::Input => 8,
             Kind::Wrench => 9,
             Kind::Constraints => 10,
+            Kind::Head => 11,
         }
     }
 
     fn from_code(tag: u8) -> Result<Kind, DecodeError> {
         match tag {
             0 => Ok(Kind::Hot),
+            2 => Ok(Kind::EventAck),
             3 => Ok(Kind::TimeRequest),
             4 => Ok(Kind::TimeResponse),
+            5 => Ok(Kind::Arrive),
+            6 => Ok(Kind::Release),
             7 => Ok(Kind::Heartbeat),
             8 => Ok(Kind::Input),
             9 => Ok(Kind::Wrench),
             10 => Ok(Kind::Constraints),
+            11 => Ok(Kind::Head),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,
@@ -81,7 +97,7 @@ pub struct Header {
     pub epoch: u32,
     /// Session number of the client; 0 is the server.
     pub sender: u16,
-    /// Reserved, 0: run state travels in the payload, where it is typed.
+    /// 0 under a session's own keys; [`crate::group::FLAG_GROUP`] and the low bits of the group's generation under a group key.
     pub flags: u16,
     /// Per session and direction, strictly increasing: nonce and replay index.
     pub sequence: u64,

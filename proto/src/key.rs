@@ -1,18 +1,37 @@
-//! The cluster key: one secret per workbench, and the proofs that a peer holds it.
+//! The cluster key: the master secret of a workbench, from which everything else is derived.
 //!
-//! A proof is HMAC-SHA-256(key, label ‖ exporter ‖ role ‖ node), where the exporter is 32 bytes of keying material of the TLS connection
-//! (RFC 9266, channel binding): it cannot be used on any other connection, so a man in the middle gains nothing by passing it on.
+//! | derived                        | by HKDF-SHA-256 over        | held by                              |
+//! |--------------------------------|-----------------------------|--------------------------------------|
+//! | the server's identity (Ed25519)| label                       | the server                           |
+//! | secret of a credential         | label, role, issue, name    | one node, or all nodes of one role   |
+//! | secret of the master           | label                       | whoever holds the key itself         |
+//!
+//! Nothing derived leads back to the key or across to another secret (RFC 5869), so that the server needs no list of credentials, and a
+//! credential that is stolen opens nothing but its own role and name. Files: [`crate::credential`]; proofs: [`crate::proof`].
 
-use crate::Role;
-use ring::{hmac, rand::SecureRandom};
+use crate::{
+    Role,
+    credential::{Credential, Holder},
+    pin::ServerPin,
+    proof::{Grant, JoinSecret},
+    text::{hex, parse_hex},
+};
+use ring::{
+    hkdf::{HKDF_SHA256, KeyType, Prk, Salt},
+    rand::SecureRandom,
+    signature::{Ed25519KeyPair, KeyPair},
+};
 use std::fmt;
 
-/// Bytes of keying material that a proof is bound to.
-pub const EXPORTER_BYTES: usize = 32;
+pub use crate::proof::EXPORTER_BYTES;
 
 const KEY_BYTES: usize = 32;
-const CLIENT_LABEL: &[u8] = b"taut client proof 1";
-const SERVER_LABEL: &[u8] = b"taut server proof 1";
+/// Domain of all derivations; the number goes up with their layout.
+const SALT: &[u8] = b"taut cluster key 1";
+const IDENTITY_LABEL: &[u8] = b"server identity";
+const MASTER_LABEL: &[u8] = b"join master";
+const NODE_LABEL: &[u8] = b"join node";
+const ANY_NODE_LABEL: &[u8] = b"join any node";
 
 /// Why a text is no key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,7 +49,7 @@ pub enum KeyError {
     NoRandomness,
 }
 
-/// The secret that all members of a workbench share.
+/// The master secret of a workbench: its holder may be anything, the server included.
 #[derive(Clone, PartialEq, Eq)]
 pub struct ClusterKey {
     bytes: [u8; KEY_BYTES],
@@ -54,106 +73,67 @@ impl ClusterKey {
 
     /// Reads 64 hexadecimal digits; blanks around them are ignored.
     pub fn parse(text: &str) -> Result<ClusterKey, KeyError> {
-        let text = text.trim();
-        let found = text.chars().take_while(char::is_ascii_hexdigit).count();
-        if found != 2 * KEY_BYTES || text.len() != 2 * KEY_BYTES {
-            return Err(KeyError::Malformed { found });
-        }
-        let (pairs, _) = text.as_bytes().as_chunks::<2>();
-        let mut bytes = [0; KEY_BYTES];
-        for (byte, [high, low]) in bytes.iter_mut().zip(pairs) {
-            *byte = hex_digit(*high) << 4 | hex_digit(*low);
-        }
+        let bytes = parse_hex(text.trim()).map_err(|found| KeyError::Malformed { found })?;
         Ok(ClusterKey { bytes })
     }
 
     /// The 64 digits, for the key file. Show it to nobody else.
     pub fn to_hex(&self) -> String {
-        self.bytes
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect()
+        hex(&self.bytes)
     }
 
-    /// What a client shows to prove the key.
-    pub fn client_proof(
-        &self,
-        exporter: &[u8; EXPORTER_BYTES],
-        role: Role,
-        node: &str,
-    ) -> [u8; 32] {
-        self.proof(&message(CLIENT_LABEL, exporter, role, node))
+    /// The seed of the server's Ed25519 identity. For the server alone.
+    pub fn identity_seed(&self) -> [u8; 32] {
+        self.derive(&[IDENTITY_LABEL])
     }
 
-    /// What the server shows to prove the key.
-    pub fn server_proof(
-        &self,
-        exporter: &[u8; EXPORTER_BYTES],
-        role: Role,
-        node: &str,
-    ) -> [u8; 32] {
-        self.proof(&message(SERVER_LABEL, exporter, role, node))
+    /// What clients know the server by: the fingerprint of its public key.
+    pub fn server_pin(&self) -> ServerPin {
+        let Ok(pair) = Ed25519KeyPair::from_seed_unchecked(&self.identity_seed()) else {
+            unreachable!("an Ed25519 seed has 32 bytes");
+        };
+        ServerPin::of_ed25519(pair.public_key().as_ref())
     }
 
-    /// Whether `proof` is a client's; constant time.
-    pub fn verify_client(
-        &self,
-        proof: &[u8; 32],
-        exporter: &[u8; EXPORTER_BYTES],
-        role: Role,
-        node: &str,
-    ) -> bool {
-        self.verify(proof, &message(CLIENT_LABEL, exporter, role, node))
+    /// A credential for one role. The same arguments give the same credential, so that it can be written again.
+    pub fn credential(&self, role: Role, holder: Holder, issue: u16) -> Credential {
+        let (grant, node) = match &holder {
+            Holder::Node(node) => (Grant::Node { issue }, node.as_str()),
+            Holder::AnyNode => (Grant::AnyNode { issue }, ""),
+        };
+        let secret = self.join_secret(role, node, grant);
+        Credential::new(role, holder, issue, self.server_pin(), secret)
     }
 
-    /// Whether `proof` is the server's; constant time.
-    pub fn verify_server(
-        &self,
-        proof: &[u8; 32],
-        exporter: &[u8; EXPORTER_BYTES],
-        role: Role,
-        node: &str,
-    ) -> bool {
-        self.verify(proof, &message(SERVER_LABEL, exporter, role, node))
+    /// The secret that a client of this role, name and grant must have.
+    pub fn join_secret(&self, role: Role, node: &str, grant: Grant) -> JoinSecret {
+        let role = [role.number()];
+        JoinSecret::new(match grant {
+            Grant::Master => self.derive(&[MASTER_LABEL]),
+            Grant::Node { issue } => {
+                self.derive(&[NODE_LABEL, &role, &issue.to_le_bytes(), node.as_bytes()])
+            }
+            Grant::AnyNode { issue } => self.derive(&[ANY_NODE_LABEL, &role, &issue.to_le_bytes()]),
+        })
     }
 
-    fn proof(&self, message: &[u8]) -> [u8; 32] {
-        let mut proof = [0; 32];
-        proof.copy_from_slice(hmac::sign(&self.hmac_key(), message).as_ref());
-        proof
-    }
-
-    fn verify(&self, proof: &[u8; 32], message: &[u8]) -> bool {
-        hmac::verify(&self.hmac_key(), message, proof).is_ok()
-    }
-
-    fn hmac_key(&self) -> hmac::Key {
-        hmac::Key::new(hmac::HMAC_SHA256, &self.bytes)
+    /// The labels have no common beginning, role and issue have fixed lengths, the name comes last: no two inputs give one message.
+    fn derive(&self, info: &[&[u8]]) -> [u8; 32] {
+        let prk: Prk = Salt::new(HKDF_SHA256, SALT).extract(&self.bytes);
+        let mut bytes = [0; 32];
+        let filled = prk
+            .expand(info, Bytes32)
+            .and_then(|okm| okm.fill(&mut bytes));
+        debug_assert!(filled.is_ok(), "32 bytes are within the limits of HKDF");
+        bytes
     }
 }
 
-/// Label, exporter and role have fixed lengths, the node name comes last: no two inputs give one message.
-fn message(label: &[u8], exporter: &[u8; EXPORTER_BYTES], role: Role, node: &str) -> Vec<u8> {
-    let role = match role {
-        Role::Render => 0,
-        Role::Device => 1,
-        Role::Observer => 2,
-        Role::Operator => 3,
-    };
-    [label, exporter, &[role], node.as_bytes()].concat()
-}
+/// Length of what is derived.
+struct Bytes32;
 
-/// Value of a digit that is known to be hexadecimal.
-fn hex_digit(digit: u8) -> u8 {
-    match digit {
-        b'0'..=b'9' => digit - b'0',
-        b'a'..=b'f' => digit - b'a' + 10,
-        _ => {
-            digit
-                .to_ascii_lowercase()
-                .wrapping_sub(b'a')
-                .wrapping_add(10)
-                & 0x0f
-        }
+impl KeyType for Bytes32 {
+    fn len(&self) -> usize {
+        32
     }
 }

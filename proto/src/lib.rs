@@ -3,31 +3,47 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`],
+//!   [`constraints::ConstraintPart`], [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
+//!
+//! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
 //!
 //! Every byte goes through [`codec`]: little-endian, fixed size integers, explicit limits, no number that is not finite.
 //! Poses are of a body's own frame; forces and torques are at the reference point, world axes; SI units.
 #![forbid(unsafe_code)]
 
+pub mod barrier;
 pub mod clock;
 pub mod codec;
 pub mod constraint_parts;
 pub mod constraints;
 pub mod control;
 pub mod coupling;
+pub mod credential;
 pub mod datagram;
+mod derive;
+pub mod events;
+pub mod group;
+pub mod head;
 pub mod header;
 pub mod input;
 pub mod key;
+pub mod limits;
+pub mod membership;
 pub mod mesh_blob;
 mod octahedral;
+pub mod pin;
 pub mod pose;
+pub mod proof;
 pub mod replay;
+pub mod revocation;
+pub mod role;
 pub mod scene;
 pub mod seal;
 pub mod state;
 pub mod stats;
+mod text;
 pub mod time;
 pub mod version;
 pub mod wrench;
@@ -37,14 +53,21 @@ pub use clock::{ClockFilter, SessionTime};
 pub use codec::{DecodeError, EncodeError};
 pub use constraint_parts::{Assembler, Division, PartTaken};
 pub use constraints::{ConstraintPart, ConstraintSet};
-pub use control::{ControlMessage, Refusal, Role, Transport};
+pub use control::{ControlMessage, Refusal, Transport};
 pub use coupling::{CouplingOffer, EdgeCoupling};
+pub use credential::{Credential, Holder, JoinKey};
 pub use datagram::Payload;
+pub use events::{EventInbox, EventOutbox, EventsTold};
+pub use group::{Group, GroupMember, GroupOpener, GroupSealer};
+pub use head::HeadSample;
 pub use header::{Header, Kind};
 pub use input::InputSample;
 pub use key::ClusterKey;
 pub use mesh_blob::{MeshBlob, MeshHash};
+pub use pin::ServerPin;
 pub use pose::{PoseF32, PoseF64};
+pub use revocation::{JoinPolicy, Revoked};
+pub use role::{Act, Role};
 pub use scene::SceneDescription;
 pub use state::HotState;
 pub use stats::ClientStats;

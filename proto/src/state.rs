@@ -26,7 +26,7 @@ pub const MAX_TOOLS: usize = 2;
 pub const MAX_BODIES: usize = 12;
 /// Most contacts in one state: for pictures; the force uses all of them in the server.
 pub const MAX_CONTACTS: usize = 8;
-/// Most recent events repeated in one state.
+/// Most events repeated in one state.
 pub const MAX_EVENTS: usize = 8;
 
 /// State of the workbench, published as one tuple so that all screens of a frame draw the same numbers.
@@ -50,7 +50,7 @@ pub struct HotState {
     pub bodies: ArrayVec<BodyState, MAX_BODIES>,
     /// Contacts, strongest first.
     pub contacts: ArrayVec<ContactState, MAX_CONTACTS>,
-    /// The most recent events, repeated so that a lost datagram loses none.
+    /// The latest events, repeated for a moment; see [`crate::events`] for how none is lost.
     pub events: ArrayVec<EventRecord, MAX_EVENTS>,
 }
 

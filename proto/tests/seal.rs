@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use taut_proto::{
     ArrayVec, DecodeError, HotState, InputSample, Kind, Payload, PoseF32, PoseF64,
+    barrier::{Release, ReleaseHead},
     header::{HEADER_BYTES, MAX_DATAGRAM_BYTES},
     seal::{DatagramBuffer, OpenError, Opener, Sealer},
     state::{
@@ -213,5 +214,25 @@ proptest! {
         let datagram = [&header.to_bytes()[..], &body].concat();
         let (_, mut opener) = pair();
         prop_assert_eq!(opener.open(&datagram), Err(OpenError::Forged));
+    }
+}
+
+#[test]
+fn the_fullest_release_fits_and_its_state_has_the_fingerprint_that_the_state_had() {
+    let (sealer, mut opener) = pair();
+    for members in [0_u16, 1, 32] {
+        let release = Release {
+            head: ReleaseHead {
+                members: (1..=members).collect(),
+                ..ReleaseHead::default()
+            },
+            state: fullest(),
+        };
+        let datagram = sealed(&sealer, &Payload::Release(release.clone()));
+        let Ok(opened) = opener.open(&datagram) else {
+            panic!("just sealed");
+        };
+        assert_eq!(opened.payload, Payload::Release(release));
+        assert_eq!(Ok(opened.state_hash), fullest().hash());
     }
 }

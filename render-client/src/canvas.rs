@@ -30,7 +30,23 @@ struct Sheet {
 impl Canvas {
     /// Makes ready to draw all screens of `stage`.
     pub fn new(gpu: Gpu, stage: Stage) -> Self {
-        let renderer = Renderer::new(&gpu, &stage, OffScreen::FORMAT);
+        let (renderer, sheets) = Self::make(&gpu, &stage);
+        Self {
+            gpu,
+            stage,
+            renderer,
+            sheets,
+        }
+    }
+
+    /// Draws another stage from now on.
+    pub fn restage(&mut self, stage: Stage) {
+        (self.renderer, self.sheets) = Self::make(&self.gpu, &stage);
+        self.stage = stage;
+    }
+
+    fn make(gpu: &Gpu, stage: &Stage) -> (Renderer, Vec<Sheet>) {
+        let renderer = Renderer::new(gpu, stage, OffScreen::FORMAT);
         let mut sheets = Vec::new();
         for (index, screen) in stage.screens.iter().enumerate() {
             let most = gpu.device.limits().max_texture_dimension_2d;
@@ -39,16 +55,11 @@ impl Canvas {
             sheets.extend(screen.stereo.pictures().iter().map(|picture| Sheet {
                 screen: index,
                 name: format!("{}{}", screen.name, picture.suffix),
-                target: renderer.picture(&gpu, picture, size),
-                image: OffScreen::new(&gpu, size),
+                target: renderer.picture(gpu, picture, size),
+                image: OffScreen::new(gpu, size),
             }));
         }
-        Self {
-            gpu,
-            stage,
-            renderer,
-            sheets,
-        }
+        (renderer, sheets)
     }
 
     /// The stage that is drawn.

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use taut_link::{ClientOptions, Role, Transport, read_key_file};
+use taut_link::{ClientOptions, Role, Transport, read_join_key};
 
 use crate::canvas::Canvas;
 use crate::description::Overrides;
 use crate::error::RenderError;
 use crate::hand::Hand;
+use crate::membership::MembershipArgs;
 use crate::renderer::Gpu;
 use crate::session::Session;
 use crate::stage::Show;
-use crate::statistics::{RenderReport, Statistics};
+use crate::statistics::{Ended, RenderReport, Statistics};
 use crate::stereo::Stereo;
 use crate::timeline::Timeline;
 use crate::{headless, window};
@@ -40,7 +41,7 @@ pub struct RenderArgs {
     /// Name of this node in the server's workbench file.
     #[arg(long, value_name = "NAME")]
     pub node: String,
-    /// File with the cluster key, copied from the server.
+    /// File with this node's credential, or with the cluster key, copied from the server.
     #[arg(long, value_name = "FILE", env = "TAUT_KEY_FILE")]
     pub key: PathBuf,
     /// How states travel to this node.
@@ -83,6 +84,9 @@ pub struct RenderArgs {
     /// Draw the world of this many milliseconds ago, so that late states can be interpolated.
     #[arg(long, value_name = "MS", default_value_t = 2.0)]
     pub delay_ms: f64,
+    /// What to do when the server goes.
+    #[command(flatten)]
+    pub membership: MembershipArgs,
 }
 
 /// How states travel.
@@ -92,6 +96,15 @@ pub enum TransportArg {
     Udp,
     /// QUIC datagrams: one port, through firewalls.
     Quic,
+}
+
+impl TransportArg {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Udp => "udp",
+            Self::Quic => "quic",
+        }
+    }
 }
 
 /// What can be drawn besides god-object and obstacles.
@@ -139,6 +152,8 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         .transpose()?;
     let duration = duration.map(Duration::from_secs_f64);
 
+    let policy = args.membership.policy()?;
+
     // Without an adapter there is no use in joining the server.
     let gpu = if args.headless {
         Some(Gpu::open()?)
@@ -152,19 +167,21 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     };
     let fps = fps.unwrap_or(default_fps);
     let frame_time = Duration::from_secs_f64(1.0 / fps);
-    let key = read_key_file(&args.key)?;
+    let key = read_join_key(&args.key)?;
     let mut options =
         ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
     options.transport = args.transport.into();
-    let mut session = Session::join(options)?;
+    options.mesh_cache = args.membership.cache()?;
     let overrides = Overrides {
         width: args.width,
         height: args.height,
         stereo: args.stereo.map(Stereo::from),
         headless: args.headless,
+        show: args.show.as_deref().map(listed),
     };
-    let (stage, server_shows) = session.stage(&overrides)?;
-    let show = args.show.as_deref().map_or(server_shows, listed);
+    let Some((mut session, stage, show)) = Session::join(options, policy, overrides)? else {
+        return Ok(RenderReport::of_nothing(&args));
+    };
 
     let mut timeline = Timeline::new(delay_ns);
     let mut statistics = Statistics::new();
@@ -218,16 +235,14 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         session.report(stats);
     }
     let (packets_lost, packets_received) = session.packets();
+    let (sessions, meshes) = (session.sessions(), session.meshes());
+    let to_first_frame_ms = statistics.first_frame_after(session.began());
     session.leave();
     let (ended, adapter) = ended?;
     let (pose_age_ms, drawn_age_ms) = statistics.ages();
     Ok(RenderReport {
         node: args.node,
-        transport: match args.transport {
-            TransportArg::Udp => "udp",
-            TransportArg::Quic => "quic",
-        }
-        .to_owned(),
+        transport: args.transport.name().to_owned(),
         adapter,
         frames: statistics.frames,
         stale_frames: statistics.stale_frames,
@@ -236,12 +251,44 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         drawn_age_ms,
         packets_lost,
         packets_received,
+        sessions,
+        longest_gap_ms: statistics.longest_gap_ms(),
+        to_first_frame_ms,
+        meshes,
         ended,
     })
 }
 
+impl RenderReport {
+    /// Of a node that was asked to end before there was a server.
+    fn of_nothing(args: &RenderArgs) -> Self {
+        Self {
+            node: args.node.clone(),
+            transport: args.transport.name().to_owned(),
+            adapter: String::new(),
+            frames: 0,
+            stale_frames: 0,
+            fps: 0.0,
+            pose_age_ms: Default::default(),
+            drawn_age_ms: Default::default(),
+            packets_lost: 0,
+            packets_received: 0,
+            sessions: 0,
+            longest_gap_ms: 0.0,
+            to_first_frame_ms: None,
+            meshes: Default::default(),
+            ended: Ended::Interrupted,
+        }
+    }
+}
+
 /// The value if it is a number in the range.
-fn within(option: &'static str, value: f64, low: f64, high: f64) -> Result<f64, RenderError> {
+pub(crate) fn within(
+    option: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+) -> Result<f64, RenderError> {
     let fits = low <= value && value <= high; // false for NaN
     if fits {
         return Ok(value);

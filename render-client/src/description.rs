@@ -25,6 +25,7 @@ pub(crate) struct Overrides {
     pub(crate) height: Option<u32>,
     pub(crate) stereo: Option<Stereo>,
     pub(crate) headless: bool,
+    pub(crate) show: Option<Show>,
 }
 
 /// The description of the node named `node`.

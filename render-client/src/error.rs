@@ -42,12 +42,20 @@ pub enum RenderError {
         /// What the operating system said.
         reason: String,
     },
+    /// The folder for meshes cannot be used.
+    #[error("meshes cannot be kept in {}: {reason}; name a folder that can be written with --mesh-cache, or use --no-mesh-cache", path.display())]
+    MeshCache {
+        /// The folder.
+        path: PathBuf,
+        /// What the operating system said.
+        reason: String,
+    },
     /// The server cannot be reached, or refuses this node.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The server was there and is not any more.
+    /// The server was there and is not any more, for longer than the node was to wait.
     #[error(
-        "the server {server} was lost: {reason}; see whether it still runs, then start this node again"
+        "the server {server} was lost: {reason}; see whether it still runs, then start this node again (or let it wait longer: --give-up)"
     )]
     ServerLost {
         /// Its address.
@@ -118,7 +126,7 @@ impl RenderError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Option { .. } | Self::UnknownNode { .. } | Self::UnknownScreen { .. } => 2,
-            Self::BadScreen { .. } | Self::BadScene { .. } => 2,
+            Self::BadScreen { .. } | Self::BadScene { .. } | Self::MeshCache { .. } => 2,
             // A wrong key, a name that does not resolve, a server that does not answer.
             Self::Link(error) => match error {
                 LinkError::Closed { .. } | LinkError::System { .. } => 1,

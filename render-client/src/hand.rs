@@ -36,6 +36,8 @@ impl Hand {
         bridge.key = Some(args.key.clone());
         bridge.transport = args.transport.into();
         bridge.priority = 0; // the picture shares this process
+        bridge.stay = args.membership.stay;
+        bridge.give_up = args.membership.give_up;
         let hold = Hold::new(stage);
         let first = target(hold.target(), 0);
         let (targets, output) = triple_buffer::TripleBuffer::new(&first).split();

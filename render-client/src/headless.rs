@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use crate::canvas::Canvas;
 use crate::error::RenderError;
-use crate::session::{Ending, Session};
+use crate::node_status::LinkHealth;
+use crate::session::{Session, Turn};
 use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
 use crate::timeline::Timeline;
@@ -41,15 +42,24 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut next_frame = start;
     let mut last_drawn = None;
+    let mut show = plan.show;
     loop {
         if session.interrupted() {
             return Ok(Ended::Interrupted);
         }
-        match session.ending() {
-            Some(Ending::Told) => return Ok(Ended::ServerStopped),
-            Some(Ending::Lost(reason)) => return Err(session.lost(reason)),
-            None => {}
+        match session.turn(timeline) {
+            Turn::Same => {}
+            Turn::Renewed(other) => {
+                if let Some(scene) = other {
+                    canvas.restage(scene.0);
+                    show = scene.1;
+                }
+                last_drawn = None;
+            }
+            Turn::Told => return Ok(Ended::ServerStopped),
+            Turn::Lost(reason) => return Err(session.lost(reason)),
         }
+        let link = session.health();
         if plan
             .duration
             .is_some_and(|duration| start.elapsed() >= duration)
@@ -65,10 +75,10 @@ pub(crate) fn run(
         let now_ns = session.now_ns().filter(|_| due);
         let latched = now_ns.and_then(|now_ns| Some((now_ns, timeline.latch(now_ns)?)));
         if let Some((taken_ns, latched)) = latched {
-            let drawn = Some((latched.state.time_ns, latched.stale));
+            let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
             if drawn != last_drawn {
                 last_drawn = drawn;
-                canvas.draw(&latched, plan.show, plan.out.is_some())?;
+                canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
                 write_pictures(canvas, plan, statistics.frames)?;
@@ -90,6 +100,14 @@ pub(crate) fn run(
             left
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
+    }
+}
+
+/// What the screen says of the link, to the second: a picture is drawn again when that changes.
+pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
+    match link {
+        LinkHealth::Connected | LinkHealth::Rejoining => None,
+        LinkHealth::Lost { since_s } => Some(since_s as u64),
     }
 }
 

@@ -14,7 +14,9 @@ pub mod error;
 mod hand;
 mod headless;
 pub mod hold;
+mod membership;
 mod mouse;
+pub mod node_status;
 pub mod normals;
 pub mod renderer;
 mod session;
@@ -27,4 +29,5 @@ mod window;
 
 pub use cli::{RenderArgs, run};
 pub use error::RenderError;
+pub use membership::MembershipArgs;
 pub use statistics::RenderReport;

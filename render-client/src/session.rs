@@ -1,41 +1,74 @@
-//! This node's session with the server: joins, fetches the stage, takes states, reports.
+//! This node's session with the server: joins, fetches the stage, takes states, reports; and joins again when the server was gone.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
-use taut_link::{ClientLink, ClientOptions, ReceivedState, STOP_REASON, connect};
+use taut_link::{
+    ClientLink, ClientOptions, MeshCounters, ReceivedState, RejoinPolicy, Renewal, SessionEnd,
+    SupervisedLink,
+};
 use taut_proto::state::HEAD_TRACKED;
-use taut_proto::{ClientStats, Role};
+use taut_proto::{ClientStats, Role, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
+use crate::node_status::LinkHealth;
 use crate::stage::{Show, Stage};
 use crate::timeline::{Contact, Head, State, Timeline};
+
+/// Distance between two looks for a signal while joining.
+const SIGNAL_LOOK: Duration = Duration::from_millis(20);
 
 /// An open session. The link runs on a thread of its own, so that drawing never delays it.
 pub(crate) struct Session {
     runtime: tokio::runtime::Runtime,
-    link: ClientLink,
+    supervised: SupervisedLink<Prepared>,
+    /// The newest session that was taken over; a lost one until there is another.
+    link: Arc<ClientLink>,
+    drawn: Arc<Drawn>,
     server: String,
     node: String,
     received: Vec<ReceivedState>,
+    /// States lost and received in earlier sessions.
+    earlier: (u64, u64),
+    /// When the node began to join.
+    began: Instant,
     stop: Arc<AtomicBool>,
 }
 
-/// Why a session is over.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Ending {
+/// What a new session brings.
+struct Prepared {
+    description: SceneDescription,
+    /// `None` where it is the one that is drawn already.
+    stage: Option<(Stage, Show)>,
+}
+
+/// The scene that is drawn: written by the frame loop when it takes a session over, read when the next one is made ready.
+type Drawn = Mutex<Option<SceneDescription>>;
+
+/// What a turn of the frame loop finds.
+pub(crate) enum Turn {
+    /// Nothing new.
+    Same,
+    /// A new session: what was drawn last stands until its first state comes. With a stage, if the scene is another.
+    Renewed(Option<Box<(Stage, Show)>>),
     /// The server told its clients that it stops.
     Told,
-    /// It is gone for another reason.
+    /// The server is gone, and the time to wait for it is over.
     Lost(String),
 }
 
 impl Session {
-    /// Joins the server as `node`.
-    pub(crate) fn join(options: ClientOptions) -> Result<Self, RenderError> {
+    /// Joins the server as `options.node`, and fetches what this node draws. `None` if a signal came first.
+    pub(crate) fn join(
+        options: ClientOptions,
+        policy: RejoinPolicy,
+        overrides: Overrides,
+    ) -> Result<Option<(Self, Stage, Show)>, RenderError> {
         debug_assert_eq!(options.role, Role::Render);
+        let began = Instant::now();
         let system = |what, error: std::io::Error| RenderError::System {
             what,
             reason: error.to_string(),
@@ -49,32 +82,90 @@ impl Session {
         let stop = Arc::new(AtomicBool::new(false));
         watch_signals(&runtime, &stop).map_err(|error| system("signal handler", error))?;
         let (server, node) = (options.server.clone(), options.node.clone());
-        let link = runtime.block_on(connect(options))?;
-        Ok(Self {
+        let drawn = Arc::new(Drawn::default());
+        let (known, name, address) = (drawn.clone(), node.clone(), server.clone());
+        let prepare = move |link: Arc<ClientLink>| {
+            prepare(
+                link,
+                known.clone(),
+                name.clone(),
+                address.clone(),
+                overrides,
+            )
+        };
+        let joining = SupervisedLink::join(options, policy, prepare);
+        let asked = stop.clone();
+        let joined = runtime.block_on(async move {
+            tokio::select! {
+                joined = joining => Some(joined),
+                () = set(asked) => None,
+            }
+        });
+        let Some(joined) = joined else {
+            return Ok(None);
+        };
+        let (supervised, link, prepared) = joined?;
+        // The first is always made: nothing was drawn before.
+        let (stage, show) = prepared.stage.ok_or_else(|| RenderError::BadScene {
+            what: "there is no stage".to_owned(),
+        })?;
+        *lock(&drawn) = Some(prepared.description);
+        let session = Self {
             runtime,
+            supervised,
             link,
+            drawn,
             server,
             node,
             received: Vec::new(),
+            earlier: (0, 0),
+            began,
             stop,
-        })
+        };
+        Ok(Some((session, stage, show)))
     }
 
-    /// What this node draws, its meshes fetched from the server; and what the server shows.
-    pub(crate) fn stage(&self, overrides: &Overrides) -> Result<(Stage, Show), RenderError> {
-        let described = self.link.description();
-        let node = description::find_node(described, &self.node)?;
-        let mut meshes = Vec::with_capacity(1 + described.obstacles.len());
-        for body in std::iter::once(&described.god_object).chain(&described.obstacles) {
-            let fetched = self.runtime.block_on(self.link.mesh(body.mesh));
-            // A server that goes while it hands out its meshes is lost like one that goes later.
-            meshes.push(fetched.map_err(|error| match self.link.is_closed() {
-                Some(reason) => self.lost(reason),
-                None => error.into(),
-            })?);
+    /// Takes over what happened to the link. Call it once per turn of the frame loop; costs the copy of a pointer.
+    pub(crate) fn turn(&mut self, timeline: &mut Timeline) -> Turn {
+        match self.supervised.take_renewal() {
+            None => Turn::Same,
+            Some(Renewal::Ended(SessionEnd::ServerStopped)) => Turn::Told,
+            Some(Renewal::Ended(SessionEnd::Lost(reason))) => Turn::Lost(reason),
+            Some(Renewal::Session { link, prepared }) => {
+                self.earlier = self.packets();
+                self.link = link;
+                self.received.clear();
+                timeline.clear();
+                *lock(&self.drawn) = Some(prepared.description);
+                Turn::Renewed(prepared.stage.map(Box::new))
+            }
         }
-        let stage = description::stage(described, node, &meshes, overrides)?;
-        Ok((stage, description::show(&described.show)))
+    }
+
+    /// How the link is, for the HUD.
+    pub(crate) fn health(&self) -> LinkHealth {
+        match self.supervised.health() {
+            taut_link::LinkHealth::Connected => LinkHealth::Connected,
+            taut_link::LinkHealth::Lost { since } => LinkHealth::Lost {
+                since_s: since.as_secs_f64(),
+            },
+            taut_link::LinkHealth::Rejoining => LinkHealth::Rejoining,
+        }
+    }
+
+    /// Sessions so far.
+    pub(crate) fn sessions(&self) -> u64 {
+        self.supervised.sessions()
+    }
+
+    /// When this node began to join.
+    pub(crate) fn began(&self) -> Instant {
+        self.began
+    }
+
+    /// Where the meshes came from.
+    pub(crate) fn meshes(&self) -> MeshCounters {
+        self.link.mesh_counters()
     }
 
     /// Whether the scene's window is to cover its monitor.
@@ -100,11 +191,9 @@ impl Session {
         self.link.session_now().map(|time| time.ns)
     }
 
-    /// Adds what the link knows to a report and sends it; a full queue drops it.
+    /// Adds what the link knows to a report and sends it; a full queue drops it, and so does a lost link.
     pub(crate) fn report(&self, mut stats: ClientStats) {
-        let counters = self.link.counters();
-        stats.packets_lost = counters.lost;
-        stats.packets_received = counters.states;
+        (stats.packets_lost, stats.packets_received) = self.packets();
         stats.clock_uncertainty_ns = self
             .link
             .session_now()
@@ -114,25 +203,16 @@ impl Session {
         }
     }
 
-    /// States lost and received since this node joined.
+    /// States lost and received since this node was started.
     pub(crate) fn packets(&self) -> (u64, u64) {
         let counters = self.link.counters();
-        (counters.lost, counters.states)
+        let (lost, received) = self.earlier;
+        (lost + counters.lost, received + counters.states)
     }
 
     /// A signal asked this process to end.
     pub(crate) fn interrupted(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
-    }
-
-    /// Why the session is over, if it is.
-    pub(crate) fn ending(&self) -> Option<Ending> {
-        let reason = self.link.is_closed()?;
-        Some(if reason.contains(STOP_REASON) {
-            Ending::Told
-        } else {
-            Ending::Lost(reason)
-        })
     }
 
     /// The error that says that the server was lost.
@@ -145,8 +225,71 @@ impl Session {
 
     /// Leaves the server.
     pub(crate) fn leave(self) {
-        self.runtime.block_on(self.link.close());
+        drop(self.supervised);
+        if self.link.is_closed().is_none() {
+            self.runtime.block_on(self.link.leave());
+        }
         self.runtime.shutdown_background();
+    }
+}
+
+/// Fetches the meshes of a new session and builds the stage, unless the scene is the one that is drawn. The states of the session queue
+/// meanwhile.
+async fn prepare(
+    link: Arc<ClientLink>,
+    drawn: Arc<Drawn>,
+    node: String,
+    server: String,
+    overrides: Overrides,
+) -> Result<Prepared, RenderError> {
+    let described = link.description().clone();
+    if lock(&drawn).as_ref() == Some(&described) {
+        return Ok(Prepared {
+            description: described,
+            stage: None,
+        });
+    }
+    // A node that the workbench does not know needs no meshes to say so.
+    description::find_node(&described, &node)?;
+    let mut meshes = Vec::with_capacity(1 + described.obstacles.len());
+    for body in std::iter::once(&described.god_object).chain(&described.obstacles) {
+        let fetched = link.mesh(body.mesh).await;
+        // A server that goes while it hands out its meshes is lost like one that goes later.
+        meshes.push(fetched.map_err(|error| match link.is_closed() {
+            Some(reason) => RenderError::ServerLost {
+                server: server.clone(),
+                reason,
+            },
+            None => error.into(),
+        })?);
+    }
+    // The meshes of a large scene are copied for longer than the network's thread may be busy.
+    let built = tokio::task::spawn_blocking(move || {
+        let node = description::find_node(&described, &node)?;
+        let stage = description::stage(&described, node, &meshes, &overrides)?;
+        let show = overrides.show;
+        let show = show.unwrap_or_else(|| description::show(&described.show));
+        Ok(Prepared {
+            stage: Some((stage, show)),
+            description: described,
+        })
+    });
+    built.await.unwrap_or_else(|error| {
+        Err(RenderError::System {
+            what: "thread for the stage",
+            reason: error.to_string(),
+        })
+    })
+}
+
+fn lock(drawn: &Drawn) -> std::sync::MutexGuard<'_, Option<SceneDescription>> {
+    drawn.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Ends when `flag` is set: while there is no frame loop that could look.
+async fn set(flag: Arc<AtomicBool>) {
+    while !flag.load(Ordering::Relaxed) {
+        tokio::time::sleep(SIGNAL_LOOK).await;
     }
 }
 

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
+use taut_link::MeshCounters;
 use taut_proto::ClientStats;
 use taut_proto::stats::DrawnState;
 
@@ -70,6 +71,14 @@ pub struct RenderReport {
     pub packets_lost: u64,
     /// States that arrived.
     pub packets_received: u64,
+    /// Sessions: one, and one more for each time that the node came back to its server.
+    pub sessions: u64,
+    /// Longest time between two frames, in milliseconds.
+    pub longest_gap_ms: f64,
+    /// From the beginning of the join to the end of the first frame, in milliseconds; `None` without a frame.
+    pub to_first_frame_ms: Option<f64>,
+    /// Where the meshes came from.
+    pub meshes: MeshCounters,
     /// Why it ended.
     pub ended: Ended,
 }
@@ -116,6 +125,7 @@ pub(crate) struct Statistics {
     drawn: Vec<DrawnState>,
     first_frame: Option<Instant>,
     last_frame: Option<Instant>,
+    longest_gap: Duration,
     last_report: Instant,
 }
 
@@ -130,6 +140,7 @@ impl Statistics {
             drawn: Vec::with_capacity(MAX_DRAWN),
             first_frame: None,
             last_frame: None,
+            longest_gap: Duration::ZERO,
             last_report: Instant::now(),
         }
     }
@@ -147,7 +158,9 @@ impl Statistics {
         }
         let now = Instant::now();
         self.first_frame.get_or_insert(now);
-        self.last_frame = Some(now);
+        if let Some(last) = self.last_frame.replace(now) {
+            self.longest_gap = self.longest_gap.max(now.saturating_duration_since(last));
+        }
     }
 
     /// The report that is due, if one is, else (with `last`) the one at the end.
@@ -187,6 +200,17 @@ impl Statistics {
         }
     }
 
+    /// Longest time between two frames, in milliseconds.
+    pub(crate) fn longest_gap_ms(&self) -> f64 {
+        self.longest_gap.as_secs_f64() * 1e3
+    }
+
+    /// Time from `began` to the end of the first frame, in milliseconds.
+    pub(crate) fn first_frame_after(&self, began: Instant) -> Option<f64> {
+        let first = self.first_frame?;
+        Some(first.saturating_duration_since(began).as_secs_f64() * 1e3)
+    }
+
     /// Ages when taken and when drawn.
     pub(crate) fn ages(&self) -> (Distribution, Distribution) {
         (
@@ -222,12 +246,27 @@ impl std::fmt::Display for RenderReport {
             drawn_age_ms: drawn,
             packets_lost,
             packets_received,
+            sessions,
+            longest_gap_ms,
+            to_first_frame_ms,
+            meshes,
             ..
         } = self;
         write!(
             f,
             "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost",
             age.p50, age.max, drawn.p50
+        )?;
+        if let Some(first) = to_first_frame_ms {
+            write!(
+                f,
+                "; first frame after {first:.0} ms, longest gap between two {longest_gap_ms:.0} ms"
+            )?;
+        }
+        write!(
+            f,
+            "; meshes: {} bytes fetched, {} from the cache; sessions: {sessions}",
+            meshes.fetched_bytes, meshes.cache_bytes
         )
     }
 }

@@ -86,6 +86,11 @@ impl Timeline {
         }
     }
 
+    /// Forgets all states: those of a new session are of another clock.
+    pub fn clear(&mut self) {
+        self.states.clear();
+    }
+
     /// Takes a received state in; any order, duplicates and those older than all kept are dropped.
     pub fn push(&mut self, mut state: State) {
         let after = self

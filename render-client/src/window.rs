@@ -18,9 +18,10 @@ use winit::window::{Fullscreen, Window, WindowId};
 use crate::canvas::eyes_of;
 use crate::error::RenderError;
 use crate::hand::Hand;
+use crate::headless::shown;
 use crate::mouse::{self, Mouse, Pointed};
 use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
-use crate::session::{Ending, Session};
+use crate::session::{Session, Turn};
 use crate::stage::{Show, Stage};
 use crate::statistics::{Ended, Statistics};
 use crate::stereo::Picture;
@@ -98,7 +99,7 @@ struct App<'a> {
     screen: Option<Display>,
     start: Instant,
     next_frame: Instant,
-    last_drawn: Option<(u64, bool)>,
+    last_drawn: Option<(u64, bool, Option<u64>)>,
     result: Option<Result<Ended, RenderError>>,
 }
 
@@ -163,7 +164,7 @@ impl ApplicationHandler for App<'_> {
         if self.result.is_some() {
             return;
         }
-        match self.tick() {
+        match self.tick(events) {
             Ok(None) => events.set_control_flow(ControlFlow::WaitUntil(self.next_frame)),
             Ok(Some(ended)) => self.end(events, Ok(ended)),
             Err(error) => self.end(events, Err(error)),
@@ -230,15 +231,43 @@ impl App<'_> {
         hand.lead(self.mouse.buttons());
     }
 
+    /// Draws another scene from now on: in the same windows, unless the node's screens changed too.
+    fn restage(&mut self, events: &ActiveEventLoop, stage: Stage) -> Result<(), RenderError> {
+        let windows = |stage: &Stage| -> Vec<_> {
+            let screens = stage.screens.iter();
+            screens
+                .map(|screen| (screen.name.clone(), screen.pixels, screen.stereo))
+                .collect()
+        };
+        let same = windows(&stage) == windows(&self.stage);
+        self.stage = stage;
+        match &mut self.screen {
+            Some(screen) if same => screen.restage(&self.stage),
+            _ => {
+                self.screen = None; // its windows close before the new ones open
+                let holds = self.hand.is_some();
+                self.screen = Some(Display::open(events, &self.stage, &self.plan, holds)?);
+            }
+        }
+        Ok(())
+    }
+
     /// Draws a frame if one is due; says if this was the last.
-    fn tick(&mut self) -> Result<Option<Ended>, RenderError> {
+    fn tick(&mut self, events: &ActiveEventLoop) -> Result<Option<Ended>, RenderError> {
         if self.session.interrupted() {
             return Ok(Some(Ended::Interrupted));
         }
-        match self.session.ending() {
-            Some(Ending::Told) => return Ok(Some(Ended::ServerStopped)),
-            Some(Ending::Lost(reason)) => return Err(self.session.lost(reason)),
-            None => {}
+        match self.session.turn(self.timeline) {
+            Turn::Same => {}
+            Turn::Renewed(other) => {
+                if let Some(scene) = other {
+                    self.show = scene.1;
+                    self.restage(events, scene.0)?;
+                }
+                self.last_drawn = None;
+            }
+            Turn::Told => return Ok(Some(Ended::ServerStopped)),
+            Turn::Lost(reason) => return Err(self.session.lost(reason)),
         }
         if self
             .plan
@@ -263,7 +292,8 @@ impl App<'_> {
         else {
             return Ok(None);
         };
-        let drawn = Some((latched.state.time_ns, latched.stale));
+        let link = shown(self.session.health());
+        let drawn = Some((latched.state.time_ns, latched.stale, link));
         if drawn == self.last_drawn {
             return Ok(None);
         }
@@ -384,6 +414,17 @@ impl Display {
             renderer,
             panes,
         })
+    }
+
+    fn restage(&mut self, stage: &Stage) {
+        let Some(format) = self.panes.first().map(|pane| pane.format) else {
+            return;
+        };
+        self.renderer = Renderer::new(&self.gpu, stage, format);
+        for pane in &mut self.panes {
+            let size = (pane.config.width, pane.config.height);
+            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size);
+        }
     }
 
     fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {

@@ -21,7 +21,7 @@ use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::TriangleMesh;
 use taut_render::statistics::Ended;
-use taut_render::{RenderError, RenderReport};
+use taut_render::{MembershipArgs, RenderError, RenderReport};
 
 /// A server that sends 500 states per second until it is stopped.
 struct Server {
@@ -168,6 +168,10 @@ impl Server {
             height: None,
             monitor: 0,
             delay_ms: 2.0,
+            membership: MembershipArgs {
+                no_mesh_cache: true,
+                ..MembershipArgs::default()
+            },
         }
     }
 
@@ -308,13 +312,15 @@ fn a_node_ends_in_good_order_when_the_server_says_that_it_stops() {
 }
 
 #[test]
-fn a_lost_server_is_an_error_that_names_it() {
+fn a_server_that_stays_lost_is_an_error_that_names_it() {
     if !can_draw() {
         return;
     }
     let server = Server::start();
     let address = server.address.clone();
-    let node = start(server.args("both"));
+    let mut args = server.args("both");
+    args.membership.give_up = Some(1.0);
+    let node = start(args);
     wait_for("a client", || !server.link.clients().is_empty());
     // All its threads stop at once, as if its machine had lost power.
     let Server {

@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use taut_bridge::EventKind;
-use taut_link::{ClientOptions, ReceivedState, Role, connect};
-use taut_proto::state::{RunState, event_code};
+use taut_link::{ClientOptions, Role, connect};
+use taut_proto::HotState;
+use taut_proto::state::{EventRecord, RunState, event_code};
 
 use crate::cli::ArmArgs;
 use crate::failure::Failure;
@@ -17,17 +18,23 @@ const LOOK_PERIOD: Duration = Duration::from_millis(10);
 
 /// Asks, and waits for the answer in the states; one sentence.
 pub async fn run(args: &ArmArgs) -> Result<&'static str, Failure> {
-    let key = key::read(args.key.as_deref())?;
-    let node = format!("arm-{}", std::process::id());
+    let key = key::read_to_join(args.key.as_deref())?;
+    let any_name = || format!("arm-{}", std::process::id());
+    let node = key.node_name().map_or_else(any_name, str::to_owned);
     let options = ClientOptions::new(&args.server, key, Role::Operator, node);
     let link = connect(options).await?;
     let mut answer = Answer::new(!args.off);
     let deadline = Instant::now() + PATIENCE;
-    let mut states = Vec::new();
+    let (mut states, mut events) = (Vec::new(), Vec::new());
     let mut asked = false;
     let told = loop {
         link.drain_states(&mut states);
-        if let Some(told) = states.drain(..).find_map(|state| answer.look(&state)) {
+        if let Some(told) = states.drain(..).find_map(|state| answer.look(&state.state)) {
+            break Some(told);
+        }
+        link.drain_events(&mut events);
+        let told = events.drain(..).find_map(|event| answer.hear(&event));
+        if let Some(told) = told.filter(|_| asked) {
             break Some(told);
         }
         if answer.knows() && !asked {
@@ -53,47 +60,44 @@ pub async fn run(args: &ArmArgs) -> Result<&'static str, Failure> {
     }
 }
 
-/// Waits for the events that answer the request.
+/// Waits for the event that answers the request.
 struct Answer {
     arm: bool,
-    /// Number of the newest event before the request.
-    before: Option<u32>,
+    /// Whether a state came: what the port does already is known then.
+    knows: bool,
 }
 
 impl Answer {
     fn new(arm: bool) -> Self {
-        Self { arm, before: None }
+        Self { arm, knows: false }
     }
 
-    /// Whether a state came: what is new after it can be told from what is old.
     fn knows(&self) -> bool {
-        self.before.is_some()
+        self.knows
     }
 
-    /// What a state says of the request, if anything.
-    fn look(&mut self, received: &ReceivedState) -> Option<Result<&'static str, &'static str>> {
-        let state = &received.state;
-        let newest = state.events.iter().map(|event| event.id).max().unwrap_or(0);
-        let Some(before) = self.before else {
-            self.before = Some(newest);
-            return match (self.arm, state.run) {
-                (true, RunState::Running) => Some(Ok("armed already")),
-                (false, RunState::Paused) => Some(Ok("disarmed already")),
-                _ => None,
-            };
-        };
-        let new = state.events.iter().filter(|event| event.id > before);
-        let kinds = new.filter_map(|event| {
-            let (kind, _) = event_code::safety_of(event.code)?;
-            EventKind::from_number(kind)
-        });
-        kinds.into_iter().find_map(|kind| match kind {
+    /// What the first state says of the request, if anything.
+    fn look(&mut self, state: &HotState) -> Option<Result<&'static str, &'static str>> {
+        if std::mem::replace(&mut self.knows, true) {
+            return None;
+        }
+        match (self.arm, state.run) {
+            (true, RunState::Running) => Some(Ok("armed already")),
+            (false, RunState::Paused) => Some(Ok("disarmed already")),
+            _ => None,
+        }
+    }
+
+    /// What an event says of the request, if anything.
+    fn hear(&self, event: &EventRecord) -> Option<Result<&'static str, &'static str>> {
+        let (kind, _) = event_code::safety_of(event.code)?;
+        match EventKind::from_number(kind)? {
             EventKind::Arming if self.arm => Some(Ok("armed: the force ramps in")),
             EventKind::ArmRefused if self.arm => Some(Err(
                 "not armed: the device or the forces are not in order; look at the server's log",
             )),
             EventKind::Disarmed if !self.arm => Some(Ok("disarmed: the force fades")),
             _ => None,
-        })
+        }
     }
 }

@@ -20,10 +20,11 @@ use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
 use crate::clock::{SessionClock, nanoseconds};
 use crate::edge_sets::EdgeSets;
 use crate::head::Head;
+use crate::looking_on::Outlets;
 use crate::loops::shell::run_at_deadlines;
 use crate::loops::wiring::SharedView;
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
-use crate::shared::device_state::DeviceState;
+use crate::shared::device_state::{DeviceState, RECENT_EVENTS};
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shutdown::Shutdown;
 
@@ -31,6 +32,10 @@ use crate::shutdown::Shutdown;
 const BUTTONS: u32 = u16::BITS;
 /// The number of a button in an event's code.
 const BUTTON_SHIFT: u32 = 16;
+/// Events that may wait for their state.
+const MAX_WAITING: usize = 64;
+/// Most events that one sample brings: contact, fault, every button, everything that the port keeps.
+const MAX_AT_ONCE: usize = 2 + BUTTONS as usize + RECENT_EVENTS;
 
 /// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
 #[derive(Debug)]
@@ -46,6 +51,7 @@ pub fn run(
     mut states: StateWriter,
     mut broadcaster: Broadcaster,
     mut bridge_commands: Option<BridgeCommands>,
+    mut outlets: Outlets,
     clock: SessionClock,
     period: Duration,
     shutdown: &Shutdown,
@@ -65,6 +71,7 @@ pub fn run(
         if let Some(state) = states.newest(now) {
             // What could not be sent is counted by the link.
             let _ = broadcaster.send(state);
+            outlets.publish(state);
         }
     });
     if let Some(commands) = &mut bridge_commands {
@@ -87,7 +94,7 @@ pub struct StateWriter {
     scene_revision: u32,
     state: HotState,
     motion: MotionEstimate,
-    events: EventTrail,
+    events: EventSource,
 }
 
 impl StateWriter {
@@ -105,7 +112,7 @@ impl StateWriter {
             scene_revision,
             state: HotState::empty(),
             motion: MotionEstimate::default(),
-            events: EventTrail::default(),
+            events: EventSource::default(),
         }
     }
 
@@ -145,7 +152,7 @@ impl StateWriter {
         state.bodies.clear();
         state.bodies.extend(contacts.moving.iter().map(body_state));
         nearest_contacts(&contacts.set, &mut state.contacts);
-        state.events.clone_from(&self.events.recent);
+        self.events.take(&mut state.events);
         Some(&self.state)
     }
 }
@@ -161,9 +168,10 @@ fn run_state(device: &DeviceState) -> RunState {
 }
 
 fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
-    let older = nanoseconds(sampled) as i64 - nanoseconds(now) as i64;
+    let pose = PoseF32::from_isometry(&head.pose(now));
+    let older = nanoseconds(sampled) as i64 - nanoseconds(head.read_at(now)) as i64;
     HeadState {
-        pose: PoseF32::from_isometry(&head.pose(now)),
+        pose,
         age_us: i32::try_from(older / 1000).unwrap_or(i32::MIN),
         eye_separation: head.eye_separation as f32,
         flags: if head.moves() { HEAD_TRACKED } else { 0 },
@@ -262,10 +270,11 @@ impl MotionEstimate {
     }
 }
 
-/// The last discrete events, repeated in every state so that a lost datagram loses none.
+/// Discrete events out of what changed; each goes into one state, and the link sees to it that no client misses it.
 #[derive(Debug, Default)]
-struct EventTrail {
-    recent: taut_proto::ArrayVec<EventRecord, MAX_EVENTS>,
+struct EventSource {
+    /// Oldest first.
+    waiting: taut_proto::ArrayVec<EventRecord, MAX_WAITING>,
     count: u32,
     touching: bool,
     buttons: u16,
@@ -274,8 +283,12 @@ struct EventTrail {
     safety: u64,
 }
 
-impl EventTrail {
+impl EventSource {
     fn follow(&mut self, device: &DeviceState, contacts: &ContactSnapshot) {
+        // What changed is compared with what was told: without room it is found with a later sample.
+        if self.waiting.remaining_capacity() < MAX_AT_ONCE {
+            return;
+        }
         let tick = device.sequence as u32;
         let touching = contacts.report.active > 0;
         if touching != self.touching {
@@ -312,15 +325,19 @@ impl EventTrail {
     }
 
     fn push(&mut self, tick: u32, code: u32) {
-        if self.recent.is_full() {
-            self.recent.remove(0);
-        }
         self.count = self.count.wrapping_add(1);
-        self.recent.push(EventRecord {
+        self.waiting.push(EventRecord {
             id: self.count,
             tick,
             code,
         });
+    }
+
+    /// Moves the oldest that wait into a state, as many as it holds.
+    fn take(&mut self, into: &mut taut_proto::ArrayVec<EventRecord, MAX_EVENTS>) {
+        into.clear();
+        let count = self.waiting.len().min(MAX_EVENTS);
+        into.extend(self.waiting.drain(..count));
     }
 }
 
@@ -374,7 +391,7 @@ mod tests {
             eye_separation: 0.064,
             motion: crate::head::HeadMotion::Still,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         let shared = SharedView {
             device: state_readers.broadcast,
             contacts: contact_readers.broadcast,

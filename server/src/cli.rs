@@ -43,7 +43,9 @@ pub enum Command {
     Check(CheckArgs),
     /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
-    /// Makes a cluster key, the secret that all machines of a workbench share
+    /// Says where the viewer's head is, from a tracker on this PC
+    Track(TrackArgs),
+    /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
 }
 
@@ -189,7 +191,7 @@ pub struct RecordArgs {
     /// Where the trace goes, a CSV file
     #[arg(long, value_name = "T")]
     pub out: PathBuf,
-    /// The cluster key; else TAUT_KEY_FILE names it
+    /// An operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// How states come here
@@ -207,7 +209,7 @@ pub struct ArmArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]
     pub server: String,
-    /// The cluster key; else TAUT_KEY_FILE names it
+    /// An operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// No force instead: it fades, and stays away until somebody arms
@@ -247,12 +249,59 @@ pub struct DoctorArgs {
 /// `taut keys`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example: taut keys --out cluster.key, then copy cluster.key to every machine of the workbench"
+    after_help = "Examples:\n  taut keys --out cluster.key\n  taut keys --master cluster.key --config workbench.toml --out keys\n  taut keys --master cluster.key --role render --node front --issue 2 --out front.key\n  taut keys --show front.key"
 )]
 pub struct KeysArgs {
-    /// The file to make; an existing one is never overwritten
-    #[arg(long, value_name = "FILE", default_value = "cluster.key")]
-    pub out: PathBuf,
+    /// The file to make (default: cluster.key), a directory with --config; an existing file is never overwritten
+    #[arg(long, value_name = "FILE|DIR")]
+    pub out: Option<PathBuf>,
+    /// Make credentials from this cluster key
+    #[arg(long, value_name = "FILE")]
+    pub master: Option<PathBuf>,
+    /// For every node of this workbench file, and for device, tracker, operator and observer
+    #[arg(long, value_name = "F", requires = "master", conflicts_with = "role")]
+    pub config: Option<PathBuf>,
+    /// For one role: render, device, tracker, operator, observer
+    #[arg(long, value_name = "ROLE", requires = "master")]
+    pub role: Option<taut_link::Role>,
+    /// For the node of this name only (default: *, any of the role)
+    #[arg(long, value_name = "NAME", requires = "role")]
+    pub node: Option<String>,
+    /// Which issue: a later one stays good when an earlier one is revoked
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub issue: u16,
+    /// Instead, say what this key file allows and its fingerprint
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "master"])]
+    pub show: Option<PathBuf>,
+}
+
+/// `taut track`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Examples:\n  taut track --server haptic-pc:4857 --key tracker.key --source vrpn:Head@localhost\n  taut track --server haptic-pc:4857 --key tracker.key --source trace:head.csv"
+)]
+pub struct TrackArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// The tracker's credential, or the cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// Where the head's poses come from: `still`, `trace:FILE` (workbench frame), `vrpn:TRACKER@HOST` with the options of `taut bridge`
+    #[arg(long, value_name = "SOURCE")]
+    pub source: crate::track::HeadFrom,
+    /// Name of this node, unique in the workbench
+    #[arg(long, value_name = "NAME", default_value = "tracker")]
+    pub node: String,
+    /// Readings per second
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = tracking_rate)]
+    pub rate: f64,
+    /// How readings travel
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: TransportChoice,
+    /// End after this many seconds (default: at Ctrl-C, or with the session)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub duration: Option<f64>,
 }
 
 /// How poses reach a client.
@@ -317,6 +366,8 @@ pub enum MethodChoice {
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
+/// No tracker is faster, and the server would take it for a flood.
+const MAX_TRACKING_RATE_HZ: f64 = 1000.0;
 
 /// The text of a device, as it is, if it names one.
 fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
@@ -330,6 +381,10 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
 
 fn positive_rate(text: &str) -> Result<f64, String> {
     positive(text, MAX_RATE_HZ, "Hz")
+}
+
+fn tracking_rate(text: &str) -> Result<f64, String> {
+    positive(text, MAX_TRACKING_RATE_HZ, "Hz")
 }
 
 fn positive(text: &str, limit: f64, unit: &str) -> Result<f64, String> {

@@ -54,7 +54,7 @@ impl ClientLedger {
                 Some(format!(
                     "{} joined as {} over {} from {}",
                     status.node,
-                    role_name(status.role),
+                    status.role.title(),
                     transport_name(status.transport),
                     status.address
                 ))
@@ -64,10 +64,14 @@ impl ClientLedger {
                 Some(format!(
                     "{} ({} over {}) left: {reason}",
                     status.node,
-                    role_name(status.role),
+                    status.role.title(),
                     transport_name(status.transport)
                 ))
             }
+            LinkEvent::Silent { node, silence } => Some(format!(
+                "{node} has been silent for {} ms",
+                silence.as_millis()
+            )),
             LinkEvent::Refused {
                 address,
                 node,
@@ -78,6 +82,10 @@ impl ClientLedger {
             } else {
                 format!("{node} at {address} was refused: {text}")
             }),
+            LinkEvent::Forbidden { node, role, act } => Some(format!(
+                "{node} ({}) tried to {act}, which its role may not: refused",
+                role.title()
+            )),
             LinkEvent::Stats { node, stats } => {
                 self.follow_stats(node, stats);
                 None
@@ -137,8 +145,7 @@ impl ClientLedger {
 
     /// One report per render node or bridge, in the order in which they joined, and the number of observers.
     pub fn reports(&self) -> (Vec<ClientReport>, u64) {
-        let observes =
-            |client: &&ClientRecord| matches!(client.role, Role::Observer | Role::Operator);
+        let observes = |client: &&ClientRecord| !matches!(client.role, Role::Render | Role::Device);
         let reports = self
             .clients
             .iter()
@@ -186,15 +193,6 @@ impl ClientRecord {
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,
         }
-    }
-}
-
-fn role_name(role: Role) -> &'static str {
-    match role {
-        Role::Render => "render node",
-        Role::Device => "device bridge",
-        Role::Observer => "observer",
-        Role::Operator => "operator",
     }
 }
 

@@ -19,6 +19,7 @@ use crate::content::content;
 use crate::devices::{device, input, vrpn_source};
 use crate::failure::Failure;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
+use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
@@ -93,7 +94,9 @@ pub fn session_setup(
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         announced_udp_port: None,
         key,
+        policy: network.admission.clone(),
         max_clients: network.max_clients,
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
     let safety = safety(workbench, &built.settings);
     let recording = overrides
@@ -114,6 +117,7 @@ pub fn session_setup(
         head: head(&workbench.viewer),
         content,
         link,
+        looking_on: LookingOnSettings::of(workbench)?,
         realtime: realtime(workbench),
         monitor: monitor(&workbench.monitoring, overrides),
     })
@@ -151,6 +155,7 @@ fn head(viewer: &Viewer) -> HeadSource {
                 amplitude: *amplitude,
                 period: *period,
             }),
+            HeadTracking::Remote => HeadMotion::Remote,
             HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
                 source: vrpn_source(sensor),
                 mapping: sensor.mapping,

@@ -51,7 +51,10 @@ impl From<taut_link::LinkError> for Failure {
             | E::BadAddress { .. }
             | E::UnknownHost { .. }
             | E::Unreachable { .. }
+            | E::TurnedAway { .. }
             | E::WrongKey { .. }
+            | E::WrongServer { .. }
+            | E::NotAllowed { .. }
             | E::WrongVersion { .. }
             | E::Refused { .. }
             | E::Protocol { .. }

@@ -1,4 +1,5 @@
-//! The viewer's head: still, swaying as people do who stand and look, or where a VRPN tracker sees it.
+//! The viewer's head: still, swaying as people do who stand and look, or where a tracker sees it: a VRPN tracker that the server listens to,
+//! or `taut track` on another PC ([`crate::remote_head`]).
 //!
 //! | symbol | name in code | unit | meaning                                              |
 //! |--------|--------------|------|------------------------------------------------------|
@@ -15,7 +16,10 @@ use std::time::Duration;
 use god_object::nalgebra::Vector3;
 use god_object::spatial::Pose;
 use taut_bridge::{TrackerFeed, VrpnSource};
+use taut_link::HeadOutput;
 use taut_vrpn::SensorMapping;
+
+use crate::remote_head::RemoteHead;
 
 /// Sway fore and aft takes this much longer than from side to side: the path does not repeat at once.
 const FORE_AFT_PERIODS: f64 = 1.618;
@@ -42,6 +46,8 @@ pub enum HeadMotion {
     Sway(Sway),
     /// Tracked.
     Tracker(Box<TrackerSource>),
+    /// Tracked by a client of the role tracker.
+    Remote,
 }
 
 /// Simulated movement of a head.
@@ -77,6 +83,7 @@ enum Motion {
     Still,
     Sway(Sway),
     Tracker(Box<Tracked>),
+    Remote(Box<RemoteHead>),
 }
 
 #[derive(Debug)]
@@ -88,11 +95,15 @@ struct Tracked {
 }
 
 impl HeadSource {
-    /// Starts to listen to the tracker, if there is one: a head for each reader.
+    /// Starts to listen to the tracker, if there is one: a head for each reader. `remote` are the link's ends for a tracker on the network;
+    /// without them such a head stays at rest.
     ///
     /// # Errors
     /// No thread or no socket can be had. A tracker that is not there yet is waited for.
-    pub fn start<const READERS: usize>(self) -> std::io::Result<[Head; READERS]> {
+    pub fn start<const READERS: usize>(
+        self,
+        remote: Option<[HeadOutput; READERS]>,
+    ) -> std::io::Result<[Head; READERS]> {
         let Self {
             rest,
             eye_separation,
@@ -106,6 +117,11 @@ impl HeadSource {
         Ok(match motion {
             HeadMotion::Still => std::array::from_fn(|_| head(Motion::Still)),
             HeadMotion::Sway(sway) => std::array::from_fn(|_| head(Motion::Sway(sway))),
+            HeadMotion::Remote => match remote {
+                Some(outputs) => outputs
+                    .map(|output| head(Motion::Remote(Box::new(RemoteHead::new(output, rest))))),
+                None => std::array::from_fn(|_| head(Motion::Still)),
+            },
             HeadMotion::Tracker(tracker) => {
                 let TrackerSource { source, mapping } = *tracker;
                 TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
@@ -133,6 +149,15 @@ impl Head {
                 }
                 tracked.last
             }
+            Motion::Remote(remote) => remote.look().pose(now),
+        }
+    }
+
+    /// When the pose that [`Self::pose`] gave at `now` was read, session time; `now` where nothing tells.
+    pub fn read_at(&mut self, now: Duration) -> Duration {
+        match &mut self.motion {
+            Motion::Remote(remote) => remote.look().read_at(now),
+            Motion::Still | Motion::Sway(_) | Motion::Tracker(_) => now,
         }
     }
 
@@ -162,7 +187,7 @@ mod tests {
             eye_separation: 0.064,
             motion,
         };
-        let [head] = source.start().expect("nothing to start");
+        let [head] = source.start(None).expect("nothing to start");
         head
     }
 
@@ -212,7 +237,7 @@ mod tests {
                 mapping: SensorMapping::identity(),
             })),
         };
-        let mut heads = source.start::<2>().expect("a thread");
+        let mut heads = source.start::<2>(None).expect("a thread");
         for head in &mut heads {
             assert!(head.moves());
             assert_eq!(head.pose(Duration::from_secs(1)), rest);

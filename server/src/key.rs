@@ -1,27 +1,36 @@
-//! Which cluster key a command uses: the file that it is given, or the one that the environment names.
+//! Which key a command uses: the file that it is given, or the one that the environment names. A server needs the cluster key itself; whoever
+//! joins may have a credential instead.
 
 use std::path::{Path, PathBuf};
 
-use taut_link::{ClusterKey, read_key_file};
+use taut_link::{ClusterKey, JoinKey, read_join_key, read_key_file};
 
 use crate::failure::Failure;
 
 /// Name of the variable that names the key file.
 pub const KEY_VARIABLE: &str = "TAUT_KEY_FILE";
 
-/// Reads the key from `named`, else from the file that [`KEY_VARIABLE`] names.
+/// Reads the cluster key from `named`, else from the file that [`KEY_VARIABLE`] names.
 pub fn read(named: Option<&Path>) -> Result<ClusterKey, Failure> {
+    Ok(read_key_file(&file(named)?)?)
+}
+
+/// Reads what to join with, the cluster key or a credential, from `named`, else from the file that [`KEY_VARIABLE`] names.
+pub fn read_to_join(named: Option<&Path>) -> Result<JoinKey, Failure> {
+    Ok(read_join_key(&file(named)?)?)
+}
+
+fn file(named: Option<&Path>) -> Result<PathBuf, Failure> {
     let from_environment = || {
         std::env::var_os(KEY_VARIABLE)
             .filter(|value| !value.is_empty())
             .map(PathBuf::from)
     };
-    let path = named.map(Path::to_path_buf).or_else(from_environment).ok_or_else(|| {
+    named.map(Path::to_path_buf).or_else(from_environment).ok_or_else(|| {
         Failure::BadInput(format!(
             "no cluster key is named: make one with `taut keys --out FILE`, and give it by --key FILE or {KEY_VARIABLE}"
         ))
-    })?;
-    Ok(read_key_file(&path)?)
+    })
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@
 //! | `taut serve`  | [`serve`]   | the haptic PC                                                |
 //! | `taut replay` | [`replay`]  | the same method code on a trace, under a virtual clock       |
 //! | `taut record` | [`record`]  | the device trace of a live session                           |
+//! | `taut track`  | [`track`]   | the viewer's head, from a tracker on another PC              |
+//! | `taut keys`   | [`keys`]    | who may join: the cluster key and credentials                |
 //! | `taut doctor` | [`doctor`]  | what this machine lacks                                      |
 //!
 //! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
@@ -31,11 +33,14 @@ pub mod failure;
 pub mod finished_file;
 pub mod head;
 pub mod key;
+pub mod keys;
+pub mod looking_on;
 pub mod loops;
 pub mod monitor;
 pub mod realtime;
 pub mod record;
 pub mod recorded_session;
+pub mod remote_head;
 pub mod rendering;
 pub mod replay;
 pub mod report;
@@ -49,3 +54,4 @@ pub mod stability;
 pub mod statistics;
 pub mod terminal;
 pub mod timing;
+pub mod track;

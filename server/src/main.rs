@@ -7,12 +7,17 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::Parser;
 use serde::Serialize;
-use taut::cli::{ArmArgs, CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs};
+use taut::cli::{
+    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs, TrackArgs,
+};
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
 use taut::signals::BlockingEndSignal;
 use taut::terminal::Terminal;
-use taut::{arm, demo, doctor, doctor_device, record, recorded_session, rendering, replay, serve};
+use taut::{
+    arm, demo, doctor, doctor_device, keys, record, recorded_session, rendering, replay, serve,
+    track,
+};
 use tracing_subscriber::EnvFilter;
 
 /// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
@@ -55,6 +60,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
         Command::Doctor(args) => doctor_command(&args),
+        Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),
     }
 }
@@ -163,11 +169,18 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
 }
 
 fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
-    taut_link::create_key_file(&args.out).map_err(Failure::from)?;
-    println!(
-        "{}: copy it to every machine of the workbench, and show it to nobody else",
-        args.out.display()
-    );
+    println!("{}", keys::run(args)?);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn track_command(args: &TrackArgs) -> Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .context("the network's threads cannot be started")?;
+    let sent = runtime.block_on(track::run(args))?;
+    println!("{sent} readings of the head sent to {}", args.server);
     Ok(ExitCode::SUCCESS)
 }
 

@@ -18,7 +18,7 @@ const DRAIN_PERIOD: Duration = Duration::from_millis(10);
 
 /// Records until the duration is over, the user ends it, or the session does. How many rows there are.
 pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
-    let key = key::read(args.key.as_deref())?;
+    let key = key::read_to_join(args.key.as_deref())?;
     let cannot_write = |error: std::io::Error| {
         Failure::BadInput(format!(
             "{}: the trace cannot be written ({error}); check the path, its permissions and the free space",
@@ -26,7 +26,8 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ))
     };
     let mut signal = EndSignal::listen().map_err(Failure::failed)?;
-    let node = format!("record-{}", std::process::id());
+    let any_name = || format!("record-{}", std::process::id());
+    let node = key.node_name().map_or_else(any_name, str::to_owned);
     let options = ClientOptions {
         transport: args.transport.into(),
         ..ClientOptions::new(&args.server, key, Role::Operator, node)

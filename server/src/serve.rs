@@ -55,6 +55,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
     if let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) {
         terminal.say(&format!("serving on {quic} (control) and {udp} (poses)"));
     }
+    if let Some(fingerprint) = session.fingerprint() {
+        terminal.say(&format!("its fingerprint is {fingerprint}"));
+    }
     if let Some(monitor) = session.monitor() {
         if let Some(page) = monitor.address() {
             terminal.say(&format!("watch it in a browser: {page}"));
@@ -62,6 +65,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
         if let Some(stream) = monitor.stream_address() {
             terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
         }
+    }
+    for line in session.looking_on().lines() {
+        terminal.say(&line);
     }
     for line in &session.realtime().waived {
         terminal.say(&format!("not in force: {line}"));

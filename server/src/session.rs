@@ -17,7 +17,7 @@ use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
 use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
-use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, ServerPin, proto};
 use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
 
@@ -27,6 +27,7 @@ use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
+use crate::looking_on::{LookingOn, Outlets};
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
@@ -67,6 +68,7 @@ pub struct Session {
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
     recorder: Option<Recorder>,
+    looking_on: LookingOn,
     link: Option<ServerLink>,
     runtime: Runtime,
 }
@@ -105,12 +107,16 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             max_clients: setup.link.max_clients,
+            policy: setup.link.policy,
+            node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
+        let (looking_on, outlets) =
+            LookingOn::start(&setup.looking_on, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
-        let [head, watched_head] = setup.head.start().map_err(|error| {
+        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
 
@@ -149,6 +155,7 @@ impl Session {
             threads: Vec::new(),
             monitor: None,
             recorder,
+            looking_on,
             link: Some(link),
             runtime,
         };
@@ -186,7 +193,13 @@ impl Session {
         )?;
         session.start_god_object(loops.god_object, loops.coupling_waker, &setup.realtime)?;
         session.start_checker(checker, loops.observers.checker)?;
-        session.start_broadcast(states, broadcaster, bridge_commands, &setup.realtime)?;
+        session.start_broadcast(
+            states,
+            broadcaster,
+            bridge_commands,
+            outlets,
+            &setup.realtime,
+        )?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.enforce(setup.realtime.policy)?;
         session.tell_start(&opening);
@@ -278,6 +291,7 @@ impl Session {
         states: StateWriter,
         broadcaster: Broadcaster,
         bridge_commands: Option<BridgeCommands>,
+        outlets: Outlets,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
         let (clock, shutdown, period) =
@@ -291,6 +305,7 @@ impl Session {
                     states,
                     broadcaster,
                     bridge_commands,
+                    outlets,
                     clock,
                     period,
                     &shutdown,
@@ -372,9 +387,19 @@ impl Session {
         self.link.as_ref().map(ServerLink::quic_addr)
     }
 
+    /// What clients know this server by.
+    pub fn fingerprint(&self) -> Option<ServerPin> {
+        self.link.as_ref().map(ServerLink::pin)
+    }
+
     /// Address of the state plane, with the port that it got.
     pub fn udp_address(&self) -> Option<SocketAddr> {
         self.link.as_ref().map(ServerLink::udp_addr)
+    }
+
+    /// Those who look on without taut's own client.
+    pub fn looking_on(&self) -> &LookingOn {
+        &self.looking_on
     }
 
     /// The running monitor.
@@ -544,6 +569,7 @@ impl Session {
             let _ = thread.join();
         }
         let monitor = self.monitor.take().map(MonitorFeed::stop);
+        self.looking_on = LookingOn::default();
         if let Some(link) = self.link.take() {
             self.runtime.block_on(link.shutdown());
         }
@@ -632,8 +658,10 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Left { .. }
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
+        LinkEvent::Forbidden { .. } => Severity::Warning,
         LinkEvent::Log { event, .. } => match event.level {
             LogLevel::Info => Severity::Info,
             LogLevel::Warning => Severity::Warning,

@@ -7,11 +7,12 @@ use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
-use taut_link::{ClusterKey, Content};
+use taut_link::{ClusterKey, Content, JoinPolicy};
 use taut_recording::Manifest;
 use taut_scene::BuiltMotion;
 
 use crate::head::HeadSource;
+use crate::looking_on::LookingOnSettings;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -36,6 +37,8 @@ pub struct SessionSetup {
     pub content: Content,
     /// Addresses, key and limits of the network.
     pub link: LinkSettings,
+    /// Those who look on without taut's own client.
+    pub looking_on: LookingOnSettings,
     /// Rates and scheduling.
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.
@@ -79,8 +82,12 @@ pub struct LinkSettings {
     pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
+    /// Who is let in, of those who can prove something.
+    pub policy: JoinPolicy,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Silence after which a render node or a bridge counts as gone.
+    pub node_timeout: Duration,
 }
 
 /// Rates and scheduling.

@@ -193,7 +193,7 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
         eye_separation: 0.064,
         motion: HeadMotion::Still,
     };
-    let Ok([head]) = source.start() else {
+    let Ok([head]) = source.start(None) else {
         panic!("a still head has nothing to start");
     };
     let WiredLoops {

@@ -1,5 +1,7 @@
 //! A whole session in this process: what happens when a part of it breaks.
 
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -225,4 +227,86 @@ fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
     assert!(report.penetration_checks > 20);
     assert_eq!(report.penetrations, 0);
     assert!(report.energy_from_obstacles_j > 0.0, "the plate did work");
+}
+
+/// One line of the stream of observers, until `wanted` takes one.
+fn line_of(
+    reader: &mut impl BufRead,
+    wanted: impl Fn(&serde_json::Value) -> bool,
+) -> serde_json::Value {
+    let begun = Instant::now();
+    loop {
+        assert!(begun.elapsed() < PATIENCE, "no such line");
+        let mut text = String::new();
+        assert!(
+            reader.read_line(&mut text).is_ok_and(|length| length > 0),
+            "the stream ended"
+        );
+        // The answer's own head is no JSON.
+        if let Ok(line) = serde_json::from_str(&text)
+            && wanted(&line)
+        {
+            return line;
+        }
+    }
+}
+
+#[test]
+fn those_who_look_on_see_the_session_without_taut_s_client() {
+    let mut setup = setup();
+    setup.looking_on.vrpn.enabled = true;
+    setup.looking_on.vrpn.port = 0;
+    setup.looking_on.stream.enabled = true;
+    setup.looking_on.stream.port = 0;
+    let session = match Session::start(setup) {
+        Ok(session) => session,
+        Err(error) => panic!("{error}"),
+    };
+    assert_eq!(session.looking_on().lines().len(), 2);
+    let (Some(stream), Some(vrpn)) = (session.looking_on().stream(), session.looking_on().vrpn())
+    else {
+        panic!("not served");
+    };
+
+    let connected = TcpStream::connect(stream).and_then(|mut socket| {
+        socket.set_read_timeout(Some(PATIENCE))?;
+        write!(socket, "GET /stream HTTP/1.1\r\nHost: {stream}\r\n\r\n")?;
+        Ok(socket)
+    });
+    let Ok(socket) = connected else {
+        panic!("the stream of observers is not reached");
+    };
+    let mut reader = BufReader::new(socket);
+    let hello = line_of(&mut reader, |line| line["type"] == "hello");
+    assert_eq!(hello["scene"], "sphere-on-plane");
+    // The hand lowers the sphere on the plane: it touches, and there is force.
+    let state = line_of(&mut reader, |line| {
+        line["tools"][0]["force"][2]
+            .as_f64()
+            .is_some_and(|force| force > 0.01)
+    });
+    assert_eq!(state["run"], "running");
+
+    let Ok(mut socket) = TcpStream::connect(vrpn) else {
+        panic!("the VRPN server is not reached");
+    };
+    assert!(socket.set_read_timeout(Some(PATIENCE)).is_ok());
+    let mut client = taut_vrpn::Client::new("taut", None);
+    let mut seen = [false; 3];
+    let mut buffer = [0; 4096];
+    while seen != [true; 3] {
+        assert!(socket.write_all(&client.outgoing()).is_ok());
+        let Ok(length @ 1..) = socket.read(&mut buffer) else {
+            panic!("the VRPN server is silent");
+        };
+        assert!(client.receive(&buffer[..length]).is_ok());
+        while let Some(event) = client.next_event() {
+            if let taut_vrpn::Event::Pose(pose, _) = event {
+                seen[pose.sensor as usize] = true;
+            }
+        }
+    }
+    let (report, failure) = session.stop(&Terminal::standard_error());
+    assert!(failure.is_none() && report.haptics_period_us.count > 0);
+    while reader.read(&mut buffer).is_ok_and(|length| length > 0) {}
 }

@@ -65,6 +65,24 @@ impl Process {
         I: IntoIterator,
         I::Item: AsRef<std::ffi::OsStr>,
     {
+        Self::start_logging(name, program, arguments, directory, None)
+    }
+
+    /// The same with a filter of its log on standard error, such as `taut=info`.
+    ///
+    /// # Panics
+    /// When the system does not start it.
+    pub fn start_logging<I>(
+        name: &str,
+        program: impl AsRef<Path>,
+        arguments: I,
+        directory: &Path,
+        log: Option<&str>,
+    ) -> Self
+    where
+        I: IntoIterator,
+        I::Item: AsRef<std::ffi::OsStr>,
+    {
         let (stdout, stderr) = (
             directory.join(format!("{name}.out")),
             directory.join(format!("{name}.err")),
@@ -82,6 +100,9 @@ impl Process {
             .env_remove("TAUT_LOG")
             .env_remove("DISPLAY")
             .env_remove("WAYLAND_DISPLAY");
+        command.envs(log.map(|filter| ("TAUT_LOG", filter)));
+        // Nothing is kept from one test for another.
+        command.env("XDG_CACHE_HOME", directory.join("cache"));
         // Drivers complain aloud where a login session has not set it.
         command.env("XDG_RUNTIME_DIR", directory);
         command
@@ -147,6 +168,16 @@ impl Process {
     /// Asks it to end as Ctrl-C does.
     pub fn interrupt(&self) {
         signal(self.child.id() as i32, libc::SIGINT);
+    }
+
+    /// Stops it as a starved or suspended machine would; [`Process::resume`] lets it go on.
+    pub fn pause(&self) {
+        signal(self.child.id() as i32, libc::SIGSTOP);
+    }
+
+    /// Lets it go on after [`Process::pause`].
+    pub fn resume(&self) {
+        signal(self.child.id() as i32, libc::SIGCONT);
     }
 
     /// Kills it alone, at once, as a crash would: no goodbye.

@@ -24,13 +24,15 @@ pub struct TestWorkbench {
     program: PathBuf,
     /// The workbench file's content.
     pub file: Table,
+    /// What the processes log, such as `taut=info`; without it warnings.
+    pub log: Option<&'static str>,
     directory: TempDir,
     /// Held until the end: two workbenches at once would starve each other on a small machine.
     _turn: Turn,
 }
 
 impl TestWorkbench {
-    /// The shipped workbench on free ports of loopback, without monitor. `program` is the program under test. Waits
+    /// The shipped workbench on free ports of loopback, without monitor, patient with silent nodes. `program` is the program under test. Waits
     /// until no other test runs a workbench.
     ///
     /// # Panics
@@ -50,6 +52,7 @@ impl TestWorkbench {
         let mut workbench = Self {
             program: program.into(),
             file,
+            log: None,
             directory,
             _turn: turn,
         };
@@ -62,6 +65,8 @@ impl TestWorkbench {
             workbench.set(port, 0);
         }
         workbench.set("monitoring.enabled", false);
+        // A busy machine may starve a client for longer than a workbench would forgive.
+        workbench.set("network.node_timeout", 4.0);
         workbench
     }
 
@@ -117,7 +122,8 @@ impl TestWorkbench {
 
     /// Starts the program under test in the directory.
     pub fn start(&self, name: &str, arguments: &[&str]) -> Process {
-        Process::start(name, &self.program, arguments, self.directory())
+        let (program, directory) = (&self.program, self.directory());
+        Process::start_logging(name, program, arguments, directory, self.log)
     }
 
     /// Runs the program under test to its end.
@@ -127,13 +133,18 @@ impl TestWorkbench {
 
     /// Starts `taut serve` on the workbench file as it is now, and waits until it serves.
     pub fn serve(&self, arguments: &[&str]) -> Server {
+        self.serve_as("server", arguments)
+    }
+
+    /// The same under another name: a server that takes the place of one that died.
+    pub fn serve_as(&self, name: &str, arguments: &[&str]) -> Server {
         let config = self
             .write("workbench.toml", self.file.to_string())
             .display()
             .to_string();
         let key = self.key_path();
         let always = ["serve", "--config", &config, "--key", &key, "--json"];
-        let mut process = self.start("server", &[&always, arguments].concat());
+        let mut process = self.start(name, &[&always, arguments].concat());
         // serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)
         let addresses = process.line_after("serving on ", START_LIMIT);
         let (quic, udp) = addresses

@@ -45,7 +45,16 @@ fn workbench_with_bridge(workbench: &mut TestWorkbench) -> (Server, Process) {
         "bridge",
         "bridge",
         &server,
-        &["--json", "--hand", "firm", "--path", &path, "--loop"],
+        &[
+            "--json",
+            "--hand",
+            "firm",
+            "--path",
+            &path,
+            "--loop",
+            "--give-up",
+            "1",
+        ],
     );
     (server, bridge)
 }
@@ -422,8 +431,9 @@ fn a_second_node_of_the_same_name_and_one_with_another_key_are_refused_in_one_se
 }
 
 #[test]
-fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end() {
+fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_gave_up() {
     let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.log = Some("warn,taut=info");
     let adapter = workbench.adapter();
     let (mut server, bridge) = workbench_with_bridge(&mut workbench);
     let drawing = adapter.is_ok().then(|| {
@@ -431,9 +441,26 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end() {
             "render",
             "front",
             &server,
-            &["--headless", "--width", "64", "--height", "64"],
+            &[
+                "--headless",
+                "--width",
+                "64",
+                "--height",
+                "64",
+                "--give-up",
+                "1",
+            ],
         )
     });
+    if adapter.is_ok() {
+        wait_for("the node to join", JOIN_LIMIT, || {
+            server
+                .process
+                .stderr()
+                .contains("front joined")
+                .then_some(())
+        });
+    }
     let runtime = Runtime::new().expect("a runtime");
     let client = Client::join(
         &runtime,
@@ -446,8 +473,9 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end() {
     for process in std::iter::once(bridge).chain(drawing) {
         let ended = process.end(END_LIMIT);
         assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+        let last = ended.stderr.lines().last().unwrap_or_default();
         assert!(
-            ended.stderr.contains(&server.quic) && ended.stderr.contains("lost"),
+            last.contains(&server.quic) && last.contains("was lost"),
             "{}",
             ended.stderr
         );

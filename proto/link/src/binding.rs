@@ -4,15 +4,13 @@
 
 use crate::LinkError;
 use taut_proto::{
+    group::SERVER_SENDER,
     key::EXPORTER_BYTES,
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
 
 const PROOF_LABEL: &[u8] = b"EXPORTER-taut-proof-1";
 const HOT_LABEL: &[u8] = b"EXPORTER-taut-hot-1";
-
-/// Sender number of the server in datagram headers.
-pub(crate) const SERVER_SENDER: u16 = 0;
 
 /// Bytes that a proof of the cluster key is bound to.
 pub fn proof_binding(connection: &quinn::Connection) -> Result<[u8; EXPORTER_BYTES], LinkError> {

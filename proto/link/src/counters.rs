@@ -73,12 +73,30 @@ counters! {
         inputs_refused,
         /// Device readings overtaken by newer ones.
         inputs_late,
+        /// Readings of the viewer's head taken.
+        heads,
+        /// Readings of the viewer's head refused: no pose, or overtaken.
+        heads_refused,
         /// Clients let in.
         joined,
         /// Clients refused, for whatever reason.
         refused,
         /// Clients refused for the wrong key.
         wrong_key,
+        /// Clients whose session was closed because they were silent.
+        evicted,
+        /// Control messages that were read later than they came, because there were too many.
+        control_delayed,
+        /// Clients refused because their credential is revoked or their role closed.
+        shut_out,
+        /// Attempts to join that were turned away before TLS: too many, too soon after wrong proofs, or too many at once.
+        turned_away,
+        /// Attempts to join that first had to prove their address.
+        address_checks,
+        /// What clients tried that their role may not.
+        forbidden,
+        /// Datagrams dropped unopened: of unknown sources beyond their rate, or of a client beyond its.
+        flooded,
         /// Events dropped because nobody took them.
         events_dropped,
     }
@@ -111,5 +129,23 @@ counters! {
         packets_sent,
         /// Datagrams that the system did not take.
         send_errors,
+    }
+}
+
+counters! {
+    /// Where a client's meshes came from since it was started, over all its sessions.
+    MeshCounters, MeshCounterCells {
+        /// Meshes fetched from the server.
+        fetched,
+        /// Bytes of these.
+        fetched_bytes,
+        /// Meshes read from the cache on disk.
+        from_cache,
+        /// Bytes of these.
+        cache_bytes,
+        /// Files of the cache that were damaged, and removed.
+        damaged,
+        /// Meshes that the cache could not keep.
+        not_kept,
     }
 }

@@ -1,7 +1,7 @@
 //! Why a link does not come about or fails; each text says what, where and what to do.
 
 use std::{io, net::SocketAddr, path::PathBuf};
-use taut_proto::control::RefusalCode;
+use taut_proto::{ServerPin, control::RefusalCode, credential::NotAllowed};
 
 /// Why a link does not come about or fails.
 #[derive(Debug, thiserror::Error)]
@@ -54,9 +54,34 @@ pub enum LinkError {
         /// How long we tried, s.
         seconds: f64,
     },
-    /// Either end does not hold the other's key.
+    /// The server is there, but does not listen to this address.
     #[error(
-        "the server at {server} does not hold the same cluster key: give this node the server's key file (--key)"
+        "the server at {server} has turned this address away for {seconds:.0} s: too many attempts from here or with wrong keys, or too many at once; wait a moment, then look for what keeps trying"
+    )]
+    TurnedAway {
+        /// What was given.
+        server: String,
+        /// How long we tried, s.
+        seconds: f64,
+    },
+    /// Another server than the one that the key is for, or somebody between.
+    #[error(
+        "the server at {server} is not the one of this node's key: its fingerprint is {found}, the key's is {wanted}; check the address, or give this node that server's cluster key or a credential made from it (--key)"
+    )]
+    WrongServer {
+        /// What was given.
+        server: String,
+        /// Whom the key is for.
+        wanted: ServerPin,
+        /// Who answered.
+        found: ServerPin,
+    },
+    /// The key does not allow what was asked for.
+    #[error("the key of this node cannot be used: {0}")]
+    NotAllowed(#[from] NotAllowed),
+    /// It is the right server, but the secret is not one that it knows.
+    #[error(
+        "the server at {server} does not know this node's secret: the cluster key or credential (--key) is damaged or forged, make it again with `taut keys`"
     )]
     WrongKey {
         /// What was given.

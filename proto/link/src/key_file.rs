@@ -1,38 +1,75 @@
-//! The cluster key's file: 64 hexadecimal digits, readable by its owner only.
+//! Key files: the cluster key (64 hexadecimal digits) and credentials, readable by their owner only.
 
 use crate::LinkError;
-use std::{fs, io::Write, path::Path};
-use taut_proto::ClusterKey;
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+};
+use taut_proto::{ClusterKey, Credential, JoinKey, credential::MAX_KEY_TEXT_BYTES};
 
-/// Most bytes of a key file: the digits and some blanks.
-const MAX_KEY_FILE_BYTES: u64 = 4096;
+/// Permission bits that no secret may have: everything for others, writing for the group. Reading by the group is left, so that a file of
+/// root's can be read by a service through its group.
+#[cfg(unix)]
+const TOO_OPEN: u32 = 0o037;
 
-/// Reads a key file.
+/// Reads the file of the cluster key itself, for a server. A credential is refused: a server needs the master.
 pub fn read_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
-    let refuse = |reason: String| LinkError::KeyFile {
-        path: path.to_owned(),
-        reason,
-    };
-    let length = fs::metadata(path)
-        .map_err(|error| refuse(format!("{error}; copy it from the server")))?
-        .len();
-    if length > MAX_KEY_FILE_BYTES {
+    match read_join_key(path)? {
+        JoinKey::Master(key) => Ok(key),
+        JoinKey::Credential(credential) => Err(LinkError::KeyFile {
+            path: path.to_owned(),
+            reason: format!(
+                "it is a credential of {} {}, which cannot serve; give the cluster key",
+                credential.role(),
+                credential.holder()
+            ),
+        }),
+    }
+}
+
+/// Reads what a client joins with: the file of the cluster key, or of a credential.
+///
+/// Refused, as ssh does, if others may read it or anybody but its owner may write it.
+pub fn read_join_key(path: &Path) -> Result<JoinKey, LinkError> {
+    let refuse = |reason: String| key_file(path, reason);
+    let metadata =
+        fs::metadata(path).map_err(|error| refuse(format!("{error}; copy it from the server")))?;
+    let length = metadata.len();
+    if length > MAX_KEY_TEXT_BYTES as u64 {
         return Err(refuse(format!(
-            "it has {length} bytes where a key has 64 digits; copy it from the server"
+            "it has {length} bytes, no key has so many; copy it from the server"
         )));
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = metadata.permissions().mode() & 0o777;
+        if mode & TOO_OPEN != 0 {
+            return Err(refuse(format!(
+                "its permissions {mode:04o} let others use it; chmod 600 {}",
+                path.display()
+            )));
+        }
     }
     let text = fs::read_to_string(path)
         .map_err(|error| refuse(format!("{error}; copy it from the server")))?;
-    ClusterKey::parse(&text).map_err(|error| refuse(error.to_string()))
+    JoinKey::parse(&text).map_err(|error| refuse(error.to_string()))
 }
 
 /// Makes a fresh key and its file, mode 0600. An existing file is an error: a key in use is never overwritten.
 pub fn create_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
-    let refuse = |reason: String| LinkError::KeyFile {
-        path: path.to_owned(),
-        reason,
-    };
-    let key = ClusterKey::generate().map_err(|error| refuse(error.to_string()))?;
+    let key = ClusterKey::generate().map_err(|error| key_file(path, error.to_string()))?;
+    write_secret(path, &format!("{}\n", key.to_hex()))?;
+    Ok(key)
+}
+
+/// Writes a credential into a new file, mode 0600.
+pub fn write_credential_file(path: &Path, credential: &Credential) -> Result<(), LinkError> {
+    write_secret(path, &credential.to_text())
+}
+
+fn write_secret(path: &Path, text: &str) -> Result<(), LinkError> {
     let mut options = fs::OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
@@ -42,8 +79,14 @@ pub fn create_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
     }
     let mut file = options
         .open(path)
-        .map_err(|error| refuse(format!("{error}; choose another path")))?;
-    writeln!(file, "{}", key.to_hex())
-        .map_err(|error| refuse(format!("{error}; free some space")))?;
-    Ok(key)
+        .map_err(|error| key_file(path, format!("{error}; choose another path")))?;
+    file.write_all(text.as_bytes())
+        .map_err(|error| key_file(path, format!("{error}; free some space")))
+}
+
+fn key_file(path: &Path, reason: String) -> LinkError {
+    LinkError::KeyFile {
+        path: PathBuf::from(path),
+        reason,
+    }
 }

@@ -5,9 +5,10 @@
 //! | control | QUIC streams, TLS 1.3               | join, scene, meshes by hash, reports, log         |
 //! | hot     | sealed UDP, or QUIC datagrams       | state at up to 1 kHz, device input, wrench, time  |
 //!
-//! The server half is [`serve`]; the client half is [`connect`]. Both prove the cluster key to each other over the exporter of their TLS
-//! connection, and take the keys of the hot plane from it: one pair per session, so that only the device bridge's session can give
-//! device input. Nothing here makes a loop of the server wait: [`Broadcaster::send`] belongs in a thread of its own.
+//! The server half is [`serve`]; the client half is [`connect`]. The client knows the server by its public key; both prove a secret to each
+//! other over the exporter of their TLS connection (that of the cluster key, or of a credential for one role), and take the keys of the hot
+//! plane from it: one pair per session, so that only the device bridge's session can give device input. What a client may do is decided by
+//! its role alone (`taut_proto::role`), in one place of the server. [`SupervisedLink`] and [`Rejoiner`] come back to a server that was gone. Nothing here makes a loop of the server wait: [`Broadcaster::send`] belongs in a thread of its own.
 //!
 //! Layout of the wire: crate `taut-proto`.
 
@@ -18,20 +19,29 @@ pub mod counters;
 pub mod error;
 mod framing;
 pub mod key_file;
+pub mod pinning;
 mod readiness;
 pub mod server;
 pub mod transport;
 
-pub use client::{ClientLink, ClientOptions, ReceivedState, ReceivedWrench, connect};
+pub use client::{
+    ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GaveUp, GroupReceiver,
+    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, ReceivedState, ReceivedWrench,
+    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, SessionEnd, SupervisedLink, connect,
+};
 pub use clock::SessionClock;
-pub use counters::{ClientCounters, Counters};
+pub use counters::{ClientCounters, Counters, MeshCounters};
 pub use error::LinkError;
-pub use key_file::{create_key_file, read_key_file};
+pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerLink, ServerOptions, serve,
+    Broadcaster, ClientStatus, Content, DeviceInput, FloodLimits, FrameMaster, FrameReport,
+    HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink, ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
-pub use taut_proto::{ClientStats, ClusterKey, Role, Transport};
+pub use taut_proto::{
+    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
+    Transport,
+};
 
 /// Default port of the control plane.
 pub const DEFAULT_QUIC_PORT: u16 = 4857;

@@ -1,20 +1,17 @@
 //! TLS and QUIC settings of both halves.
 //!
-//! The server's certificate is made at start and says nothing: the client takes any, checks only that the peer holds the certificate's key,
-//! and both ends then prove the cluster key over this very connection's exporter (see [`crate::binding`]).
+//! The server's identity is an Ed25519 key derived from the cluster key. Its self-signed certificate says nothing but that key: the client
+//! compares the key's fingerprint with the one that it was given (see [`crate::pinning`]) and takes no other. Then both ends prove their
+//! secret over this very connection's exporter (see [`crate::binding`]).
 
-use crate::LinkError;
+use crate::{LinkError, pinning::PinnedServer};
 use quinn::{
     IdleTimeout, TransportConfig, VarInt,
     crypto::rustls::{QuicClientConfig, QuicServerConfig},
 };
-use rustls::{
-    DigitallySignedStruct, SignatureScheme,
-    client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier},
-    crypto::{CryptoProvider, verify_tls12_signature, verify_tls13_signature},
-    pki_types::{CertificateDer, PrivatePkcs8KeyDer, ServerName, UnixTime},
-};
+use rustls::{crypto::CryptoProvider, pki_types::PrivatePkcs8KeyDer};
 use std::{sync::Arc, time::Duration};
+use taut_proto::{ClusterKey, pin::ed25519_pkcs8};
 
 /// Silence after which a peer counts as gone.
 pub(crate) const IDLE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -26,6 +23,13 @@ const DATAGRAM_SEND_BYTES: usize = 4800;
 const DATAGRAM_RECEIVE_BYTES: usize = 256 << 10;
 /// Bytes in flight before congestion control knows the path: the default of 12 kB holds back a 1 kHz stream at join.
 const INITIAL_WINDOW_BYTES: u64 = 256 << 10;
+/// Bytes of one stream that a client may send ahead of the server's reading: some dozen reports.
+const SERVER_STREAM_BYTES: u32 = 128 << 10;
+/// The same of all streams of a client together.
+const SERVER_CONNECTION_BYTES: u32 = 512 << 10;
+/// Round trip that a client assumes before it knows: its first packet is sent again after three of these, so that a server that has just
+/// started is reached soon. On a longer way a packet is sent twice for nothing.
+const INITIAL_ROUND_TRIP: Duration = Duration::from_millis(100);
 /// Streams that a client may have open at once: control and meshes.
 const MAX_STREAMS: u32 = 32;
 /// Protocol name in TLS; the version is not in it, so that versions can refuse each other with a sentence.
@@ -33,49 +37,66 @@ const ALPN: &[u8] = b"taut";
 /// Name that clients ask for; nothing depends on it.
 pub(crate) const SERVER_NAME: &str = "taut";
 
-/// QUIC settings of a server with a certificate of its own.
-pub(crate) fn server_config(idle_timeout: Duration) -> Result<quinn::ServerConfig, LinkError> {
+/// QUIC settings of the server of `key`'s workbench.
+pub(crate) fn server_config(
+    key: &ClusterKey,
+    idle_timeout: Duration,
+) -> Result<quinn::ServerConfig, LinkError> {
     let failed = |reason: String| LinkError::System {
         what: "make a TLS identity",
         reason,
     };
-    let identity = rcgen::generate_simple_self_signed([SERVER_NAME.to_owned()])
+    let private = PrivatePkcs8KeyDer::from(ed25519_pkcs8(&key.identity_seed()));
+    let signing = rcgen::KeyPair::from_pkcs8_der_and_sign_algo(&private, &rcgen::PKCS_ED25519)
         .map_err(|error| failed(error.to_string()))?;
-    let key = PrivatePkcs8KeyDer::from(identity.signing_key.serialize_der());
+    let certificate = rcgen::CertificateParams::new([SERVER_NAME.to_owned()])
+        .and_then(|parameters| parameters.self_signed(&signing))
+        .map_err(|error| failed(error.to_string()))?;
     let mut tls = rustls::ServerConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(|error| failed(error.to_string()))?
         .with_no_client_auth()
-        .with_single_cert(vec![identity.cert.der().clone()], key.into())
+        .with_single_cert(vec![certificate.der().clone()], private.into())
         .map_err(|error| failed(error.to_string()))?;
+    // Every session's keys come from a handshake of its own: nothing is resumed, nothing is sent before it is over.
+    tls.send_tls13_tickets = 0;
     tls.alpn_protocols = vec![ALPN.to_vec()];
     let crypto = QuicServerConfig::try_from(tls).map_err(|error| failed(error.to_string()))?;
+    let mut transport = transport(idle_timeout);
+    transport
+        .stream_receive_window(VarInt::from_u32(SERVER_STREAM_BYTES))
+        .receive_window(VarInt::from_u32(SERVER_CONNECTION_BYTES));
     let mut config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
-    config.transport_config(Arc::new(transport(idle_timeout)));
+    config.transport_config(Arc::new(transport));
     Ok(config)
 }
 
-/// QUIC settings of a client. Speaks to any server: who trusts it must check the binding.
-pub fn client_config(idle_timeout: Duration) -> Result<quinn::ClientConfig, LinkError> {
+/// QUIC settings of a client that speaks to `server` alone.
+pub fn client_config(
+    server: Arc<PinnedServer>,
+    idle_timeout: Duration,
+) -> Result<quinn::ClientConfig, LinkError> {
     let failed = |reason: String| LinkError::System {
         what: "set up TLS",
         reason,
     };
-    let provider = provider();
-    let mut tls = rustls::ClientConfig::builder_with_provider(provider.clone())
+    let mut tls = rustls::ClientConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(|error| failed(error.to_string()))?
         .dangerous()
-        .with_custom_certificate_verifier(Arc::new(AnyCertificate { provider }))
+        .with_custom_certificate_verifier(server)
         .with_no_client_auth();
+    tls.resumption = rustls::client::Resumption::disabled();
     tls.alpn_protocols = vec![ALPN.to_vec()];
     let crypto = QuicClientConfig::try_from(tls).map_err(|error| failed(error.to_string()))?;
+    let mut transport = transport(idle_timeout);
+    transport.initial_rtt(INITIAL_ROUND_TRIP);
     let mut config = quinn::ClientConfig::new(Arc::new(crypto));
-    config.transport_config(Arc::new(transport(idle_timeout)));
+    config.transport_config(Arc::new(transport));
     Ok(config)
 }
 
-fn provider() -> Arc<CryptoProvider> {
+pub(crate) fn provider() -> Arc<CryptoProvider> {
     Arc::new(rustls::crypto::ring::default_provider())
 }
 
@@ -93,49 +114,4 @@ fn transport(idle_timeout: Duration) -> TransportConfig {
         .max_concurrent_uni_streams(VarInt::from_u32(0))
         .congestion_controller_factory(Arc::new(congestion));
     transport
-}
-
-/// Takes any certificate whose key the peer holds; trust comes from the cluster key, over the exporter.
-#[derive(Debug)]
-struct AnyCertificate {
-    provider: Arc<CryptoProvider>,
-}
-
-impl ServerCertVerifier for AnyCertificate {
-    fn verify_server_cert(
-        &self,
-        _end_entity: &CertificateDer<'_>,
-        _intermediates: &[CertificateDer<'_>],
-        _server_name: &ServerName<'_>,
-        _ocsp_response: &[u8],
-        _now: UnixTime,
-    ) -> Result<ServerCertVerified, rustls::Error> {
-        Ok(ServerCertVerified::assertion())
-    }
-
-    fn verify_tls12_signature(
-        &self,
-        message: &[u8],
-        cert: &CertificateDer<'_>,
-        signature: &DigitallySignedStruct,
-    ) -> Result<HandshakeSignatureValid, rustls::Error> {
-        let algorithms = &self.provider.signature_verification_algorithms;
-        verify_tls12_signature(message, cert, signature, algorithms)
-    }
-
-    fn verify_tls13_signature(
-        &self,
-        message: &[u8],
-        cert: &CertificateDer<'_>,
-        signature: &DigitallySignedStruct,
-    ) -> Result<HandshakeSignatureValid, rustls::Error> {
-        let algorithms = &self.provider.signature_verification_algorithms;
-        verify_tls13_signature(message, cert, signature, algorithms)
-    }
-
-    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
-        self.provider
-            .signature_verification_algorithms
-            .supported_schemes()
-    }
 }

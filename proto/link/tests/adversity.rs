@@ -3,10 +3,7 @@
 mod support;
 
 use std::{net::UdpSocket, time::Duration};
-use support::{
-    relay::{Impairment, Relay, Waiting},
-    *,
-};
+use support::{relay::Impairment, *};
 use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 
@@ -15,6 +12,7 @@ async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) 
     let waiting = Waiting::new();
     let server = server_with(ServerOptions {
         announced_udp_port: Some(waiting.port()),
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     })
     .await;
@@ -76,7 +74,7 @@ async fn garbage_is_counted_and_has_no_effect() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
-    let (server, relay) = behind_relay(Impairment::default(), 1).await;
+    let (server, relay) = behind_relay(Impairment::default(), 1, |options| options).await;
     let Some(mut inputs) = server.device_inputs() else {
         panic!("the first taker gets the inputs");
     };
@@ -117,12 +115,13 @@ async fn replayed_datagrams_are_counted_and_do_not_move_the_path() {
 async fn a_bad_network_costs_states_but_never_order_or_truth() {
     let impairment = Impairment {
         lost: 50,
+        bursts: 0,
         doubled: 50,
         swapped: 50,
         damaged: 50,
         delay_us: 0,
     };
-    let (server, relay) = behind_relay(impairment, 2).await;
+    let (server, relay) = behind_relay(impairment, 2, |options| options).await;
     let client = client(&server, Role::Render, "left").await;
     take_states(&server, &client, 1, 600).await; // asserts order and equality with what was sent
 
@@ -172,7 +171,11 @@ fn murdered_client(server: &ServerLink, node: &str) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
-    let server = server_with(ServerOptions::loopback(key('a'))).await; // 1 s of silence
+    let server = server_with(ServerOptions {
+        node_timeout: FORGIVING, // it is QUIC that notices here, after 1 s of silence
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
     let survivor = client(&server, Role::Render, "right").await;
     let tick = take_states(&server, &survivor, 1, 20).await;
     tokio::task::block_in_place(|| murdered_client(&server, "left"));
@@ -202,8 +205,9 @@ async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_restarted_node_takes_the_place_of_its_silent_self() {
     let server = server_with(ServerOptions {
-        // QUIC alone would take a minute to notice; the client's own timeout is as long, see below.
+        // Nobody would notice for a minute; the client's own timeout is as long, see below.
         idle_timeout: Duration::from_secs(60),
+        node_timeout: Duration::from_secs(60),
         ..ServerOptions::loopback(key('a'))
     })
     .await;

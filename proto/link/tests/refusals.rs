@@ -4,15 +4,18 @@ mod support;
 
 use std::{
     net::SocketAddr,
+    sync::Arc,
     time::{Duration, Instant},
 };
 use support::*;
 use taut_link::{
-    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, serve, transport,
+    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, pinning::PinnedServer,
+    serve, transport,
 };
 use taut_proto::{
     PROTOCOL_VERSION,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
+    proof::Grant,
 };
 
 async fn error_of(options: ClientOptions) -> LinkError {
@@ -23,33 +26,37 @@ async fn error_of(options: ClientOptions) -> LinkError {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_wrong_key_is_refused_with_a_sentence() {
+async fn the_key_of_another_workbench_meets_the_wrong_server_and_says_nothing_to_it() {
     let server = server().await;
     let error = error_of(ClientOptions {
-        key: key('b'),
+        key: key('b').into(),
         ..options(&server, Role::Render, "left")
     })
     .await;
+    assert!(matches!(error, LinkError::WrongServer { .. }), "{error}");
+    let text = error.to_string();
+    for named in [
+        server.quic_addr().to_string(),
+        key('a').server_pin().to_string(),
+        key('b').server_pin().to_string(),
+        "--key".to_owned(),
+    ] {
+        assert!(text.contains(&named), "{text}");
+    }
     assert_eq!(
-        error.to_string(),
-        format!(
-            "the server at {} does not hold the same cluster key: give this node the server's key file (--key)",
-            server.quic_addr()
-        )
+        server.counters().wrong_key,
+        0,
+        "no proof was sent to a stranger"
     );
-    assert_eq!(server.counters().wrong_key, 1);
     assert!(server.clients().is_empty());
-    event(&server, "refusal", |event| {
-        matches!(event, LinkEvent::Refused { code: RefusalCode::WrongKey, node, .. } if node == "left")
-    })
-    .await;
 }
 
 /// A peer that speaks QUIC but says `frame` first; returns what the server answers.
 async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
     let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
-    let config =
-        transport::client_config(Duration::from_secs(5)).unwrap_or_else(|error| fail(&error));
+    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
+    let config = transport::client_config(pinned, Duration::from_secs(5))
+        .unwrap_or_else(|error| fail(&error));
     let any = SocketAddr::from(([127, 0, 0, 1], 0));
     let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
     let connecting = endpoint
@@ -77,6 +84,7 @@ fn hello() -> Vec<u8> {
         transport: Transport::Udp,
         rate_hz: 0,
         proof: [0; 32],
+        grant: Grant::Master,
     });
     hello.to_frame().unwrap_or_else(|error| panic!("{error}"))
 }
@@ -114,7 +122,12 @@ async fn a_hello_without_proof_or_sense_is_refused() {
         }
     }
     assert_eq!(server.counters().refused, 3);
+    assert_eq!(server.counters().wrong_key, 1);
     assert!(server.clients().is_empty());
+    event(&server, "refusal", |event| {
+        matches!(event, LinkEvent::Refused { code: RefusalCode::WrongKey, node, .. } if node == "stranger")
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -256,6 +269,12 @@ fn a_key_file_is_made_once_private_and_read_again() {
     }
     let short = folder.path().join("short.key");
     assert!(std::fs::write(&short, "abc").is_ok());
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let private = std::fs::Permissions::from_mode(0o600);
+        assert!(std::fs::set_permissions(&short, private).is_ok());
+    }
     for bad in [short, folder.path().join("missing.key")] {
         let error = taut_link::read_key_file(&bad)
             .err()

@@ -7,9 +7,10 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, HotState,
-    InputSample, MeshHash, Payload, PoseF32, PoseF64, Refusal, Role, SceneDescription, Transport,
-    WrenchCommand,
+    ArrayVec, ClientStats, ConstraintPart, ControlMessage, CouplingOffer, EdgeCoupling, EventsTold,
+    Group, GroupMember, HeadSample, HotState, InputSample, MeshHash, Payload, PoseF32, PoseF64,
+    Refusal, Role, SceneDescription, Transport, WrenchCommand,
+    barrier::{Arrive, MAX_MEMBERS, Release, ReleaseHead},
     constraints::{
         ConstraintRow, MAX_PART_ROWS, MAX_PARTS, MAX_SET_ROWS, RowFeature, RowSeparation, SetHead,
     },
@@ -17,6 +18,9 @@ use taut_proto::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, Welcome,
     },
     coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface},
+    events::EventAck,
+    group::GroupSecret,
+    proof::Grant,
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
@@ -96,6 +100,14 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
         flags: 0,
     };
+    let head = HeadSample {
+        sample_time_ns: 1_000_000_000,
+        index: 43,
+        pose: PoseF64 {
+            position: [0.0, -1.25, 0.875],
+            rotation: [0.5, 0.5, 0.5, 0.5],
+        },
+    };
     let response = TimeResponse {
         client_sent: 17,
         server_received: 1017,
@@ -112,7 +124,43 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("input", Payload::Input(input)),
         ("wrench", Payload::Wrench(wrench)),
         ("constraints", Payload::Constraints(part())),
+        ("head", Payload::Head(head)),
+        ("arrive", Payload::Arrive(arrive())),
+        ("release", Payload::Release(release())),
+        ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
     ]
+}
+
+pub fn arrive() -> Arrive {
+    Arrive {
+        term: 1,
+        frame: 1001,
+        ready_ns: 16_000_000_000,
+        state_hash: 0x0102_0304_0506_0708,
+        state_time_ns: 15_990_000_000,
+        missed: 3,
+        swapped_frame: 1000,
+        swapped_ns: 15_995_000_000,
+        draw_us: 4200,
+        period_us: 8333,
+    }
+}
+
+pub fn release() -> Release {
+    Release {
+        head: ReleaseHead {
+            term: 1,
+            master: 0,
+            frame: 1001,
+            swap_ns: 16_000_300_000,
+            period_us: 16_667,
+            skew_ns: 12_000,
+            waited: 0b01,
+            late: 0b10,
+            members: ArrayVec::from_iter([3, 9]),
+        },
+        state: hot(),
+    }
 }
 
 /// A part with a row of every kind.
@@ -252,6 +300,12 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         transport: Transport::QuicDatagram,
         rate_hz: 1000,
         proof: [3; 32],
+        grant: Grant::Master,
+    };
+    let granted = Hello {
+        role: Role::Tracker,
+        grant: Grant::Node { issue: 2 },
+        ..hello.clone()
     };
     let welcome = Welcome {
         proof: [4; 32],
@@ -316,7 +370,36 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
             }),
         ),
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
+        ("group", ControlMessage::Group(group())),
+        ("hello_granted", ControlMessage::Hello(granted)),
+        (
+            "events",
+            ControlMessage::Events(EventsTold {
+                after: 16,
+                records: hot().events.to_vec(),
+            }),
+        ),
     ]
+}
+
+/// Three members, one of each kind of address.
+pub fn group() -> Group {
+    let member = |sender: u16, node: &str, role, address: Option<&str>| GroupMember {
+        sender,
+        node: node.to_owned(),
+        role,
+        address: address.and_then(|address| address.parse().ok()),
+    };
+    Group {
+        generation: 9,
+        secret: GroupSecret([5; 32]),
+        members: vec![
+            member(1, "left", Role::Render, Some("192.168.7.2:40001")),
+            member(2, "right", Role::Render, Some("[fd00::2]:40002")),
+            member(5, "watcher", Role::Observer, None),
+        ],
+        multicast: "239.255.72.87:4859".parse().ok(),
+    }
 }
 
 fn finite32() -> impl Strategy<Value = f32> {
@@ -480,6 +563,13 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 server_sent,
             })
         });
+    let head = (any::<(u64, u64)>(), pose64()).prop_map(|((sample_time_ns, index), pose)| {
+        Payload::Head(HeadSample {
+            sample_time_ns,
+            index,
+            pose,
+        })
+    });
     prop_oneof![
         any_hot().prop_map(Payload::Hot),
         any::<u64>().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
@@ -488,7 +578,61 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         input,
         wrench,
         any_part().prop_map(Payload::Constraints),
+        head,
+        any_arrive().prop_map(Payload::Arrive),
+        any_release().prop_map(Payload::Release),
     ]
+}
+
+pub fn any_arrive() -> impl Strategy<Value = Arrive> {
+    (
+        any::<(u32, u64, u64, u64, u64)>(),
+        any::<(u32, u64, u64, u32, u32)>(),
+    )
+        .prop_map(
+            |(
+                (term, frame, ready_ns, state_hash, state_time_ns),
+                (missed, swapped_frame, swapped_ns, draw_us, period_us),
+            )| Arrive {
+                term,
+                frame,
+                ready_ns,
+                state_hash,
+                state_time_ns,
+                missed,
+                swapped_frame,
+                swapped_ns,
+                draw_us,
+                period_us,
+            },
+        )
+}
+
+pub fn any_release() -> impl Strategy<Value = Release> {
+    let members = prop::collection::btree_set(any::<u16>(), 0..=MAX_MEMBERS);
+    (
+        any::<(u32, u16, u64, u64, u32, u32, u32, u32)>(),
+        members,
+        any_hot(),
+    )
+        .prop_map(
+            |((term, master, frame, swap_ns, period_us, skew_ns, waited, late), members, state)| {
+                Release {
+                    head: ReleaseHead {
+                        term,
+                        master,
+                        frame,
+                        swap_ns,
+                        period_us,
+                        skew_ns,
+                        waited,
+                        late,
+                        members: members.into_iter().collect(),
+                    },
+                    state,
+                }
+            },
+        )
 }
 
 pub fn any_row() -> impl Strategy<Value = ConstraintRow> {

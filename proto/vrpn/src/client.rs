@@ -16,6 +16,7 @@ use crate::PayloadError;
 use crate::button::{self, ButtonChange, ButtonStates};
 use crate::cookie::{COOKIE_BYTES, CookieError, Version, check, cookie};
 use crate::description;
+use crate::force::{self, ForceReport, SurfaceContactReport};
 use crate::message::{Header, Message, MessageError, Stamp, append, first};
 use crate::tracker::{self, PoseReport, VelocityReport};
 
@@ -23,13 +24,15 @@ use crate::tracker::{self, PoseReport, VelocityReport};
 pub const MAX_LISTED_SENDERS: usize = 64;
 
 /// Types that this side understands, in the order of [`Kind`].
-const TYPES: [&str; 6] = [
+const TYPES: [&str; 8] = [
     tracker::POSE,
     tracker::VELOCITY,
     button::CHANGE,
     button::STATES,
     "vrpn_Base ping_message",
     "vrpn_Base pong_message",
+    force::FORCE,
+    force::SCP,
 ];
 
 /// Which of [`TYPES`].
@@ -41,15 +44,19 @@ enum Kind {
     States,
     Ping,
     Pong,
+    Force,
+    SurfaceContact,
 }
 
-const KINDS: [Kind; 6] = [
+const KINDS: [Kind; 8] = [
     Kind::Pose,
     Kind::Velocity,
     Kind::Change,
     Kind::States,
     Kind::Ping,
     Kind::Pong,
+    Kind::Force,
+    Kind::SurfaceContact,
 ];
 
 /// What came from the server.
@@ -67,6 +74,10 @@ pub enum Event {
     Button(ButtonChange),
     /// All buttons.
     Buttons(ButtonStates),
+    /// The force that a force device gives.
+    Force(ForceReport, Stamp),
+    /// Where a force device's surface holds the tool back.
+    SurfaceContact(SurfaceContactReport, Stamp),
     /// The device answered a [`Client::ping`].
     Pong,
 }
@@ -256,6 +267,10 @@ impl Client {
             Kind::Change => Event::Button(ButtonChange::decode(payload)?),
             Kind::States => Event::Buttons(ButtonStates::decode(payload)?),
             Kind::Pong => Event::Pong,
+            Kind::Force => Event::Force(ForceReport::decode(payload)?, time),
+            Kind::SurfaceContact => {
+                Event::SurfaceContact(SurfaceContactReport::decode(payload)?, time)
+            }
             Kind::Ping => {
                 self.send(Kind::Pong, time);
                 return Ok(());
@@ -385,7 +400,10 @@ mod tests {
             rest = &rest[taken..];
         }
         assert!(rest.is_empty());
-        assert_eq!(kinds, [-3, -1, -2, -2, -2, -2, -2, -2, Kind::Ping as i32]);
+        assert_eq!(
+            kinds,
+            [-3, -1, -2, -2, -2, -2, -2, -2, -2, -2, Kind::Ping as i32]
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The VRPN wire protocol, as far as trackers and buttons need it: bytes in, reports out.
+//! The VRPN wire protocol, as far as trackers, force devices and buttons need it: bytes in, reports out, and the other way.
 //!
 //! VRPN is what motion trackers speak in a laboratory. Two peers greet each other with a [`cookie`]; then
 //! [`message`]s flow over TCP and, where both want it, over UDP. Each side describes its own names of devices
@@ -8,7 +8,9 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Everything is big-endian.
 //!
 //! - [`Client`]: one connection to a server, from its first byte on.
-//! - [`PoseReport`], [`VelocityReport`], [`ButtonChange`], [`ButtonStates`]: what devices say.
+//! - [`ServerSession`]: one client of a server, from its first byte on.
+//! - [`PoseReport`], [`VelocityReport`], [`ButtonChange`], [`ButtonStates`], [`ForceReport`],
+//!   [`SurfaceContactReport`]: what devices say.
 //! - Where a device is, [`Address`], as in `Tracker0@host:3883`.
 //! - [`SensorMapping`]: from a tracker's axes and units to poses in metres.
 //!
@@ -21,16 +23,20 @@ pub mod button;
 mod client;
 pub mod cookie;
 pub mod description;
+pub mod force;
 mod mapping;
 pub mod message;
+mod server;
 pub mod tracker;
 
 pub use address::{Address, AddressError, DEFAULT_PORT};
 pub use button::{ButtonChange, ButtonStates};
 pub use client::{Client, ClientError, Event, MAX_LISTED_SENDERS, callback_request};
 pub use cookie::{COOKIE_BYTES, CookieError, Version};
+pub use force::{ForceReport, SurfaceContactReport};
 pub use mapping::{Axes, AxesError, SensorMapping};
 pub use message::{Header, Message, MessageError, Stamp};
+pub use server::{MAX_PENDING_BYTES, Report, ServerError, ServerSession, callback_address};
 pub use tracker::{PoseReport, VelocityReport};
 
 /// A payload that is not what its type says.

@@ -22,7 +22,7 @@ pub use document::Document;
 pub use files::{
     DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file,
 };
-pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, write_ply};
+pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
@@ -37,9 +37,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
-    RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
-    VrpnSensor, Window, Workbench,
+    Device, DeviceDynamics, HeadTracking, Monitoring, Network, Node, ObserverStream, Passivity,
+    RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind,
+    Viewer, Vrpn, VrpnSensor, Window, Workbench, Zenoh,
 };
 
 /// Why a scene could not be used.

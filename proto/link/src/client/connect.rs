@@ -2,23 +2,31 @@
 
 use super::{
     ClientLink, ClientOptions,
+    group::GroupEnd,
     hot::{Hot, Path},
     inbound::Inbound,
+    meshes::Meshes,
+    told,
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
     framing::{CLOSE_REFUSED, ReadMessageError, close_text, read_message, write_message},
+    pinning::PinnedServer,
     transport,
 };
 use quinn::{Connection, ConnectionError, Endpoint, RecvStream, SendStream};
 use std::{
     net::{Ipv4Addr, Ipv6Addr, SocketAddr},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 use taut_proto::{
-    CouplingOffer, DecodeError, PROTOCOL_VERSION, Refusal, Role, SceneDescription, Transport,
+    Act, CouplingOffer, DecodeError, PROTOCOL_VERSION, Refusal, SceneDescription, Transport,
     control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
+    proof::Claim,
 };
 use tokio::time::{Instant, sleep_until, timeout_at};
 
@@ -29,6 +37,17 @@ const RETRY_PERIOD: Duration = Duration::from_millis(200);
 ///
 /// Runs on the current tokio runtime, which must live as long as the link; over UDP, states arrive in a thread named `taut-states`.
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
+    // Nobody is asked for what the key does not allow.
+    options.key.secret_for(options.role, &options.node)?;
+    let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
+    connect_with(options, meshes).await
+}
+
+/// The same with the meshes that earlier sessions brought.
+pub(crate) async fn connect_with(
+    options: ClientOptions,
+    meshes: Arc<Meshes>,
+) -> Result<ClientLink, LinkError> {
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
@@ -37,9 +56,16 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
     let addresses = timeout_at(deadline, resolve(&options.server))
         .await
         .map_err(|_| unreachable())??;
-    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses))
+    let turned_away = AtomicBool::new(false);
+    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses, &turned_away))
         .await
-        .map_err(|_| unreachable())??;
+        .map_err(|_| match turned_away.load(Ordering::Relaxed) {
+            true => LinkError::TurnedAway {
+                server: options.server.clone(),
+                seconds: options.connect_timeout.as_secs_f64(),
+            },
+            false => unreachable(),
+        })??;
 
     let joining = timeout_at(deadline, join(&options, &connection));
     let Joined {
@@ -47,6 +73,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         description,
         coupling,
         send,
+        recv,
     } = match joining.await {
         Ok(Ok(joined)) => joined,
         Ok(Err(error)) => {
@@ -68,9 +95,12 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         connection,
         sealer,
         Inbound::new(opener, options.role),
+        GroupEnd::new(welcome.epoch, welcome.session),
         path,
     ));
     hot.clone().start()?;
+    tokio::spawn(told::listen(hot.clone(), recv));
+    meshes.keep_only(&description);
     Ok(ClientLink::new(
         options.server,
         endpoint,
@@ -78,6 +108,7 @@ pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
         welcome.session,
         description,
         coupling,
+        meshes,
         send,
     ))
 }
@@ -123,8 +154,10 @@ async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
 async fn reach(
     options: &ClientOptions,
     addresses: &[SocketAddr],
+    turned_away: &AtomicBool,
 ) -> Result<(Endpoint, Connection), LinkError> {
-    let config = transport::client_config(options.idle_timeout)?;
+    let pinned = Arc::new(PinnedServer::new(options.key.pin()));
+    let config = transport::client_config(pinned.clone(), options.idle_timeout)?;
     loop {
         let round = Instant::now();
         for address in addresses {
@@ -143,12 +176,24 @@ async fn reach(
             match connecting.await {
                 Ok(connection) => return Ok((endpoint, connection)),
                 Err(ConnectionError::TransportError(error)) => {
-                    return Err(LinkError::Protocol {
-                        server: options.server.clone(),
-                        reason: error.to_string(),
+                    let server = options.server.clone();
+                    return Err(match pinned.stranger() {
+                        Some(found) => LinkError::WrongServer {
+                            server,
+                            wanted: pinned.pin(),
+                            found,
+                        },
+                        None => LinkError::Protocol {
+                            server,
+                            reason: error.to_string(),
+                        },
                     });
                 }
-                Err(_) => {} // nobody there, or too busy: try again
+                // It is there, and will not listen yet: try again.
+                Err(ConnectionError::ConnectionClosed(_)) => {
+                    turned_away.store(true, Ordering::Relaxed);
+                }
+                Err(_) => {} // nobody there: try again
             }
         }
         sleep_until(round + RETRY_PERIOD).await;
@@ -162,6 +207,8 @@ struct Joined {
     /// For a device bridge.
     coupling: Option<CouplingOffer>,
     send: SendStream,
+    /// What else the server tells.
+    recv: RecvStream,
 }
 
 /// Hello to scene, and to the coupling for a device bridge.
@@ -172,14 +219,19 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
     };
     let (mut send, mut recv) = connection.open_bi().await.map_err(lost)?;
     let binding = binding::proof_binding(connection)?;
+    let (grant, secret) = options.key.secret_for(options.role, &options.node)?;
+    let claim = Claim {
+        role: options.role,
+        node: &options.node,
+        grant,
+    };
     let hello = Hello {
         node: options.node.clone(),
         role: options.role,
         transport: options.transport,
         rate_hz: options.rate_hz,
-        proof: options
-            .key
-            .client_proof(&binding, options.role, &options.node),
+        proof: secret.client_proof(&binding, claim),
+        grant,
     };
     if write_message(&mut send, &ControlMessage::Hello(hello))
         .await
@@ -197,11 +249,8 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
             ));
         }
     };
-    // Now the server must prove the key: somebody in the middle would have ended here.
-    if !options
-        .key
-        .verify_server(&welcome.proof, &binding, options.role, &options.node)
-    {
+    // Now the server must prove the secret, too: its certificate alone says only that it holds its own key.
+    if !secret.verify_server(&welcome.proof, &binding, claim) {
         return Err(LinkError::WrongKey {
             server: options.server.clone(),
         });
@@ -215,8 +264,8 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
             ));
         }
     };
-    let coupling = match options.role {
-        Role::Device => match expect(options, connection, &mut recv).await? {
+    let coupling = match options.role.may(Act::GetWrenches) {
+        true => match expect(options, connection, &mut recv).await? {
             ControlMessage::Coupling(offer) => Some(offer),
             other => {
                 return Err(protocol(
@@ -225,13 +274,14 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
                 ));
             }
         },
-        _ => None,
+        false => None,
     };
     Ok(Joined {
         welcome,
         description,
         coupling,
         send,
+        recv,
     })
 }
 
@@ -250,6 +300,7 @@ async fn expect(
             })
         }
         Err(ReadMessageError::Decode(error)) => Err(protocol(options, error.to_string())),
+        Err(error @ ReadMessageError::Stalled) => Err(protocol(options, error.to_string())),
         Err(ReadMessageError::Ended(reason)) => Err(LinkError::Closed {
             server: options.server.clone(),
             reason: connection

@@ -1,7 +1,7 @@
 //! The hot plane of a client: a UDP socket with a thread, or QUIC datagrams with a task. Both receive, and both keep the path and the
-//! clock alive with time requests: 16 quick ones at join, then ten per second.
+//! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
-use super::inbound::Inbound;
+use super::{group::GroupEnd, inbound::Inbound};
 use crate::LinkError;
 use quinn::Connection;
 use std::{
@@ -13,14 +13,21 @@ use std::{
     },
     time::{Duration, Instant},
 };
-use taut_proto::{Payload, header::MAX_DATAGRAM_BYTES, seal::Sealer, time::TimeRequest};
+use taut_proto::{
+    Header, Payload,
+    events::EventAck,
+    group::{SERVER_SENDER, is_grouped},
+    header::MAX_DATAGRAM_BYTES,
+    seal::Sealer,
+    time::TimeRequest,
+};
 
 /// Time requests at join, so that the clock is locked within 100 ms.
 const QUICK_REQUESTS: u32 = 16;
 /// Distance between these.
 const QUICK_PERIOD: Duration = Duration::from_millis(5);
-/// Distance between later ones: also the sign of life that the server expects.
-const PERIOD: Duration = Duration::from_millis(100);
+/// Distance between later ones: also the sign of life that the server expects, ten of which may be lost in a row.
+const PERIOD: Duration = Duration::from_millis(50);
 /// Longest that a send may take: the kernel's buffer is full then, and the datagram is given up.
 const SEND_TIMEOUT: Duration = Duration::from_millis(1);
 /// Shortest receive timeout: zero would mean "for ever".
@@ -38,6 +45,7 @@ pub(crate) enum Path {
 /// Sending, receiving and the clock of one session. Shared by the link and its receiver.
 pub(crate) struct Hot {
     pub(crate) inbound: Inbound,
+    pub(crate) group: GroupEnd,
     pub(crate) connection: Connection,
     sealer: Sealer,
     path: Path,
@@ -65,9 +73,16 @@ impl Path {
 }
 
 impl Hot {
-    pub(crate) fn new(connection: Connection, sealer: Sealer, inbound: Inbound, path: Path) -> Hot {
+    pub(crate) fn new(
+        connection: Connection,
+        sealer: Sealer,
+        inbound: Inbound,
+        group: GroupEnd,
+        path: Path,
+    ) -> Hot {
         Hot {
             inbound,
+            group,
             connection,
             sealer,
             path,
@@ -96,6 +111,57 @@ impl Hot {
         }
     }
 
+    /// Sends `payload` to a member under the group key, or counts the failure; `false` where that is not possible. No allocation.
+    pub(crate) fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        let Path::Udp { socket, .. } = &self.path else {
+            return false;
+        };
+        let Some(address) = self.group.address(member) else {
+            return false;
+        };
+        let mut buffer = [0; MAX_DATAGRAM_BYTES];
+        let now_ns = self.inbound.local_ns(Instant::now());
+        let Some(datagram) = self.group.seal(payload, now_ns, &mut buffer) else {
+            return false;
+        };
+        let sent = socket.send_to(datagram, address).is_ok();
+        let counters = &self.inbound.counters;
+        if sent {
+            counters.packets_sent.one();
+        } else {
+            counters.send_errors.one();
+        }
+        sent
+    }
+
+    /// Takes one datagram in, under whichever key, or counts why not.
+    fn receive(&self, datagram: &[u8], received: Instant) {
+        match Header::parse(datagram) {
+            Ok(header) if is_grouped(&header) => self.receive_grouped(datagram, received),
+            _ => self.inbound.receive(datagram, received),
+        }
+        self.acknowledge();
+    }
+
+    /// Tells the server which events are here, if that is news.
+    pub(crate) fn acknowledge(&self) {
+        if let Some(newest) = self.inbound.acknowledgement() {
+            self.send(&Payload::EventAck(EventAck { newest }));
+        }
+    }
+
+    fn receive_grouped(&self, datagram: &[u8], received: Instant) {
+        let opened = match self.group.open(datagram, self.inbound.local_ns(received)) {
+            Ok(opened) => opened,
+            Err(error) => return self.inbound.count_refused(&error),
+        };
+        self.inbound.counters.packets_received.one();
+        match (opened.header.sender, &opened.payload) {
+            (SERVER_SENDER, Payload::Hot(_)) => {}
+            (sender, payload) => self.group.hand_over(sender, payload, received),
+        }
+    }
+
     /// Starts receiving; ends by itself with the connection.
     pub(crate) fn start(self: Arc<Hot>) -> Result<(), LinkError> {
         match self.path {
@@ -120,7 +186,8 @@ impl Hot {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    fn is_over(&self) -> bool {
+    /// Whether the session is at its end.
+    pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed) || self.connection.close_reason().is_some()
     }
 
@@ -150,7 +217,7 @@ impl Hot {
                 wait = Some(longest);
             }
             match socket.recv(&mut buffer) {
-                Ok(length) => self.inbound.receive(&buffer[..length], Instant::now()),
+                Ok(length) => self.receive(&buffer[..length], Instant::now()),
                 Err(error)
                     if matches!(
                         error.kind(),
@@ -170,7 +237,7 @@ impl Hot {
                 self.request_time();
             }
             match tokio::time::timeout(rhythm.left(now), self.connection.read_datagram()).await {
-                Ok(Ok(datagram)) => self.inbound.receive(&datagram, Instant::now()),
+                Ok(Ok(datagram)) => self.receive(&datagram, Instant::now()),
                 Ok(Err(_)) => return,
                 Err(_) => {} // time for a request
             }

@@ -1,7 +1,7 @@
 //! What arrives on the hot plane: states into a bounded queue, the newest wrench, constraint sets put together, time into the clock
 //! filter; everything else counted.
 
-use super::{ReceivedState, ReceivedWrench};
+use super::{ReceivedState, ReceivedWrench, frames::Frames};
 use crate::counters::ClientCounterCells;
 use std::{
     collections::VecDeque,
@@ -9,8 +9,10 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    Assembler, ClockFilter, ConstraintSet, DecodeError, PartTaken, Payload, Role, SessionTime,
+    Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken, Payload,
+    Role, SessionTime,
     seal::{OpenError, Opened, Opener},
+    state::EventRecord,
 };
 
 /// States kept for who takes them: a quarter of a second at 1 kHz. Beyond it the oldest go, newest wins.
@@ -18,6 +20,7 @@ const MAX_QUEUED_STATES: usize = 256;
 
 pub(crate) struct Inbound {
     inner: Mutex<Inner>,
+    pub(crate) frames: Frames,
     /// Zero of this client's clock in the time exchange.
     start: Instant,
     pub(crate) counters: ClientCounterCells,
@@ -31,6 +34,9 @@ struct Inner {
     newest_state: Option<u64>,
     wrench: Option<ReceivedWrench>,
     sets: Option<ReceivedSets>,
+    events: EventInbox,
+    /// Newest event that was acknowledged.
+    acknowledged: Option<u32>,
 }
 
 /// Constraint sets, for a device bridge.
@@ -53,7 +59,10 @@ impl Inbound {
                     assembler: Assembler::new(),
                     confirmed: None,
                 }),
+                events: EventInbox::default(),
+                acknowledged: None,
             }),
+            frames: Frames::new(),
             start: Instant::now(),
             counters: ClientCounterCells::default(),
         }
@@ -70,12 +79,7 @@ impl Inbound {
         let mut inner = self.lock();
         let opened = match inner.opener.open(datagram) {
             Ok(opened) => opened,
-            Err(OpenError::Header(DecodeError::WrongVersion { .. })) => {
-                return counters.wrong_version.one();
-            }
-            Err(OpenError::Header(_) | OpenError::Payload(_)) => return counters.garbage.one(),
-            Err(OpenError::Forged) => return counters.forged.one(),
-            Err(OpenError::Replayed) => return counters.duplicates.one(),
+            Err(error) => return self.count_refused(&error),
         };
         counters.packets_received.one();
         let sequence = opened.header.sequence;
@@ -83,12 +87,55 @@ impl Inbound {
             Some(gap) => counters.lost.add(gap),
             None => counters.lost.take_one(), // late: it was counted when it was overtaken
         }
-        inner.take(opened, received, self.local_ns(received), counters);
+        let local_ns = self.local_ns(received);
+        if let Payload::Release(release) = opened.payload {
+            drop(inner);
+            return self.frames.release(release, opened.state_hash, local_ns);
+        }
+        inner.take(opened, received, local_ns, counters);
+    }
+
+    /// Counts a datagram that does not open.
+    pub(crate) fn count_refused(&self, error: &OpenError) {
+        let counters = &self.counters;
+        match error {
+            OpenError::Header(DecodeError::WrongVersion { .. }) => counters.wrong_version.one(),
+            OpenError::Header(_) | OpenError::Payload(_) => counters.garbage.one(),
+            OpenError::Forged | OpenError::Misplaced => counters.forged.one(),
+            OpenError::Replayed => counters.duplicates.one(),
+        }
     }
 
     /// Moves the queued states to the end of `out`.
     pub(crate) fn drain_states(&self, out: &mut Vec<ReceivedState>) {
         out.extend(self.lock().states.drain(..));
+    }
+
+    /// Takes what the control stream tells.
+    pub(crate) fn told_events(&self, told: &EventsTold) {
+        self.lock().events.told(told);
+    }
+
+    /// Moves the queued events to the end of `out`.
+    pub(crate) fn drain_events(&self, out: &mut Vec<EventRecord>) {
+        self.lock().events.drain(out);
+    }
+
+    /// Events that this client will never get, and events that nobody took in time.
+    pub(crate) fn events_lost(&self) -> (u64, u64) {
+        let inner = self.lock();
+        (inner.events.missed(), inner.events.overrun())
+    }
+
+    /// The newest event, if the server has not been told yet that it is here.
+    pub(crate) fn acknowledgement(&self) -> Option<u32> {
+        let mut inner = self.lock();
+        let newest = inner.events.newest();
+        if newest == inner.acknowledged {
+            return None;
+        }
+        inner.acknowledged = newest;
+        newest
     }
 
     pub(crate) fn latest_wrench(&self) -> Option<ReceivedWrench> {
@@ -118,8 +165,13 @@ impl Inbound {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.inner)
     }
+}
+
+/// The lock, whoever panicked while holding it: no datum here can be left half-changed.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Inner {
@@ -134,6 +186,7 @@ impl Inner {
         match opened.payload {
             Payload::Hot(state) => {
                 counters.states.one();
+                self.events.repeated(&state.events);
                 // Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
                 if self.newest_state.is_some_and(|last| last > sequence) {
                     return counters.late.one();
@@ -178,7 +231,12 @@ impl Inner {
             },
             Payload::Heartbeat => {}
             // The server has no business sending these.
-            Payload::Input(_) | Payload::TimeRequest(_) => counters.garbage.one(),
+            Payload::Input(_)
+            | Payload::Head(_)
+            | Payload::TimeRequest(_)
+            | Payload::Arrive(_)
+            | Payload::EventAck(_) => counters.garbage.one(),
+            Payload::Release(_) => {} // taken before
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A joined session: scene, meshes, states, device input and reports.
 
-use super::{ReceivedState, ReceivedWrench, hot::Hot, meshes::Meshes};
+use super::{
+    FrameGate, GroupReceiver, ReceivedState, ReceivedWrench, Roster, hot::Hot, meshes::Meshes,
+};
 use crate::{
-    ClientCounters, LinkError,
+    ClientCounters, LinkError, MeshCounters, STOP_REASON,
     framing::{CLOSE_BYE, close_text, write_message},
 };
 use quinn::{Endpoint, SendStream};
@@ -11,9 +13,10 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, ConstraintSet, CouplingOffer, InputSample, MeshBlob, MeshHash, Payload,
-    SceneDescription, SessionTime,
+    ClientStats, ConstraintSet, CouplingOffer, HeadSample, InputSample, MeshBlob, MeshHash,
+    Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
+    state::EventRecord,
 };
 use tokio::{sync::mpsc, time::timeout};
 
@@ -21,6 +24,15 @@ use tokio::{sync::mpsc, time::timeout};
 const MAX_WAITING_MESSAGES: usize = 64;
 /// Time for the goodbye to arrive.
 const CLOSE_TIMEOUT: Duration = Duration::from_millis(500);
+
+/// How a session ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SessionEnd {
+    /// The server said that it stops.
+    ServerStopped,
+    /// For another reason, one sentence.
+    Lost(String),
+}
 
 /// A joined session. Every method takes `&self`: share it by `Arc`. Dropping it leaves the session at once.
 pub struct ClientLink {
@@ -30,7 +42,7 @@ pub struct ClientLink {
     session: u16,
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
-    meshes: Meshes,
+    meshes: Arc<Meshes>,
     outbox: mpsc::Sender<ControlMessage>,
 }
 
@@ -43,6 +55,7 @@ impl ClientLink {
         session: u16,
         description: SceneDescription,
         coupling: Option<CouplingOffer>,
+        meshes: Arc<Meshes>,
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
@@ -54,7 +67,7 @@ impl ClientLink {
             session,
             description,
             coupling,
-            meshes: Meshes::default(),
+            meshes,
             outbox,
         }
     }
@@ -74,16 +87,39 @@ impl ClientLink {
         self.session
     }
 
-    /// The mesh of `hash`, from the server or, the second time, from memory. Its hash has been checked.
+    /// The mesh of `hash`, from memory, from the cache on disk, or from the server. Its hash has been checked.
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
         self.meshes
             .get(&self.hot.connection, &self.server, hash)
             .await
     }
 
+    /// Where the meshes came from, over all sessions of this client.
+    pub fn mesh_counters(&self) -> MeshCounters {
+        self.meshes.counters()
+    }
+
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
     pub fn drain_states(&self, out: &mut Vec<ReceivedState>) {
         self.hot.inbound.drain_states(out);
+    }
+
+    /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
+    /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
+    pub fn frame_gate(&self, period: Duration) -> FrameGate {
+        FrameGate::new(self.hot.clone(), self.session, period)
+    }
+
+    /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most
+    /// the newest [`taut_proto::events::MAX_QUEUED`] wait.
+    pub fn drain_events(&self, out: &mut Vec<EventRecord>) {
+        self.hot.inbound.drain_events(out);
+    }
+
+    /// Events since the join that this client did not get: because its stream stood still for longer than the server keeps them, and because nobody
+    /// drained them in time.
+    pub fn events_lost(&self) -> (u64, u64) {
+        self.hot.inbound.events_lost()
     }
 
     /// Session time now; `None` until the clock is locked, about 100 ms after joining.
@@ -101,9 +137,19 @@ impl ClientLink {
         self.hot.inbound.round_trip_ns().map(Duration::from_nanos)
     }
 
+    /// Round trip of the control plane, as QUIC measures it.
+    pub fn control_round_trip(&self) -> Duration {
+        self.hot.connection.rtt()
+    }
+
     /// Sends a device reading at once. Counts if [`crate::Role::Device`] joined; from any other role the server refuses it.
     pub fn send_input(&self, sample: &InputSample) {
         self.hot.send(&Payload::Input(*sample));
+    }
+
+    /// Sends a reading of the viewer's head at once. Counts if [`crate::Role::Tracker`] joined; from any other role the server refuses it.
+    pub fn send_head(&self, sample: &HeadSample) {
+        self.hot.send(&Payload::Head(*sample));
     }
 
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.
@@ -118,6 +164,24 @@ impl ClientLink {
     /// `out` must be of this session: a set is known by its sequence number.
     pub fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
         self.hot.inbound.newest_set(out)
+    }
+
+    /// Who is in, as the server told it last; `None` until it did, a moment after joining, and always for a device bridge.
+    pub fn roster(&self) -> Option<Arc<Roster>> {
+        self.hot.group.roster()
+    }
+
+    /// Sends `payload` from node to node under the group key, at once; `false` if the member's address or the key is not known (yet), if a group key
+    /// may not carry it, or if the system did not take it. Over UDP only. No allocation.
+    ///
+    /// It proves to the receiver that a member sent it, not which one: see [`taut_proto::group`].
+    pub fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        self.hot.send_to_member(member, payload)
+    }
+
+    /// Sets who takes what other members send with [`ClientLink::send_to_member`]; `false` if there is one already.
+    pub fn on_group_datagram(&self, receiver: GroupReceiver) -> bool {
+        self.hot.group.set_receiver(receiver)
     }
 
     /// Sends a report, waiting while earlier ones are not away yet.
@@ -171,6 +235,22 @@ impl ClientLink {
             .map(|error| close_text(&error, "the server"))
     }
 
+    /// How the session ended; `None` while it is open.
+    pub fn ended(&self) -> Option<SessionEnd> {
+        let reason = self.is_closed()?;
+        Some(if reason.contains(STOP_REASON) {
+            SessionEnd::ServerStopped
+        } else {
+            SessionEnd::Lost(reason)
+        })
+    }
+
+    /// Leaves at once, without waiting for anything: the server is gone, or this link is of no use any more.
+    pub fn abandon(&self) {
+        self.hot.stop();
+        self.hot.connection.close(CLOSE_BYE, b"the node left");
+    }
+
     /// Waits until the link is closed and returns why.
     pub async fn closed(&self) -> String {
         close_text(&self.hot.connection.closed().await, "the server")
@@ -178,6 +258,11 @@ impl ClientLink {
 
     /// Says goodbye and leaves; reports sent before arrive first.
     pub async fn close(self) {
+        self.leave().await;
+    }
+
+    /// The same for a link that others share; they find it closed.
+    pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
             reason: "the node left".to_owned(),
         });
@@ -202,8 +287,7 @@ impl ClientLink {
 
 impl Drop for ClientLink {
     fn drop(&mut self) {
-        self.hot.stop();
-        self.hot.connection.close(CLOSE_BYE, b"the node left");
+        self.abandon();
     }
 }
 

@@ -1,16 +1,19 @@
-//! Meshes by hash: each on a stream of its own, checked against its hash, kept for the next who asks.
+//! Meshes by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
+//! for the next who asks, in this session or in a later one.
 
+use super::mesh_cache::{Cached, MeshCache};
 use crate::{
-    LinkError,
+    LinkError, MeshCounters,
+    counters::MeshCounterCells,
     framing::{read_message, write_message},
 };
 use quinn::Connection;
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use taut_proto::{
-    MeshBlob, MeshHash,
+    MeshBlob, MeshHash, SceneDescription,
     control::{ControlMessage, MeshHeader, MeshRequest},
     mesh_blob::MAX_MESH_BYTES,
 };
@@ -18,12 +21,35 @@ use taut_proto::{
 /// Most bytes of the message before a mesh.
 const MAX_HEADER_BYTES: usize = 256;
 
+/// The meshes that a client has. Outlives its sessions.
 #[derive(Default)]
 pub(crate) struct Meshes {
     known: Mutex<HashMap<MeshHash, Arc<MeshBlob>>>,
+    cache: Option<Arc<MeshCache>>,
+    counters: MeshCounterCells,
 }
 
 impl Meshes {
+    pub(crate) fn new(cache: Option<Arc<MeshCache>>) -> Meshes {
+        Meshes {
+            cache,
+            ..Meshes::default()
+        }
+    }
+
+    pub(crate) fn counters(&self) -> MeshCounters {
+        self.counters.read()
+    }
+
+    /// Forgets the meshes that `description` does not name: a scene that changed must not stay in memory.
+    pub(crate) fn keep_only(&self, description: &SceneDescription) {
+        let named = |hash: &MeshHash| {
+            let bodies = std::iter::once(&description.god_object).chain(&description.obstacles);
+            bodies.into_iter().any(|body| body.mesh == *hash)
+        };
+        self.lock().retain(|hash, _| named(hash));
+    }
+
     /// The mesh of `hash`, from here or from the server.
     pub(crate) async fn get(
         &self,
@@ -31,32 +57,73 @@ impl Meshes {
         server: &str,
         hash: MeshHash,
     ) -> Result<Arc<MeshBlob>, LinkError> {
-        if let Some(mesh) = self
-            .known
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .get(&hash)
-        {
+        if let Some(mesh) = self.lock().get(&hash) {
             return Ok(mesh.clone());
         }
+        let mesh = match self.from_cache(hash).await {
+            Some(mesh) => mesh,
+            None => self.from_server(connection, server, hash).await?,
+        };
+        let mesh = Arc::new(mesh);
+        self.lock().insert(hash, mesh.clone());
+        Ok(mesh)
+    }
+
+    async fn from_cache(&self, hash: MeshHash) -> Option<MeshBlob> {
+        let cache = self.cache.clone()?;
+        // Reading, hashing and decoding a large mesh takes milliseconds that the network's tasks must not wait.
+        let read = tokio::task::spawn_blocking(move || match cache.read(hash) {
+            Cached::Bytes(bytes) => match MeshBlob::decode(&bytes) {
+                Ok(mesh) => (Some((mesh, bytes.len())), false),
+                Err(_) => (None, true), // right, but of another release: it is fetched and replaced
+            },
+            Cached::Missing => (None, false),
+            Cached::Damaged => (None, true),
+        });
+        let (found, damaged) = read.await.unwrap_or_default();
+        if damaged {
+            self.counters.damaged.one();
+            tracing::warn!("mesh {hash} in the cache was damaged; fetching it again");
+        }
+        let (mesh, bytes) = found?;
+        self.counters.from_cache.one();
+        self.counters.cache_bytes.add(bytes as u64);
+        Some(mesh)
+    }
+
+    async fn from_server(
+        &self,
+        connection: &Connection,
+        server: &str,
+        hash: MeshHash,
+    ) -> Result<MeshBlob, LinkError> {
         let bytes = fetch(connection, server, hash).await?;
-        // Hashing and decoding a large mesh takes milliseconds that the network's tasks must not wait.
+        self.counters.fetched.one();
+        self.counters.fetched_bytes.add(bytes.len() as u64);
+        let cache = self.cache.clone();
         let decoded = tokio::task::spawn_blocking(move || {
             if MeshHash::of(&bytes) != hash {
                 return Err("its bytes have another hash".to_owned());
             }
-            MeshBlob::decode(&bytes).map_err(|error| error.to_string())
+            let mesh = MeshBlob::decode(&bytes).map_err(|error| error.to_string())?;
+            Ok((
+                mesh,
+                cache.and_then(|cache| cache.write(hash, &bytes).err()),
+            ))
         });
-        let mesh = decoded
+        let (mesh, not_kept) = decoded
             .await
             .unwrap_or_else(|error| Err(error.to_string()))
             .map_err(|reason| bad_mesh(server, hash, reason))?;
-        let mesh = Arc::new(mesh);
-        self.known
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .insert(hash, mesh.clone());
+        if let Some(error) = not_kept {
+            self.counters.not_kept.one();
+            tracing::warn!("mesh {hash} cannot be kept in the cache ({error}); going on without");
+        }
         Ok(mesh)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<MeshHash, Arc<MeshBlob>>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

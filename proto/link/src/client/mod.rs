@@ -1,12 +1,26 @@
 //! Client half of a session.
 
 mod connect;
+mod frame_gate;
+mod frames;
+mod group;
 mod hot;
 mod inbound;
 mod link;
+mod mesh_cache;
 mod meshes;
 mod options;
+mod rejoiner;
+mod supervised;
+mod told;
+mod watch;
 
 pub use connect::connect;
-pub use link::ClientLink;
+pub use frame_gate::{FrameGate, FrameStatus, FrameTurn, ReleasedState};
+pub use group::{GroupReceiver, Roster};
+pub use link::{ClientLink, SessionEnd};
+pub use mesh_cache::{MESH_CACHE_BYTES, MeshCache};
 pub use options::{ClientOptions, ReceivedState, ReceivedWrench};
+pub use rejoiner::{GaveUp, RejoinPolicy, Rejoiner};
+pub use supervised::{Renewal, SupervisedLink};
+pub use watch::{LinkHealth, LinkWatch};

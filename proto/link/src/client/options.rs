@@ -1,15 +1,19 @@
 //! What a client is given, and what it receives.
 
-use std::time::{Duration, Instant};
-use taut_proto::{ClusterKey, HotState, Role, Transport, WrenchCommand};
+use super::MeshCache;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
 
 /// How to connect.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
     /// `host:port`, name or number, IPv4 or IPv6 (in brackets); without port, the default one.
     pub server: String,
-    /// The cluster key.
-    pub key: ClusterKey,
+    /// The cluster key, or a credential for this role and name.
+    pub key: JoinKey,
     /// What this client is.
     pub role: Role,
     /// Its name, unique in the workbench.
@@ -22,25 +26,28 @@ pub struct ClientOptions {
     pub connect_timeout: Duration,
     /// Silence after which the server counts as gone.
     pub idle_timeout: Duration,
+    /// Where meshes are kept on disk; `None`: nowhere.
+    pub mesh_cache: Option<Arc<MeshCache>>,
 }
 
 impl ClientOptions {
-    /// UDP, every state, 3 s to connect.
+    /// UDP, every state, 3 s to connect, no meshes on disk.
     pub fn new(
         server: impl Into<String>,
-        key: ClusterKey,
+        key: impl Into<JoinKey>,
         role: Role,
         node: impl Into<String>,
     ) -> ClientOptions {
         ClientOptions {
             server: server.into(),
-            key,
+            key: key.into(),
             role,
             node: node.into(),
             transport: Transport::Udp,
             rate_hz: 0,
             connect_timeout: Duration::from_secs(3),
             idle_timeout: crate::transport::IDLE_TIMEOUT,
+            mesh_cache: None,
         }
     }
 }

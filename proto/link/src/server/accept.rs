@@ -1,35 +1,60 @@
 //! How a client gets in, and its control plane while it is in.
 
 use super::{
-    LinkEvent,
+    LinkEvent, downstream,
+    gate::{act_of_message, demand},
+    joining::Joining,
     receive::receive,
-    session::{Admitted, Session},
+    session::{Admitted, Session, lock},
     shared::{Admission, Refused, Shared},
 };
 use crate::{
     binding,
     framing::{
         CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text,
-        read_message, write_message,
+        read_message, read_whole_message, write_message,
     },
 };
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
-    DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
+    Act, DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
     control::{
         ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
         Welcome,
     },
+    limits::Attempt,
+    membership::Pace,
+    proof::{Claim, Grant},
+    revocation::ShutOut,
 };
-use tokio::{sync::Semaphore, time::timeout};
+use tokio::{
+    sync::Semaphore,
+    time::{sleep, timeout},
+};
 
 /// Clients that may be joining at once; more are turned away before any cryptography.
 const MAX_JOINING: usize = 64;
+/// Clients joining at once above which an address must first prove that it receives what is sent to it (QUIC Retry): whoever names the
+/// addresses of others cannot keep them out.
+const CHECK_ADDRESSES_ABOVE: usize = 8;
 /// Time for a client to join.
 const JOIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Time for a refused client to read why.
 const REFUSAL_TIMEOUT: Duration = Duration::from_millis(500);
+/// Reports and log lines of a client that are read per second, and after a pause at once. A node reports once a second; a bridge in trouble
+/// logs some dozen lines.
+const MESSAGES_PER_SECOND: u64 = 100;
+/// See [`MESSAGES_PER_SECOND`].
+const MESSAGE_BURST: u64 = 256;
+/// Time for one of these to come, once it has begun.
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(3);
+/// Priority of a mesh's stream, below that of control, which has 0.
+const MESH_PRIORITY: i32 = -1;
+/// Bytes of a mesh that are written at a time: 1 ms at the pace of all meshes.
+const MESH_CHUNK_BYTES: usize = 64 << 10;
+/// Time for a client to take one of these.
+const STALL_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most bytes of a Hello: nobody has proven anything yet.
 const MAX_HELLO_BYTES: usize = 1024;
 
@@ -37,14 +62,22 @@ const MAX_HELLO_BYTES: usize = 1024;
 pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
     let joining = Arc::new(Semaphore::new(MAX_JOINING));
     while let Some(incoming) = endpoint.accept().await {
-        let Ok(permit) = joining.clone().try_acquire_owned() else {
+        let busy = MAX_JOINING - joining.available_permits() >= CHECK_ADDRESSES_ABOVE;
+        if busy && !incoming.remote_address_validated() && incoming.may_retry() {
+            shared.counters.address_checks.one();
+            let _ = incoming.retry(); // fails only where it may not be asked for
+            continue;
+        }
+        let attempt = Joining::begin(&shared, incoming.remote_address().ip());
+        let (Some(attempt), Ok(permit)) = (attempt, joining.clone().try_acquire_owned()) else {
+            shared.counters.turned_away.one();
             shared.counters.refused.one();
             incoming.refuse();
             continue;
         };
         let shared = shared.clone();
         tokio::spawn(async move {
-            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming)).await;
+            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming, attempt)).await;
             drop(permit);
             if let Ok(Some((session, send, recv))) = joined {
                 attend(&shared, session, send, recv).await;
@@ -57,6 +90,7 @@ pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
 async fn join(
     shared: &Arc<Shared>,
     incoming: quinn::Incoming,
+    mut attempt: Joining,
 ) -> Option<(Arc<Session>, SendStream, RecvStream)> {
     let connection = incoming.await.ok()?;
     let (mut send, mut recv) = connection.accept_bi().await.ok()?;
@@ -77,8 +111,15 @@ async fn join(
         Err(error) => Err((RefusalCode::BadHello, error.to_string())),
     };
     let (session, welcome) = match outcome {
-        Ok(admitted) => admitted,
+        Ok(admitted) => {
+            attempt.came_to(Attempt::Proven);
+            admitted
+        }
         Err((code, text)) => {
+            if code == RefusalCode::WrongKey {
+                attempt.came_to(Attempt::WrongProof);
+            }
+            drop(attempt); // it is over for the limits before the client has read why
             refuse(shared, &connection, send, node, code, text).await;
             return None;
         }
@@ -87,7 +128,7 @@ async fn join(
         .await
         .is_ok();
     welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
-    if session.role == Role::Device {
+    if session.role.may(Act::GetWrenches) {
         welcomed = welcomed && send.write_all(&shared.content.coupling).await.is_ok();
     }
     if !welcomed {
@@ -105,21 +146,40 @@ fn admit(
 ) -> Result<(Arc<Session>, Welcome), Refused> {
     let bad = |text: String| (RefusalCode::BadHello, text);
     let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
-    if !shared
-        .key
-        .verify_client(&hello.proof, &binding, hello.role, &hello.node)
-    {
+    let claim = Claim {
+        role: hello.role,
+        node: &hello.node,
+        grant: hello.grant,
+    };
+    let secret = shared.key.join_secret(claim.role, claim.node, claim.grant);
+    if !secret.verify_client(&hello.proof, &binding, claim) {
         shared.counters.wrong_key.one();
-        let text =
-            "it does not hold the same cluster key: give this node the server's key file (--key)";
+        let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
         return Err((RefusalCode::WrongKey, text.to_owned()));
     }
+    shared.policy.check(claim).map_err(|shut_out| {
+        shared.counters.shut_out.one();
+        let code = match shut_out {
+            ShutOut::Role(_) => RefusalCode::RoleClosed,
+            ShutOut::Revoked(_) => RefusalCode::Revoked,
+        };
+        (code, shut_out.to_string())
+    })?;
     let printable = hello.node.chars().all(|c| !c.is_control());
     if hello.node.trim().is_empty() || hello.node.len() > MAX_NODE_NAME_BYTES || !printable {
         let text = format!(
             "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
         );
         return Err(bad(text));
+    }
+    // Who may choose his name must not take a screen's.
+    let is_any_node = matches!(hello.grant, Grant::AnyNode { .. });
+    if is_any_node && hello.role != Role::Render && shared.content.nodes.contains(&hello.node) {
+        let text = format!(
+            "\"{}\" is a render node of the workbench: choose another name (--node)",
+            hello.node
+        );
+        return Err((RefusalCode::NameTaken, text));
     }
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
@@ -135,6 +195,7 @@ fn admit(
                     transport: hello.transport,
                     rate_hz: hello.rate_hz,
                     joined_ns: now_ns,
+                    after_event: shared.discrete.newest(),
                 };
                 Ok(Session::new(admitted, connection.clone(), keys))
             })?;
@@ -150,7 +211,7 @@ fn admit(
         });
     }
     let welcome = Welcome {
-        proof: shared.key.server_proof(&binding, hello.role, &hello.node),
+        proof: secret.server_proof(&binding, claim),
         session: session.number,
         epoch: shared.epoch,
         udp_port: shared.udp_port,
@@ -199,7 +260,7 @@ async fn refuse(
 async fn attend(
     shared: &Arc<Shared>,
     session: Arc<Session>,
-    _send: SendStream,
+    send: SendStream,
     mut recv: RecvStream,
 ) {
     shared.counters.joined.one();
@@ -209,8 +270,9 @@ async fn attend(
     let connection = &session.connection;
     let reason = tokio::select! {
         reason = read_control(shared, &session, &mut recv) => reason,
-        reason = serve_meshes(shared, connection) => reason,
+        reason = serve_meshes(shared, &session) => reason,
         reason = read_datagrams(shared, &session) => reason,
+        reason = downstream::tell(shared, &session, send) => reason,
     };
     connection.close(CLOSE_BYE, b"");
     // A session that was replaced is gone already, and told.
@@ -225,33 +287,56 @@ async fn attend(
 
 /// Reports and log lines until the client says goodbye; returns why it ended.
 async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream) -> String {
+    let mut pace = Pace::new(MESSAGES_PER_SECOND, MESSAGE_BURST);
     loop {
-        match read_message(recv, MAX_FRAME_BYTES).await {
-            Ok(ControlMessage::Stats(stats)) => {
+        let message = read_whole_message(recv, MAX_FRAME_BYTES, MESSAGE_TIMEOUT).await;
+        at_pace(shared, &mut pace).await;
+        let message = match message {
+            Ok(message) => message,
+            Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
+                return broken(session, &error.to_string());
+            }
+            Err(ReadMessageError::Ended(_)) => {
+                let error = session.connection.closed().await;
+                return close_text(&error, "the node");
+            }
+        };
+        let Some(act) = act_of_message(&message) else {
+            return broken(session, &format!("a client sent {}", message.name()));
+        };
+        if let Err(reason) = demand(shared, session, act) {
+            return reason;
+        }
+        match message {
+            ControlMessage::Stats(stats) => {
                 session.report(stats.clone(), shared);
                 shared.tell(LinkEvent::Stats {
                     node: session.node.clone(),
                     stats,
                 });
             }
-            Ok(ControlMessage::Log(event)) => shared.tell(LinkEvent::Log {
+            ControlMessage::Log(event) => shared.tell(LinkEvent::Log {
                 node: session.node.clone(),
                 event,
             }),
-            Ok(ControlMessage::Arm(request)) if session.role == Role::Operator => {
-                shared.tell(LinkEvent::Arm {
-                    node: session.node.clone(),
-                    arm: request.arm,
-                });
-            }
-            Ok(ControlMessage::Bye(bye)) => return bye.reason,
-            Ok(other) => return broken(session, &format!("a client sent {}", other.name())),
-            Err(ReadMessageError::Decode(error)) => return broken(session, &error.to_string()),
-            Err(ReadMessageError::Ended(_)) => {
-                let error = session.connection.closed().await;
-                return close_text(&error, "the node");
-            }
+            ControlMessage::Arm(request) => shared.tell(LinkEvent::Arm {
+                node: session.node.clone(),
+                arm: request.arm,
+            }),
+            ControlMessage::Bye(bye) => return bye.reason,
+            other => return broken(session, &format!("a client sent {}", other.name())),
         }
+    }
+}
+
+/// Waits until another message may be taken. Who sends faster is read later, and finds its stream full: it loses its own reports, and
+/// nobody else's.
+async fn at_pace(shared: &Shared, pace: &mut Pace) {
+    let now_ns = shared.clock.now_ns();
+    let at_ns = pace.book(now_ns, 1);
+    if at_ns > now_ns {
+        shared.counters.control_delayed.one();
+        sleep(Duration::from_nanos(at_ns - now_ns)).await;
     }
 }
 
@@ -261,10 +346,13 @@ fn broken(session: &Session, reason: &str) -> String {
 }
 
 /// One stream per mesh, until the connection ends.
-async fn serve_meshes(shared: &Arc<Shared>, connection: &Connection) -> String {
+async fn serve_meshes(shared: &Arc<Shared>, session: &Session) -> String {
     loop {
-        match connection.accept_bi().await {
+        match session.connection.accept_bi().await {
             Ok((send, recv)) => {
+                if let Err(reason) = demand(shared, session, Act::GetMeshes) {
+                    return reason;
+                }
                 let shared = shared.clone();
                 // Ends with the connection; the number of streams is limited by the transport.
                 tokio::spawn(async move { serve_mesh(&shared, send, recv).await });
@@ -275,10 +363,12 @@ async fn serve_meshes(shared: &Arc<Shared>, connection: &Connection) -> String {
 }
 
 async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream) {
-    let Ok(ControlMessage::MeshRequest(request)) = read_message(&mut recv, MAX_HELLO_BYTES).await
-    else {
+    let request = timeout(JOIN_TIMEOUT, read_message(&mut recv, MAX_HELLO_BYTES)).await;
+    let Ok(Ok(ControlMessage::MeshRequest(request))) = request else {
         return; // dropping the stream resets it
     };
+    // Everything else goes first. Fails only if the stream is gone, and then writing fails, too.
+    let _ = send.set_priority(MESH_PRIORITY);
     let mesh = shared.content.meshes.get(&request.hash);
     let header = MeshHeader {
         hash: request.hash,
@@ -291,11 +381,27 @@ async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream)
         return;
     }
     if let Some(bytes) = mesh
-        && send.write_all(bytes).await.is_err()
+        && write_paced(shared, &mut send, bytes).await.is_err()
     {
         return;
     }
     let _ = send.finish(); // fails only if the client is gone
+}
+
+/// Writes `bytes` at the pace that all meshes share; an error if the client is gone, or takes nothing for [`STALL_TIMEOUT`].
+async fn write_paced(shared: &Shared, send: &mut SendStream, bytes: &[u8]) -> Result<(), ()> {
+    for chunk in bytes.chunks(MESH_CHUNK_BYTES) {
+        let now_ns = shared.clock.now_ns();
+        let at_ns = lock(&shared.mesh_pace).book(now_ns, chunk.len() as u64);
+        if at_ns > now_ns {
+            sleep(Duration::from_nanos(at_ns - now_ns)).await;
+        }
+        match timeout(STALL_TIMEOUT, send.write_all(chunk)).await {
+            Ok(Ok(())) => {}
+            Ok(Err(_)) | Err(_) => return Err(()),
+        }
+    }
+    Ok(())
 }
 
 /// Hot plane over QUIC; a client on UDP sends none here.

@@ -6,8 +6,10 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    ConstraintPart, HotState, Kind, Payload, Role, WrenchCommand,
+    Act, ConstraintPart, HotState, Kind, Payload, WrenchCommand,
+    barrier::Newest,
     codec::encode_into,
+    events::is_newer,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     state::payload_hash,
 };
@@ -45,22 +47,32 @@ impl Broadcaster {
 
     /// Sends `state` to every client that is due by its rate, each under its own key.
     ///
+    /// Its events are the new ones, each told once and with a number above those before: what a client gets here is repeated as long as it should be, and
+    /// told on its control stream too (see [`taut_proto::events`]).
+    ///
     /// A state with a number that is not finite goes to nobody and is counted in `encode_errors`.
     pub fn send(&mut self, state: &HotState) -> SendReport {
         let mut report = SendReport::default();
+        self.shared
+            .sessions
+            .refresh(&mut self.sessions, &mut self.generation);
+        let by_all = acknowledged_by_all(&self.sessions);
+        let now_ns = self.shared.clock.now_ns();
+        let repeating = self.shared.discrete.exchange(state, by_all, now_ns);
+        let state = repeating.as_ref().unwrap_or(state);
         let Ok(length) = encode_into(state, &mut self.payload) else {
             self.shared.counters.encode_errors.one();
             return report;
         };
         let payload = &self.payload[..length];
-        self.shared
-            .sent_states
-            .remember(state.tick, payload_hash(payload));
-        self.shared
-            .sessions
-            .refresh(&mut self.sessions, &mut self.generation);
+        let hash = payload_hash(payload);
+        self.shared.sent_states.remember(state.tick, hash);
+        if let Some(frames) = &self.shared.frames {
+            let time_ns = state.sample_time_ns;
+            frames.offer(payload, Newest { hash, time_ns });
+        }
         for session in self.sessions.iter() {
-            if !session.take_due(state.sample_time_ns) {
+            if !session.role.may(Act::GetStates) || !session.take_due(state.sample_time_ns) {
                 report.skipped += 1;
                 continue;
             }
@@ -89,7 +101,22 @@ impl Broadcaster {
             .refresh(&mut self.sessions, &mut self.generation);
         self.sessions
             .iter()
-            .find(|session| session.role == Role::Device)
+            .find(|session| session.role.may(Act::GetWrenches))
             .is_some_and(|session| session.send(payload, &self.shared) == Sent::Yes)
     }
+}
+
+/// The newest event that every client has; `None` while one has not said so.
+fn acknowledged_by_all(sessions: &[Arc<Session>]) -> Option<u32> {
+    let mut oldest = None;
+    for session in sessions {
+        let newest = session.acknowledged()?;
+        oldest = Some(
+            oldest.map_or(newest, |oldest| match is_newer(oldest, newest) {
+                true => newest,
+                false => oldest,
+            }),
+        );
+    }
+    oldest
 }

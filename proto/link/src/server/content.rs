@@ -20,6 +20,8 @@ pub(crate) struct EncodedContent {
     /// The framed message about coupling, for the device bridge.
     pub(crate) coupling: Vec<u8>,
     pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
+    /// Names of the workbench's render nodes.
+    pub(crate) nodes: Vec<String>,
 }
 
 impl Content {
@@ -40,6 +42,12 @@ impl Content {
                 )));
             }
         }
+        let nodes = self
+            .description
+            .nodes
+            .iter()
+            .map(|node| node.name.clone())
+            .collect();
         let scene = ControlMessage::Scene(self.description)
             .to_frame()
             .map_err(|error| refuse(error.to_string()))?;
@@ -50,6 +58,7 @@ impl Content {
             scene,
             coupling,
             meshes,
+            nodes,
         })
     }
 }

@@ -1,12 +1,18 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, LinkEvent, ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, HEAD_READERS,
+    HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    events::EventHub,
+    eviction,
+    frames::Frames,
+    group::{self, GroupHub},
+    head_input::head_inputs,
     receive,
     sent_states::SentStates,
     session::lock,
-    shared::{Sessions, Shared},
+    shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
@@ -24,6 +30,8 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
+use taut_proto::ServerPin;
+use taut_proto::membership::{Pace, SilenceLimits};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -41,7 +49,9 @@ pub struct ServerLink {
     udp_address: SocketAddr,
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
+    heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
     udp_thread: Mutex<Option<JoinHandle<()>>>,
+    eviction: tokio::task::JoinHandle<()>,
 }
 
 /// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
@@ -59,7 +69,10 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (quic_address, udp_address) = (address_of(&quic_socket)?, address_of(&udp)?);
     let endpoint = quinn::Endpoint::new(
         quinn::EndpointConfig::default(),
-        Some(transport::server_config(options.idle_timeout)?),
+        Some(transport::server_config(
+            &options.key,
+            options.idle_timeout,
+        )?),
         quic_socket,
         Arc::new(quinn::TokioRuntime),
     )
@@ -67,10 +80,16 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
 
     let (events_in, events) = mpsc::sync_channel(MAX_EVENTS);
     let (input, output) = triple_buffer::triple_buffer(&None);
+    let epoch = random_epoch()?;
+    let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
+        policy: options.policy,
+        joins: Mutex::new(options.limits.guard()),
+        unknown: Mutex::new(options.limits.unknown()),
+        heads,
         clock: options.clock,
-        epoch: random_epoch()?,
+        epoch,
         content,
         udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),
         udp,
@@ -78,7 +97,11 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         counters: CounterCells::default(),
         events: events_in,
         inputs: InputWriter::new(input),
+        frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
+        group: GroupHub::new(epoch, None),
+        mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
+        discrete: EventHub::default(),
         stopping: AtomicBool::new(false),
     });
     let of_thread = shared.clone();
@@ -87,6 +110,10 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         .spawn(move || receive::run_udp(&of_thread))
         .map_err(|error| system("start the state thread", &error))?;
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
+    tokio::spawn(group::run(shared.clone()));
+    let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
+    let limits = SilenceLimits::OF_A_NODE.with_dead_after(node_timeout_ns);
+    let eviction = tokio::spawn(eviction::run(Arc::downgrade(&shared), limits));
     Ok(ServerLink {
         shared,
         endpoint,
@@ -94,11 +121,23 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         udp_address,
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
+        heads: Mutex::new(Some(head_outputs)),
         udp_thread: Mutex::new(Some(udp_thread)),
+        eviction,
     })
 }
 
 impl ServerLink {
+    /// What clients know this server by.
+    pub fn pin(&self) -> ServerPin {
+        self.shared.key.server_pin()
+    }
+
+    /// Incarnation of this server, in every datagram's header: no secret, it is sent clear.
+    pub fn epoch(&self) -> u32 {
+        self.shared.epoch
+    }
+
     /// Address of the control plane, with the port that was taken.
     pub fn quic_addr(&self) -> SocketAddr {
         self.quic_address
@@ -119,9 +158,25 @@ impl ServerLink {
         Broadcaster::new(self.shared.clone())
     }
 
+    /// The leader of the render nodes' frames, for the frames thread; `None` where [`ServerOptions::frames`] is.
+    pub fn frame_master(&self) -> Option<FrameMaster> {
+        let leads = self.shared.frames.is_some();
+        leads.then(|| FrameMaster::new(self.shared.clone()))
+    }
+
+    /// How the frames of the render nodes went; `None` where they are not locked.
+    pub fn frame_report(&self) -> Option<FrameReport> {
+        self.shared.frames.as_ref().map(Frames::report)
+    }
+
     /// Newest device reading, for the haptics loop. There is one: the first call takes it, later ones get `None`.
     pub fn device_inputs(&self) -> Option<triple_buffer::Output<Option<DeviceInput>>> {
         lock(&self.inputs).take()
+    }
+
+    /// Newest reading of the tracker on the viewer's head, for each reader. The first call takes them, later ones get `None`.
+    pub fn head_inputs(&self) -> Option<[HeadOutput; HEAD_READERS]> {
+        lock(&self.heads).take()
     }
 
     /// The clients that are in.
@@ -146,7 +201,10 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
     /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
-    pub async fn shutdown(self) {
+    pub async fn shutdown(mut self) {
+        // Nothing may hold the sockets for the length of a look.
+        self.eviction.abort();
+        let _ = (&mut self.eviction).await; // it was cancelled: that is no news
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
@@ -182,6 +240,7 @@ async fn freed(address: SocketAddr) {
 
 impl Drop for ServerLink {
     fn drop(&mut self) {
+        self.eviction.abort();
         self.shared.stopping.store(true, Ordering::Relaxed);
         self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
     }

@@ -1,6 +1,15 @@
-//! What clients send on the hot plane: time requests, signs of life, device readings. From the UDP thread and from QUIC datagrams.
+//! What clients send on the hot plane: time requests, signs of life, readings of device and head. From the UDP thread and from QUIC datagrams.
+//!
+//! Before any cryptography: the header must be ours, its epoch this server's and its sender a session; a datagram from where that session is
+//! known to be counts against the session's rate, any other against the rate of its source and of all unknown sources together.
 
-use super::{DeviceInput, device_input::Taken, session::Session, shared::Shared};
+use super::{
+    DeviceInput, HeadInput,
+    device_input::Taken,
+    gate::{act_of_datagram, permits},
+    session::{Session, lock},
+    shared::Shared,
+};
 use crate::readiness::wait_readable;
 use std::{
     net::SocketAddr,
@@ -8,7 +17,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::{
-    DecodeError, Header, Payload, Role, header::MAX_DATAGRAM_BYTES, seal::OpenError,
+    Act, DecodeError, Header, Payload, header::MAX_DATAGRAM_BYTES, seal::OpenError,
     time::TimeResponse,
 };
 
@@ -35,10 +44,16 @@ fn receive_udp(shared: &Shared, datagram: &[u8], from: SocketAddr, now_ns: u64) 
         Ok(header) => header,
         Err(error) => return count_bad_header(shared, error),
     };
-    match shared.sessions.by_number(header.sender) {
-        Some(session) => receive(shared, &session, datagram, Some(from), now_ns),
-        None => shared.counters.forged.one(),
+    if header.epoch != shared.epoch {
+        return shared.counters.forged.one();
     }
+    let Some(session) = shared.sessions.by_number(header.sender) else {
+        return shared.counters.forged.one();
+    };
+    if !session.is_at(from) && !lock(&shared.unknown).admit(from, now_ns) {
+        return shared.counters.flooded.one();
+    }
+    receive(shared, &session, datagram, Some(from), now_ns);
 }
 
 /// Takes one datagram of `session` in, or counts why not. What is not authentic has no effect.
@@ -50,14 +65,27 @@ pub(crate) fn receive(
     now_ns: u64,
 ) {
     let counters = &shared.counters;
+    if !session.rights.take_datagram(now_ns) {
+        return counters.flooded.one();
+    }
     let opened = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,
         Err(OpenError::Header(error)) => return count_bad_header(shared, error),
-        Err(OpenError::Forged) => return counters.forged.one(),
+        // A group key proves a member, not this one: nothing under it is opened here.
+        Err(OpenError::Forged | OpenError::Misplaced) => return counters.forged.one(),
         Err(OpenError::Replayed) => return counters.replayed.one(),
         Err(OpenError::Payload(_)) => return counters.garbage.one(),
     };
     counters.packets_received.one();
+    let Some(act) = act_of_datagram(&opened.payload) else {
+        return counters.garbage.one(); // a client has no business sending these
+    };
+    if !permits(shared, session, act) {
+        if act == Act::GiveInput {
+            counters.inputs_refused.one();
+        }
+        return;
+    }
     match opened.payload {
         Payload::TimeRequest(request) => {
             session.send(
@@ -69,8 +97,13 @@ pub(crate) fn receive(
                 shared,
             );
         }
-        Payload::Heartbeat => {}
-        Payload::Input(sample) if session.role == Role::Device => {
+        Payload::Arrive(arrive) => {
+            if let Some(frames) = &shared.frames {
+                frames.arrive(session, &arrive, now_ns, shared);
+            }
+        }
+        Payload::EventAck(ack) => session.acknowledge(ack.newest),
+        Payload::Input(sample) => {
             let input = DeviceInput {
                 sample,
                 received_ns: now_ns,
@@ -82,12 +115,24 @@ pub(crate) fn receive(
                 Taken::NoPose => counters.inputs_refused.one(),
             }
         }
-        Payload::Input(_) => counters.inputs_refused.one(),
-        // A client has no business sending these.
-        Payload::Hot(_)
+        Payload::Head(sample) => {
+            let input = HeadInput {
+                sample,
+                received_ns: now_ns,
+                session: session.number,
+            };
+            if shared.heads.offer(input) {
+                counters.heads.one();
+            } else {
+                counters.heads_refused.one();
+            }
+        }
+        Payload::Heartbeat
+        | Payload::Hot(_)
+        | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
-        | Payload::Constraints(_) => counters.garbage.one(),
+        | Payload::Constraints(_) => {}
     }
 }
 

@@ -1,6 +1,6 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-use super::{ClientStatus, shared::Shared};
+use super::{ClientStatus, rights::Rights, shared::Shared};
 use crate::counters::Cell;
 use std::{
     net::SocketAddr,
@@ -11,6 +11,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, Kind, Payload, Role, Transport,
+    events::is_newer,
     seal::{DatagramBuffer, OpenError, Opened, Opener, Sealer},
 };
 
@@ -22,12 +23,18 @@ pub(crate) struct Session {
     pub(crate) rate_hz: u32,
     pub(crate) connection: quinn::Connection,
     pub(crate) joined_ns: u64,
+    /// What the gate remembers of it.
+    pub(crate) rights: Rights,
+    /// Newest event when it was let in: those after it are for it.
+    pub(crate) after_event: u32,
     sealer: Sealer,
     opener: Mutex<Opener>,
     udp_address: Mutex<Option<SocketAddr>>,
     last_heard_ns: AtomicU64,
     /// Session time of the state from which on the next one is due, ns.
     due_ns: AtomicU64,
+    /// Newest event that the client has, in the upper half beside a 1; 0 before it said so.
+    acknowledged: AtomicU64,
     packets_sent: Cell,
     bytes_sent: Cell,
     send_errors: Cell,
@@ -53,6 +60,7 @@ pub(crate) struct Admitted {
     pub(crate) transport: Transport,
     pub(crate) rate_hz: u32,
     pub(crate) joined_ns: u64,
+    pub(crate) after_event: u32,
 }
 
 impl Session {
@@ -69,11 +77,14 @@ impl Session {
             rate_hz: admitted.rate_hz,
             connection,
             joined_ns: admitted.joined_ns,
+            rights: Rights::new(admitted.role),
+            after_event: admitted.after_event,
             sealer,
             opener: Mutex::new(opener),
             udp_address: Mutex::new(None),
             last_heard_ns: AtomicU64::new(admitted.joined_ns),
             due_ns: AtomicU64::new(0),
+            acknowledged: AtomicU64::new(0),
             packets_sent: Cell::default(),
             bytes_sent: Cell::default(),
             send_errors: Cell::default(),
@@ -180,6 +191,33 @@ impl Session {
         Ok(opened)
     }
 
+    /// Notes that the client has all events up to `newest`.
+    pub(crate) fn acknowledge(&self, newest: u32) {
+        if self
+            .acknowledged()
+            .is_none_or(|before| is_newer(newest, before))
+        {
+            let noted = u64::from(newest) << 32 | 1;
+            self.acknowledged.store(noted, Ordering::Relaxed);
+        }
+    }
+
+    /// The newest event that the client has, if it said so.
+    pub(crate) fn acknowledged(&self) -> Option<u32> {
+        let noted = self.acknowledged.load(Ordering::Relaxed);
+        (noted != 0).then_some((noted >> 32) as u32)
+    }
+
+    /// Where its states go, once its first authentic datagram came; for UDP only.
+    pub(crate) fn udp_address(&self) -> Option<SocketAddr> {
+        *lock(&self.udp_address)
+    }
+
+    /// Whether its newest datagram came from there.
+    pub(crate) fn is_at(&self, from: SocketAddr) -> bool {
+        *lock(&self.udp_address) == Some(from)
+    }
+
     /// Session time of the last authentic datagram, ns; `None` if there was none yet.
     pub(crate) fn last_heard_ns(&self) -> Option<u64> {
         let heard = self.last_heard_ns.load(Ordering::Relaxed);
@@ -206,7 +244,7 @@ impl Session {
             transport: self.transport,
             rate_hz: self.rate_hz,
             address: self.connection.remote_address(),
-            udp_address: *lock(&self.udp_address),
+            udp_address: self.udp_address(),
             joined_ns: self.joined_ns,
             last_heard_ns: self.last_heard_ns.load(Ordering::Relaxed),
             round_trip_us: self.connection.rtt().as_micros() as u64,

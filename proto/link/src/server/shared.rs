@@ -4,6 +4,10 @@ use super::{
     LinkEvent,
     content::EncodedContent,
     device_input::InputWriter,
+    events::EventHub,
+    frames::Frames,
+    group::GroupHub,
+    head_input::HeadWriter,
     sent_states::SentStates,
     session::{Session, lock},
 };
@@ -16,10 +20,18 @@ use std::{
         mpsc::SyncSender,
     },
 };
-use taut_proto::{ClusterKey, Role, control::RefusalCode};
+use taut_proto::{
+    ClusterKey, JoinPolicy, Role,
+    control::RefusalCode,
+    limits::{JoinGuard, UnknownSources},
+    membership::{Pace, SilenceLimits},
+};
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
+    pub(crate) policy: JoinPolicy,
+    pub(crate) joins: Mutex<JoinGuard>,
+    pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,
     pub(crate) epoch: u32,
     pub(crate) content: EncodedContent,
@@ -29,11 +41,27 @@ pub(crate) struct Shared {
     pub(crate) counters: CounterCells,
     pub(crate) events: SyncSender<LinkEvent>,
     pub(crate) inputs: InputWriter,
+    pub(crate) frames: Option<Frames>,
+    pub(crate) heads: HeadWriter,
     pub(crate) sent_states: SentStates,
+    pub(crate) group: GroupHub,
+    /// How fast meshes go to all clients together.
+    pub(crate) mesh_pace: Mutex<Pace>,
+    pub(crate) discrete: EventHub,
     pub(crate) stopping: AtomicBool,
 }
 
+/// Bytes of meshes per second to all clients together: half of a gigabit link, so that the states of the others find room at every moment
+/// while a node joins. 10 MB take 0.16 s.
+pub(crate) const MESH_BYTES_PER_SECOND: u64 = 64 << 20;
+/// Bytes of meshes that may go at once: 2 ms of a gigabit link.
+pub(crate) const MESH_BURST_BYTES: u64 = 256 << 10;
+
 impl Shared {
+    pub(crate) fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+
     /// Hands an event over, or counts that nobody takes them.
     pub(crate) fn tell(&self, event: LinkEvent) {
         if self.events.try_send(event).is_err() {
@@ -63,9 +91,6 @@ struct Listed {
     sessions: Arc<[Arc<Session>]>,
     last_number: u16,
 }
-
-/// A silence after which a new client of the same name takes the place of the old one, ns. The hot plane speaks every 100 ms.
-const SUSPECT_NS: u64 = 500_000_000;
 
 impl Sessions {
     pub(crate) fn new(max_clients: usize) -> Sessions {
@@ -114,12 +139,13 @@ impl Sessions {
         let rival = list
             .sessions
             .iter()
-            .find(|other| {
-                other.node == node || (role == Role::Device && other.role == Role::Device)
-            })
+            .find(|other| other.node == node || (role.is_single() && other.role == role))
             .cloned();
         let replaced = match rival {
-            Some(rival) if rival.node == node && silent(&rival, now_ns) => Some(rival),
+            // Another role does not inherit a name: an observer must not push a render node out.
+            Some(rival) if rival.node == node && rival.role == role && silent(&rival, now_ns) => {
+                Some(rival)
+            }
             Some(rival) if rival.node == node => {
                 let text = format!(
                     "a node named \"{node}\" is connected already (from {}): give this one another name (--node)",
@@ -129,11 +155,16 @@ impl Sessions {
             }
             Some(rival) => {
                 let text = format!(
-                    "the device bridge \"{}\" is connected already (from {}): stop it first",
+                    "the {} \"{}\" is connected already (from {}): stop it first",
+                    role.title(),
                     rival.node,
                     rival.connection.remote_address()
                 );
-                return Err((RefusalCode::DeviceTaken, text));
+                let code = match role {
+                    Role::Tracker => RefusalCode::TrackerTaken,
+                    _ => RefusalCode::DeviceTaken,
+                };
+                return Err((code, text));
             }
             None => None,
         };
@@ -184,8 +215,9 @@ impl Sessions {
     }
 }
 
+/// Whether a new client of the same name takes the place of this one.
 fn silent(session: &Session, now_ns: u64) -> bool {
-    session
-        .last_heard_ns()
-        .is_some_and(|heard| now_ns.saturating_sub(heard) > SUSPECT_NS)
+    session.last_heard_ns().is_some_and(|heard| {
+        now_ns.saturating_sub(heard) > SilenceLimits::OF_A_NODE.suspect_after_ns
+    })
 }

@@ -1,7 +1,7 @@
 //! What the server knows of its clients, and what it tells of them.
 
-use std::net::SocketAddr;
-use taut_proto::{ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
+use std::{net::SocketAddr, time::Duration};
+use taut_proto::{Act, ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
 
 /// A client as the server sees it.
 #[derive(Clone, Debug)]
@@ -52,6 +52,13 @@ pub enum LinkEvent {
         /// Why, one sentence.
         reason: String,
     },
+    /// It has not been heard for a while, and may be gone.
+    Silent {
+        /// Its name.
+        node: String,
+        /// For how long.
+        silence: Duration,
+    },
     /// It was not let in.
     Refused {
         /// Where it came from.
@@ -62,6 +69,15 @@ pub enum LinkEvent {
         code: RefusalCode,
         /// Why, for people.
         text: String,
+    },
+    /// It tried what its role may not; told once per session and act, counted each time.
+    Forbidden {
+        /// Its name.
+        node: String,
+        /// Its role.
+        role: Role,
+        /// What it tried.
+        act: Act,
     },
     /// It reported.
     Stats {

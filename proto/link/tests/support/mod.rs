@@ -95,6 +95,7 @@ pub fn content() -> Content {
 pub async fn server() -> ServerLink {
     let options = ServerOptions {
         idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     };
     server_with(options).await
@@ -155,6 +156,23 @@ pub fn input(index: u64) -> InputSample {
         rendered: [0.0; 6],
         set_sequence: 0,
     }
+}
+
+/// A server whose hot plane is behind a relay.
+pub async fn behind_relay(
+    impairment: relay::Impairment,
+    seed: u64,
+    options: impl FnOnce(ServerOptions) -> ServerOptions,
+) -> (ServerLink, relay::Relay) {
+    let waiting = relay::Waiting::new();
+    let server = server_with(options(ServerOptions {
+        announced_udp_port: Some(waiting.port()),
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    }))
+    .await;
+    let relay = waiting.start(server.udp_addr(), impairment, seed);
+    (server, relay)
 }
 
 /// Sends states of growing tick until `done`, one per millisecond; gives up after [`PATIENCE`]. Returns the next tick.

@@ -1,4 +1,4 @@
-//! A relay between one client and the server's UDP port that loses, doubles, delays and damages datagrams, by a seed.
+//! A relay between clients and the server's UDP port that loses, doubles, delays and damages datagrams, by a seed.
 
 use std::{
     collections::VecDeque,
@@ -15,6 +15,8 @@ use std::{
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Impairment {
     pub lost: u64,
+    /// The first of twenty that are lost in a row.
+    pub bursts: u64,
     pub doubled: u64,
     /// Held back until the next one has passed.
     pub swapped: u64,
@@ -114,55 +116,82 @@ fn run(
     seed: u64,
     seen: &Seen,
 ) {
-    let server_side = bind();
     let mut random = seed;
-    let mut client = None;
+    let mut lanes: Vec<Lane> = Vec::new();
     let mut buffer = [0; 2048];
-    let (mut held_up, mut held_down) = (None, None);
     let delay = Duration::from_micros(impairment.delay_us);
-    let (mut going_up, mut going_down) = (UnderWay::new(delay), UnderWay::new(delay));
     while !seen.stop.load(Ordering::SeqCst) {
         let mut idle = true;
         if let Ok((length, from)) = client_side.recv_from(&mut buffer) {
             idle = false;
-            client = Some(from);
+            let known = lanes.iter().position(|lane| lane.client == from);
+            let index = known.unwrap_or_else(|| {
+                lanes.push(Lane::new(from, delay));
+                lanes.len() - 1
+            });
+            let lane = &mut lanes[index];
             seen.upstream
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .push(buffer[..length].to_vec());
+            let up = &mut lane.going_up;
             impair(
                 &buffer[..length],
                 impairment,
                 &mut random,
-                &mut held_up,
-                |datagram| going_up.push(datagram),
+                &mut lane.held_up,
+                |datagram| up.push(datagram),
             );
         }
-        if let Ok((length, _)) = server_side.recv_from(&mut buffer) {
-            idle = false;
-            let copies = impair(
-                &buffer[..length],
-                impairment,
-                &mut random,
-                &mut held_down,
-                |datagram| going_down.push(datagram),
-            );
-            match copies {
-                0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
-                2 => seen.doubled_down.fetch_add(1, Ordering::SeqCst),
-                _ => 0,
-            };
-        }
-        going_up.deliver(|datagram| {
-            let _ = server_side.send_to(datagram, server);
-        });
-        if let Some(client) = client {
-            going_down.deliver(|datagram| {
-                let _ = client_side.send_to(datagram, client);
+        for lane in &mut lanes {
+            if let Ok((length, _)) = lane.server_side.recv_from(&mut buffer) {
+                idle = false;
+                let down = &mut lane.going_down;
+                let copies = impair(
+                    &buffer[..length],
+                    impairment,
+                    &mut random,
+                    &mut lane.held_down,
+                    |datagram| down.push(datagram),
+                );
+                match copies {
+                    0 => seen.lost_down.fetch_add(1, Ordering::SeqCst),
+                    2 => seen.doubled_down.fetch_add(1, Ordering::SeqCst),
+                    _ => 0,
+                };
+            }
+            lane.going_up.deliver(|datagram| {
+                let _ = lane.server_side.send_to(datagram, server);
+            });
+            lane.going_down.deliver(|datagram| {
+                let _ = client_side.send_to(datagram, lane.client);
             });
         }
         if idle {
             std::thread::sleep(Duration::from_micros(200));
+        }
+    }
+}
+
+/// One client's way through the relay.
+struct Lane {
+    client: SocketAddr,
+    server_side: UdpSocket,
+    held_up: Held,
+    held_down: Held,
+    going_up: UnderWay,
+    going_down: UnderWay,
+}
+
+impl Lane {
+    fn new(client: SocketAddr, delay: Duration) -> Lane {
+        Lane {
+            client,
+            server_side: bind(),
+            held_up: Held::default(),
+            held_down: Held::default(),
+            going_up: UnderWay::new(delay),
+            going_down: UnderWay::new(delay),
         }
     }
 }
@@ -197,16 +226,31 @@ impl UnderWay {
     }
 }
 
+/// Datagrams lost in a row.
+const BURST: u32 = 21;
+
+/// What one direction remembers.
+#[derive(Default)]
+struct Held {
+    /// Passes after the next one.
+    datagram: Option<Vec<u8>>,
+    burst_left: u32,
+}
+
 /// Passes `datagram` on as the dice fall; returns how many intact copies pass, now or after the next one.
 fn impair(
     datagram: &[u8],
     impairment: Impairment,
     random: &mut u64,
-    held: &mut Option<Vec<u8>>,
+    held: &mut Held,
     mut pass: impl FnMut(&[u8]),
 ) -> usize {
     let mut roll = |thousandths: u64| next(random) % 1000 < thousandths;
-    if roll(impairment.lost) {
+    if held.burst_left == 0 && roll(impairment.bursts) {
+        held.burst_left = BURST;
+    }
+    held.burst_left = held.burst_left.saturating_sub(1);
+    if held.burst_left > 0 || roll(impairment.lost) {
         return 0;
     }
     if roll(impairment.damaged) {
@@ -216,8 +260,8 @@ fn impair(
         pass(&damaged);
     }
     let mut roll = |thousandths: u64| next(random) % 1000 < thousandths;
-    if held.is_none() && roll(impairment.swapped) {
-        *held = Some(datagram.to_vec());
+    if held.datagram.is_none() && roll(impairment.swapped) {
+        held.datagram = Some(datagram.to_vec());
         return 1;
     }
     let doubled = roll(impairment.doubled);
@@ -225,7 +269,7 @@ fn impair(
     if doubled {
         pass(datagram);
     }
-    if let Some(earlier) = held.take() {
+    if let Some(earlier) = held.datagram.take() {
         pass(&earlier);
     }
     1 + usize::from(doubled)

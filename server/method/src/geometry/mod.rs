@@ -1,5 +1,6 @@
 //! Meshes: checked once, then read only. Tree, closest points, mass, normals.
 
+mod collapse;
 pub mod distance;
 pub(crate) mod lanes;
 mod mass;

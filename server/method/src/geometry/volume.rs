@@ -20,6 +20,7 @@
 
 use nalgebra::{Point3, Vector2, Vector3};
 
+use super::collapse::Collapse;
 use super::normal_cone::NormalCone;
 use super::tree::Node;
 
@@ -62,6 +63,7 @@ pub(super) struct Source<'a> {
     pub(super) cones: &'a [NormalCone],
     pub(super) owned: &'a [u8],
     pub(super) binary: &'a [Node],
+    pub(super) collapse: Collapse<'a>,
     /// Triangles in the order of the binary tree's leaves, and the range of them below each of its nodes.
     pub(super) order: Vec<u32>,
     pub(super) ranges: Vec<[u32; 2]>,

@@ -4,6 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::collapse::Collapse;
 use super::lanes::{LANES, Lanes};
 use super::normal_cone::NormalCone;
 use super::tree::Tree;
@@ -57,7 +58,7 @@ pub(crate) struct WideTree {
 }
 
 impl WideTree {
-    /// From the binary tree: each node takes its largest descendants until it has eight.
+    /// From the binary tree ([`Collapse`]).
     pub(crate) fn build(
         vertices: &[Point3<f64>],
         triangles: &[[u32; 3]],
@@ -89,6 +90,7 @@ impl WideTree {
             cones,
             owned,
             binary,
+            collapse: Collapse::of(binary),
             order,
             ranges,
             origin: binary[0].center,
@@ -211,21 +213,7 @@ impl Source<'_> {
         if node.is_leaf() {
             return node.triangle | TRIANGLE;
         }
-        let mut below = [top; LANES];
-        let mut count = 1;
-        while count < LANES {
-            let widest = (0..count)
-                .filter(|k| !self.binary[below[*k] as usize].is_leaf())
-                .reduce(|a, b| {
-                    let radius = |k: usize| self.binary[below[k] as usize].radius;
-                    if radius(b) > radius(a) { b } else { a }
-                });
-            let Some(widest) = widest else { break };
-            let opened = below[widest];
-            below[widest] = opened + 1;
-            below[count] = self.binary[opened as usize].second;
-            count += 1;
-        }
+        let (below, count) = self.collapse.open(top);
         let index = tree.add_node();
         for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
             let volume = self.volume(*opened, Some(tangent));

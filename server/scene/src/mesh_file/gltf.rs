@@ -4,6 +4,7 @@ use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions};
 use gltf::buffer::Source;
+use gltf::json::validation::Checked;
 use gltf::mesh::Mode;
 use god_object::surface::CornerCoordinates;
 use nalgebra::{Matrix4, Point3};
@@ -37,8 +38,7 @@ fn parse_with(
     directory: Option<&Path>,
     mut coordinates: Option<&mut Vec<CornerCoordinates>>,
 ) -> Result<RawMesh, Fault> {
-    let file = gltf::Gltf::from_slice(bytes)
-        .map_err(|e| Fault::new(format!("is no valid glTF ({e}); export it again")))?;
+    let file = validated(bytes)?;
     let buffers = buffers(&file, directory)?;
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
         return Err(Fault::new("has no scene; export it with one"));
@@ -84,6 +84,60 @@ fn parse_with(
         );
     }
     Ok(mesh)
+}
+
+/// The file as the crate validates it, around what the crate panics at: its reader of containers subtracts lengths unseen, and its
+/// validation reads the accessor of a primitive's positions before it knows that there is one.
+fn validated(bytes: &[u8]) -> Result<gltf::Gltf, Fault> {
+    let invalid = |e: gltf::Error| Fault::new(format!("is no valid glTF ({e}); export it again"));
+    let (json, blob) = if bytes.starts_with(GLB_MAGIC) {
+        chunks(bytes).ok_or_else(|| {
+            Fault::new("is no valid GLB: its chunks are cut off; copy the file again")
+        })?
+    } else {
+        (bytes, None)
+    };
+    let root = gltf::json::deserialize::from_slice::<gltf::json::Root>(json)
+        .map_err(|e| invalid(gltf::Error::Deserialize(e)))?;
+    let positions = Checked::Valid(gltf::Semantic::Positions);
+    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let mut named = primitives.filter_map(|primitive| primitive.attributes.get(&positions));
+    if let Some(missing) = named.find(|index| index.value() >= root.accessors.len()) {
+        let text = format!(
+            "has positions in accessor {}, but {} accessors; export it again",
+            missing.value(),
+            root.accessors.len()
+        );
+        return Err(Fault::new(text));
+    }
+    Ok(gltf::Gltf {
+        document: gltf::Document::from_json(root).map_err(invalid)?,
+        blob: blob.map(<[u8]>::to_vec),
+    })
+}
+
+/// First bytes of a GLB container.
+const GLB_MAGIC: &[u8] = b"glTF";
+
+/// The text and the buffer, if there is one, of a GLB container of version 2; further chunks are passed over. `None` if it is none.
+///
+/// Source: glTF 2.0, section 4 (GLB file format).
+fn chunks(bytes: &[u8]) -> Option<(&[u8], Option<&[u8]>)> {
+    let (magic, rest) = bytes.split_at_checked(GLB_MAGIC.len())?;
+    let (version, rest) = rest.split_first_chunk::<4>()?;
+    let (length, _) = rest.split_first_chunk::<4>()?;
+    let whole = bytes.get(12..u32::from_le_bytes(*length) as usize)?;
+    let (json, rest) = chunk(whole, b"JSON")?;
+    let is_glb = magic == GLB_MAGIC && u32::from_le_bytes(*version) == 2;
+    is_glb.then_some((json, chunk(rest, b"BIN\0").map(|(buffer, _)| buffer)))
+}
+
+/// The content of the first chunk if it is of this kind, and what follows it.
+fn chunk<'a>(bytes: &'a [u8], wanted: &[u8; 4]) -> Option<(&'a [u8], &'a [u8])> {
+    let (length, rest) = bytes.split_first_chunk::<4>()?;
+    let (kind, rest) = rest.split_first_chunk::<4>()?;
+    let found = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+    (kind == wanted).then_some(found)
 }
 
 fn buffers(file: &gltf::Gltf, directory: Option<&Path>) -> Result<Vec<Vec<u8>>, Fault> {
@@ -355,6 +409,27 @@ mod tests {
             "accessors":[{{"bufferView":0,"componentType":5123,"count":3,"type":"SCALAR"}},
             {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}]}}"#
         )
+    }
+
+    /// Found by fuzzing: the crate's reader took the header's length for longer than the header.
+    #[test]
+    fn a_container_shorter_than_its_header_is_refused() {
+        for length in [0_u32, 11, 12, 19, 40, u32::MAX] {
+            let bytes = [b"glTF\x02\0\0\0", &length.to_le_bytes()[..], &[0; 27]].concat();
+            let fault = parse(&bytes, None).expect_err("no chunk");
+            assert!(fault.text.starts_with("is no valid GLB"), "{}", fault.text);
+        }
+    }
+
+    /// Found by fuzzing: the crate's validation indexed the accessors without a look at their number.
+    #[test]
+    fn positions_in_an_accessor_that_is_not_there_are_refused() {
+        let text = r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":2}}]}]}"#;
+        let fault = parse(text.as_bytes(), None).expect_err("no accessors");
+        assert_eq!(
+            fault.text,
+            "has positions in accessor 2, but 0 accessors; export it again"
+        );
     }
 
     #[test]

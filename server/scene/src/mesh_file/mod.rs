@@ -11,5 +11,5 @@ mod texture_coordinates;
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
-pub use read::{is_mesh_path, read_mesh};
+pub use read::{is_mesh_path, read_mesh, read_mesh_bytes};
 pub(crate) use texture_coordinates::read_texture_coordinates;

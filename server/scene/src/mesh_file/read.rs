@@ -65,11 +65,14 @@ pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
         let text = "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf";
         return Err(Problem::of_file(path.display(), text).into());
     }
-    let bytes = read_bytes(path, MAX_MESH_BYTES)?;
-    parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path).into())
+    read_mesh_bytes(path, &read_bytes(path, MAX_MESH_BYTES)?)
 }
 
-/// Reads a mesh from bytes; `path` gives the format and where a .gltf finds its buffers.
+/// The same from bytes that are there already; `path` gives the format, the name in messages and where a .gltf finds its buffers.
+pub fn read_mesh_bytes(path: &Path, bytes: &[u8]) -> Result<RawMesh, FileError> {
+    parse_mesh(path, bytes).map_err(|fault| fault.in_file(path).into())
+}
+
 fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
     let mesh = match extension(path).as_str() {
         "ply" => ply::parse(bytes),

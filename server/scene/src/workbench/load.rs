@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use god_object::Pose;
 
 use super::dynamics::DeviceDynamics;
+use super::looking_on::{ObserverStream, Vrpn, Zenoh};
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
@@ -44,6 +45,12 @@ pub struct Workbench {
     pub safety: Safety,
     /// What is drawn beside the bodies.
     pub show: Show,
+    /// The VRPN server.
+    pub vrpn: Vrpn,
+    /// JSON lines for browsers and scripts.
+    pub observers: ObserverStream,
+    /// Publication through Zenoh routers.
+    pub zenoh: Zenoh,
     pub(super) scene_at: At,
 }
 

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_proto::JoinPolicy;
 
+use super::admission::admission;
 use super::dynamics::dynamics;
 use super::load::Workbench;
+use super::looking_on::{observers, vrpn, zenoh};
 use super::safety::safety;
 use super::spec::{
     Device, HeadTracking, Monitoring, Network, Node, RealTime, RealTimeMode, Screen, Show, Stereo,
@@ -75,6 +78,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
+    let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
+    let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
+    let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
@@ -110,17 +116,20 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         realtime,
         safety,
         show,
+        vrpn,
+        observers,
+        zenoh,
         scene_at,
     })
 }
 
 /// Paths in the file are relative to it.
-struct Files<'d> {
+pub(super) struct Files<'d> {
     directory: &'d Path,
 }
 
 impl Files<'_> {
-    fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
+    pub(super) fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
         section.text(key).map(|text| self.directory.join(text))
     }
 
@@ -303,7 +312,15 @@ fn viewer(section: &Section<'_>) -> Option<Viewer> {
         let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
         section.complain(&node.at, text);
     }
+    let remote = section.boolean("remote_tracker").unwrap_or(false);
+    if let (true, Some(node)) = (remote, section.get("remote_tracker"))
+        && (tracker.is_some() || sway.is_some())
+    {
+        let text = "`remote_tracker` in [viewer] excludes `tracker` and `sway`; leave one out";
+        section.complain(&node.at, text);
+    }
     let tracking = match tracker {
+        None if remote => HeadTracking::Remote,
         Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
         None => sway.unwrap_or(HeadTracking::Fixed),
     };
@@ -401,7 +418,7 @@ fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
 }
 
 /// An address to listen on.
-fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
+pub(super) fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     let Some(text) = section.text("bind") else {
         return (!section.has("bind")).then_some(default);
     };
@@ -419,12 +436,17 @@ fn bind(section: &Section<'_>, default: IpAddr) -> Option<IpAddr> {
     address.ok()
 }
 
-fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
+pub(super) fn port(section: &Section<'_>, key: &'static str, default: u16) -> u16 {
     section
         .integer(key, 0, i64::from(u16::MAX))
         .and_then(|n| u16::try_from(n).ok())
         .unwrap_or(default)
 }
+
+/// Silence after which a node counts as gone, s: ten of its signs of life.
+const NODE_TIMEOUT: f64 = 0.5;
+/// Longest that may be asked for, s.
+const MAX_NODE_TIMEOUT: f64 = 60.0;
 
 fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) -> Option<Network> {
     let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
@@ -437,6 +459,8 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
             key_file: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
+            admission: JoinPolicy::default(),
+            node_timeout: NODE_TIMEOUT,
         });
     };
     let transports = [
@@ -470,6 +494,12 @@ fn network(section: Option<Section<'_>>, root: &Section<'_>, files: &Files<'_>) 
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)
             .map_or(16, |n| n as usize),
+        admission: admission(&section),
+        node_timeout: section.number_or(
+            "node_timeout",
+            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            NODE_TIMEOUT,
+        ),
     };
     section.finish();
     Some(network)

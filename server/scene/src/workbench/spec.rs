@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_proto::JoinPolicy;
 use taut_vrpn::{Address, SensorMapping};
 
 use crate::scene::HandPreset;
@@ -87,6 +88,8 @@ pub enum HeadTracking {
     },
     /// A VRPN tracker says where it is.
     Vrpn(Box<VrpnSensor>),
+    /// `taut track`, somewhere on the network, says where it is.
+    Remote,
 }
 
 /// A sensor of a VRPN tracker, and where the thing that it is fixed to is on the workbench.
@@ -199,6 +202,10 @@ pub struct Network {
     pub broadcast_rate: f64,
     /// Most clients at a time.
     pub max_clients: usize,
+    /// Who may join, of those who can prove something.
+    pub admission: JoinPolicy,
+    /// Silence after which a render node or a bridge counts as gone, s.
+    pub node_timeout: f64,
 }
 
 /// The rerun stream.

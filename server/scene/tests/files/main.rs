@@ -8,3 +8,4 @@ mod shipped;
 mod simplification;
 mod workbench_faults;
 mod workbench_inputs;
+mod workbench_lookers_on;

@@ -1,0 +1,233 @@
+//! What a render node's drawing thread does with the barrier: take a frame, draw it, say so, wait, show it.
+
+use super::hot::Hot;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use taut_proto::{
+    HotState, Payload,
+    barrier::{Arrive, Drawn, Node, Turn},
+};
+
+/// The last of the way to a planned swap is waited for without sleep, because no timer is that sharp.
+const SPIN: Duration = Duration::from_micros(80);
+/// A planned swap that is further away is an error of a clock: the frame is shown at once.
+const FARTHEST_SWAP: Duration = Duration::from_millis(100);
+
+/// One node's way through the barrier, for the thread that draws. A node with several screens goes through it once per frame, with all of them.
+///
+/// Dropped, the node takes no part any more.
+pub struct FrameGate {
+    hot: Arc<Hot>,
+    drawing: Option<Drawing>,
+}
+
+/// What is drawn and not shown yet.
+struct Drawing {
+    state_hash: u64,
+    state_time_ns: u64,
+    began: Instant,
+}
+
+/// What the node is to draw.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one of them lives, on the stack of the drawing thread"
+)]
+pub enum FrameTurn {
+    /// There is no barrier: whatever is newest, whenever it suits. Ask again before the next frame.
+    Free,
+    /// The frame of this state; then [`FrameGate::arrive`].
+    Draw(ReleasedState),
+}
+
+/// A frame and the state that all nodes draw for it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReleasedState {
+    /// Number of the frame.
+    pub frame: u64,
+    /// The state.
+    pub state: HotState,
+    /// Its fingerprint, as the server broadcast it.
+    pub state_hash: u64,
+}
+
+/// How the node stands in the barrier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameStatus {
+    /// There is a barrier, and this node draws its frames.
+    pub synchronised: bool,
+    /// The other nodes do not wait for this one: it is new, or it was late.
+    pub late: bool,
+    /// Nodes that take part.
+    pub members: u32,
+    /// The newest released frame.
+    pub frame: u64,
+    /// Frames that were released and not shown by this node.
+    pub missed: u32,
+    /// Last swap call less first of the newest frame that all nodes told of, ns.
+    pub skew_ns: u32,
+}
+
+impl FrameGate {
+    /// `period`: shortest time between two frames that this node is made for.
+    pub(crate) fn new(hot: Arc<Hot>, session: u16, period: Duration) -> FrameGate {
+        let period_us = u32::try_from(period.as_micros()).unwrap_or(u32::MAX);
+        hot.inbound.frames.take_part(Node::new(session, period_us));
+        FrameGate { hot, drawing: None }
+    }
+
+    /// What to draw now; the barrier hears from this node meanwhile. Does not wait.
+    pub fn turn(&mut self) -> FrameTurn {
+        let began = Instant::now();
+        let now_ns = self.hot.inbound.local_ns(began);
+        let turn = self.hot.inbound.frames.with(|part| {
+            let message = part.node.message(now_ns);
+            let frame = match part.node.turn(now_ns) {
+                Turn::Draw { frame } => Some(frame),
+                Turn::Free | Turn::Wait { .. } | Turn::Swap { .. } => None,
+            };
+            (message, frame.zip(part.state.clone()))
+        });
+        let Some((message, drawn)) = turn else {
+            return FrameTurn::Free;
+        };
+        self.send(message);
+        let Some((frame, (state, state_hash))) = drawn else {
+            return FrameTurn::Free;
+        };
+        self.drawing = Some(Drawing {
+            state_hash,
+            state_time_ns: state.sample_time_ns,
+            began,
+        });
+        FrameTurn::Draw(ReleasedState {
+            frame,
+            state,
+            state_hash,
+        })
+    }
+
+    /// The frame is drawn, to the last pixel: tells the master.
+    pub fn arrive(&mut self) {
+        let Some(drawing) = self.drawing.take() else {
+            return;
+        };
+        let now = Instant::now();
+        let (now_ns, ready_ns) = (self.hot.inbound.local_ns(now), self.session_ns(now));
+        let drawn = Drawn {
+            state_hash: drawing.state_hash,
+            state_time_ns: drawing.state_time_ns,
+            ready_ns,
+            draw_us: u32::try_from((now - drawing.began).as_micros()).unwrap_or(u32::MAX),
+        };
+        let message = self.hot.inbound.frames.with(|part| {
+            part.node.drawn(now_ns, drawn);
+            part.node.message(now_ns)
+        });
+        self.send(message.flatten());
+    }
+
+    /// Waits until the drawn frame is to be shown, and tells the master again and again until then; `false` if the barrier is gone, so
+    /// that there is nothing to wait for. Then show the frame, and call [`FrameGate::swapped`].
+    ///
+    /// Ends after half a second without a release, or three frames where they are slow.
+    pub fn wait(&mut self) -> bool {
+        loop {
+            if self.hot.is_over() {
+                return false;
+            }
+            let now_ns = self.hot.inbound.local_ns(Instant::now());
+            let mut message = None;
+            let found = self.hot.inbound.frames.wait(|part| {
+                match part.node.turn(now_ns) {
+                    Turn::Swap { swap_ns, .. } => return Ok(Some(swap_ns)),
+                    Turn::Free | Turn::Draw { .. } => return Ok(None),
+                    Turn::Wait { .. } => {}
+                }
+                message = part.node.message(now_ns);
+                if message.is_some() {
+                    return Err(Duration::ZERO); // send first
+                }
+                match part.node.turn(now_ns) {
+                    Turn::Wait { until_ns } => {
+                        Err(Duration::from_nanos(until_ns.saturating_sub(now_ns)))
+                    }
+                    Turn::Swap { .. } | Turn::Free | Turn::Draw { .. } => Err(Duration::ZERO),
+                }
+            });
+            match found {
+                Some(Some(swap_ns)) => {
+                    self.sleep_until(swap_ns);
+                    return true;
+                }
+                Some(None) => return false,
+                None => self.send(message),
+            }
+        }
+    }
+
+    /// The frame's swap was called at `swap`.
+    pub fn swapped(&mut self, swap: Instant) {
+        let swapped_ns = self.session_ns(swap);
+        self.hot
+            .inbound
+            .frames
+            .with(|part| part.node.swapped(swapped_ns));
+    }
+
+    /// How the node stands.
+    pub fn status(&self) -> FrameStatus {
+        let status = self.hot.inbound.frames.with(|part| {
+            let newest = part.node.newest()?;
+            Some(FrameStatus {
+                synchronised: !part.node.is_free(),
+                late: !part.node.is_waited_for(),
+                members: newest.members.len() as u32,
+                frame: newest.frame,
+                missed: part.node.missed(),
+                skew_ns: newest.skew_ns,
+            })
+        });
+        status.flatten().unwrap_or_default()
+    }
+
+    /// Session time, ns; 0 while it is not known.
+    fn session_ns(&self, moment: Instant) -> u64 {
+        let time = self.hot.inbound.session_at(moment);
+        time.map_or(0, |time| time.ns)
+    }
+
+    fn send(&self, message: Option<Arrive>) {
+        if let Some(message) = message {
+            self.hot.send(&Payload::Arrive(message));
+        }
+    }
+
+    /// Sleeps, then spins, until a session time; returns at once where it is 0, over, not known or implausible.
+    fn sleep_until(&self, swap_ns: u64) {
+        let now = Instant::now();
+        let left = match self.session_ns(now) {
+            0 => Duration::ZERO,
+            now_ns => Duration::from_nanos(swap_ns.saturating_sub(now_ns)),
+        };
+        if left > FARTHEST_SWAP {
+            return;
+        }
+        let swap = now + left;
+        if let Some(sleep) = left.checked_sub(SPIN) {
+            std::thread::sleep(sleep);
+        }
+        while Instant::now() < swap {
+            std::hint::spin_loop();
+        }
+    }
+}
+
+impl Drop for FrameGate {
+    fn drop(&mut self) {
+        self.hot.inbound.frames.take_leave();
+    }
+}

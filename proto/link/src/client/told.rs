@@ -1,0 +1,28 @@
+//! What the server tells on the control stream after the join.
+
+use super::hot::Hot;
+use crate::framing::{CLOSE_PROTOCOL, ReadMessageError, read_message};
+use quinn::RecvStream;
+use std::{sync::Arc, time::Instant};
+use taut_proto::control::{ControlMessage, MAX_FRAME_BYTES};
+
+/// Reads until the stream or the connection ends.
+pub(crate) async fn listen(hot: Arc<Hot>, mut recv: RecvStream) {
+    let reason = loop {
+        match read_message(&mut recv, MAX_FRAME_BYTES).await {
+            Ok(ControlMessage::Group(group)) => {
+                hot.group.learn(group, hot.inbound.local_ns(Instant::now()));
+            }
+            Ok(ControlMessage::Events(told)) => {
+                hot.inbound.told_events(&told);
+                hot.acknowledge();
+            }
+            Ok(other) => break format!("the server sent {}", other.name()),
+            Err(error @ (ReadMessageError::Decode(_) | ReadMessageError::Stalled)) => {
+                break error.to_string();
+            }
+            Err(ReadMessageError::Ended(_)) => return,
+        }
+    };
+    hot.connection.close(CLOSE_PROTOCOL, reason.as_bytes());
+}

@@ -1,0 +1,73 @@
+//! Discrete events at the server: from the broadcaster into the states and onto the control streams.
+//!
+//! Written by the broadcaster, read by the writers of the streams; both hold the lock for a copy of a few records and across no system call.
+
+use super::session::lock;
+use std::sync::{
+    Mutex,
+    atomic::{AtomicBool, Ordering},
+};
+use taut_proto::{EventOutbox, EventsTold, HotState};
+use tokio::sync::watch;
+
+pub(crate) struct EventHub {
+    outbox: Mutex<EventOutbox>,
+    /// Whether states repeat anything: saves the lock where nothing happens.
+    repeats: AtomicBool,
+    newest: watch::Sender<u32>,
+}
+
+impl Default for EventHub {
+    fn default() -> EventHub {
+        EventHub {
+            outbox: Mutex::default(),
+            repeats: AtomicBool::new(false),
+            newest: watch::Sender::new(0),
+        }
+    }
+}
+
+impl EventHub {
+    /// Takes the new events of `state`, and returns the state with those that are to be repeated; `None` if it goes as it is. No allocation.
+    pub(crate) fn exchange(
+        &self,
+        state: &HotState,
+        by_all: Option<u32>,
+        now_ns: u64,
+    ) -> Option<HotState> {
+        if state.events.is_empty() && !self.repeats.load(Ordering::Relaxed) {
+            return None;
+        }
+        let mut sent = state.clone();
+        sent.events.clear();
+        let newest = {
+            let mut outbox = lock(&self.outbox);
+            let mut pushed = false;
+            for record in &state.events {
+                pushed |= outbox.push(*record, now_ns);
+            }
+            sent.events.extend(outbox.trail(now_ns, by_all));
+            self.repeats.store(outbox.repeats(), Ordering::Relaxed);
+            pushed.then(|| outbox.newest())
+        };
+        if let Some(newest) = newest {
+            self.newest.send_replace(newest);
+        }
+        Some(sent)
+    }
+
+    /// Changes when there are new events.
+    pub(crate) fn follow(&self) -> watch::Receiver<u32> {
+        self.newest.subscribe()
+    }
+
+    /// Number of the newest event.
+    pub(crate) fn newest(&self) -> u32 {
+        lock(&self.outbox).newest()
+    }
+
+    /// What a client that has all up to `after` is to be told.
+    pub(crate) fn told_after(&self, after: u32) -> EventsTold {
+        lock(&self.outbox).told_after(after)
+    }
+}

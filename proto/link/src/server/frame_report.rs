@@ -1,0 +1,119 @@
+//! How frames went: counts, and how far apart the screens swapped.
+
+use hdrhistogram::Histogram;
+use taut_proto::barrier::{Counts, FrameSkew};
+
+/// Longest time told apart, ns: a minute.
+const LONGEST_NS: u64 = 60_000_000_000;
+/// Nodes told apart by name; more are not recorded one by one.
+const MAX_NODES: usize = 64;
+const NS_PER_US: f64 = 1e3;
+
+/// Percentiles of a time, µs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// Median.
+    pub p50: f64,
+    /// 99 of 100 are below.
+    pub p99: f64,
+    /// 999 of 1000 are below.
+    pub p999: f64,
+    /// The largest.
+    pub max: f64,
+    /// How many there were.
+    pub count: u64,
+}
+
+/// How frames went since the server started. Swap times are as true as the nodes' clocks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameReport {
+    /// Counts of the barrier.
+    pub counts: Counts,
+    /// Last swap call less first, of each frame that at least two nodes told of, µs.
+    pub skew: Spread,
+    /// From the moment at which a frame could be shown to the last swap call, µs.
+    pub overhead: Spread,
+    /// Age of the state at the last swap call, µs.
+    pub age: Spread,
+    /// Each node by name: its swap call less the first of the same frame, µs.
+    pub nodes: Vec<(String, Spread)>,
+}
+
+/// Gathers shown frames. Memory is taken once, and once for each node that shows its first frame.
+pub(crate) struct Recorder {
+    skew: Histogram<u64>,
+    overhead: Histogram<u64>,
+    age: Histogram<u64>,
+    nodes: Vec<(String, Histogram<u64>)>,
+}
+
+impl Default for Recorder {
+    fn default() -> Recorder {
+        Recorder {
+            skew: histogram(),
+            overhead: histogram(),
+            age: histogram(),
+            nodes: Vec::new(),
+        }
+    }
+}
+
+impl Recorder {
+    /// Takes a frame in; `name_of` knows the nodes.
+    pub(crate) fn record<'a>(
+        &mut self,
+        shown: &FrameSkew,
+        name_of: impl Fn(u16) -> Option<&'a str>,
+    ) {
+        self.skew.saturating_record(shown.skew_ns);
+        self.overhead.saturating_record(shown.overhead_ns);
+        self.age.saturating_record(shown.age_ns);
+        for swap in &shown.swaps {
+            let Some(name) = name_of(swap.session) else {
+                continue; // it has just left
+            };
+            let known = self.nodes.iter().position(|(node, _)| node == name);
+            let index = match known {
+                Some(index) => index,
+                None if self.nodes.len() < MAX_NODES => {
+                    self.nodes.push((name.to_owned(), histogram()));
+                    self.nodes.len() - 1
+                }
+                None => continue,
+            };
+            self.nodes[index].1.saturating_record(swap.after_first_ns);
+        }
+    }
+
+    pub(crate) fn report(&self, counts: Counts) -> FrameReport {
+        let nodes = self.nodes.iter();
+        FrameReport {
+            counts,
+            skew: spread(&self.skew),
+            overhead: spread(&self.overhead),
+            age: spread(&self.age),
+            nodes: nodes
+                .map(|(node, times)| (node.clone(), spread(times)))
+                .collect(),
+        }
+    }
+}
+
+fn histogram() -> Histogram<u64> {
+    // Two significant figures over a fixed range: constants that hdrhistogram takes.
+    Histogram::new_with_bounds(1, LONGEST_NS, 2).unwrap_or_else(|_| unreachable!("constant bounds"))
+}
+
+fn spread(times: &Histogram<u64>) -> Spread {
+    let us = |ns: u64| ns as f64 / NS_PER_US;
+    if times.is_empty() {
+        return Spread::default();
+    }
+    Spread {
+        p50: us(times.value_at_quantile(0.5)),
+        p99: us(times.value_at_quantile(0.99)),
+        p999: us(times.value_at_quantile(0.999)),
+        max: us(times.max()),
+        count: times.len(),
+    }
+}

@@ -1,0 +1,320 @@
+//! The barrier of frames over real sockets: two nodes in step, a bad network, a node that stops, nobody who leads.
+//!
+//! Nothing here measures: how sharp the swaps are is told by the example `swap_skew`.
+
+mod support;
+
+use std::{
+    collections::HashMap,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+use support::{
+    relay::{Impairment, Relay, Waiting},
+    *,
+};
+use taut_link::{ClientLink, FrameTurn, Role, ServerLink, ServerOptions};
+use taut_proto::barrier::{MasterSettings, Swap};
+
+/// Fast enough for many frames, slow enough for a busy machine.
+const PERIOD: Duration = Duration::from_millis(33);
+
+/// Which state each frame showed, by all nodes.
+type Shown = Arc<Mutex<HashMap<u64, Vec<u64>>>>;
+
+/// A server that broadcasts and leads frames, in threads, until it is dropped.
+struct Leader {
+    server: ServerLink,
+    relay: Option<Relay>,
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Leader {
+    async fn start(swap: Option<Swap>, impairment: Option<Impairment>) -> Leader {
+        let waiting = impairment.map(|_| Waiting::new());
+        let server = server_with(ServerOptions {
+            idle_timeout: FORGIVING,
+            announced_udp_port: waiting.as_ref().map(Waiting::port),
+            frames: swap.map(|swap| MasterSettings {
+                swap,
+                period_ns: PERIOD.as_nanos() as u64,
+            }),
+            ..ServerOptions::loopback(key('a'))
+        })
+        .await;
+        let relay = waiting
+            .zip(impairment)
+            .map(|(waiting, impairment)| waiting.start(server.udp_addr(), impairment, 7));
+        let stop = Arc::new(AtomicBool::new(false));
+        let mut threads = Vec::new();
+        let (mut broadcaster, clock, over) = (server.broadcaster(), server.clock(), stop.clone());
+        threads.push(thread("states", move || {
+            while !over.load(Ordering::SeqCst) {
+                let mut now = state(clock.now_ns() / 1_000_000 + 1);
+                now.sample_time_ns = clock.now_ns();
+                broadcaster.send(&now);
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }));
+        if let Some(mut master) = server.frame_master() {
+            let over = stop.clone();
+            threads.push(thread("frames", move || {
+                master.run(&|| over.load(Ordering::SeqCst));
+            }));
+        }
+        Leader {
+            server,
+            relay,
+            stop,
+            threads,
+        }
+    }
+}
+
+impl Drop for Leader {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        for thread in self.threads.drain(..) {
+            assert!(thread.join().is_ok() || std::thread::panicking());
+        }
+    }
+}
+
+fn thread(name: &str, body: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(body)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A node that "draws" for a few milliseconds per frame.
+struct Screen {
+    link: Arc<ClientLink>,
+    frames: Arc<AtomicU64>,
+    free_turns: Arc<AtomicU64>,
+    paused: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Screen {
+    async fn start(
+        leader: &Leader,
+        role: Role,
+        name: &str,
+        draws_ms: u64,
+        shown: &Shown,
+    ) -> Screen {
+        let link = Arc::new(client(&leader.server, role, name).await);
+        let mut screen = Screen {
+            link: link.clone(),
+            frames: Arc::default(),
+            free_turns: Arc::default(),
+            paused: Arc::default(),
+            stop: Arc::default(),
+            thread: None,
+        };
+        let (frames, free_turns) = (screen.frames.clone(), screen.free_turns.clone());
+        let (paused, stop, shown) = (screen.paused.clone(), screen.stop.clone(), shown.clone());
+        screen.thread = Some(thread(name, move || {
+            let mut gate = link.frame_gate(Duration::ZERO);
+            let mut last = 0;
+            while !stop.load(Ordering::SeqCst) {
+                while paused.load(Ordering::SeqCst) && !stop.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                let FrameTurn::Draw(released) = gate.turn() else {
+                    free_turns.fetch_add(1, Ordering::SeqCst);
+                    std::thread::sleep(Duration::from_millis(1));
+                    continue;
+                };
+                assert_eq!(released.state.hash(), Ok(released.state_hash));
+                std::thread::sleep(Duration::from_millis(draws_ms));
+                gate.arrive();
+                if gate.wait() {
+                    assert!(released.frame > last, "{} after {last}", released.frame);
+                    last = released.frame;
+                    gate.swapped(Instant::now());
+                    let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+                    shown
+                        .entry(released.frame)
+                        .or_default()
+                        .push(released.state_hash);
+                    frames.fetch_add(1, Ordering::SeqCst);
+                }
+            }
+        }));
+        screen
+    }
+
+    fn frames(&self) -> u64 {
+        self.frames.load(Ordering::SeqCst)
+    }
+
+    async fn show(&self, more: u64) {
+        let enough = self.frames() + more;
+        wait_until("frames", || self.frames() >= enough).await;
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        if let Some(thread) = self.thread.take() {
+            assert!(thread.join().is_ok() || std::thread::panicking());
+        }
+    }
+}
+
+/// Equal frames showed equal states, and enough of them were shown by more than one node.
+fn assert_equal_frames(shown: &Shown, at_least: usize) {
+    let shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+    for (frame, states) in shown.iter() {
+        assert!(
+            states.windows(2).all(|pair| pair[0] == pair[1]),
+            "frame {frame}: {states:?}"
+        );
+    }
+    let shared = shown.values().filter(|states| states.len() > 1).count();
+    assert!(
+        shared >= at_least,
+        "{shared} frames were shown by more than one node"
+    );
+}
+
+async fn in_step(swap: Swap) {
+    let leader = Leader::start(Some(swap), None).await;
+    let shown = Shown::default();
+    let front = Screen::start(&leader, Role::Render, "front", 3, &shown).await;
+    let table = Screen::start(&leader, Role::Render, "table", 7, &shown).await;
+    front.show(40).await;
+    table.show(40).await;
+    // Both are waited for once they have arrived in time for a while, however busy the machine is.
+    wait_until("step", || {
+        let report = leader.server.frame_report().unwrap_or_default();
+        report.skew.count >= 10
+    })
+    .await;
+    drop((front, table));
+    assert_equal_frames(&shown, 30);
+    let report = leader.server.frame_report().unwrap_or_default();
+    assert_eq!(report.counts.mismatches, 0, "{report:?}");
+    assert!(report.counts.compared >= 80, "{report:?}");
+    let names: Vec<_> = report.nodes.iter().map(|(name, _)| name.as_str()).collect();
+    assert!(
+        names.contains(&"front") && names.contains(&"table"),
+        "{report:?}"
+    );
+    assert!(report.nodes.iter().all(|(_, skew)| skew.count >= 10));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_nodes_show_the_same_states_when_the_release_comes() {
+    in_step(Swap::Immediate).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_nodes_show_the_same_states_at_a_planned_time() {
+    in_step(Swap::Scheduled).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_bad_network_costs_time_but_never_truth() {
+    let impairment = Impairment {
+        lost: 150,
+        doubled: 100,
+        swapped: 100,
+        damaged: 50,
+        ..Impairment::default()
+    };
+    let leader = Leader::start(Some(Swap::Immediate), Some(impairment)).await;
+    let shown = Shown::default();
+    let front = Screen::start(&leader, Role::Render, "front", 2, &shown).await;
+    let table = Screen::start(&leader, Role::Render, "table", 5, &shown).await;
+    front.show(80).await;
+    table.show(80).await;
+    drop((front, table));
+    assert!(
+        leader
+            .relay
+            .as_ref()
+            .is_some_and(|relay| relay.lost_down() > 0)
+    );
+    assert_equal_frames(&shown, 50);
+    let report = leader.server.frame_report().unwrap_or_default();
+    assert_eq!(report.counts.mismatches, 0, "{report:?}");
+    assert!(report.counts.compared >= 160, "{report:?}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_that_stops_is_left_behind_and_taken_in_again() {
+    let leader = Leader::start(Some(Swap::Immediate), None).await;
+    let shown = Shown::default();
+    let front = Screen::start(&leader, Role::Render, "front", 2, &shown).await;
+    let table = Screen::start(&leader, Role::Render, "table", 2, &shown).await;
+    let counts = || leader.server.frame_report().unwrap_or_default().counts;
+    let synced = |name: &'static str| {
+        let server = &leader.server;
+        move || {
+            let nodes = server.frame_report().unwrap_or_default().nodes;
+            nodes
+                .iter()
+                .any(|(node, skew)| node == name && skew.count > 0)
+        }
+    };
+    wait_until("step", synced("table")).await;
+
+    let before = counts();
+    table.paused.store(true, Ordering::SeqCst);
+    front.show(30).await;
+    wait_until("eviction", || counts().evicted > before.evicted).await;
+    let stopped_at = table.frames();
+    front.show(10).await;
+    assert!(table.frames() <= stopped_at + 1);
+
+    table.paused.store(false, Ordering::SeqCst);
+    table.show(20).await;
+    drop((front, table));
+    assert_equal_frames(&shown, 20);
+    assert_eq!(counts().mismatches, 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_whose_session_ends_holds_nobody_up() {
+    let leader = Leader::start(Some(Swap::Immediate), None).await;
+    let shown = Shown::default();
+    let front = Screen::start(&leader, Role::Render, "front", 2, &shown).await;
+    let table = Screen::start(&leader, Role::Render, "table", 2, &shown).await;
+    table.show(20).await;
+    drop(table); // the link with it
+    front.show(50).await;
+    wait_until("parting", || leader.server.clients().len() == 1).await;
+    front.show(5).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_a_leader_a_node_draws_on_its_own() {
+    let leader = Leader::start(None, None).await;
+    assert!(leader.server.frame_master().is_none() && leader.server.frame_report().is_none());
+    let shown = Shown::default();
+    let front = Screen::start(&leader, Role::Render, "front", 2, &shown).await;
+    wait_until("turns", || front.free_turns.load(Ordering::SeqCst) > 200).await;
+    assert_eq!((front.frames(), leader.server.counters().garbage), (0, 0));
+    assert!(front.link.is_closed().is_none());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_observer_takes_no_part() {
+    let leader = Leader::start(Some(Swap::Immediate), None).await;
+    let shown = Shown::default();
+    let observer = Screen::start(&leader, Role::Observer, "observer", 2, &shown).await;
+    wait_until("refusal", || leader.server.counters().garbage > 3).await;
+    assert_eq!(observer.frames(), 0);
+    let report = leader.server.frame_report().unwrap_or_default();
+    assert_eq!(report.counts.released, 0);
+}

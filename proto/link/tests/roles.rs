@@ -1,0 +1,341 @@
+//! What each role may do once it is in: every role against every act, over both transports; and who is shut out.
+
+mod support;
+
+use std::time::Duration;
+use support::*;
+use taut_link::{
+    Act, ClientLink, ClientOptions, Credential, Holder, JoinPolicy, LinkError, LinkEvent, Role,
+    ServerLink, ServerOptions, Transport, connect,
+};
+use taut_proto::{
+    HeadSample, PoseF64,
+    control::{LogLevel, RefusalCode},
+    revocation::Revoked,
+};
+
+fn credential(role: Role, name: &str, issue: u16) -> Credential {
+    let holder = Holder::of(name).unwrap_or_else(|error| panic!("{error}"));
+    key('a').credential(role, holder, issue)
+}
+
+fn with(server: &ServerLink, role: Role, node: &str, credential: Credential) -> ClientOptions {
+    ClientOptions {
+        key: credential.into(),
+        ..options(server, role, node)
+    }
+}
+
+async fn join(options: ClientOptions) -> ClientLink {
+    connect(options)
+        .await
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+async fn error_of(options: ClientOptions) -> LinkError {
+    match connect(options).await {
+        Err(error) => error,
+        Ok(_) => panic!("let in"),
+    }
+}
+
+fn head(index: u64) -> HeadSample {
+    HeadSample {
+        sample_time_ns: index * 1_000_000,
+        index,
+        pose: PoseF64 {
+            position: [0.0, -1.0, index as f64 * 1e-3],
+            ..PoseF64::IDENTITY
+        },
+    }
+}
+
+/// Tries `act` as the client would; whether there is a way to.
+async fn attempt(client: &ClientLink, act: Act) -> bool {
+    match act {
+        Act::GiveInput => client.send_input(&input(1)),
+        Act::GiveHead => client.send_head(&head(1)),
+        Act::Arm => assert!(client.post_arm(true)),
+        Act::Log => assert!(client.post_log(LogLevel::Info, "here".to_owned())),
+        Act::Report => assert!(client.post_stats(Default::default())),
+        Act::GetMeshes => {
+            let _ = client.mesh(client.description().god_object.mesh).await;
+        }
+        // Every client does the first; the others are the server's to send, or have no datagram of their own here.
+        Act::KeepPath | Act::GetStates | Act::GetWrenches | Act::KeepFrames => return false,
+    }
+    true
+}
+
+/// What the server shows when `act` had its effect.
+fn has_effect(server: &ServerLink, act: Act) -> bool {
+    let counters = server.counters();
+    match act {
+        Act::GiveInput => counters.inputs == 1,
+        Act::GiveHead => counters.heads == 1,
+        _ => {
+            let mut found = false;
+            while let Some(event) = server.try_event() {
+                found |= matches!(
+                    (act, event),
+                    (Act::Arm, LinkEvent::Arm { .. })
+                        | (Act::Log, LinkEvent::Log { .. })
+                        | (Act::Report, LinkEvent::Stats { .. })
+                );
+            }
+            found
+        }
+    }
+}
+
+async fn each_role_against_each_act(transport: Transport) {
+    for (name, role) in Role::NAMED {
+        for act in Act::ALL {
+            let server = server().await;
+            let client = join(ClientOptions {
+                transport,
+                ..with(&server, role, name, credential(role, name, 1))
+            })
+            .await;
+            if !attempt(&client, act).await {
+                continue;
+            }
+            let what = format!("{role}: {act}");
+            if role.may(act) {
+                if act != Act::GetMeshes {
+                    wait_until(&what, || has_effect(&server, act)).await;
+                }
+                assert_eq!(client.is_closed(), None, "{what}");
+                assert_eq!(server.counters().forbidden, 0, "{what}");
+                continue;
+            }
+            event(&server, &what, |event| {
+                matches!(event, LinkEvent::Forbidden { node, role: r, act: a }
+                    if node == name && *r == role && *a == act)
+            })
+            .await;
+            assert_eq!(server.counters().forbidden, 1, "{what}");
+            assert!(!has_effect(&server, act), "{what} had its effect");
+            if matches!(act, Act::GiveInput | Act::GiveHead) {
+                assert_eq!(client.is_closed(), None, "a datagram ends no session");
+            } else {
+                wait_until(&what, || client.is_closed().is_some()).await;
+                let reason = client.is_closed().unwrap_or_default();
+                assert!(
+                    reason.contains(act.name()) && reason.contains(role.name()),
+                    "{reason}"
+                );
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_role_may_do_what_the_table_says_and_nothing_else_over_udp() {
+    each_role_against_each_act(Transport::Udp).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn each_role_may_do_what_the_table_says_and_nothing_else_over_quic() {
+    each_role_against_each_act(Transport::QuicDatagram).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn states_go_to_who_may_get_them_and_wrenches_to_the_device_alone() {
+    let server = server().await;
+    let mut clients = Vec::new();
+    for (name, role) in Role::NAMED {
+        clients.push((role, client(&server, role, name).await));
+    }
+    let mut broadcaster = server.broadcaster();
+    let counts = |clients: &[(Role, ClientLink)]| -> Vec<(Role, u64)> {
+        clients
+            .iter()
+            .map(|(role, client)| (*role, client.counters().states))
+            .collect()
+    };
+    let next = broadcast_until(&mut broadcaster, 1, || {
+        counts(&clients)
+            .iter()
+            .all(|(role, states)| *states > 0 || !role.may(Act::GetStates))
+    })
+    .await;
+    // The tracker's path is open by now, too: it was simply not sent any.
+    wait_until("time at the tracker", || {
+        clients
+            .iter()
+            .all(|(_, client)| client.session_now().is_some())
+    })
+    .await;
+    let _ = broadcast_until(&mut broadcaster, next, || {
+        clients
+            .iter()
+            .any(|(_, client)| client.counters().states > 200)
+    })
+    .await;
+    for (role, states) in counts(&clients) {
+        assert_eq!(states > 0, role.may(Act::GetStates), "{role}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_newest_reading_of_the_head_reaches_both_readers() {
+    let server = server().await;
+    let tracker = client(&server, Role::Tracker, "tracker").await;
+    let [mut one, mut other] = match server.head_inputs() {
+        Some(readers) => readers,
+        None => panic!("taken already"),
+    };
+    assert!(server.head_inputs().is_none());
+    for index in [1, 3, 2] {
+        // One after the other, so that each is judged in this order.
+        let before = server.counters().heads + server.counters().heads_refused;
+        tracker.send_head(&head(index));
+        wait_until("its arrival", || {
+            server.counters().heads + server.counters().heads_refused > before
+        })
+        .await;
+    }
+    wait_until("all three", || {
+        server.counters().heads == 2 && server.counters().heads_refused == 1
+    })
+    .await;
+    for reader in [&mut one, &mut other] {
+        let newest = reader.read().unwrap_or_else(|| panic!("nothing"));
+        assert_eq!(newest.sample, head(3));
+        assert_eq!(newest.session, tracker.session());
+    }
+    // A rotation that is none gets no further than the link.
+    tracker.send_head(&HeadSample {
+        index: 4,
+        pose: PoseF64 {
+            rotation: [0.0; 4],
+            ..PoseF64::IDENTITY
+        },
+        ..head(4)
+    });
+    wait_until("the refusal", || server.counters().heads_refused == 2).await;
+    assert_eq!(one.read().map(|input| input.sample), Some(head(3)));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn there_is_one_tracker_at_a_time() {
+    let server = server().await;
+    let _first = client(&server, Role::Tracker, "tracker").await;
+    match error_of(options(&server, Role::Tracker, "another")).await {
+        LinkError::Refused { code, text, .. } => {
+            assert_eq!(code, RefusalCode::TrackerTaken);
+            assert!(text.contains("head tracker \"tracker\""), "{text}");
+        }
+        other => panic!("{other}"),
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_credential_is_not_even_shown_for_what_it_is_not() {
+    let server = server().await;
+    for (role, node) in [
+        (Role::Device, "left"),
+        (Role::Operator, "left"),
+        (Role::Render, "right"),
+    ] {
+        let error = error_of(with(
+            &server,
+            role,
+            node,
+            credential(Role::Render, "left", 1),
+        ))
+        .await;
+        assert!(matches!(error, LinkError::NotAllowed(_)), "{error}");
+    }
+    assert_eq!(server.counters().refused, 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_comes_in() {
+    let revoked =
+        |text: &str| -> Revoked { text.parse().unwrap_or_else(|error| panic!("{error}")) };
+    let server = server_with(ServerOptions {
+        policy: JoinPolicy {
+            roles: vec![Role::Render, Role::Device],
+            revoked: vec![revoked("left#1"), revoked("bridge")],
+        },
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    for (role, name, code) in [
+        (Role::Render, "left", RefusalCode::Revoked),
+        (Role::Device, "bridge", RefusalCode::Revoked),
+        (Role::Observer, "web", RefusalCode::RoleClosed),
+    ] {
+        let options = with(&server, role, name, credential(role, name, 1));
+        match error_of(options).await {
+            LinkError::Refused {
+                code: found, text, ..
+            } => {
+                assert_eq!(found, code, "{text}");
+                assert!(text.contains("network."), "{text}");
+            }
+            other => panic!("{name}: {other}"),
+        }
+    }
+    assert_eq!(server.counters().shut_out, 3);
+    let _second = join(with(
+        &server,
+        Role::Render,
+        "left",
+        credential(Role::Render, "left", 2),
+    ))
+    .await;
+}
+
+/// Whoever may choose his name must not keep a screen out, nor push out one that is silent for a moment.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_name_of_a_screen_is_not_for_others() {
+    let server = server().await;
+    let any = credential(Role::Observer, "*", 1);
+    let taken = error_of(with(&server, Role::Observer, "left", any.clone())).await;
+    assert!(
+        matches!(
+            taken,
+            LinkError::Refused {
+                code: RefusalCode::NameTaken,
+                ..
+            }
+        ),
+        "{taken}"
+    );
+    let _free = join(with(&server, Role::Observer, "watcher", any)).await;
+}
+
+/// A client that floods is cut to its role's rate; its session, and the others', go on.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
+    let server = server().await;
+    let flooding = client(&server, Role::Observer, "flooding").await;
+    let device = client(&server, Role::Device, "bridge").await;
+    wait_until("both paths", || {
+        server
+            .clients()
+            .iter()
+            .all(|client| client.udp_address.is_some())
+    })
+    .await;
+    for index in 0..2_000 {
+        flooding.send_input(&input(index));
+        if index % 100 == 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    }
+    device.send_input(&input(1));
+    wait_until("the reading of the device", || {
+        server.counters().inputs == 1
+    })
+    .await;
+    let counters = server.counters();
+    assert!(counters.flooded > 0, "{counters:?}");
+    assert!(counters.forbidden < 2_000, "{counters:?}");
+    assert_eq!(flooding.is_closed(), None);
+    assert_eq!(device.is_closed(), None);
+}

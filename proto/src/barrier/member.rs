@@ -1,0 +1,109 @@
+//! One node as the master sees it.
+
+use super::{Arrive, RECOVERY_FRAMES, WARM_UP_FRAMES};
+
+/// How far a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NodeState {
+    /// It wants to take part and has drawn no released frame yet.
+    Joining,
+    /// It draws released frames; the others do not wait for it yet.
+    WarmUp,
+    /// The others wait for it.
+    Synced,
+    /// It was waited for in vain; the others do not wait until it is back on time.
+    Late,
+}
+
+/// What the master knows of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MemberStatus {
+    /// Its session number.
+    pub session: u16,
+    /// How far it is.
+    pub state: NodeState,
+    /// Highest frame at which it arrived; 0 for none.
+    pub arrived: u64,
+    /// Frames at which it was waited for in vain.
+    pub lapses: u64,
+    /// Frames that it says were released and not shown.
+    pub missed: u32,
+    /// How long it took to draw its last frame, µs.
+    pub draw_us: u32,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Member {
+    pub(super) session: u16,
+    pub(super) state: NodeState,
+    pub(super) arrived: u64,
+    pub(super) lapses: u64,
+    pub(super) missed: u32,
+    pub(super) draw_us: u32,
+    pub(super) period_us: u32,
+    /// When it was heard last: session time, ns.
+    pub(super) heard_ns: u64,
+    /// Frames in a row at which it arrived in time.
+    on_time: u32,
+    /// Releases in a row without an arrival between them.
+    pub(super) misses: u32,
+    /// It arrived, at whatever frame, since the last release.
+    pub(super) arrived_lately: bool,
+}
+
+impl Member {
+    pub(super) fn new(session: u16, now_ns: u64) -> Member {
+        Member {
+            session,
+            state: NodeState::Joining,
+            arrived: 0,
+            lapses: 0,
+            missed: 0,
+            draw_us: 0,
+            period_us: 0,
+            heard_ns: now_ns,
+            on_time: 0,
+            misses: 0,
+            arrived_lately: false,
+        }
+    }
+
+    /// Takes the arrival at a frame that it has not arrived at yet.
+    pub(super) fn arrive(&mut self, arrive: &Arrive, in_time: bool) {
+        self.arrived = arrive.frame;
+        self.missed = arrive.missed;
+        self.draw_us = arrive.draw_us;
+        self.arrived_lately = true;
+        self.on_time = if in_time { self.on_time + 1 } else { 0 };
+        self.state = match self.state {
+            NodeState::Joining => NodeState::WarmUp,
+            NodeState::WarmUp if self.on_time >= WARM_UP_FRAMES => NodeState::Synced,
+            NodeState::Late if self.on_time >= RECOVERY_FRAMES => NodeState::Synced,
+            state => state,
+        };
+    }
+
+    /// The frame is released without it.
+    pub(super) fn pass_over(&mut self) {
+        self.on_time = 0;
+        if self.state == NodeState::Synced {
+            self.state = NodeState::Late;
+            self.lapses += 1;
+        }
+    }
+
+    pub(super) fn is_waited_for(&self) -> bool {
+        self.state == NodeState::Synced
+    }
+
+    pub(super) fn status(&self) -> MemberStatus {
+        MemberStatus {
+            session: self.session,
+            state: self.state,
+            arrived: self.arrived,
+            lapses: self.lapses,
+            missed: self.missed,
+            draw_us: self.draw_us,
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! The swap barrier: frames that every screen shows at the same instant, of the same state.
+//!
+//! | message | from   | says                                                                                   |
+//! |---------|--------|----------------------------------------------------------------------------------------|
+//! | ARRIVE  | node   | frame N is drawn; repeated every [`ARRIVE_PERIOD_NS`] until it is released             |
+//! | RELEASE | master | show frame N, now or at a time; the whole state of frame N + 1; who takes part, who is late |
+//!
+//! The RELEASE carries the state, so that every node draws the same bytes whatever else it lost. A lost ARRIVE is repeated, a lost RELEASE is
+//! sent again for every ARRIVE that comes after it. Nobody waits for ever: the master passes a late node over at the deadline, does not wait
+//! for it until it is back on time, and forgets one that is silent; a node that hears nothing draws on its own again.
+//!
+//! Pure state machines, times are arguments: [`Master`] (session time), [`Node`] and [`Succession`] (any monotonic clock of the node).
+//!
+//! Source: the barrier with one emitter and repeated messages of cluster displays; a distributed barrier with a central coordinator.
+
+mod master;
+mod member;
+mod message;
+mod node;
+mod skew;
+mod succession;
+
+pub use master::{Answer, Change, Counts, Master, MasterSettings, Newest, Swap};
+pub use member::{MemberStatus, NodeState};
+pub use message::{Arrive, MAX_MEMBERS, Release, ReleaseHead, state_bytes};
+pub use node::{Drawn, Node, Turn};
+pub use skew::{FrameSkew, NodeSwap};
+pub use succession::{Succession, Successor};
+
+/// Time between two ARRIVEs of one frame, ns.
+pub const ARRIVE_PERIOD_NS: u64 = 500_000;
+/// Time between two invitations of a node that has no frame yet, ns.
+pub const JOIN_PERIOD_NS: u64 = 50_000_000;
+/// Time between the two copies of a RELEASE, ns.
+pub const REPEAT_NS: u64 = 200_000;
+/// Frames that a node arrives at in time before the others wait for it.
+pub const WARM_UP_FRAMES: u32 = 5;
+/// Frames that a late node arrives at in time before the others wait for it again: one that is now and then in time costs nothing.
+pub const RECOVERY_FRAMES: u32 = 3;
+/// Frames in a row without a sign of a node after which it is out.
+pub const MAX_MISSES: u32 = 10;
+/// Silence after which a node is out, ns.
+pub const SILENCE_NS: u64 = 500_000_000;
+/// Time from the RELEASE to a planned swap, ns: two threads wake up meanwhile, and a lost copy comes again.
+pub const LEAD_NS: u64 = 300_000;
+/// Silence of the master after which a node may take its place, ns.
+pub const SUCCESSION_NS: u64 = 150_000_000;
+/// Silence of all masters after which a node draws on its own, ns.
+pub const FREE_NS: u64 = 500_000_000;

@@ -1,0 +1,112 @@
+//! Who is master when the master is gone: the lowest session number that is alive.
+//!
+//! Nobody votes: the nodes know each other from the last RELEASE, and each waits its turn. The first in order stands after [`SUCCESSION_NS`] of
+//! silence, each further one [`TURN_NS`] later. A master that hears of one with a higher term, or with the same term and a lower number,
+//! resigns. So the cluster has one master again as soon as the living hear each other. Should two reign for a while, their frames have
+//! different ([`ReleaseHead::rank`], frame), and each node shows only ascending ones.
+//!
+//! Source: Garcia-Molina 1982 (bully election), with time-outs instead of messages.
+
+use super::{ReleaseHead, SUCCESSION_NS};
+
+/// Time between the turns of two successors, ns: a RELEASE of the earlier one is there long before.
+const TURN_NS: u64 = 50_000_000;
+/// Frame numbers that a successor leaves out: more than any RELEASE that it may have missed.
+const FRAMES_LEFT_OUT: u64 = 1024;
+
+/// What a node is to do about the master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
+pub enum Successor {
+    /// Nothing.
+    No,
+    /// Be the master from now on, in this term, from this frame on, with the state held from the last RELEASE.
+    Stand {
+        /// Of its RELEASEs.
+        term: u32,
+        /// Of its first RELEASE.
+        first: u64,
+    },
+    /// Be master no longer: a better one is there.
+    Resign,
+}
+
+/// One node's part in the succession. Times are ns on any clock of the node that does not fall.
+#[derive(Clone, Debug)]
+pub struct Succession {
+    session: u16,
+    heard_ns: u64,
+    newest: Option<ReleaseHead>,
+    reign: Option<u32>,
+}
+
+impl Succession {
+    /// A node that has heard the master now.
+    pub fn new(session: u16, now_ns: u64) -> Succession {
+        Succession {
+            session,
+            heard_ns: now_ns,
+            newest: None,
+            reign: None,
+        }
+    }
+
+    /// Any authentic datagram of the present master came.
+    pub fn hear(&mut self, now_ns: u64) {
+        self.heard_ns = self.heard_ns.max(now_ns);
+    }
+
+    /// An authentic RELEASE came, from whomever.
+    pub fn release(&mut self, now_ns: u64, head: &ReleaseHead) {
+        let order = |head: &ReleaseHead| (head.rank(), head.frame);
+        if self
+            .newest
+            .as_ref()
+            .is_none_or(|newest| order(newest) < order(head))
+        {
+            self.newest = Some(head.clone());
+            self.hear(now_ns);
+        }
+    }
+
+    /// What is to be done now.
+    pub fn poll(&mut self, now_ns: u64) -> Successor {
+        let Some(newest) = &self.newest else {
+            return Successor::No; // never part of anything
+        };
+        if let Some(term) = self.reign {
+            let own = ReleaseHead {
+                term,
+                master: self.session,
+                ..ReleaseHead::default()
+            };
+            if newest.rank() > own.rank() {
+                self.reign = None;
+                return Successor::Resign;
+            }
+            return Successor::No;
+        }
+        let Some(place) = self.turn(newest) else {
+            return Successor::No;
+        };
+        if now_ns.saturating_sub(self.heard_ns) < SUCCESSION_NS + place * TURN_NS {
+            return Successor::No;
+        }
+        let term = newest.term.saturating_add(1);
+        self.reign = Some(term);
+        Successor::Stand {
+            term,
+            first: newest.frame + FRAMES_LEFT_OUT,
+        }
+    }
+
+    /// How many stand before this node; `None` if it takes no part.
+    fn turn(&self, newest: &ReleaseHead) -> Option<u64> {
+        let place = newest.place(self.session)?;
+        // A node that reigned and is silent is gone: it does not stand before the others.
+        let gone = newest
+            .place(newest.master)
+            .is_some_and(|master| master < place);
+        Some((place - usize::from(gone)) as u64)
+    }
+}

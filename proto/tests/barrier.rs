@@ -1,0 +1,270 @@
+//! The barrier under a virtual clock and a bad network: one master, some nodes, everything lost, doubled, delayed and dying by a seed.
+
+mod barrier_support;
+
+use barrier_support::*;
+use proptest::prelude::*;
+use taut_proto::barrier::{
+    Arrive, MAX_MISSES, Master, MasterSettings, Newest, Node, NodeState, SILENCE_NS, Swap, Turn,
+};
+
+const MS: u64 = 1_000_000;
+const PERIOD: u64 = 16_666_667;
+
+fn settings(swap: Swap) -> MasterSettings {
+    MasterSettings {
+        swap,
+        period_ns: PERIOD,
+    }
+}
+
+/// A master with these nodes in step, at the moment after a release; all arrive at once in every frame.
+fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
+    let mut master = Master::new(settings(swap), 0, 1, 1);
+    let mut now = MS;
+    for &session in sessions {
+        let _ = master.arrive(now, session, &Arrive::default());
+    }
+    for _ in 0..8 {
+        now = release_when_due(&mut master);
+        let frame = released(&master) + 1;
+        for &session in sessions {
+            let _ = master.arrive(now + MS, session, &arrived(frame));
+        }
+    }
+    now = release_when_due(&mut master);
+    for member in master.members() {
+        assert_eq!(member.state, NodeState::Synced);
+    }
+    (master, now)
+}
+
+fn arrived(frame: u64) -> Arrive {
+    Arrive {
+        term: 1,
+        frame,
+        ..Arrive::default()
+    }
+}
+
+fn released(master: &Master) -> u64 {
+    master.newest().map_or(0, |newest| newest.frame)
+}
+
+/// Polls at the moment that the master asks for, and not a nanosecond before.
+fn release_when_due(master: &mut Master) -> u64 {
+    let Some(wake) = master.wake_ns() else {
+        panic!("there are nodes");
+    };
+    assert!(master.poll(wake - 1, Newest::default()).is_none());
+    assert!(master.poll(wake, Newest::default()).is_some());
+    wake
+}
+
+#[test]
+fn frames_keep_the_rhythm_while_all_are_in_time() {
+    let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2]);
+    for _ in 0..100 {
+        let frame = released(&master) + 1;
+        for session in [1, 2] {
+            let _ = master.arrive(last + 5 * MS, session, &arrived(frame));
+        }
+        let now = release_when_due(&mut master);
+        assert_eq!(now - last, PERIOD);
+        last = now;
+    }
+    assert_eq!(master.counts().lapses, 0);
+}
+
+#[test]
+fn a_planned_swap_keeps_the_rhythm_and_is_told_ahead() {
+    let (mut master, mut last) = in_step(Swap::Scheduled, &[1, 2]);
+    let mut last_swap = master.newest().map_or(0, |newest| newest.swap_ns);
+    for _ in 0..100 {
+        let frame = released(&master) + 1;
+        for session in [1, 2] {
+            let _ = master.arrive(last + 5 * MS, session, &arrived(frame));
+        }
+        last = release_when_due(&mut master);
+        let swap = master.newest().map_or(0, |newest| newest.swap_ns);
+        assert_eq!((swap - last, swap - last_swap), (300_000, PERIOD));
+        last_swap = swap;
+    }
+}
+
+#[test]
+fn a_late_node_costs_one_deadline_and_none_until_it_is_back() {
+    let (mut master, start) = in_step(Swap::Immediate, &[1, 2]);
+    let (mut last, mut gaps) = (start, Vec::new());
+    for round in 0..40 {
+        let frame = released(&master) + 1;
+        let _ = master.arrive(last + 5 * MS, 1, &arrived(frame));
+        // The other one is away for eight frames, then in time again.
+        if !(0..8).contains(&round) {
+            let _ = master.arrive(last + 6 * MS, 2, &arrived(frame));
+        }
+        let now = release_when_due(&mut master);
+        gaps.push(now - last);
+        last = now;
+    }
+    let slow = gaps.iter().filter(|gap| **gap > PERIOD).count();
+    assert_eq!(slow, 1, "{gaps:?}");
+    assert!(gaps.iter().all(|gap| *gap <= 25 * MS), "{gaps:?}");
+    let states: Vec<_> = master.members().map(|member| member.state).collect();
+    assert_eq!(states, [NodeState::Synced, NodeState::Synced]);
+    assert_eq!(master.counts().lapses, 1);
+}
+
+#[test]
+fn a_dead_node_is_out_after_ten_frames_and_a_silent_one_after_half_a_second() {
+    let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2]);
+    let died = last;
+    let mut frames = 0;
+    while master.members().count() == 2 {
+        let _ = master.arrive(last + MS, 1, &arrived(released(&master) + 1));
+        last = release_when_due(&mut master);
+        frames += 1;
+    }
+    assert!(frames <= MAX_MISSES && last - died < SILENCE_NS);
+    assert_eq!(master.counts().evicted, 1);
+
+    // One that never drew a frame is not late, but silent.
+    let (mut master, mut last) = in_step(Swap::Immediate, &[1]);
+    let died = last;
+    let _ = master.arrive(last, 2, &Arrive::default());
+    while master.members().count() == 2 {
+        let _ = master.arrive(last + MS, 1, &arrived(released(&master) + 1));
+        last = release_when_due(&mut master);
+    }
+    assert!((SILENCE_NS..SILENCE_NS + 2 * PERIOD).contains(&(last - died)));
+}
+
+#[test]
+fn a_node_that_is_made_for_slow_frames_slows_everybody_but_not_beyond_a_second() {
+    let (mut master, _) = in_step(Swap::Immediate, &[1]);
+    let slow = |period_us| Arrive {
+        period_us,
+        ..Arrive::default()
+    };
+    let _ = master.arrive(2000 * MS, 2, &slow(100_000));
+    assert_eq!(
+        (master.period_ns(), master.patience_ns()),
+        (100 * MS, 150 * MS)
+    );
+    let _ = master.arrive(2000 * MS, 2, &slow(u32::MAX));
+    assert_eq!(master.period_ns(), 1000 * MS);
+    master.leave(2);
+    assert_eq!(master.period_ns(), PERIOD);
+}
+
+#[test]
+fn swaps_are_compared_when_all_have_told() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
+    let shown = released(&master);
+    let told = |ns| Arrive {
+        swapped_frame: shown,
+        swapped_ns: ns,
+        ..arrived(shown + 1)
+    };
+    assert_eq!(
+        master.arrive(last + 5 * MS, 1, &told(last + 70_000)).1,
+        None
+    );
+    let Some(skew) = master.arrive(last + 5 * MS, 2, &told(last + 90_000)).1 else {
+        panic!("both have told");
+    };
+    assert_eq!(
+        (skew.frame, skew.skew_ns, skew.overhead_ns),
+        (shown, 20_000, 90_000)
+    );
+    let after: Vec<_> = skew
+        .swaps
+        .iter()
+        .map(|s| (s.session, s.after_first_ns))
+        .collect();
+    assert_eq!(after, [(1, 0), (2, 20_000)]);
+    release_when_due(&mut master);
+    assert_eq!(master.newest().map(|newest| newest.skew_ns), Some(20_000));
+}
+
+#[test]
+fn a_wrong_picture_is_counted() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1]);
+    let before = master.counts();
+    assert_eq!(before.mismatches, 0);
+    assert!(before.compared > 0);
+    let wrong = Arrive {
+        state_hash: 99,
+        ..arrived(released(&master) + 1)
+    };
+    let _ = master.arrive(last + MS, 1, &wrong);
+    assert_eq!(master.counts().mismatches, 1);
+    let _ = master.arrive(last + MS, 1, &wrong);
+    assert_eq!(
+        master.counts().mismatches,
+        1,
+        "a repeated message counts once"
+    );
+}
+
+#[test]
+fn a_frame_that_nobody_began_is_refused() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1]);
+    let ahead = arrived(released(&master) + 2);
+    assert_eq!(
+        master.arrive(last, 1, &ahead).0,
+        taut_proto::barrier::Answer::Refused
+    );
+    assert_eq!(master.counts().refused, 1);
+}
+
+#[test]
+fn a_node_that_hears_nothing_draws_on_its_own_again() {
+    let mut node = Node::new(1, 0);
+    assert_eq!(node.turn(0), Turn::Free);
+    assert!(node.message(0).is_some_and(|message| message.frame == 0));
+    assert_eq!(node.message(1), None);
+    let mut head = taut_proto::barrier::ReleaseHead {
+        term: 1,
+        frame: 7,
+        ..Default::default()
+    };
+    assert!(node.release(MS, &head));
+    assert!(!node.release(MS, &head), "a copy");
+    assert_eq!(node.turn(MS), Turn::Draw { frame: 8 });
+    node.drawn(2 * MS, Default::default());
+    assert!(
+        node.message(2 * MS)
+            .is_some_and(|message| message.frame == 8)
+    );
+    let mut now = 2 * MS;
+    while let Turn::Wait { until_ns } = node.turn(now) {
+        assert!(until_ns > now && now < 600 * MS);
+        now = until_ns;
+        let _ = node.message(now);
+    }
+    assert_eq!(node.turn(now), Turn::Free);
+    head.frame = 9;
+    assert!(node.release(now, &head));
+    assert_eq!(node.turn(now), Turn::Draw { frame: 10 });
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 48, ..ProptestConfig::default() })]
+
+    /// Whatever is lost, doubled, overtaken, and whoever dies or stops: frames go on, in order, and equal frames show equal states.
+    #[test]
+    fn frames_go_on_whatever_happens(world in any_world()) {
+        let seen = world.run();
+        seen.assert_truth()?;
+        seen.assert_progress(&world)?;
+    }
+
+    /// The same when the server dies: one of the living leads, all the living follow.
+    #[test]
+    fn the_living_agree_on_a_master(world in any_world_without_server()) {
+        let seen = world.run();
+        seen.assert_truth()?;
+        seen.assert_one_master(&world)?;
+    }
+}

@@ -1,0 +1,38 @@
+//! The workbench for those who speak no taut.
+//!
+//! - [`VrpnServer`]: a VRPN tracker, force device and buttons, for programs that know VRPN.
+//! - [`StreamServer`]: JSON lines over WebSocket and HTTP, and a page that shows them, for browsers and scripts.
+//! - [`lines`]: those lines; other carriers of them use it too.
+//!
+//! Each is a thread of its own with normal scheduling. It reads a [`StateFeed`], whose writer never waits for it, at a rate of
+//! its own, and nothing that its clients send goes anywhere: whoever is connected here can look and can do nothing else.
+//! Clients are bounded in number and in what waits for them; one that does not keep up misses states or is dropped.
+//!
+//! Without the feature `servers` there are the feed and the lines alone.
+#![forbid(unsafe_code)]
+
+mod event_lines;
+mod feed;
+pub mod lines;
+#[cfg(feature = "servers")]
+mod pump;
+#[cfg(feature = "servers")]
+mod request;
+#[cfg(feature = "servers")]
+mod service;
+#[cfg(feature = "servers")]
+mod stream_server;
+#[cfg(feature = "servers")]
+mod vrpn_reports;
+#[cfg(feature = "servers")]
+mod vrpn_server;
+
+pub use event_lines::EventLines;
+pub use feed::{StateFeed, StateOutlet, state_channel};
+pub use lines::{Hello, Naming};
+#[cfg(feature = "servers")]
+pub use stream_server::{StreamServer, StreamSettings};
+#[cfg(feature = "servers")]
+pub use vrpn_reports::VrpnFrame;
+#[cfg(feature = "servers")]
+pub use vrpn_server::{VrpnServer, VrpnSettings};

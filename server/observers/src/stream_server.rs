@@ -1,0 +1,347 @@
+//! JSON lines for browsers and scripts: over WebSocket at `/ws`, as a plain HTTP body at `/stream`, and a page at `/`.
+//!
+//! Plain HTTP without TLS: it belongs on the loopback address, behind a tunnel, or, with a token, on a network that is trusted.
+//! Every line is written once, whoever reads it. An observer that does not keep up misses states (the newest is next) and, if
+//! it is far behind, events, which it is told; one that takes nothing for [`SEND_TIME`] is dropped.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use futures_util::{SinkExt, StreamExt};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{broadcast, watch};
+use tokio::time::{sleep, timeout};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
+use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+use tokio_tungstenite::tungstenite::{Message, Utf8Bytes};
+
+use crate::event_lines::EventLines;
+use crate::feed::StateFeed;
+use crate::lines::{Hello, Naming, missed_line, state_line};
+use crate::request::{MAX_REQUEST_BYTES, Refusal, Wish, read};
+use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
+
+/// The page at `/`: self-contained, it reads `/ws`.
+const PAGE: &str = include_str!("page.html");
+/// Longest that an observer may take for its request.
+const REQUEST_TIME: Duration = Duration::from_secs(5);
+/// Longest that an observer may take nothing of what is sent.
+const SEND_TIME: Duration = Duration::from_secs(5);
+/// Events that wait for a slow observer.
+const EVENT_LINES: usize = 256;
+/// Largest message of an observer; they have nothing to say.
+const MAX_INBOUND_BYTES: usize = 4096;
+/// What every answer says beside its own: nothing is kept, nothing is taken from elsewhere.
+const COMMON_HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\nConnection: close\r\n";
+
+/// How the stream is set up.
+#[derive(Clone, Debug)]
+pub struct StreamSettings {
+    /// TCP address; port 0 takes a free one.
+    pub address: SocketAddr,
+    /// States per second, at most.
+    pub rate: f64,
+    /// What observers must show; `None` lets everybody in who reaches the port and is no page from elsewhere.
+    pub token: Option<String>,
+    /// Most observers at a time.
+    pub max_observers: usize,
+    /// What the device port's events are called.
+    pub naming: Naming,
+}
+
+/// A running stream. Dropped, it ends.
+#[derive(Debug)]
+pub struct StreamServer {
+    address: SocketAddr,
+    counts: Arc<Counts>,
+    _service: Service,
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    observers: AtomicUsize,
+    dropped: AtomicU64,
+}
+
+/// What every observer's task knows.
+#[derive(Clone)]
+struct Shared {
+    token: Option<Arc<str>>,
+    hello: Utf8Bytes,
+    states: watch::Receiver<Option<Arc<Utf8Bytes>>>,
+    events: broadcast::Sender<Utf8Bytes>,
+    counts: Arc<Counts>,
+    max_observers: usize,
+}
+
+/// A place among the observers; dropped, it is free again.
+struct Place(Arc<Counts>);
+
+impl StreamServer {
+    /// Opens the port and serves what `feed` has.
+    ///
+    /// # Errors
+    /// The address cannot be had, or no thread.
+    pub fn start(settings: StreamSettings, hello: &Hello, mut feed: StateFeed) -> io::Result<Self> {
+        let runtime = runtime()?;
+        let guard = runtime.enter();
+        let listener = listen(settings.address)?;
+        let address = listener.local_addr()?;
+        drop(guard);
+        let counts = Arc::<Counts>::default();
+        let (sender, states) = watch::channel(None);
+        let (events, _) = broadcast::channel(EVENT_LINES);
+        let shared = Shared {
+            token: settings.token.map(Arc::from),
+            hello: hello.line().into(),
+            states,
+            events: events.clone(),
+            counts: counts.clone(),
+            max_observers: settings.max_observers,
+        };
+        let mut trail = EventLines::new(settings.naming);
+        // The first state only says where the trail of events begins.
+        if let Some(state) = feed.fresh() {
+            trail.take(state);
+        }
+        let service = Service::start("observers", runtime, move |_| async move {
+            let pump = feed.pump(settings.rate, sender, move |state| {
+                for line in trail.take(state) {
+                    // An error means that nobody listens.
+                    let _ = events.send(line.into());
+                }
+                state_line(state).into()
+            });
+            tokio::join!(pump, accept(listener, &shared));
+        })?;
+        Ok(Self {
+            address,
+            counts,
+            _service: service,
+        })
+    }
+
+    /// Where it is, with the port that it got.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Observers that are connected.
+    #[must_use]
+    pub fn observers(&self) -> usize {
+        self.counts.observers.load(Ordering::Relaxed)
+    }
+
+    /// Observers that were given up because they took nothing.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.counts.dropped.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.observers.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+async fn accept(listener: TcpListener, shared: &Shared) {
+    loop {
+        let Ok((stream, peer)) = listener.accept().await else {
+            sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        let observers = &shared.counts.observers;
+        let taken = observers.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |observers| {
+            (observers < shared.max_observers).then_some(observers + 1)
+        });
+        if taken.is_err() {
+            continue; // closed at once
+        }
+        let place = Place(shared.counts.clone());
+        let shared = shared.clone();
+        tokio::spawn(async move {
+            match observer(stream, &shared).await {
+                Ok(()) => tracing::debug!("observer {peer} went"),
+                Err(End::Slow) => {
+                    shared.counts.dropped.fetch_add(1, Ordering::Relaxed);
+                    tracing::info!("observer {peer} was given up: it takes nothing");
+                }
+                Err(End::Gone) => {}
+            }
+            drop(place);
+        });
+    }
+}
+
+/// Why an observer's connection ended.
+#[derive(Debug)]
+enum End {
+    /// It closed, or the network did.
+    Gone,
+    /// It took nothing for [`SEND_TIME`].
+    Slow,
+}
+
+impl From<io::Error> for End {
+    fn from(_: io::Error) -> Self {
+        Self::Gone
+    }
+}
+
+async fn observer(mut stream: TcpStream, shared: &Shared) -> Result<(), End> {
+    // A socket that refuses this is merely later.
+    let _ = stream.set_nodelay(true);
+    let wish = timeout(REQUEST_TIME, request(&mut stream, shared.token.as_deref()))
+        .await
+        .map_err(|_| End::Gone)??;
+    match wish {
+        Err(refusal) => {
+            let (status, text) = refusal.text();
+            answer(
+                &mut stream,
+                status,
+                "text/plain; charset=utf-8",
+                &format!("{text}\n"),
+            )
+            .await
+        }
+        Ok(Wish::Page) => answer(&mut stream, "200 OK", "text/html; charset=utf-8", PAGE).await,
+        Ok(Wish::Hello) => {
+            let line = format!("{}\n", shared.hello);
+            answer(&mut stream, "200 OK", "application/json", &line).await
+        }
+        Ok(Wish::Lines) => {
+            let head = head("200 OK", "application/x-ndjson");
+            send(stream.write_all(head.as_bytes())).await?;
+            follow(Lines(stream), shared).await
+        }
+        Ok(Wish::WebSocket(key)) => {
+            let accept = derive_accept_key(key.as_bytes());
+            let head = format!(
+                "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
+            );
+            send(stream.write_all(head.as_bytes())).await?;
+            let config = WebSocketConfig::default()
+                .max_message_size(Some(MAX_INBOUND_BYTES))
+                .max_frame_size(Some(MAX_INBOUND_BYTES));
+            let socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
+            follow(socket, shared).await
+        }
+    }
+}
+
+/// Reads a request's head.
+async fn request(stream: &mut TcpStream, token: Option<&str>) -> io::Result<Result<Wish, Refusal>> {
+    let mut head = Vec::with_capacity(1024);
+    loop {
+        if stream.read_buf(&mut head).await? == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        if let Some(wish) = read(&head, token) {
+            return Ok(wish);
+        }
+        if head.len() > MAX_REQUEST_BYTES {
+            return Ok(Err(Refusal::NotHttp));
+        }
+    }
+}
+
+fn head(status: &str, kind: &str) -> String {
+    format!("HTTP/1.1 {status}\r\nContent-Type: {kind}\r\n{COMMON_HEADERS}\r\n")
+}
+
+/// A whole answer; its length is where the connection ends.
+async fn answer(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> Result<(), End> {
+    let head = head(status, kind);
+    send(stream.write_all(head.as_bytes())).await?;
+    send(stream.write_all(body.as_bytes())).await?;
+    send(stream.shutdown()).await
+}
+
+/// What `sending` comes to, at most [`SEND_TIME`].
+async fn send(sending: impl Future<Output = io::Result<()>>) -> Result<(), End> {
+    match timeout(SEND_TIME, sending).await {
+        Ok(sent) => Ok(sent?),
+        Err(_) => Err(End::Slow),
+    }
+}
+
+/// A carrier of lines.
+trait Carrier {
+    /// Sends one line.
+    fn line(&mut self, line: Utf8Bytes) -> impl Future<Output = Result<(), End>> + Send;
+    /// Waits until the observer goes.
+    fn gone(&mut self) -> impl Future<Output = ()> + Send;
+}
+
+/// Lines as the body of an answer.
+struct Lines(TcpStream);
+
+impl Carrier for Lines {
+    async fn line(&mut self, line: Utf8Bytes) -> Result<(), End> {
+        let whole = format!("{line}\n");
+        send(self.0.write_all(whole.as_bytes())).await
+    }
+
+    async fn gone(&mut self) {
+        let mut ignored = [0; 256];
+        while self
+            .0
+            .read(&mut ignored)
+            .await
+            .is_ok_and(|length| length > 0)
+        {}
+    }
+}
+
+impl Carrier for WebSocketStream<TcpStream> {
+    async fn line(&mut self, line: Utf8Bytes) -> Result<(), End> {
+        let sending = SinkExt::send(self, Message::Text(line));
+        match timeout(SEND_TIME, sending).await {
+            Ok(sent) => sent.map_err(|_| End::Gone),
+            Err(_) => Err(End::Slow),
+        }
+    }
+
+    async fn gone(&mut self) {
+        // Pings are answered while this reads; what else an observer says is not listened to.
+        while let Some(Ok(_)) = self.next().await {}
+    }
+}
+
+/// Greets, then sends every event and the newest state until the observer goes.
+async fn follow(mut to: impl Carrier, shared: &Shared) -> Result<(), End> {
+    let mut events = shared.events.subscribe();
+    let mut states = shared.states.clone();
+    states.mark_changed();
+    to.line(shared.hello.clone()).await?;
+    loop {
+        tokio::select! {
+            biased;
+            event = events.recv() => match event {
+                Ok(line) => to.line(line).await?,
+                Err(broadcast::error::RecvError::Lagged(events)) => {
+                    to.line(missed_line(events).into()).await?;
+                }
+                Err(broadcast::error::RecvError::Closed) => return Ok(()),
+            },
+            changed = states.changed() => {
+                if changed.is_err() {
+                    return Ok(());
+                }
+                let line = states.borrow_and_update().clone();
+                if let Some(line) = line {
+                    to.line(line.as_ref().clone()).await?;
+                }
+            }
+            () = to.gone() => return Ok(()),
+        }
+    }
+}

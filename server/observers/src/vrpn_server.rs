@@ -1,0 +1,314 @@
+//! A VRPN server on real sockets: TCP, and the call-back that a datagram asks for.
+//!
+//! VRPN has no authentication and no encryption: whoever reaches the port sees the poses. Nobody can do more than that, since
+//! nothing of what a client sends goes beyond its session. Connections and datagrams go only to the address that asked for
+//! them.
+
+use std::collections::HashSet;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use taut_proto::HotState;
+use taut_vrpn::{ServerError, ServerSession, Stamp, callback_address};
+use tokio::net::{TcpListener, TcpStream, UdpSocket};
+use tokio::sync::watch;
+use tokio::time::{Instant, sleep, timeout, timeout_at};
+
+use crate::feed::StateFeed;
+use crate::service::{ACCEPT_PAUSE, Service, dialling_socket, listen, runtime};
+use crate::vrpn_reports::{VrpnFrame, button_reports};
+
+/// Longest that a client may take to greet, and a call-back to be answered.
+const GREETING_TIME: Duration = Duration::from_secs(5);
+/// Bytes read at a time.
+const READ_BYTES: usize = 4096;
+
+/// How the server is set up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VrpnSettings {
+    /// TCP and UDP address; port 0 takes a free one.
+    pub address: SocketAddrV4,
+    /// Reports of each sensor per second, at most.
+    pub rate: f64,
+    /// Name of the device: `tracker` in `tracker@host`.
+    pub tracker: String,
+    /// Most clients at a time.
+    pub max_clients: usize,
+    /// Where the scene stands on the workbench.
+    pub frame: VrpnFrame,
+}
+
+/// A running VRPN server. Dropped, it ends.
+#[derive(Debug)]
+pub struct VrpnServer {
+    address: SocketAddrV4,
+    counts: Arc<Counts>,
+    _service: Service,
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    clients: AtomicUsize,
+    dropped: AtomicU64,
+}
+
+/// What every client's task knows.
+#[derive(Clone)]
+struct Shared {
+    settings: Arc<VrpnSettings>,
+    counts: Arc<Counts>,
+    states: watch::Receiver<Option<Arc<HotState>>>,
+    datagrams: Arc<UdpSocket>,
+    /// Who is being dialled or was: clients ask until they are.
+    called: Arc<Mutex<HashSet<SocketAddrV4>>>,
+}
+
+/// A place among the clients; dropped, it is free again.
+struct Place(Arc<Counts>);
+
+impl VrpnServer {
+    /// Opens the ports and serves what `feed` has.
+    ///
+    /// # Errors
+    /// The address cannot be had, or no thread.
+    pub fn start(settings: VrpnSettings, feed: StateFeed) -> io::Result<Self> {
+        let runtime = runtime()?;
+        let guard = runtime.enter();
+        let listener = listen(SocketAddr::V4(settings.address))?;
+        let SocketAddr::V4(address) = listener.local_addr()? else {
+            unreachable!("it was bound to an IPv4 address");
+        };
+        let datagrams = std::net::UdpSocket::bind(address)?;
+        datagrams.set_nonblocking(true)?;
+        let datagrams = Arc::new(UdpSocket::from_std(datagrams)?);
+        drop(guard);
+        let counts = Arc::<Counts>::default();
+        let (sender, states) = watch::channel(None);
+        let rate = settings.rate;
+        let shared = Shared {
+            settings: Arc::new(settings),
+            counts: counts.clone(),
+            states,
+            datagrams,
+            called: Arc::default(),
+        };
+        let service = Service::start("vrpn", runtime, move |_| async move {
+            tokio::join!(
+                feed.pump(rate, sender, HotState::clone),
+                accept(listener, &shared),
+                call_back(&shared),
+            );
+        })?;
+        Ok(Self {
+            address,
+            counts,
+            _service: service,
+        })
+    }
+
+    /// Where it is, with the port that it got.
+    #[must_use]
+    pub fn address(&self) -> SocketAddrV4 {
+        self.address
+    }
+
+    /// Clients that are connected.
+    #[must_use]
+    pub fn clients(&self) -> usize {
+        self.counts.clients.load(Ordering::Relaxed)
+    }
+
+    /// Clients whose connection was ended here: garbage, silence, or reports that they did not take.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.counts.dropped.load(Ordering::Relaxed)
+    }
+}
+
+impl Shared {
+    /// A place for one more client, if there is one.
+    fn place(&self) -> Option<Place> {
+        let most = self.settings.max_clients;
+        self.counts
+            .clients
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |clients| {
+                (clients < most).then_some(clients + 1)
+            })
+            .is_ok()
+            .then(|| Place(self.counts.clone()))
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.clients.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+async fn accept(listener: TcpListener, shared: &Shared) {
+    loop {
+        match listener.accept().await {
+            Ok((stream, SocketAddr::V4(peer))) => {
+                // Without a place the connection is closed at once.
+                if let Some(place) = shared.place() {
+                    tokio::spawn(client(stream, *peer.ip(), shared.clone(), place));
+                }
+            }
+            Ok(_) => {}
+            Err(_) => sleep(ACCEPT_PAUSE).await,
+        }
+    }
+}
+
+/// Dials those who ask for it by a datagram.
+async fn call_back(shared: &Shared) {
+    let mut buffer = [0; 256];
+    loop {
+        let Ok((length, SocketAddr::V4(from))) = shared.datagrams.recv_from(&mut buffer).await
+        else {
+            sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        let Some(address) = callback_address(&buffer[..length], *from.ip()) else {
+            continue;
+        };
+        let called = &shared.called;
+        if called
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .contains(&address)
+        {
+            continue;
+        }
+        let Some(place) = shared.place() else {
+            continue;
+        };
+        called
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .insert(address);
+        let shared = shared.clone();
+        tokio::spawn(async move {
+            if let Ok(socket) = dialling_socket()
+                && let Ok(Ok(stream)) = timeout(GREETING_TIME, socket.connect(address.into())).await
+            {
+                client(stream, *address.ip(), shared.clone(), place).await;
+            }
+            shared
+                .called
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .remove(&address);
+        });
+    }
+}
+
+/// Serves one client until it goes or is given up.
+async fn client(stream: TcpStream, peer: Ipv4Addr, shared: Shared, _place: Place) {
+    match serve(&stream, peer, &shared).await {
+        Ok(()) => tracing::debug!("VRPN client {peer} went"),
+        Err(end) => {
+            shared.counts.dropped.fetch_add(1, Ordering::Relaxed);
+            tracing::info!("VRPN client {peer} was given up: {end}");
+        }
+    }
+}
+
+/// Why a client is given up.
+#[derive(Debug, thiserror::Error)]
+enum End {
+    #[error(transparent)]
+    Session(#[from] ServerError),
+    #[error("it did not greet within {} s", GREETING_TIME.as_secs())]
+    Silent,
+}
+
+async fn serve(stream: &TcpStream, peer: Ipv4Addr, shared: &Shared) -> Result<(), End> {
+    let mut session = ServerSession::new(&shared.settings.tracker, peer);
+    let mut states = shared.states.clone();
+    let mut last = Last::default();
+    let mut buffer = [0; READ_BYTES];
+    let greeting_end = Instant::now() + GREETING_TIME;
+    // A socket that refuses this is merely later.
+    let _ = stream.set_nodelay(true);
+    loop {
+        let is_open = session.is_open();
+        tokio::select! {
+            ready = stream.readable() => match ready.and_then(|()| stream.try_read(&mut buffer)) {
+                Ok(0) => return Ok(()),
+                Ok(length) => session.receive(&buffer[..length], now())?,
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(_) => return Ok(()),
+            },
+            ready = stream.writable(), if !session.pending().is_empty() => {
+                match ready.and_then(|()| stream.try_write(session.pending())) {
+                    Ok(length) => session.sent(length),
+                    Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                    Err(_) => return Ok(()),
+                }
+            }
+            changed = states.changed(), if is_open => {
+                let Ok(()) = changed else { return Ok(()) };
+                let state = states.borrow_and_update().clone();
+                if let Some(state) = state {
+                    last.tell(&state, &mut session, shared)?;
+                }
+            }
+            () = sleep_until(greeting_end), if !is_open => return Err(End::Silent),
+        }
+    }
+}
+
+async fn sleep_until(end: Instant) {
+    // Never ready by itself: the time decides.
+    let _ = timeout_at(end, std::future::pending::<()>()).await;
+}
+
+/// What a client was told, and buffers for what it is told next.
+#[derive(Default)]
+struct Last {
+    tick: Option<u64>,
+    buttons: Option<u16>,
+    reports: Vec<taut_vrpn::Report>,
+    datagram: Vec<u8>,
+}
+
+impl Last {
+    fn tell(
+        &mut self,
+        state: &HotState,
+        session: &mut ServerSession,
+        shared: &Shared,
+    ) -> Result<(), ServerError> {
+        if self.tick.replace(state.tick) == Some(state.tick) {
+            return Ok(()); // said already; VRPN has pings of its own
+        }
+        shared.settings.frame.reports(state, &mut self.reports);
+        if let Some(tool) = state.tools.first() {
+            button_reports(&mut self.buttons, tool.buttons, &mut self.reports);
+        }
+        let time = now();
+        for report in &self.reports {
+            session.report(report, time)?;
+        }
+        if let Some(to) = session.take_datagram(&mut self.datagram) {
+            // Newest wins: what the socket does not take now is not worth sending later.
+            let _ = shared.datagrams.try_send_to(&self.datagram, to.into());
+        }
+        Ok(())
+    }
+}
+
+/// The wall clock, as VRPN stamps its reports.
+fn now() -> Stamp {
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Stamp {
+        seconds: since.as_secs() as u32,
+        microseconds: since.subsec_micros(),
+    }
+}

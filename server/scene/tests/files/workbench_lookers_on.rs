@@ -1,0 +1,92 @@
+//! Those who look on, in a workbench file: off unless wanted, and never open to everybody by a slip.
+
+use std::net::Ipv4Addr;
+use std::path::Path;
+
+use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+
+fn with(assignments: &[&str]) -> Result<Workbench, String> {
+    Workbench::parse_with_overrides("w.toml", SHIPPED_WORKBENCH, Path::new(""), assignments)
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn nobody_looks_on_unless_the_file_says_so() {
+    let shipped = Workbench::shipped().expect("valid");
+    assert!(!shipped.vrpn.enabled && !shipped.observers.enabled && !shipped.zenoh.enabled);
+    let begin = SHIPPED_WORKBENCH.find("[vrpn]").expect("there");
+    let end = SHIPPED_WORKBENCH.find("[realtime]").expect("there");
+    let without = format!(
+        "{}{}",
+        &SHIPPED_WORKBENCH[..begin],
+        &SHIPPED_WORKBENCH[end..]
+    );
+    let without = Workbench::parse("w.toml", &without, Path::new("")).expect("valid");
+    assert_eq!(
+        (without.vrpn, without.observers, without.zenoh),
+        (shipped.vrpn, shipped.observers, shipped.zenoh),
+        "the shipped file shows the defaults"
+    );
+}
+
+#[test]
+fn the_keys_are_read() {
+    let workbench = with(&[
+        "vrpn.enabled=true",
+        "vrpn.bind=\"192.168.1.5\"",
+        "vrpn.tracker=\"Haptic0\"",
+        "observers.enabled=true",
+        "observers.rate=30",
+        "zenoh.enabled=true",
+        "zenoh.connect=[\"tcp/a:7447\", \"tls/b:7447\"]",
+    ])
+    .expect("valid");
+    assert_eq!(workbench.vrpn.bind, Ipv4Addr::new(192, 168, 1, 5));
+    assert_eq!((workbench.vrpn.port, workbench.vrpn.rate), (3883, 120.0));
+    assert_eq!(workbench.vrpn.tracker, "Haptic0");
+    assert_eq!(
+        (workbench.observers.port, workbench.observers.rate),
+        (4860, 30.0)
+    );
+    assert_eq!(workbench.observers.token(), Ok(None));
+    assert_eq!(workbench.zenoh.connect, ["tcp/a:7447", "tls/b:7447"]);
+}
+
+#[test]
+fn slips_are_refused_with_what_to_do() {
+    for (assignments, wanted) in [
+        (&["vrpn.bind=\"::1\""][..], "write an IPv4 one"),
+        (&["vrpn.tracker=\"a b\""], "letters, digits"),
+        (&["vrpn.rate=0"], "`rate`"),
+        (
+            &["observers.enabled=true", "observers.bind=\"0.0.0.0\""],
+            "token_file =",
+        ),
+        (&["observers.rate=100"], "`rate`"),
+        (&["zenoh.enabled=true"], "connect ="),
+        (&["zenoh.name=\"a/b\""], "letters, digits"),
+        (&["observers.tokn=1"], "tokn"),
+    ] {
+        let found = with(assignments).expect_err(wanted);
+        assert!(found.contains(wanted), "{found}");
+    }
+}
+
+#[test]
+fn a_token_is_read_from_its_file_and_a_poor_one_is_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().join("observers.token");
+    let set = format!("observers.token_file=\"{}\"", path.display());
+    let open = ["observers.enabled=true", "observers.bind=\"0.0.0.0\"", &set];
+    let stream = with(&open).expect("valid").observers;
+    assert!(
+        stream
+            .token()
+            .expect_err("no file")
+            .contains("openssl rand")
+    );
+    std::fs::write(&path, "short\n").expect("written");
+    assert!(stream.token().expect_err("short").contains("at least 16"));
+    std::fs::write(&path, "0123456789abcdef_-\n").expect("written");
+    assert_eq!(stream.token(), Ok(Some("0123456789abcdef_-".to_owned())));
+}

@@ -1,0 +1,235 @@
+//! `taut track`: says where the viewer's head is to a server whose workbench file has `remote_tracker = true` in `[viewer]`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use god_object::spatial::Pose;
+use taut_bridge::{
+    DeviceChoice, InputChoice, Trace, TrackerFeed, UnknownDevice, VrpnSettings, read_trace,
+};
+use taut_link::{ClientLink, ClientOptions, Role, connect};
+use taut_proto::{HeadSample, PoseF64};
+
+use crate::cli::TrackArgs;
+use crate::failure::Failure;
+use crate::key;
+use crate::signals::EndSignal;
+
+/// A tracker is asked this much more often than readings are wanted, so that they are told soon after they come.
+const LOOKS_PER_READING: f64 = 4.0;
+
+/// Where the head's poses come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HeadFrom {
+    /// It stays where the workbench file has it.
+    Still,
+    /// A recorded trace of the head, workbench frame, again and again.
+    Trace(PathBuf),
+    /// A sensor of a VRPN tracker.
+    Vrpn(Box<VrpnSettings>),
+}
+
+/// A text that names no source.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnknownHeadSource {
+    /// Not one of the three.
+    #[error("\"{0}\" gives no head: write still, trace:FILE or vrpn:TRACKER@HOST")]
+    Name(String),
+    /// The tracker.
+    #[error(transparent)]
+    Tracker(#[from] UnknownDevice),
+}
+
+impl FromStr for HeadFrom {
+    type Err = UnknownHeadSource;
+
+    fn from_str(text: &str) -> Result<Self, UnknownHeadSource> {
+        match text.split_once(':').map_or(text, |(name, _)| name) {
+            "still" if text == "still" => Ok(Self::Still),
+            "trace" | "vrpn" => match text.parse()? {
+                DeviceChoice::Trace(path) => Ok(Self::Trace(path)),
+                DeviceChoice::Input(InputChoice::Vrpn(settings)) => Ok(Self::Vrpn(settings)),
+                _ => Err(UnknownHeadSource::Name(text.to_owned())),
+            },
+            _ => Err(UnknownHeadSource::Name(text.to_owned())),
+        }
+    }
+}
+
+/// Tracks until the duration is over, the user ends it, or the session does; how many readings were sent.
+pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
+    let key = key::read_to_join(args.key.as_deref())?;
+    let mut signal = EndSignal::listen().map_err(Failure::failed)?;
+    let mut source = match &args.source {
+        HeadFrom::Still => Source::Still(None),
+        HeadFrom::Trace(path) => {
+            let trace = read_trace(path).map_err(Failure::bad_input)?;
+            Source::Trace(TracePlayer::new(trace)?)
+        }
+        HeadFrom::Vrpn(settings) => Source::Tracker {
+            feed: TrackerFeed::start(settings.source.clone()).map_err(|error| {
+                Failure::failed(format!("the head tracker cannot be listened to ({error})"))
+            })?,
+            settings: settings.clone(),
+            told: 0,
+        },
+    };
+    let options = ClientOptions {
+        transport: args.transport.into(),
+        ..ClientOptions::new(&args.server, key, Role::Tracker, &args.node)
+    };
+    let link = connect(options).await?;
+    if let Source::Still(pose) = &mut source {
+        *pose = link.description().viewer.to_isometry();
+    }
+    let sent = send_readings(&link, &mut source, args, &mut signal).await;
+    let closed = link.is_closed();
+    link.close().await;
+    match closed {
+        Some(reason) => Err(Failure::Failed(format!(
+            "the link to {} is closed: {reason}",
+            args.server
+        ))),
+        None => Ok(sent),
+    }
+}
+
+async fn send_readings(
+    link: &ClientLink,
+    source: &mut Source,
+    args: &TrackArgs,
+    signal: &mut EndSignal,
+) -> u64 {
+    let looks = match source {
+        Source::Tracker { .. } => args.rate * LOOKS_PER_READING,
+        Source::Still(_) | Source::Trace(_) => args.rate,
+    };
+    let mut period = tokio::time::interval(Duration::from_secs_f64(looks.recip()));
+    period.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let start = Instant::now();
+    let mut index = 0;
+    loop {
+        tokio::select! {
+            () = signal.given() => return index,
+            _ = period.tick() => {}
+        }
+        let since_start = start.elapsed();
+        let is_over = args
+            .duration
+            .is_some_and(|wanted| since_start.as_secs_f64() >= wanted);
+        if is_over || link.is_closed().is_some() {
+            return index;
+        }
+        if let Some(pose) = source.newest(since_start) {
+            index += 1;
+            link.send_head(&HeadSample {
+                sample_time_ns: link.session_now().map_or(0, |now| now.ns),
+                index,
+                pose: PoseF64::from_isometry(&pose),
+            });
+        }
+    }
+}
+
+/// A source at work.
+enum Source {
+    Still(Option<Pose>),
+    Trace(TracePlayer),
+    Tracker {
+        feed: TrackerFeed,
+        settings: Box<VrpnSettings>,
+        /// Reports that were told already.
+        told: u64,
+    },
+}
+
+impl Source {
+    /// The head, workbench frame, if there is anything new.
+    fn newest(&mut self, since_start: Duration) -> Option<Pose> {
+        match self {
+            Self::Still(pose) => *pose,
+            Self::Trace(player) => Some(player.pose(since_start)),
+            Self::Tracker {
+                feed,
+                settings,
+                told,
+            } => {
+                let state = feed.newest();
+                if state.reports == *told {
+                    return None;
+                }
+                *told = state.reports;
+                settings.mapping.pose(&state.pose?)
+            }
+        }
+    }
+}
+
+/// Plays a trace in its own time, from its first row to its last and again.
+struct TracePlayer {
+    trace: Trace,
+}
+
+impl TracePlayer {
+    fn new(trace: Trace) -> Result<Self, Failure> {
+        if trace.is_empty() {
+            return Err(Failure::bad_input(
+                "the trace of the head has no row; record one or write one",
+            ));
+        }
+        Ok(Self { trace })
+    }
+
+    /// The row that is due, without anything between rows.
+    fn pose(&self, since_start: Duration) -> Pose {
+        let (first, last) = (&self.trace[0], &self.trace[self.trace.len() - 1]);
+        let length = last.time_s - first.time_s;
+        let time = if length > 0.0 {
+            first.time_s + since_start.as_secs_f64() % length
+        } else {
+            first.time_s
+        };
+        let after = self.trace.partition_point(|row| row.time_s <= time);
+        self.trace[after.saturating_sub(1)].pose
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_bridge::TraceRow;
+
+    #[test]
+    fn a_source_is_one_of_three() {
+        assert_eq!("still".parse(), Ok(HeadFrom::Still));
+        assert_eq!(
+            "trace:head.csv".parse(),
+            Ok(HeadFrom::Trace("head.csv".into()))
+        );
+        assert!(matches!(
+            "vrpn:Head@lab,sensor=1".parse(),
+            Ok(HeadFrom::Vrpn(settings)) if settings.source.sensor == 1
+        ));
+        for bad in ["", "stil", "still:now", "trace:", "vrpn:", "space-mouse"] {
+            assert!(bad.parse::<HeadFrom>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_trace_begins_again_at_its_end() {
+        let row = |time_s: f64| TraceRow {
+            time_s,
+            pose: Pose::translation(time_s, 0.0, 0.0),
+            buttons: 0,
+        };
+        let Ok(player) = TracePlayer::new(vec![row(1.0), row(1.5), row(2.0)]) else {
+            panic!("three rows");
+        };
+        for (since_s, x) in [(0.0, 1.0), (0.4, 1.0), (0.6, 1.5), (1.1, 1.0), (7.75, 1.5)] {
+            let pose = player.pose(Duration::from_secs_f64(since_s));
+            assert_eq!(pose.translation.x, x, "{since_s}");
+        }
+        assert!(TracePlayer::new(Vec::new()).is_err());
+    }
+}

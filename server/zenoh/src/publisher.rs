@@ -1,0 +1,237 @@
+//! The publisher: a thread that reads the newest state at its own rate and puts it on Zenoh's keys.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use taut_observers::lines::{Naming, state_line};
+use taut_observers::{EventLines, Hello, StateFeed};
+use taut_proto::codec::encode_onto;
+use zenoh::bytes::Encoding;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::{Config, Session, Wait};
+
+/// Time between two attempts to reach a router.
+const RETRY_PERIOD: Duration = Duration::from_secs(1);
+
+/// How the publisher is set up.
+#[derive(Clone, Debug)]
+pub struct ZenohSettings {
+    /// Name of the workbench among the keys.
+    pub name: String,
+    /// Routers to dial, such as `tcp/router.example:7447`.
+    pub connect: Vec<String>,
+    /// Zenoh's own configuration, JSON5.
+    pub config: Option<PathBuf>,
+    /// States per second, at most.
+    pub rate: f64,
+    /// What the device port's events are called.
+    pub naming: Naming,
+}
+
+/// Why nothing can be published.
+#[derive(Debug, thiserror::Error)]
+pub enum ZenohError {
+    /// Zenoh's configuration.
+    #[error("[zenoh] cannot be used: {0}; check `connect` and the file of `config`")]
+    Config(String),
+    /// The thread.
+    #[error("the thread of [zenoh] cannot be started: {0}")]
+    Thread(#[from] io::Error),
+}
+
+/// A running publisher. Dropped, it ends.
+#[derive(Debug)]
+pub struct ZenohPublisher {
+    prefix: String,
+    stop: Arc<AtomicBool>,
+    published: Arc<AtomicU64>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl ZenohPublisher {
+    /// Checks the configuration and starts to publish what `feed` has. A router that is not there yet is waited for.
+    ///
+    /// # Errors
+    /// [`ZenohError`].
+    pub fn start(
+        settings: ZenohSettings,
+        hello: &Hello,
+        feed: StateFeed,
+    ) -> Result<Self, ZenohError> {
+        let config = config(&settings).map_err(|error| ZenohError::Config(error.to_string()))?;
+        let prefix = format!("taut/{}", settings.name);
+        let stop = Arc::<AtomicBool>::default();
+        let published = Arc::<AtomicU64>::default();
+        let work = Work {
+            config,
+            prefix: prefix.clone(),
+            hello: hello.line(),
+            period: Duration::from_secs_f64(settings.rate.recip()),
+            trail: EventLines::new(settings.naming),
+            stop: stop.clone(),
+            published: published.clone(),
+        };
+        let thread = std::thread::Builder::new()
+            .name("zenoh".to_owned())
+            .spawn(move || work.run(feed))?;
+        Ok(Self {
+            prefix,
+            stop,
+            published,
+            thread: Some(thread),
+        })
+    }
+
+    /// What all keys begin with.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
+    /// States handed to Zenoh so far.
+    #[must_use]
+    pub fn published(&self) -> u64 {
+        self.published.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for ZenohPublisher {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A panic of it is no fault of the loops; it has been printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Zenoh's configuration: the file's, as a client of routers that listens nowhere and looks for nobody by itself.
+fn config(settings: &ZenohSettings) -> zenoh::Result<Config> {
+    let mut config = match &settings.config {
+        Some(path) => Config::from_file(path)?,
+        None => Config::default(),
+    };
+    config.insert_json5("mode", "\"client\"")?;
+    config.insert_json5("scouting/multicast/enabled", "false")?;
+    if !settings.connect.is_empty() {
+        let routers: Vec<String> = settings.connect.iter().map(|r| format!("{r:?}")).collect();
+        config.insert_json5("connect/endpoints", &format!("[{}]", routers.join(",")))?;
+    }
+    Ok(config)
+}
+
+struct Work {
+    config: Config,
+    prefix: String,
+    hello: String,
+    period: Duration,
+    trail: EventLines,
+    stop: Arc<AtomicBool>,
+    published: Arc<AtomicU64>,
+}
+
+impl Work {
+    fn run(mut self, feed: StateFeed) {
+        let Some(session) = self.session() else {
+            return;
+        };
+        if let Err(error) = self.publish(&session, feed) {
+            tracing::error!("[zenoh] ended: {error}");
+        }
+        // It ends with this thread; a router that does not hear of it notices.
+        let _ = session.close().wait();
+    }
+
+    /// The session with a router; `None` where the end came before one was reached.
+    fn session(&self) -> Option<Session> {
+        let mut told = false;
+        while !self.stop.load(Ordering::Relaxed) {
+            match zenoh::open(self.config.clone()).wait() {
+                Ok(session) => return Some(session),
+                Err(error) if !told => {
+                    tracing::warn!("[zenoh] reaches no router and goes on trying: {error}");
+                    told = true;
+                }
+                Err(_) => {}
+            }
+            self.sleep_until(Instant::now() + RETRY_PERIOD);
+        }
+        None
+    }
+
+    fn publish(&mut self, session: &Session, mut feed: StateFeed) -> zenoh::Result<()> {
+        let key = |name: &str| format!("{}/{name}", self.prefix);
+        let newest_wins = |name: &str, encoding: Encoding| {
+            session
+                .declare_publisher(key(name))
+                .encoding(encoding)
+                .congestion_control(CongestionControl::Drop)
+                .priority(Priority::RealTime)
+                .express(true)
+                .wait()
+        };
+        let states: Publisher<'_> = newest_wins("state", Encoding::APPLICATION_JSON)?;
+        let hot: Publisher<'_> = newest_wins("hot", Encoding::APPLICATION_OCTET_STREAM)?;
+        let events: Publisher<'_> = session
+            .declare_publisher(key("event"))
+            .encoding(Encoding::APPLICATION_JSON)
+            .congestion_control(CongestionControl::Block)
+            .priority(Priority::InteractiveHigh)
+            .express(true)
+            .wait()?;
+        // Those who come later ask for it.
+        let (answer, answered_key) = (self.hello.clone(), key("hello"));
+        let hello_key = answered_key.clone();
+        let _queryable = session
+            .declare_queryable(answered_key)
+            .callback(move |query| {
+                let reply = query.reply(hello_key.clone(), answer.clone());
+                // Whoever asked may be gone.
+                let _ = reply.encoding(Encoding::APPLICATION_JSON).wait();
+            })
+            .wait()?;
+        session
+            .put(key("hello"), self.hello.clone())
+            .encoding(Encoding::APPLICATION_JSON)
+            .congestion_control(CongestionControl::Block)
+            .wait()?;
+
+        let mut payload = Vec::new();
+        let mut deadline = Instant::now();
+        while !self.stop.load(Ordering::Relaxed) {
+            if let Some(state) = feed.fresh() {
+                for line in self.trail.take(state) {
+                    events.put(line).wait()?;
+                }
+                states.put(state_line(state)).wait()?;
+                payload.clear();
+                // A state that cannot be encoded is not sent to render clients either, and counted there.
+                if encode_onto(state, &mut payload).is_ok() {
+                    hot.put(payload.as_slice()).wait()?;
+                }
+                self.published.fetch_add(1, Ordering::Relaxed);
+            }
+            // Late ones are given up, not made up for.
+            deadline = (deadline + self.period).max(Instant::now());
+            self.sleep_until(deadline);
+        }
+        Ok(())
+    }
+
+    /// Sleeps in pieces that keep the end from waiting.
+    fn sleep_until(&self, end: Instant) {
+        const PIECE: Duration = Duration::from_millis(100);
+        while !self.stop.load(Ordering::Relaxed) {
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            std::thread::sleep(left.min(PIECE));
+        }
+    }
+}

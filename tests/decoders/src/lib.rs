@@ -1,0 +1,109 @@
+//! Every decoder of taut that takes bytes from outside: packets, files, reports.
+//!
+//! A [`Decoder`] is fed bytes; it must read them or refuse them, never panic, and what it reads must keep the promise that its function
+//! states. Two users: the targets in `fuzz/`, which search with coverage for as long as they are let, and the test of this package, which
+//! changes golden samples by a seed for a fixed number of times and watches the memory.
+#![forbid(unsafe_code)]
+
+mod files;
+mod meshes;
+pub mod mutation;
+mod peripherals;
+mod samples;
+mod wire;
+
+/// Something that takes bytes from outside.
+#[derive(Clone, Copy, Debug)]
+pub struct Decoder {
+    /// Name, also of the fuzz target and of its corpus.
+    pub name: &'static str,
+    /// Reads or refuses the bytes.
+    ///
+    /// # Panics
+    /// If a promise is broken: that is the finding.
+    pub feed: fn(&[u8]),
+    /// Valid inputs to begin with.
+    pub seeds: fn() -> Vec<Vec<u8>>,
+    /// Most bytes of memory that one input may hold at a time: this much for each of its bytes, beside [`FIXED_MEMORY`].
+    pub memory_per_byte: usize,
+}
+
+/// Memory that any decoder may hold, bytes: error texts, tables, buffers of files.
+pub const FIXED_MEMORY: usize = 4 << 20;
+
+/// All of them.
+pub const DECODERS: [Decoder; 19] = [
+    decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
+    decoder("payload", wire::payload, wire::payload_seeds, 1),
+    decoder("opener", wire::opener, wire::datagram_seeds, 1),
+    decoder(
+        "constraint_parts",
+        wire::constraint_parts,
+        wire::part_seeds,
+        1,
+    ),
+    decoder("control", wire::control, wire::control_seeds, 64),
+    decoder("mesh_blob", wire::mesh_blob, wire::mesh_blob_seeds, 8),
+    decoder(
+        "vrpn_client",
+        peripherals::vrpn_client,
+        peripherals::vrpn_seeds,
+        64,
+    ),
+    decoder(
+        "space_mouse",
+        peripherals::space_mouse,
+        peripherals::space_mouse_seeds,
+        1,
+    ),
+    decoder("key_file", files::key_file, files::key_seeds, 1),
+    decoder("scene_toml", files::scene_toml, files::scene_seeds, 1024),
+    decoder(
+        "workbench_toml",
+        files::workbench_toml,
+        files::workbench_seeds,
+        1024,
+    ),
+    decoder(
+        "string_geometry",
+        files::string_geometry,
+        files::string_geometry_seeds,
+        1024,
+    ),
+    decoder("trace_csv", files::trace_csv, files::trace_seeds, 64),
+    decoder(
+        "bridge_trace_csv",
+        files::bridge_trace_csv,
+        files::trace_seeds,
+        64,
+    ),
+    decoder("recording", files::recording, files::recording_seeds, 64),
+    decoder("mesh_obj", meshes::obj, meshes::obj_seeds, 256),
+    decoder("mesh_stl", meshes::stl, meshes::stl_seeds, 64),
+    decoder("mesh_ply", meshes::ply, meshes::ply_seeds, 256),
+    decoder("mesh_gltf", meshes::gltf, meshes::gltf_seeds, 1024),
+];
+
+const fn decoder(
+    name: &'static str,
+    feed: fn(&[u8]),
+    seeds: fn() -> Vec<Vec<u8>>,
+    memory_per_byte: usize,
+) -> Decoder {
+    Decoder {
+        name,
+        feed,
+        seeds,
+        memory_per_byte,
+    }
+}
+
+/// The decoder of this name.
+///
+/// # Panics
+/// When there is none: a fuzz target is misnamed.
+#[must_use]
+pub fn named(name: &str) -> Decoder {
+    let found = DECODERS.into_iter().find(|decoder| decoder.name == name);
+    found.unwrap_or_else(|| panic!("there is no decoder `{name}`"))
+}

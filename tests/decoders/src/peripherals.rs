@@ -1,0 +1,108 @@
+//! What comes from devices: VRPN servers and HID reports.
+
+use std::net::{Ipv4Addr, SocketAddrV4};
+
+use taut_bridge::{CapState, Report};
+use taut_vrpn::{
+    Client, Event, Header, MAX_LISTED_SENDERS, PoseReport, SensorMapping, Stamp, VelocityReport,
+    description, message,
+};
+
+/// Most chunks that a stream comes in.
+const MAX_CHUNKS: usize = 64;
+/// Name of the device in the samples.
+const DEVICE: &str = "Tracker0";
+
+/// A server's stream, cut into chunks whose size is the first byte, and then the same bytes as a datagram.
+pub(crate) fn vrpn_client(bytes: &[u8]) {
+    let Some((chunk, stream)) = bytes.split_first() else {
+        return;
+    };
+    let at = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 3883);
+    let mut client = Client::new(DEVICE, Some(at));
+    let size = usize::from(*chunk).max(stream.len() / MAX_CHUNKS + 1);
+    let broken = stream
+        .chunks(size)
+        .any(|chunk| client.receive(chunk).is_err());
+    if !broken {
+        client.receive_datagram(stream);
+        client.ping(Stamp::default());
+    }
+    assert!(client.senders().len() <= MAX_LISTED_SENDERS);
+    while let Some(event) = client.next_event() {
+        if let Event::Pose(report, _) = event
+            && let Some(pose) = SensorMapping::identity().pose(&report)
+        {
+            assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+            assert!((pose.rotation.norm() - 1.0).abs() < 1e-9);
+        }
+    }
+    let _ = client.outgoing();
+}
+
+/// Reports of at most 16 bytes, one after the other.
+pub(crate) fn space_mouse(bytes: &[u8]) {
+    let mut cap = CapState::default();
+    let mut rest = bytes;
+    while let Some((length, after)) = rest.split_first() {
+        let (report, after) = after.split_at(usize::from(length % 17).min(after.len()));
+        rest = after;
+        if let Ok(report) = Report::parse(report) {
+            cap.take(&report);
+        }
+        let deflection = cap.deflection();
+        assert!(
+            deflection.iter().all(|x| (-1.0..=1.0).contains(x)),
+            "{deflection}"
+        );
+    }
+}
+
+pub(crate) fn vrpn_seeds() -> Vec<Vec<u8>> {
+    let mut stream = taut_vrpn::cookie::cookie().to_vec();
+    description::append_udp(&mut stream, SocketAddrV4::new(Ipv4Addr::LOCALHOST, 3884));
+    for (number, name) in [(0, "VRPN Control"), (3, "Tracker1"), (7, DEVICE)] {
+        description::append_name(&mut stream, description::SENDER, number, name);
+    }
+    let types = [
+        (4, "vrpn_Tracker Pos_Quat"),
+        (5, "vrpn_Tracker Velocity"),
+        (9, "vrpn_Button Change"),
+        (1, "vrpn_Base ping_message"),
+        (2, "vrpn_Base pong_message"),
+    ];
+    for (number, name) in types {
+        description::append_name(&mut stream, description::TYPE, number, name);
+    }
+    let pose = PoseReport {
+        sensor: 1,
+        position: [1.0, 2.0, 3.0],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+    };
+    let velocity = VelocityReport {
+        sensor: 1,
+        linear: [0.5; 3],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+        interval: 0.001,
+    };
+    for (kind, payload) in [(4, pose.encode()), (5, velocity.encode()), (1, Vec::new())] {
+        let header = Header {
+            sender: 7,
+            kind,
+            ..Header::default()
+        };
+        message::append(&mut stream, &header, &payload);
+    }
+    [0, 7, 255]
+        .map(|chunk| [&[chunk], &stream[..]].concat())
+        .to_vec()
+}
+
+pub(crate) fn space_mouse_seeds() -> Vec<Vec<u8>> {
+    vec![
+        vec![
+            7, 1, 94, 1, 0, 0, 162, 254, 7, 2, 1, 0, 2, 0, 3, 0, 3, 3, 1, 0,
+        ],
+        vec![13, 1, 1, 0, 2, 0, 3, 0, 4, 0, 5, 0, 6, 0, 2, 23, 90],
+    ]
+}

@@ -1,0 +1,494 @@
+//! Whether clients disturb the haptics loop: its period without clients and with eight, in turns.
+//!
+//! The program itself runs with its simulated device; it reports the period of its loop. The eight: two that read by UDP, two by QUIC, two whose
+//! process is stopped most of the time, so that nothing is read and buffers fill, and two that flood: one as a member, with device readings that are
+//! not its to send, one from outside, with datagrams that look like taut's.
+
+use std::io::{BufRead, BufReader, Read};
+use std::net::UdpSocket;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use taut_link::{ClientOptions, ClusterKey, Role, Transport, connect, create_key_file};
+use taut_proto::{InputSample, PoseF64, version::MAGIC};
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+
+use super::{BenchError, request_fifo};
+
+/// The workbench file that is shipped.
+const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
+/// Longest wait for the program to serve or to end.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
+const STALL: Duration = Duration::from_millis(700);
+/// Time that a stalled client runs between two stalls: enough to answer for its connection.
+const BREATH: Duration = Duration::from_millis(60);
+/// Datagrams per second of each flood.
+const FLOOD_HZ: u32 = 5000;
+/// Time between two looks at the clock of a flood.
+const FLOOD_STEP: Duration = Duration::from_millis(2);
+
+/// The period of one run, us, as the program reports it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Period {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// The largest.
+    pub max: f64,
+    /// Ticks.
+    pub count: f64,
+    /// Deadlines missed.
+    pub missed: f64,
+}
+
+/// What came of all turns.
+#[derive(Clone, Debug, Default)]
+pub struct Isolation {
+    /// Without clients, one per turn.
+    pub alone: Vec<Period>,
+    /// With eight, one per turn.
+    pub crowded: Vec<Period>,
+    /// Datagrams sent by the floods, all turns.
+    pub flooded: u64,
+    /// Datagrams that the program counted as refused, all turns.
+    pub refused: u64,
+    /// Clients that the program had to the end, fewest of all turns.
+    pub members: usize,
+    /// What real-time measures the program had.
+    pub realtime: String,
+}
+
+impl Isolation {
+    /// Median over the turns of the 99th percentiles: alone, crowded, us.
+    #[must_use]
+    pub fn p99(&self) -> [f64; 2] {
+        [&self.alone, &self.crowded].map(|turns| {
+            let mut values: Vec<f64> = turns.iter().map(|turn| turn.p99).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+        })
+    }
+}
+
+/// Runs `program` without and with clients, `turns` times each for `duration`, in the order a b b a. `this` is this program, for the stalled clients.
+///
+/// # Errors
+/// The program does not run as expected.
+pub fn measure(
+    program: &Path,
+    this: &Path,
+    duration: Duration,
+    turns: usize,
+) -> Result<Isolation, BenchError> {
+    let mut result = Isolation {
+        members: usize::MAX,
+        ..Isolation::default()
+    };
+    for turn in 0..turns {
+        let order = if turn % 2 == 0 {
+            [false, true]
+        } else {
+            [true, false]
+        };
+        for crowded in order {
+            run(program, this, duration, crowded, &mut result)?;
+        }
+    }
+    Ok(result)
+}
+
+/// `taut serve` in a directory of its own.
+struct Served {
+    child: Child,
+    lines: BufReader<std::process::ChildStderr>,
+    directory: TempDir,
+    quic: String,
+    udp: String,
+}
+
+impl Served {
+    fn start(program: &Path) -> Result<Served, BenchError> {
+        let directory = tempfile::tempdir()?;
+        let (config, key) = write_workbench(directory.path())?;
+        let mut child = Command::new(program)
+            .args(["serve", "--json", "--no-monitor", "--config"])
+            .arg(config)
+            .arg("--key")
+            .arg(key)
+            .current_dir(directory.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let Some(errors) = child.stderr.take() else {
+            return Err(BenchError::Missing(
+                "the program has no standard error".to_owned(),
+            ));
+        };
+        let mut served = Served {
+            child,
+            lines: BufReader::new(errors),
+            directory,
+            quic: String::new(),
+            udp: String::new(),
+        };
+        (served.quic, served.udp) = served.addresses()?;
+        Ok(served)
+    }
+
+    /// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
+    fn addresses(&mut self) -> Result<(String, String), BenchError> {
+        let (mut line, mut all) = (String::new(), String::new());
+        while self.lines.read_line(&mut line)? > 0 {
+            let found = line.trim_end().strip_prefix("serving on ");
+            let both =
+                found.and_then(|text| text.strip_suffix(" (poses)")?.split_once(" (control) and "));
+            if let Some((quic, udp)) = both {
+                return Ok((quic.to_owned(), udp.to_owned()));
+            }
+            all.push_str(&line);
+            line.clear();
+        }
+        Err(BenchError::Missing(format!(
+            "the program does not serve: {}",
+            all.trim()
+        )))
+    }
+
+    fn key(&self) -> PathBuf {
+        self.directory.path().join("cluster.key")
+    }
+
+    /// Ends it as Ctrl-C does; its report.
+    fn stop(mut self) -> Result<serde_json::Value, BenchError> {
+        let id = rustix::process::Pid::from_child(&self.child);
+        rustix::process::kill_process(id, rustix::process::Signal::INT)
+            .map_err(std::io::Error::from)?;
+        let mut text = String::new();
+        if let Some(mut out) = self.child.stdout.take() {
+            out.read_to_string(&mut text)?;
+        }
+        self.child.wait()?;
+        serde_json::from_str(&text).map_err(|error| {
+            BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))
+        })
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // it has ended where all went well
+        let _ = self.child.wait();
+    }
+}
+
+/// The shipped workbench on free ports, and a key; their paths.
+fn write_workbench(directory: &Path) -> Result<(PathBuf, PathBuf), BenchError> {
+    let broken = || BenchError::Missing("the shipped workbench file is no TOML".to_owned());
+    let mut file: toml::Table = SHIPPED_WORKBENCH.parse().map_err(|_| broken())?;
+    file.insert("scene".to_owned(), "sphere-on-plane".into());
+    let network = file.get_mut("network").and_then(toml::Value::as_table_mut);
+    let network = network.ok_or_else(broken)?;
+    for port in ["quic_port", "udp_port"] {
+        network.insert(port.to_owned(), 0.into());
+    }
+    let (config, key) = (
+        directory.join("workbench.toml"),
+        directory.join("cluster.key"),
+    );
+    std::fs::write(&config, file.to_string())?;
+    create_key_file(&key)?;
+    Ok((config, key))
+}
+
+fn run(
+    program: &Path,
+    this: &Path,
+    duration: Duration,
+    crowded: bool,
+    result: &mut Isolation,
+) -> Result<(), BenchError> {
+    let served = Served::start(program)?;
+    let crowd = crowded.then(|| awake(&served, this)).transpose()?;
+    std::thread::sleep(duration);
+    let flooded = crowd.map_or(Ok(0), Crowd::leave)?;
+    let report = served.stop()?;
+    let number = |value: &serde_json::Value| value.as_f64().unwrap_or(f64::NAN);
+    let period = &report["haptics_period_us"];
+    let period = Period {
+        p50: number(&period["p50"]),
+        p99: number(&period["p99"]),
+        max: number(&period["max"]),
+        count: number(&period["count"]),
+        missed: number(&report["deadline_misses"]),
+    };
+    result.realtime = report["realtime"]["enforced"].to_string();
+    if crowded {
+        result.crowded.push(period);
+        result.flooded += flooded;
+        result.refused += report["packets_refused"].as_u64().unwrap_or(0);
+        let members = report["clients"].as_array().map_or(0, Vec::len);
+        result.members = result.members.min(members);
+    } else {
+        result.alone.push(period);
+    }
+    Ok(())
+}
+
+/// The eight, with threads of the lowest real-time priority where the system grants it: on a loaded machine they would be thrown out for their
+/// silence. The program, started before, does not inherit it.
+fn awake(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+    const PRIORITY: u8 = 1;
+    std::thread::scope(|scope| {
+        let joined = std::thread::Builder::new()
+            .name("crowd".to_owned())
+            .spawn_scoped(scope, || {
+                let _ = request_fifo(PRIORITY);
+                Crowd::join(served, this)
+            })?;
+        joined
+            .join()
+            .unwrap_or_else(|_| Err(BenchError::Missing("a client panicked".to_owned())))
+    })
+}
+
+/// The eight.
+struct Crowd {
+    runtime: Runtime,
+    readers: Vec<taut_link::ClientLink>,
+    stalled: Vec<Stalled>,
+    stop: Arc<AtomicBool>,
+    flooded: Arc<AtomicU64>,
+    floods: Vec<std::thread::JoinHandle<()>>,
+}
+
+impl Crowd {
+    fn join(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+        let runtime = Runtime::new()?;
+        let key = taut_link::read_key_file(&served.key())?;
+        let mut readers = Vec::new();
+        for (node, transport) in [
+            ("udp-1", Transport::Udp),
+            ("udp-2", Transport::Udp),
+            ("quic-1", Transport::QuicDatagram),
+            ("quic-2", Transport::QuicDatagram),
+        ] {
+            readers.push(member(&runtime, &served.quic, &key, node, transport)?);
+        }
+        let mut stalled = Vec::new();
+        for (node, transport) in [("stalled-1", "udp"), ("stalled-2", "quic")] {
+            stalled.push(Stalled::start(
+                this,
+                &served.quic,
+                &served.key(),
+                node,
+                transport,
+            )?);
+        }
+        let (stop, flooded) = (
+            Arc::new(AtomicBool::new(false)),
+            Arc::new(AtomicU64::new(0)),
+        );
+        let flooder = member(&runtime, &served.quic, &key, "flooder", Transport::Udp)?;
+        let mut index = 0;
+        let from_inside = move || {
+            index += 1;
+            flooder.send_input(&InputSample {
+                sample_time_ns: 0,
+                index,
+                pose: PoseF64::IDENTITY,
+                velocity: [0.0; 6],
+                buttons: 0,
+                flags: 0,
+                rendered: [0.0; 6],
+                set_sequence: 0,
+            });
+        };
+        let socket = UdpSocket::bind("127.0.0.1:0")?;
+        socket.connect(&served.udp)?;
+        let mut datagram = [0; 400];
+        datagram[..2].copy_from_slice(&MAGIC.to_le_bytes());
+        datagram[2] = taut_proto::PROTOCOL_VERSION;
+        datagram[3] = 8; // a device reading
+        datagram[8] = 1; // of the first session
+        datagram[20..22].copy_from_slice(&(400_u16 - 40).to_le_bytes());
+        let from_outside = move || {
+            let _ = socket.send(&datagram);
+        };
+        let floods = vec![
+            flood("flood-inside", from_inside, &stop, &flooded)?,
+            flood("flood-outside", from_outside, &stop, &flooded)?,
+        ];
+        Ok(Crowd {
+            runtime,
+            readers,
+            stalled,
+            stop,
+            flooded,
+            floods,
+        })
+    }
+
+    /// Ends the floods, lets everybody go; how many datagrams were flooded.
+    fn leave(self) -> Result<u64, BenchError> {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.floods {
+            let ended = thread.join();
+            ended.map_err(|_| BenchError::Missing("a flood panicked".to_owned()))?;
+        }
+        for reader in &self.readers {
+            if let Some(reason) = reader.is_closed() {
+                return Err(BenchError::Missing(format!(
+                    "a client was thrown out: {reason}"
+                )));
+            }
+        }
+        drop(self.stalled);
+        drop(self.readers);
+        self.runtime.shutdown_timeout(Duration::from_secs(1));
+        Ok(self.flooded.load(Ordering::Relaxed))
+    }
+}
+
+fn member(
+    runtime: &Runtime,
+    server: &str,
+    key: &ClusterKey,
+    node: &str,
+    transport: Transport,
+) -> Result<taut_link::ClientLink, BenchError> {
+    let options = ClientOptions {
+        transport,
+        connect_timeout: PATIENCE,
+        ..ClientOptions::new(server, key.clone(), Role::Render, node)
+    };
+    Ok(runtime.block_on(connect(options))?)
+}
+
+/// Sends [`FLOOD_HZ`] times per second until told to stop.
+fn flood(
+    name: &str,
+    mut send: impl FnMut() + Send + 'static,
+    stop: &Arc<AtomicBool>,
+    count: &Arc<AtomicU64>,
+) -> Result<std::thread::JoinHandle<()>, BenchError> {
+    let (stop, count) = (stop.clone(), count.clone());
+    let run = move || {
+        let (start, mut sent) = (Instant::now(), 0);
+        while !stop.load(Ordering::Relaxed) {
+            let due = (start.elapsed().as_secs_f64() * f64::from(FLOOD_HZ)) as u64;
+            // What a busy machine made late is not made up for at once.
+            let batch = (due - sent).min(u64::from(FLOOD_HZ) / 10);
+            (0..batch).for_each(|_| send());
+            count.fetch_add(batch, Ordering::Relaxed);
+            sent = due;
+            std::thread::sleep(FLOOD_STEP);
+        }
+    };
+    Ok(std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(run)?)
+}
+
+/// A client process that is stopped most of the time.
+struct Stalled {
+    child: Child,
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+/// Starts a client as a process of its own, and waits until it has joined.
+pub(super) fn start_client(
+    this: &Path,
+    server: &str,
+    key: &Path,
+    node: &str,
+    transport: &str,
+) -> Result<Child, BenchError> {
+    let mut child = Command::new(this)
+        .args(["--client", server, node, transport])
+        .arg(key)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let mut line = String::new();
+    if let Some(out) = child.stdout.take() {
+        BufReader::new(out).read_line(&mut line)?;
+    }
+    if line.trim() == "joined" {
+        return Ok(child);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    Err(BenchError::Missing(format!(
+        "a client did not join: {line}"
+    )))
+}
+
+impl Stalled {
+    fn start(
+        this: &Path,
+        server: &str,
+        key: &Path,
+        node: &str,
+        transport: &str,
+    ) -> Result<Stalled, BenchError> {
+        let child = start_client(this, server, key, node, transport)?;
+        let id = rustix::process::Pid::from_child(&child);
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = stop.clone();
+        let run = move || {
+            use rustix::process::{Signal, kill_process};
+            while !stopped.load(Ordering::Relaxed) {
+                let _ = kill_process(id, Signal::STOP);
+                std::thread::sleep(STALL);
+                let _ = kill_process(id, Signal::CONT);
+                std::thread::sleep(BREATH);
+            }
+        };
+        let thread = std::thread::Builder::new()
+            .name("stall".to_owned())
+            .spawn(run)?;
+        Ok(Stalled {
+            child,
+            stop,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Drop for Stalled {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What the stalled client's process does: joins, says so, and takes states until its standard input ends.
+///
+/// # Errors
+/// It does not get in.
+pub fn client(server: &str, node: &str, transport: &str, key: &Path) -> Result<(), BenchError> {
+    let runtime = Runtime::new()?;
+    let key = taut_link::read_key_file(key)?;
+    let transport = match transport {
+        "quic" => Transport::QuicDatagram,
+        _ => Transport::Udp,
+    };
+    let link = member(&runtime, server, &key, node, transport)?;
+    println!("joined");
+    let mut ignored = Vec::new();
+    std::io::stdin().read_to_end(&mut ignored)?;
+    drop(link);
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! A small server and clients of it, for measuring.
+
+use std::time::{Duration, Instant};
+
+use taut_link::{ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink, ServerOptions};
+use taut_proto::{
+    HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
+    mesh_blob::Positions,
+    scene::{BodyDescription, ShowOptions},
+    state::{BodyState, ContactState, MAX_BODIES, MAX_CONTACTS, RunState, ToolState},
+};
+
+/// Silence and joining time that a busy machine is forgiven.
+const FORGIVING: Duration = Duration::from_secs(10);
+
+/// Why something could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The link failed.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The relay failed.
+    #[error(transparent)]
+    Relay(#[from] crate::relay::RelayError),
+    /// The system failed.
+    #[error(transparent)]
+    System(#[from] std::io::Error),
+    /// Something that was waited for did not happen, or a program is not there.
+    #[error("{0}")]
+    Missing(String),
+}
+
+/// A server on free ports of 127.0.0.1 that forgives a busy machine.
+#[must_use]
+pub fn server_options(key: &ClusterKey) -> ServerOptions {
+    ServerOptions {
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key.clone())
+    }
+}
+
+/// A client of `server` that forgives a busy machine.
+#[must_use]
+pub fn client_options(
+    server: &ServerLink,
+    key: &ClusterKey,
+    role: Role,
+    node: &str,
+) -> ClientOptions {
+    ClientOptions {
+        idle_timeout: FORGIVING,
+        connect_timeout: FORGIVING,
+        ..ClientOptions::new(server.quic_addr().to_string(), key.clone(), role, node)
+    }
+}
+
+/// A scene of one triangle.
+#[must_use]
+pub fn small_content() -> Content {
+    content_with(1)
+}
+
+/// A scene of one mesh with this many triangles, 36 bytes each in single precision.
+///
+/// # Panics
+/// If that is more than a mesh may have.
+#[must_use]
+pub fn content_with(triangles: u32) -> Content {
+    let positions = (0..triangles + 2)
+        .map(|i| [i as f32 * 1e-3, (i % 2) as f32 * 1e-3, 0.0])
+        .collect();
+    let triangles = (0..triangles).map(|i| [i, i + 1, i + 2]).collect();
+    let mesh = MeshBlob::new(Positions::F32(positions), triangles, None)
+        .unwrap_or_else(|error| panic!("{error}"));
+    let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+    let body = BodyDescription {
+        name: "body".to_owned(),
+        mesh: MeshHash::of(&bytes),
+        pose: PoseF64::IDENTITY,
+        colour: [1.0, 0.5, 0.1, 1.0],
+    };
+    let description = SceneDescription {
+        name: "bench".to_owned(),
+        revision: 1,
+        god_object: body,
+        obstacles: Vec::new(),
+        reference_point: [0.0; 3],
+        scene_origin: PoseF64::IDENTITY,
+        display_scale: 1.0,
+        screens: Vec::new(),
+        nodes: Vec::new(),
+        viewer: PoseF64::IDENTITY,
+        eye_separation: 0.064,
+        near: 0.05,
+        far: 10.0,
+        show: ShowOptions::default(),
+    };
+    Content {
+        description,
+        meshes: vec![mesh],
+    }
+}
+
+/// A state of `tick`, sampled at `sample_time_ns`; `full` has everything that a state may hold but the events, else one tool.
+#[must_use]
+pub fn state(tick: u64, sample_time_ns: u64, full: bool) -> HotState {
+    let mut state = HotState {
+        tick,
+        sample_time_ns,
+        scene_revision: 1,
+        run: RunState::Running,
+        ..HotState::empty()
+    };
+    let tool = ToolState {
+        god_object: PoseF32 {
+            position: [tick as f32 * 1e-6, 0.0, 0.1],
+            ..PoseF32::IDENTITY
+        },
+        force: [0.0, 1.5, tick as f32 * 1e-3],
+        ..ToolState::default()
+    };
+    state.tools.push(tool);
+    if full {
+        state.tools.push(tool);
+        let bodies = 0..MAX_BODIES as u16;
+        state.bodies = bodies
+            .map(|id| BodyState {
+                id,
+                flags: 0,
+                pose: PoseF32::IDENTITY,
+            })
+            .collect();
+        let contacts = 0..MAX_CONTACTS as u16;
+        state.contacts = contacts
+            .map(|id| ContactState {
+                pair: [0, id],
+                point: [0.1; 3],
+                normal: [0.0, 0.0, 1.0],
+                force: 1.0,
+                gap: 1e-3,
+            })
+            .collect();
+    }
+    state
+}
+
+/// Waits for a condition.
+///
+/// # Errors
+/// It does not hold within half a minute.
+pub fn wait_until(what: &str, mut done: impl FnMut() -> bool) -> Result<(), BenchError> {
+    let start = Instant::now();
+    while !done() {
+        if start.elapsed() > Duration::from_secs(30) {
+            return Err(BenchError::Missing(format!("{what}: not within 30 s")));
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Ok(())
+}

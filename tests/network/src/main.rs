@@ -1,0 +1,135 @@
+//! Prints the table of the cluster's targets with what this machine keeps of them now:
+//! `cargo run --release -p taut-network-tests -- [--quick] [--soak S] [--seconds S] [--taut PROGRAM] [--csv FILE] [SECTION...]`.
+//!
+//! `-- --node SERVER NAME udp|quic KEY SECONDS` is one node of a network of namespaces or machines, see `scripts/netns-cluster`.
+//!
+//! Exit code 1 where a measured target is not met, 2 where something could not be measured at all.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use taut_link::Transport;
+use taut_network_tests::bench::{isolation, node};
+use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
+
+struct Arguments {
+    extent: Extent,
+    csv: Option<PathBuf>,
+    sections: Vec<Section>,
+}
+
+fn main() -> Result<ExitCode, Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1).peekable();
+    // A process of the isolation run: a client that can be stopped.
+    if arguments.next_if(|first| first == "--client").is_some() {
+        let words: Vec<String> = arguments.collect();
+        let [server, node, transport, key] = &words[..] else {
+            return Err("--client takes SERVER NODE TRANSPORT KEY".into());
+        };
+        isolation::client(server, node, transport, key.as_ref())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    // One node of a network of namespaces or machines.
+    if arguments.next_if(|first| first == "--node").is_some() {
+        let words: Vec<String> = arguments.collect();
+        let [server, node, transport, key, seconds] = &words[..] else {
+            return Err("--node takes SERVER NODE udp|quic KEY SECONDS".into());
+        };
+        let transport = match transport.as_str() {
+            "quic" => Transport::QuicDatagram,
+            _ => Transport::Udp,
+        };
+        let seconds = Duration::from_secs_f64(positive(seconds)?);
+        let got = node::run(server, node, transport, key.as_ref(), seconds)?;
+        println!(
+            "{node}: joined in {:.3} s, {} states, {} lost, {} refused, {} out of order; latency p50 {:.2} ms, p99 {:.2} ms, clock +-{:.3} ms",
+            got.joined_s,
+            got.states,
+            got.lost,
+            got.refused,
+            got.disordered,
+            got.latency_ms.p50,
+            got.latency_ms.p99,
+            got.clock_ms
+        );
+        let good = got.states > 0 && got.disordered == 0;
+        return Ok(ExitCode::from(u8::from(!good)));
+    }
+    let Arguments {
+        extent,
+        csv: file,
+        sections,
+    } = read(arguments)?;
+    let (mut rows, mut broken) = (Vec::<Row>::new(), false);
+    for section in sections {
+        eprintln!("{}: {}", section.name, section.about);
+        match (section.run)(&extent) {
+            Ok(new) => {
+                eprint!("{}", table(&new));
+                rows.extend(new);
+            }
+            Err(error) => {
+                broken = true;
+                rows.push(Row::unknown(section.about, "", error));
+            }
+        }
+    }
+    print!("{}", table(&rows));
+    if let Some(file) = file {
+        std::fs::write(&file, csv(&rows))
+            .map_err(|error| format!("{}: {error}", file.display()))?;
+    }
+    let missed = rows.iter().any(|row| row.verdict == Verdict::Missed);
+    Ok(ExitCode::from(if broken { 2 } else { u8::from(missed) }))
+}
+
+fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dyn Error>> {
+    let this = std::env::current_exe()?;
+    let (mut extent, mut csv, mut wanted) = (Extent::full(&this), None, Vec::new());
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or(format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--quick" => {
+                extent = Extent {
+                    program: extent.program,
+                    ..Extent::quick(&this)
+                }
+            }
+            "--soak" => extent.soak_seconds = Some(positive(&value()?)?),
+            "--seconds" => extent.seconds = positive(&value()?)?,
+            "--turns" => extent.turns = positive(&value()?)?.ceil() as usize,
+            "--taut" => extent.program = value()?.into(),
+            "--csv" => csv = Some(value()?.into()),
+            name => {
+                let known = SECTIONS.iter().find(|section| section.name == name);
+                let names: Vec<_> = SECTIONS.iter().map(|section| section.name).collect();
+                let unknown = || {
+                    format!(
+                        "there is no section `{name}`; there are {}",
+                        names.join(", ")
+                    )
+                };
+                wanted.push(*known.ok_or_else(unknown)?);
+            }
+        }
+    }
+    Ok(Arguments {
+        extent,
+        csv,
+        sections: if wanted.is_empty() {
+            SECTIONS.to_vec()
+        } else {
+            wanted
+        },
+    })
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| *number > 0.0 && f64::is_finite(*number));
+    number.ok_or_else(|| format!("`{text}` is no positive number"))
+}

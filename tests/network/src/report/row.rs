@@ -1,0 +1,157 @@
+//! A row of the report: one figure against its target.
+
+use std::fmt;
+
+/// Whether a target is met.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is.
+    Met,
+    /// It is not.
+    Missed,
+    /// Nothing was measured; why.
+    Unknown(String),
+}
+
+/// A row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// What is measured.
+    pub measure: String,
+    /// What it must be.
+    pub target: String,
+    /// What it is, with its unit and its control.
+    pub measured: String,
+    /// Whether that is met.
+    pub verdict: Verdict,
+    /// Broken, this is a fault of the code wherever it runs; the others depend on the machine.
+    pub invariant: bool,
+}
+
+impl Row {
+    /// A figure that must not be above a limit; NaN is above any.
+    #[must_use]
+    pub fn at_most(
+        measure: impl fmt::Display,
+        value: f64,
+        limit: f64,
+        unit: &str,
+        beside: impl fmt::Display,
+    ) -> Row {
+        Row {
+            measure: measure.to_string(),
+            target: format!("<= {} {unit}", brief(limit)),
+            measured: format!("{} {unit} ({beside})", brief(value)),
+            verdict: verdict(value <= limit),
+            invariant: false,
+        }
+    }
+
+    /// Something that must be so on every machine.
+    #[must_use]
+    pub fn invariant(
+        measure: impl fmt::Display,
+        target: impl fmt::Display,
+        measured: impl fmt::Display,
+        holds: bool,
+    ) -> Row {
+        Row {
+            measure: measure.to_string(),
+            target: target.to_string(),
+            measured: measured.to_string(),
+            verdict: verdict(holds),
+            invariant: true,
+        }
+    }
+
+    /// A figure that was not taken.
+    #[must_use]
+    pub fn unknown(
+        measure: impl fmt::Display,
+        target: impl fmt::Display,
+        why: impl fmt::Display,
+    ) -> Row {
+        Row {
+            measure: measure.to_string(),
+            target: target.to_string(),
+            measured: "-".to_owned(),
+            verdict: Verdict::Unknown(why.to_string()),
+            invariant: false,
+        }
+    }
+}
+
+fn verdict(met: bool) -> Verdict {
+    if met { Verdict::Met } else { Verdict::Missed }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Verdict::Met => f.write_str("met"),
+            Verdict::Missed => f.write_str("NOT MET"),
+            Verdict::Unknown(why) => write!(f, "not measured: {why}"),
+        }
+    }
+}
+
+/// The rows as a table.
+#[must_use]
+pub fn table(rows: &[Row]) -> String {
+    let mut text = "| measure | target | measured | |\n|---|---|---|---|\n".to_owned();
+    for row in rows {
+        text += &format!(
+            "| {} | {} | {} | {} |\n",
+            row.measure, row.target, row.measured, row.verdict
+        );
+    }
+    text
+}
+
+/// The rows as CSV, RFC 4180.
+#[must_use]
+pub fn csv(rows: &[Row]) -> String {
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut text = "measure,target,measured,verdict\n".to_owned();
+    for row in rows {
+        let cells = [
+            &row.measure,
+            &row.target,
+            &row.measured,
+            &row.verdict.to_string(),
+        ];
+        text += &cells.map(|cell| quoted(cell)).join(",");
+        text.push('\n');
+    }
+    text
+}
+
+/// A few digits.
+pub(super) fn brief(value: f64) -> String {
+    match value.abs() {
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 10.0 => format!("{value:.1}"),
+        _ => format!("{value:.3}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_that_is_none_meets_nothing() {
+        let row = |value| Row::at_most("a", value, 1.0, "us", "b").verdict;
+        assert_eq!(row(1.0), Verdict::Met);
+        assert_eq!(row(1.1), Verdict::Missed);
+        assert_eq!(row(f64::NAN), Verdict::Missed);
+    }
+
+    #[test]
+    fn cells_with_quotes_survive_the_csv() {
+        let rows = [Row::unknown("a, \"b\"", "c", "d")];
+        let expected =
+            "measure,target,measured,verdict\n\"a, \"\"b\"\"\",\"c\",\"-\",\"not measured: d\"\n";
+        assert_eq!(csv(&rows), expected);
+    }
+}

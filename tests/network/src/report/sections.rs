@@ -1,0 +1,425 @@
+//! What is measured for which rows.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::row::{Row, brief};
+use crate::bench::age::{self, Age};
+use crate::bench::death::{self, Aftermath, Death};
+use crate::bench::{BenchError, isolation, join, latency, soak};
+use crate::forge::attack;
+use crate::relay::{Burst, Impairment};
+
+/// How much is measured.
+#[derive(Clone, Debug)]
+pub struct Extent {
+    /// Time per latency or age run, s.
+    pub seconds: f64,
+    /// Forgeries.
+    pub forgeries: u64,
+    /// Joins.
+    pub joins: usize,
+    /// Deaths of each sort.
+    pub deaths: usize,
+    /// Turns of the isolation runs, each without and with clients.
+    pub turns: usize,
+    /// Time of each, s.
+    pub turn_seconds: f64,
+    /// Time of the soak, s; `None`: not now.
+    pub soak_seconds: Option<f64>,
+    /// The program `taut`.
+    pub program: PathBuf,
+    /// This program.
+    pub this: PathBuf,
+}
+
+/// A part of the report.
+#[derive(Clone, Copy, Debug)]
+pub struct Section {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it is about.
+    pub about: &'static str,
+    /// Measures it.
+    pub run: fn(&Extent) -> Result<Vec<Row>, BenchError>,
+}
+
+/// All parts, in the order of the table.
+pub const SECTIONS: [Section; 8] = [
+    Section {
+        name: "latency",
+        about: "one-way latency, sealed UDP and QUIC datagrams beside raw UDP",
+        run: latency_rows,
+    },
+    Section {
+        name: "loss",
+        about: "pose age behind a network that loses, beside one that does not",
+        run: loss_rows,
+    },
+    Section {
+        name: "isolation",
+        about: "period of the haptics loop without and with eight clients, stalled and flooding ones included",
+        run: isolation_rows,
+    },
+    Section {
+        name: "forged",
+        about: "forged, replayed, truncated and damaged datagrams",
+        run: forged_rows,
+    },
+    Section {
+        name: "join",
+        about: "time to join a scene of 10 MB",
+        run: join_rows,
+    },
+    Section {
+        name: "death",
+        about: "a node that is killed or stopped, and the others",
+        run: death_rows,
+    },
+    Section {
+        name: "soak",
+        about: "clients that come, go, vanish and are refused behind a bad network",
+        run: soak_rows,
+    },
+    Section {
+        name: "elsewhere",
+        about: "what is not measured here",
+        run: elsewhere,
+    },
+];
+
+fn latency_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let mut rows = Vec::new();
+    for full in [false, true] {
+        let run = latency::measure(Duration::from_secs_f64(extent.seconds), full)?;
+        let (raw, sealed, quic) = (run.raw, run.sealed, run.quic);
+        let bytes = run.bytes;
+        let class = if run.fifo { "FIFO" } else { "default class" };
+        let all = |q: &crate::bench::Quantiles| {
+            format!("{}/{}/{} us", brief(q.p50), brief(q.p99), brief(q.p999))
+        };
+        let raw_text = format!("raw {}, {class}", all(&raw));
+        let over = |p50: f64| p50 - raw.p50;
+        rows.push(Row::at_most(
+            format!("sealed UDP, {bytes} B: p50 over raw UDP"),
+            over(sealed.p50),
+            10.0,
+            "us",
+            format!("p50/p99/p99.9 {}, {raw_text}", all(&sealed)),
+        ));
+        rows.push(Row::at_most(
+            format!("sealed UDP, {bytes} B: p99 over raw p99"),
+            sealed.p99 / raw.p99,
+            2.0,
+            "times",
+            format!("opening costs {} us, included", brief(run.opening_us)),
+        ));
+        rows.push(Row::at_most(
+            format!("QUIC datagram, {bytes} B: p50 over raw UDP"),
+            over(quic.p50),
+            50.0,
+            "us",
+            format!("p50/p99/p99.9 {}, {raw_text}", all(&quic)),
+        ));
+        let lost = |q: crate::bench::Quantiles| run.sent.saturating_sub(q.count as u64) as f64;
+        rows.push(Row::at_most(
+            format!("datagrams lost of {} each way, {bytes} B", run.sent),
+            lost(sealed).max(lost(quic)),
+            0.0,
+            "lost",
+            format!(
+                "raw {}, sealed {}, QUIC {}",
+                lost(raw),
+                lost(sealed),
+                lost(quic)
+            ),
+        ));
+    }
+    Ok(rows)
+}
+
+/// Bursts of 20, with this chance at each state.
+fn bursts_of_20(chance: f64) -> Impairment {
+    Impairment {
+        bursts: Some(Burst { chance, length: 20 }),
+        ..Impairment::default()
+    }
+}
+
+fn loss_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let duration = Duration::from_secs_f64(extent.seconds);
+    let both = Impairment {
+        lost: 0.05,
+        ..bursts_of_20(1.0 / 4000.0)
+    };
+    let mut rows = Vec::new();
+    for (what, impairment, seed) in [
+        ("5 % lost", Impairment::losing(0.05), 11),
+        ("5 % lost and bursts of 20, one in 4 s", both, 12),
+    ] {
+        let run = age::measure(duration, &impairment, seed)?;
+        rows.push(Row::at_most(
+            format!("{what}: age p99 over the control's"),
+            run.impaired.p99 - run.control.p99,
+            2.0,
+            "ms",
+            format!(
+                "p99 {} against {} ms, {} by the losses alone; {}",
+                brief(run.impaired.p99),
+                brief(run.control.p99),
+                brief(run.by_loss_alone.p99),
+                losses(&run)
+            ),
+        ));
+        rows.push(truth(what, &run));
+    }
+    let what = "bursts of 20, two in 1 s";
+    let run = age::measure(duration, &bursts_of_20(1.0 / 500.0), 13)?;
+    rows.push(Row::at_most(
+        format!("{what}: largest age over the control's, by the losses alone"),
+        run.by_loss_alone.max - run.control.max,
+        20.0,
+        "ms",
+        format!(
+            "{} against {} ms; {}",
+            brief(run.by_loss_alone.max),
+            brief(run.control.max),
+            losses(&run)
+        ),
+    ));
+    rows.push(truth(what, &run));
+    Ok(rows)
+}
+
+fn losses(run: &Age) -> String {
+    format!(
+        "{} of {} states lost, longest run {}",
+        run.sent - run.arrived[1],
+        run.sent,
+        run.longest_gap
+    )
+}
+
+fn truth(what: &str, run: &Age) -> Row {
+    Row::invariant(
+        format!("{what}: states that are not what was sent, or out of order"),
+        "0",
+        run.wrong,
+        run.wrong == 0 && run.arrived[1] > run.sent / 2,
+    )
+}
+
+fn isolation_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let measure = "haptics period p99, 8 clients against none";
+    if !extent.program.is_file() {
+        let why = format!(
+            "{} is not there; cargo build --release -p taut --no-default-features, or --taut PROGRAM",
+            extent.program.display()
+        );
+        return Ok(vec![Row::unknown(measure, "<= 1.05 times", why)]);
+    }
+    let duration = Duration::from_secs_f64(extent.turn_seconds);
+    let run = isolation::measure(&extent.program, &extent.this, duration, extent.turns)?;
+    let [alone, crowded] = run.p99();
+    let each = |turns: &[isolation::Period]| {
+        let p99s: Vec<String> = turns.iter().map(|turn| brief(turn.p99)).collect();
+        p99s.join(" ")
+    };
+    Ok(vec![
+        Row::at_most(
+            measure,
+            crowded / alone,
+            1.05,
+            "times",
+            format!(
+                "median of {} turns: {} against {} us; turns {} against {} us; in force: {}",
+                extent.turns,
+                brief(crowded),
+                brief(alone),
+                each(&run.crowded),
+                each(&run.alone),
+                run.realtime
+            ),
+        ),
+        Row::invariant(
+            "clients that stayed members while others flooded",
+            ">= 7",
+            format!(
+                "{} ({} datagrams flooded, {} counted as refused)",
+                run.members, run.flooded, run.refused
+            ),
+            run.members >= 7,
+        ),
+    ])
+}
+
+fn forged_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let run = attack(extent.forgeries, 1);
+    Ok(vec![Row::invariant(
+        "forged, replayed, truncated, bit-flipped datagrams accepted",
+        "0",
+        format!(
+            "{} of {}; {} of {} genuine ones between them refused",
+            run.accepted, run.forged, run.refused, run.genuine
+        ),
+        run.accepted == 0 && run.refused == 0,
+    )])
+}
+
+fn join_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let run = join::measure(extent.joins)?;
+    Ok(vec![Row::at_most(
+        "join: scene, mesh and first state, slowest",
+        run.joined_s.max,
+        1.0,
+        "s",
+        format!(
+            "median {} s of {} joins, {:.1} MB",
+            brief(run.joined_s.p50),
+            run.joined_s.count,
+            run.mesh_bytes as f64 * 1e-6
+        ),
+    )])
+}
+
+fn death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    /// Three frames at 60 Hz, ms.
+    const THREE_FRAMES_MS: f64 = 50.0;
+    let mut rows = Vec::new();
+    for (death, signal) in [(Death::Killed, "SIGKILL"), (Death::Stopped, "SIGSTOP")] {
+        let mut runs = Vec::new();
+        for _ in 0..extent.deaths {
+            runs.push(death::measure(&extent.this, death)?);
+        }
+        let worst = |of: fn(&Aftermath) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let times = format!("largest of {}", runs.len());
+        rows.push(Row::at_most(
+            format!("{signal} of a node: others' longest time without a state"),
+            worst(|run| run.longest_gap_ms),
+            THREE_FRAMES_MS,
+            "ms",
+            format!("{times}; {} states missed", worst(|run| run.missed as f64)),
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: let go by the server"),
+            worst(|run| run.let_go_s * 1e3),
+            600.0,
+            "ms",
+            &times,
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: joined again, from the start of its process"),
+            worst(|run| run.back_s),
+            1.0,
+            "s",
+            &times,
+        ));
+    }
+    Ok(rows)
+}
+
+fn soak_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let Some(seconds) = extent.soak_seconds else {
+        let why = "--soak SECONDS runs it";
+        return Ok(vec![Row::unknown("soak", "no invariant broken", why)]);
+    };
+    let run = soak::run(Duration::from_secs_f64(seconds), 21)?;
+    let server = &run.server;
+    let forged_counted = server.garbage + server.wrong_version + server.forged + server.replayed;
+    let [before, after] = run.memory.map(|bytes| bytes as f64 / (1 << 20) as f64);
+    Ok(vec![
+        Row::invariant(
+            format!("soak of {seconds} s: states wrong or out of order"),
+            "0",
+            format!(
+                "{} of {} taken; {} joined, {} left, {} vanished, {} refused for their key, {} joins lost to the network",
+                run.wrong,
+                run.received,
+                run.joined,
+                run.left,
+                run.vanished,
+                run.refused,
+                run.failed_joins
+            ),
+            run.wrong == 0 && run.received > 0 && run.joined > 0,
+        ),
+        Row::invariant(
+            "soak: clients left over at the end",
+            "0",
+            run.remaining,
+            run.remaining == 0,
+        ),
+        Row::invariant(
+            "soak: forgeries at the server's own port that are counted, and change nothing",
+            "all",
+            format!(
+                "{forged_counted} counted for {} forged and what the relay damaged; {} inputs",
+                run.forged, server.inputs
+            ),
+            forged_counted >= run.forged && server.inputs == 0 && server.inputs_refused == 0,
+        ),
+        Row::at_most(
+            "soak: growth of resident memory",
+            after - before,
+            8.0,
+            "MiB",
+            format!("{} to {} MiB", brief(before), brief(after)),
+        ),
+    ])
+}
+
+/// Targets of the cluster that other programs measure.
+fn elsewhere(_: &Extent) -> Result<Vec<Row>, BenchError> {
+    Ok(vec![
+        Row::unknown("swap-call skew", "p50 <= 20 us, p99 <= 100 us", "not here"),
+        Row::unknown(
+            "pose age at swap, 60 Hz and 120 Hz",
+            "p99 <= 23 ms and 14 ms",
+            "not here",
+        ),
+        Row::unknown("equal state hash on released frames", "100 %", "not here"),
+        Row::unknown(
+            "SIGKILL of the server",
+            "clients back <= 2 s, zero force <= 120 ms",
+            "not here",
+        ),
+        Row::unknown(
+            "fuzzing",
+            "10 minutes per decoder, no finding",
+            "scripts/fuzz 600",
+        ),
+    ])
+}
+
+impl Extent {
+    /// What the report of a release takes, beside the program at `this`.
+    #[must_use]
+    pub fn full(this: &Path) -> Extent {
+        Extent {
+            seconds: 20.0,
+            forgeries: 1_000_000,
+            joins: 10,
+            deaths: 5,
+            turns: 6,
+            turn_seconds: 8.0,
+            soak_seconds: None,
+            program: this.with_file_name("taut"),
+            this: this.to_path_buf(),
+        }
+    }
+
+    /// A few seconds in all: the figures mean little, the invariants hold.
+    #[must_use]
+    pub fn quick(this: &Path) -> Extent {
+        Extent {
+            seconds: 1.0,
+            forgeries: 20_000,
+            joins: 1,
+            deaths: 1,
+            turns: 1,
+            turn_seconds: 2.0,
+            soak_seconds: Some(3.0),
+            ..Extent::full(this)
+        }
+    }
+}
