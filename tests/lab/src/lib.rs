@@ -6,7 +6,7 @@
 //! - [`method`]: what a method has to do, and which there are; [`methods`]: each in a file.
 //! - [`clock`]: the virtual clock, and what it records.
 //! - [`recipe`]: what a recipe is; [`recipes`]: all of them; [`study`]: those that are no run along a path.
-//! - [`reference`]: right answers for recipes without a formula, with their own error.
+//! - [`mod@reference`]: right answers for recipes without a formula, with their own error.
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
 //! - [`row`]: the one type of row that tables and files are made of.

@@ -1,4 +1,4 @@
-//! Runs the recipes for every method and rate: `cargo run --release -p taut-lab -- [--quick] [--out DIRECTORY] [RECIPE...]`.
+//! Runs the recipes for every method and rate: `cargo run --release -p taut-lab -- [--quick] [--out DIRECTORY] [--method NAME]... [RECIPE...]`.
 //!
 //! Prints the table and writes it, the CSV files and the chart. Exit code 1 where this project's own method fails at 1 kHz, or a study or
 //! a reference answer does.
@@ -21,13 +21,28 @@ const OWN_RATE: u32 = 1000;
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let (mut extent, mut directory, mut wanted) =
         (Extent::Full, PathBuf::from(DIRECTORY), Vec::new());
+    let mut methods = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--quick" => extent = Extent::Quick,
             "--out" => directory = arguments.next().ok_or("--out needs a directory")?.into(),
+            "--method" => {
+                let name = arguments.next().ok_or("--method needs a name")?;
+                let known = Method::ALL.iter().find(|method| method.name() == name);
+                methods.push(*known.ok_or_else(|| {
+                    let all = Method::ALL.map(Method::name).join(", ");
+                    format!("there is no method `{name}`; there are {all}")
+                })?);
+            }
+            option if option.starts_with('-') => {
+                return Err(format!("there is no option `{option}`").into());
+            }
             name => wanted.push(name.to_owned()),
         }
+    }
+    if methods.is_empty() {
+        methods.extend(Method::ALL);
     }
     let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
     let recipes = all(extent);
@@ -46,7 +61,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let mut outcomes = Vec::new();
     for recipe in recipes.iter().filter(|recipe| is_wanted(recipe.name)) {
         eprint!("{recipe:?}: {} ", recipe.about);
-        let (of_recipe, its_rows) = run_recipe(recipe, |_| eprint!("."));
+        let (of_recipe, its_rows) = run_recipe(recipe, &methods, |_| eprint!("."));
         eprintln!();
         outcomes.extend(of_recipe);
         rows.extend(its_rows);

@@ -65,7 +65,7 @@ impl Probe {
 pub enum Ideal {
     /// A formula: the wrench of the exact quasi-static problem at a time, s, in N and N m.
     Closed(Box<dyn Fn(f64) -> Vector6>),
-    /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`reference`].
+    /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
     Reference,
     /// None: the recipe is judged by what must hold of any answer.
     None,

@@ -3,7 +3,7 @@
 //! The run covers the whole difference of poses in every step (k_s = 1, the stiffness unchanged), re-linearises its rows, rests ten times
 //! nearer to the surface, has no adaptation, and makes 5, 10, 20, ... steps a millisecond until halving the step changes 95 % of
 //! its forces by less than a tenth of what people feel. That last change is its error estimate; a reference that does not get
-//! there says so, and the row of its error fails. Source: METHOD, accuracy; Richardson's argument for a first-order limit.
+//! there says so, and the row of its error fails. Source: Richardson's argument for a first-order limit.
 //!
 //! Answers are cached by content: scene, settings, motion and the sources of the method decide the file's name.
 

@@ -135,7 +135,11 @@ impl PointGodObject {
 impl HapticMethod for PointGodObject {
     fn update(&mut self, _time: f64, device: &Pose) {
         self.now.planes = self.touched(&self.now.pose.clone());
-        for _ in 0..MAX_LEGS {
+        for leg in 0..=MAX_LEGS {
+            // The last leg is for a point that the one before led off a curved surface: back to it.
+            if leg == MAX_LEGS && !self.now.planes.is_empty() {
+                break;
+            }
             let wish = self.wish(&self.now, device);
             let answer = self
                 .projector

@@ -11,7 +11,7 @@ use super::Extent;
 use super::bodies::{sound, turns};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Line, Open, Recipe};
 use crate::row::Row;
 
 /// Which mesh: that of 5,000 triangles, so that every method at every rate is done within an hour.
@@ -29,7 +29,7 @@ pub(super) fn unavailable(extent: Extent) -> Vec<Row> {
     if data_file(FILE).is_none() {
         vec![row.out_of_scope(format!("test data are not there: {FILE}"))]
     } else if extent == Extent::Quick {
-        vec![row.out_of_scope("a quarter of an hour: in the full extent only")]
+        vec![row.out_of_scope("minutes: in the full extent only")]
     } else {
         Vec::new()
     }
@@ -68,6 +68,11 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));
             lines
         }),
+        open: vec![Open {
+            key: Measure::ForceP95.key(),
+            rate: 1000,
+            reason: "off the reference while it slides and turns under load; not traced yet",
+        }],
         check_every: 10,
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, 1.8, device)
