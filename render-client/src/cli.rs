@@ -310,6 +310,7 @@ impl RenderReport {
             adapter: String::new(),
             present_timing: String::new(),
             frames: 0,
+            locked_frames: 0,
             stale_frames: 0,
             fps: 0.0,
             pose_age_ms: Default::default(),

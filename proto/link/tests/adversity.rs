@@ -4,21 +4,8 @@ mod support;
 
 use std::{net::UdpSocket, time::Duration};
 use support::{relay::Impairment, *};
-use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
+use taut_link::{ClientLink, LinkEvent, Role, ServerLink};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
-
-/// A server whose hot plane is behind a relay.
-async fn behind_relay(impairment: Impairment, seed: u64) -> (ServerLink, Relay) {
-    let waiting = Waiting::new();
-    let server = server_with(ServerOptions {
-        announced_udp_port: Some(waiting.port()),
-        node_timeout: FORGIVING,
-        ..ServerOptions::loopback(key('a'))
-    })
-    .await;
-    let relay = waiting.start(server.udp_addr(), impairment, seed);
-    (server, relay)
-}
 
 /// Sends states until `client` has `count` of them.
 async fn take_states(server: &ServerLink, client: &ClientLink, first: u64, count: usize) -> u64 {

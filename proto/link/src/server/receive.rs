@@ -1,7 +1,7 @@
 //! What clients send on the hot plane: time requests, signs of life, readings of device and head. From the UDP thread and from QUIC datagrams.
 //!
-//! Before any cryptography: the header must be ours, its epoch this server's and its sender a session; a datagram from where that session is
-//! known to be counts against the session's rate, any other against the rate of its source and of all unknown sources together.
+//! Before any cryptography: the header must be ours, its epoch this server's and its sender a session; a datagram from elsewhere than where
+//! that session is known to be counts against the rate of its source and of all unknown sources together. After it: the session's own rate.
 
 use super::{
     DeviceInput, HeadInput,
@@ -65,9 +65,6 @@ pub(crate) fn receive(
     now_ns: u64,
 ) {
     let counters = &shared.counters;
-    if !session.rights.take_datagram(now_ns) {
-        return counters.flooded.one();
-    }
     let opened = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,
         Err(OpenError::Header(error)) => return count_bad_header(shared, error),
@@ -76,6 +73,10 @@ pub(crate) fn receive(
         Err(OpenError::Replayed) => return counters.replayed.one(),
         Err(OpenError::Payload(_)) => return counters.garbage.one(),
     };
+    // Only what is authentic counts against a session's rate: nobody else can use it up by naming its address.
+    if !session.rights.take_datagram(now_ns) {
+        return counters.flooded.one();
+    }
     counters.packets_received.one();
     let Some(act) = act_of_datagram(&opened.payload) else {
         return counters.garbage.one(); // a client has no business sending these

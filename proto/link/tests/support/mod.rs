@@ -171,6 +171,7 @@ pub async fn behind_relay(
     let server = server_with(options(ServerOptions {
         announced_udp_port: Some(waiting.port()),
         idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     }))
     .await;
