@@ -268,6 +268,7 @@ impl RenderReport {
             transport: args.transport.name().to_owned(),
             adapter: String::new(),
             frames: 0,
+            locked_frames: 0,
             stale_frames: 0,
             fps: 0.0,
             pose_age_ms: Default::default(),
