@@ -312,13 +312,15 @@ fn a_node_ends_in_good_order_when_the_server_says_that_it_stops() {
 }
 
 #[test]
-fn a_lost_server_is_an_error_that_names_it() {
+fn a_server_that_stays_lost_is_an_error_that_names_it() {
     if !can_draw() {
         return;
     }
     let server = Server::start();
     let address = server.address.clone();
-    let node = start(server.args("both"));
+    let mut args = server.args("both");
+    args.membership.give_up = Some(1.0);
+    let node = start(args);
     wait_for("a client", || !server.link.clients().is_empty());
     // All its threads stop at once, as if its machine had lost power.
     let Server {

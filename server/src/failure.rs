@@ -51,6 +51,7 @@ impl From<taut_link::LinkError> for Failure {
             | E::BadAddress { .. }
             | E::UnknownHost { .. }
             | E::Unreachable { .. }
+            | E::TurnedAway { .. }
             | E::WrongKey { .. }
             | E::WrongServer { .. }
             | E::NotAllowed { .. }

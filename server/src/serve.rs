@@ -55,6 +55,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
     if let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) {
         terminal.say(&format!("serving on {quic} (control) and {udp} (poses)"));
     }
+    if let Some(fingerprint) = session.fingerprint() {
+        terminal.say(&format!("its fingerprint is {fingerprint}"));
+    }
     if let Some(monitor) = session.monitor() {
         if let Some(page) = monitor.address() {
             terminal.say(&format!("watch it in a browser: {page}"));

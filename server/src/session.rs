@@ -17,7 +17,7 @@ use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
 use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
-use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, proto};
+use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, ServerPin, proto};
 use taut_recording::{EventRecord, Recorder};
 use tokio::runtime::Runtime;
 
@@ -385,6 +385,11 @@ impl Session {
     /// Address of the control plane, with the port that it got.
     pub fn quic_address(&self) -> Option<SocketAddr> {
         self.link.as_ref().map(ServerLink::quic_addr)
+    }
+
+    /// What clients know this server by.
+    pub fn fingerprint(&self) -> Option<ServerPin> {
+        self.link.as_ref().map(ServerLink::pin)
     }
 
     /// Address of the state plane, with the port that it got.

@@ -65,6 +65,24 @@ impl Process {
         I: IntoIterator,
         I::Item: AsRef<std::ffi::OsStr>,
     {
+        Self::start_logging(name, program, arguments, directory, None)
+    }
+
+    /// The same with a filter of its log on standard error, such as `taut=info`.
+    ///
+    /// # Panics
+    /// When the system does not start it.
+    pub fn start_logging<I>(
+        name: &str,
+        program: impl AsRef<Path>,
+        arguments: I,
+        directory: &Path,
+        log: Option<&str>,
+    ) -> Self
+    where
+        I: IntoIterator,
+        I::Item: AsRef<std::ffi::OsStr>,
+    {
         let (stdout, stderr) = (
             directory.join(format!("{name}.out")),
             directory.join(format!("{name}.err")),
@@ -82,6 +100,7 @@ impl Process {
             .env_remove("TAUT_LOG")
             .env_remove("DISPLAY")
             .env_remove("WAYLAND_DISPLAY");
+        command.envs(log.map(|filter| ("TAUT_LOG", filter)));
         // Nothing is kept from one test for another.
         command.env("XDG_CACHE_HOME", directory.join("cache"));
         // Drivers complain aloud where a login session has not set it.

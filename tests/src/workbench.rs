@@ -24,6 +24,8 @@ pub struct TestWorkbench {
     program: PathBuf,
     /// The workbench file's content.
     pub file: Table,
+    /// What the processes log, such as `taut=info`; without it warnings.
+    pub log: Option<&'static str>,
     directory: TempDir,
     /// Held until the end: two workbenches at once would starve each other on a small machine.
     _turn: Turn,
@@ -50,6 +52,7 @@ impl TestWorkbench {
         let mut workbench = Self {
             program: program.into(),
             file,
+            log: None,
             directory,
             _turn: turn,
         };
@@ -119,7 +122,8 @@ impl TestWorkbench {
 
     /// Starts the program under test in the directory.
     pub fn start(&self, name: &str, arguments: &[&str]) -> Process {
-        Process::start(name, &self.program, arguments, self.directory())
+        let (program, directory) = (&self.program, self.directory());
+        Process::start_logging(name, program, arguments, directory, self.log)
     }
 
     /// Runs the program under test to its end.

@@ -433,6 +433,7 @@ fn a_second_node_of_the_same_name_and_one_with_another_key_are_refused_in_one_se
 #[test]
 fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_gave_up() {
     let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.log = Some("warn,taut=info");
     let adapter = workbench.adapter();
     let (mut server, bridge) = workbench_with_bridge(&mut workbench);
     let drawing = adapter.is_ok().then(|| {
@@ -451,6 +452,15 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_
             ],
         )
     });
+    if adapter.is_ok() {
+        wait_for("the node to join", JOIN_LIMIT, || {
+            server
+                .process
+                .stderr()
+                .contains("front joined")
+                .then_some(())
+        });
+    }
     let runtime = Runtime::new().expect("a runtime");
     let client = Client::join(
         &runtime,

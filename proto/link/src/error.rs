@@ -54,6 +54,16 @@ pub enum LinkError {
         /// How long we tried, s.
         seconds: f64,
     },
+    /// The server is there, but does not listen to this address.
+    #[error(
+        "the server at {server} has turned this address away for {seconds:.0} s: too many attempts from here or with wrong keys, or too many at once; wait a moment, then look for what keeps trying"
+    )]
+    TurnedAway {
+        /// What was given.
+        server: String,
+        /// How long we tried, s.
+        seconds: f64,
+    },
     /// Another server than the one that the key is for, or somebody between.
     #[error(
         "the server at {server} is not the one of this node's key: its fingerprint is {found}, the key's is {wanted}; check the address, or give this node that server's cluster key or a credential made from it (--key)"

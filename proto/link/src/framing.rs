@@ -20,9 +20,6 @@ pub(crate) const CLOSE_EVICTED: VarInt = VarInt::from_u32(5);
 /// The peer broke the protocol.
 pub(crate) const CLOSE_PROTOCOL: VarInt = VarInt::from_u32(4);
 
-/// Time for a message to come, once it has begun.
-const MESSAGE_TIMEOUT: Duration = Duration::from_secs(3);
-
 /// Why no message came.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ReadMessageError {
@@ -57,13 +54,14 @@ pub(crate) async fn read_message(
     read_body(stream, length).await
 }
 
-/// The same from a client that is in: it may be silent between messages, but not within one.
+/// The same from a client that is in: it may be silent between messages, but must bring one to its end within `patience`.
 pub(crate) async fn read_whole_message(
     stream: &mut RecvStream,
     max: usize,
+    patience: Duration,
 ) -> Result<ControlMessage, ReadMessageError> {
     let length = read_length(stream, max).await?;
-    match tokio::time::timeout(MESSAGE_TIMEOUT, read_body(stream, length)).await {
+    match tokio::time::timeout(patience, read_body(stream, length)).await {
         Ok(read) => read,
         Err(_) => Err(ReadMessageError::Stalled),
     }
@@ -124,5 +122,62 @@ pub(crate) fn close_text(error: &ConnectionError, peer: &str) -> String {
         ConnectionError::LocallyClosed => "closed on this side".to_owned(),
         ConnectionError::Reset => format!("{peer} was restarted"),
         other => format!("{peer} is lost: {other}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quinn::{ClientConfig, Connection, Endpoint, ServerConfig};
+    use std::{net::SocketAddr, sync::Arc};
+    use taut_proto::control::Bye;
+
+    /// Two ends of a connection on loopback, with the endpoints that keep it alive.
+    async fn pair() -> (Connection, Connection, [Endpoint; 2]) {
+        let name = "localhost".to_owned();
+        let made = rcgen::generate_simple_self_signed([name.clone()]).expect("a certificate");
+        let certificate = made.cert.der().clone();
+        let key = rustls::pki_types::PrivatePkcs8KeyDer::from(made.signing_key.serialize_der());
+        let server = ServerConfig::with_single_cert(vec![certificate.clone()], key.into());
+        let mut roots = rustls::RootCertStore::empty();
+        roots.add(certificate).expect("a certificate");
+        let client = ClientConfig::with_root_certificates(Arc::new(roots)).expect("a root");
+        let any = SocketAddr::from(([127, 0, 0, 1], 0));
+        let host = Endpoint::server(server.expect("a key"), any).expect("a port");
+        let guest = Endpoint::client(any).expect("a port");
+        let address = host.local_addr().expect("bound");
+        let connecting = guest
+            .connect_with(client, address, &name)
+            .expect("an address");
+        let accepting = async { host.accept().await.expect("open").await };
+        let (theirs, ours) = tokio::join!(connecting, accepting);
+        let (theirs, ours) = (theirs.expect("connected"), ours.expect("connected"));
+        (theirs, ours, [host, guest])
+    }
+
+    #[tokio::test]
+    async fn a_client_may_rest_between_messages_but_not_within_one() {
+        let (theirs, ours, _endpoints) = pair().await;
+        let patience = Duration::from_millis(300);
+        let message = ControlMessage::Bye(Bye {
+            reason: "done".to_owned(),
+        });
+        let frame = message.to_frame().expect("encodes");
+        let (mut send, _) = theirs.open_bi().await.expect("open");
+        send.write_all(&frame).await.expect("open");
+        let (_, mut recv) = ours.accept_bi().await.expect("open");
+        let read = read_whole_message(&mut recv, 1000, patience).await;
+        assert_eq!(read.expect("whole"), message);
+
+        // Longer than the patience, then a whole message, then half of one.
+        let (read, ()) = tokio::join!(read_whole_message(&mut recv, 1000, patience), async {
+            tokio::time::sleep(2 * patience).await;
+            send.write_all(&frame).await.expect("open");
+        });
+        assert_eq!(read.expect("whole"), message);
+        let half = &frame[..frame.len() / 2];
+        send.write_all(half).await.expect("open");
+        let read = read_whole_message(&mut recv, 1000, patience).await;
+        assert!(matches!(read, Err(ReadMessageError::Stalled)), "{read:?}");
     }
 }

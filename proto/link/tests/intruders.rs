@@ -3,14 +3,20 @@
 mod support;
 
 use ring::digest::{SHA256, digest};
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    net::SocketAddr,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use support::*;
 use taut_link::{
     ClientOptions, Credential, FloodLimits, Holder, LinkError, Role, ServerLink, ServerOptions,
     ServerPin, binding, connect, pinning::PinnedServer, transport,
 };
 use taut_proto::{
+    Header, Kind,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
+    header::{HEADER_BYTES, TAG_BYTES},
     limits::{JoinLimits, Rate},
     proof::{Claim, Grant},
 };
@@ -261,7 +267,9 @@ async fn a_proof_counts_on_its_own_connection_and_for_its_own_claim_only() {
         let answer = answer(&connection, hello(wrong, proof)).await;
         assert_wrong_key(&answer, &format!("{wrong:?}"));
     }
-    match answer(&one, hello(claim(), proof)).await {
+    let own = open().await;
+    let proof = secret.client_proof(&must(binding::proof_binding(&own)), claim());
+    match answer(&own, hello(claim(), proof)).await {
         ControlMessage::Welcome(_) => {}
         other => panic!("where it belongs it counts: {}", other.name()),
     }
@@ -360,4 +368,84 @@ async fn many_attempts_at_once_must_prove_their_address_and_are_bounded() {
     for task in silent {
         task.abort();
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn who_is_turned_away_for_long_is_told_so() {
+    let server = server_with(ServerOptions {
+        limits: FloodLimits {
+            joins: JoinLimits {
+                at_once: 0,
+                ..JoinLimits::default()
+            },
+            ..FloodLimits::default()
+        },
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let error = error_of(ClientOptions {
+        connect_timeout: Duration::from_secs(1),
+        ..options(&server, Role::Render, "left")
+    })
+    .await;
+    assert!(matches!(error, LinkError::TurnedAway { .. }), "{error}");
+    assert!(server.counters().turned_away > 0);
+}
+
+/// Somebody on the path has seen epoch and session number: what he sends costs the server no cryptography beyond his rate, and the client whose
+/// number he uses none of its own.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn forged_datagrams_of_an_unknown_source_are_opened_at_its_rate_only() {
+    let of_one = Rate {
+        per_second: 1,
+        burst: 8,
+    };
+    let server = server_with(ServerOptions {
+        limits: FloodLimits {
+            unknown_source: of_one,
+            ..FloodLimits::default()
+        },
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let device = client(&server, Role::Device, "bridge").await;
+    wait_until("its path", || {
+        server
+            .clients()
+            .iter()
+            .all(|client| client.udp_address.is_some())
+    })
+    .await;
+    let header = Header {
+        kind: Kind::Input,
+        epoch: server.epoch(),
+        sender: device.session(),
+        flags: 0,
+        sequence: 1 << 30,
+        length: 32,
+    };
+    let mut forged = header.to_bytes().to_vec();
+    forged.resize(HEADER_BYTES + 32 + TAG_BYTES, 0x5a);
+    let start = Instant::now();
+    let socket = must(std::net::UdpSocket::bind("127.0.0.1:0"));
+    for number in 0..400 {
+        must(socket.send_to(&forged, server.udp_addr()));
+        if number % 20 == 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    }
+    wait_until("most of them", || {
+        let counters = server.counters();
+        counters.forged + counters.flooded >= 200
+    })
+    .await;
+    device.send_input(&input(1));
+    wait_until("the reading of the device", || {
+        server.counters().inputs == 1
+    })
+    .await;
+    let most = 8.0 + start.elapsed().as_secs_f64() + 1.0;
+    let opened = server.counters().forged as f64;
+    assert!(opened >= 1.0 && opened <= most, "{opened} of {most}");
 }

@@ -138,9 +138,12 @@ fn a_link_whose_server_dies_is_lost_and_comes_back_to_the_next_server_with_a_new
     );
     clients.block_on(wait_until("the clock", || link.session_now().is_some()));
     assert_eq!(supervised.health(), LinkHealth::Connected);
+    let mut seen = Vec::new();
     clients.block_on(broadcast_until(&mut server.link.broadcaster(), 1, || {
-        drain(&link).len() > 10
+        link.drain_states(&mut seen);
+        seen.len() > 10
     }));
+    assert_in_order(&seen);
     assert_eq!(made.load(Ordering::Relaxed), 2);
 }
 

@@ -80,7 +80,7 @@ async fn a_node_that_joins_late_gets_everything() {
     })
     .await;
 
-    let late = client(&server, Role::Observer, "late").await;
+    let late = client(&server, Role::Render, "late").await;
     assert_eq!(late.description(), first.description());
     let hash = late.description().obstacles[0].mesh;
     let mesh = late

@@ -14,6 +14,7 @@ use crate::measure::Measure;
 use crate::method::Method;
 use crate::outcome::Outcome;
 use crate::report::{KEYS, keys};
+use crate::row::{Row, Verdict};
 
 /// Least J of the axis.
 const FLOOR: f64 = 1e-3;
@@ -34,12 +35,25 @@ fn colour(method: Method) -> RGBColor {
         Method::VirtualCoupling => RGBColor(0, 130, 80),
         Method::Penalty => RGBColor(110, 110, 60),
         Method::Discrete => RGBColor(140, 60, 150),
+        Method::Point => RGBColor(190, 40, 70),
     }
 }
 
 /// A point: time of an update, us, and J.
 fn point(outcome: &Outcome) -> (f64, f64) {
     (outcome.times.update[1], outcome.worst(Measure::Felt))
+}
+
+/// Whether every row of an outcome is passed.
+fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
+    let of_it = |row: &&Row| {
+        row.recipe == outcome.recipe
+            && row.case == outcome.case
+            && row.method == outcome.method.name()
+            && row.rate == Some(outcome.rate)
+    };
+    let missed = |row: &Row| matches!(row.verdict, Verdict::Fail | Verdict::Open(_));
+    !rows.iter().filter(of_it).any(missed)
 }
 
 /// Those that no other one beats in time and J, by time.
@@ -58,17 +72,18 @@ fn front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// Writes `speed-accuracy.svg` and `chart.csv`.
-pub fn write(outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
+pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
     let mut panels: Vec<(&str, &str)> = Vec::new();
     for outcome in outcomes {
         let panel = (outcome.recipe, outcome.case.as_str());
-        if !panels.contains(&panel) {
+        let has_answer = !point(outcome).1.is_nan(); // else there is no error to draw
+        if has_answer && !panels.contains(&panel) {
             panels.push(panel);
         }
     }
-    let rows = panels.len().div_ceil(COLUMNS).max(1);
+    let lines = panels.len().div_ceil(COLUMNS).max(1);
     let svg = directory.join("speed-accuracy.svg");
-    let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * rows as u32 + 90);
+    let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 90);
     let root = SVGBackend::new(&svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(
@@ -79,7 +94,7 @@ pub fn write(outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error
     draw_legend(&legend)?;
     let mut csv = format!("panel,{KEYS},update_p99_us,j,on_front\n");
     for (index, (area, panel)) in grid
-        .split_evenly((rows, COLUMNS))
+        .split_evenly((lines, COLUMNS))
         .iter()
         .zip(&panels)
         .enumerate()
@@ -87,10 +102,11 @@ pub fn write(outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error
         let of_panel: Vec<&Outcome> = outcomes
             .iter()
             .filter(|o| (o.recipe, o.case.as_str()) == *panel)
+            .filter(|o| !point(o).1.is_nan())
             .collect();
         let points: Vec<_> = of_panel.iter().map(|o| point(o)).collect();
         let front = front(&points);
-        draw_panel(area, panel, &of_panel, &front)?;
+        draw_panel(area, panel, &of_panel, &front, rows)?;
         for outcome in of_panel {
             let (time, felt) = point(outcome);
             let on_front = front.contains(&(time, felt));
@@ -134,6 +150,7 @@ fn draw_panel(
     (recipe, case): &(&str, &str),
     outcomes: &[&Outcome],
     front: &[(f64, f64)],
+    rows: &[Row],
 ) -> Result<(), Box<dyn Error>> {
     let mut chart = ChartBuilder::on(area)
         .margin(10)
@@ -168,7 +185,7 @@ fn draw_panel(
         let size = SIZES[size.unwrap_or(0)];
         let place = shown(point(outcome));
         let ink = colour(outcome.method);
-        if outcome.passes() {
+        if passes(outcome, rows) {
             chart.draw_series([Circle::new(place, size, ink.filled())])?;
         } else {
             chart.draw_series([Cross::new(place, size, ink.stroke_width(2))])?;

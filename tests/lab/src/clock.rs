@@ -7,6 +7,7 @@ use god_object::{Pose, Vector6};
 
 use crate::cpu_time::thread_us;
 use crate::method::HapticMethod;
+use crate::recipe::Recipe;
 
 /// Time between forces, s.
 pub const TICK: f64 = 1e-3;
@@ -37,26 +38,24 @@ pub struct Run {
     pub force_us: Vec<f64>,
 }
 
-/// Runs `method` along `device` for `duration` seconds, updated `rate` times a second, first after `phase` of a period.
+/// Runs `method` along the device of a recipe, updated `rate` times a second, first after `phase` of a period.
 ///
 /// The phase lies within (0, 1): no update begins at the instant of a force.
-pub fn run(
-    method: &mut dyn HapticMethod,
-    device: &dyn Fn(f64) -> Pose,
-    duration: f64,
-    rate: u32,
-    phase: f64,
-) -> Run {
+pub fn run(method: &mut dyn HapticMethod, recipe: &Recipe, rate: u32, phase: f64) -> Run {
+    let device = &recipe.device;
     let begin = |update: u32| (f64::from(update) + phase) / f64::from(rate);
     let mut run = Run::default();
     let mut updates = 0;
-    for tick in 0..=(duration / TICK).round() as u32 {
+    for tick in 0..recipe.ticks() {
         let time = f64::from(tick) * TICK;
         while begin(updates) <= time {
             if updates > 0 {
                 method.publish();
             }
             let pose = device(begin(updates));
+            if let Some(moving) = &recipe.moving {
+                method.move_obstacle(&moving(begin(updates)));
+            }
             let before = thread_us();
             method.update(begin(updates), &pose);
             run.update_us.push(thread_us() - before);

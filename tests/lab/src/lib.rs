@@ -5,9 +5,11 @@
 //!
 //! - [`method`]: what a method has to do, and which there are; [`methods`]: each in a file.
 //! - [`clock`]: the virtual clock, and what it records.
-//! - [`recipe`]: what a recipe is; [`recipes`]: all of them.
+//! - [`recipe`]: what a recipe is; [`recipes`]: all of them; [`study`]: those that are no run along a path.
+//! - [`reference`]: right answers for recipes without a formula, with their own error.
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
+//! - [`row`]: the one type of row that tables and files are made of.
 //! - [`report`]: table and CSV; [`chart`]: error against time.
 //!
 //! Same machine type, same answers: only times differ between runs, and those stand in a file of their own.
@@ -21,5 +23,8 @@ pub mod methods;
 pub mod outcome;
 pub mod recipe;
 pub mod recipes;
+pub mod reference;
 pub mod report;
+pub mod row;
+pub mod study;
 pub mod vertex_depth;

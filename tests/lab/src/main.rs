@@ -1,15 +1,16 @@
 //! Runs the recipes for every method and rate: `cargo run --release -p taut-lab -- [--quick] [--out DIRECTORY] [RECIPE...]`.
 //!
-//! Prints the table and writes it, the CSV files and the chart. Exit code 1 where this project's own method fails at 1 kHz.
+//! Prints the table and writes it, the CSV files and the chart. Exit code 1 where this project's own method fails at 1 kHz, or a study or
+//! a reference answer does.
 
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use taut_lab::clock::RATES;
 use taut_lab::method::Method;
-use taut_lab::outcome::Outcome;
-use taut_lab::recipes::{Extent, all};
+use taut_lab::outcome::run_recipe;
+use taut_lab::recipes::{Extent, STUDIES, all};
+use taut_lab::row::{Row, Verdict};
 use taut_lab::{chart, report};
 
 /// Where files go unless told otherwise.
@@ -28,29 +29,40 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             name => wanted.push(name.to_owned()),
         }
     }
-    let mut recipes = all(extent);
-    if let Some(unknown) = wanted
-        .iter()
-        .find(|name| recipes.iter().all(|recipe| recipe.name != name.as_str()))
-    {
+    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
+    let recipes = all(extent);
+    let known = |name: &str| {
+        recipes.iter().any(|recipe| recipe.name == name)
+            || STUDIES.iter().any(|study| study.name == name)
+    };
+    if let Some(unknown) = wanted.iter().find(|name| !known(name.as_str())) {
         return Err(format!("there is no recipe `{unknown}`").into());
     }
-    recipes.retain(|recipe| wanted.is_empty() || wanted.iter().any(|name| name == recipe.name));
-    let mut outcomes = Vec::new();
-    for recipe in &recipes {
-        for method in Method::ALL {
-            for rate in RATES {
-                outcomes.push(Outcome::of(recipe, method, rate));
-            }
-        }
-        eprintln!("{recipe:?}: {}", recipe.about);
+    let mut rows: Vec<Row> = Vec::new();
+    for study in STUDIES.iter().filter(|study| is_wanted(study.name)) {
+        eprintln!("{}: {}", study.name, study.about);
+        rows.extend((study.run)(extent));
     }
-    print!("{}", report::table(&outcomes));
-    report::write(&outcomes, &directory)?;
-    chart::write(&outcomes, &directory)?;
+    let mut outcomes = Vec::new();
+    for recipe in recipes.iter().filter(|recipe| is_wanted(recipe.name)) {
+        eprint!("{recipe:?}: {} ", recipe.about);
+        let (of_recipe, its_rows) = run_recipe(recipe, |_| eprint!("."));
+        eprintln!();
+        outcomes.extend(of_recipe);
+        rows.extend(its_rows);
+    }
+    rows.sort_by(|a, b| a.recipe.cmp(b.recipe)); // stable: cases stay in their order
+    print!("{}", report::table(&rows));
+    report::write(&rows, &outcomes, &directory)?;
+    chart::write(&rows, &outcomes, &directory)?;
     println!("\nfiles in {}", directory.display());
-    let own_fails = outcomes
-        .iter()
-        .any(|o| o.method == Method::Ours && o.rate == OWN_RATE && !o.passes());
-    Ok(ExitCode::from(u8::from(own_fails)))
+    let failed = rows.iter().any(own_failure);
+    Ok(ExitCode::from(u8::from(failed)))
+}
+
+/// Whether a row is a failure of this project's own: of its method at the rate that counts, or of something that has no rate.
+fn own_failure(row: &Row) -> bool {
+    let own =
+        row.rate.is_none() || (row.method == Method::Ours.name() && row.rate == Some(OWN_RATE));
+    own && row.verdict == Verdict::Fail
 }

@@ -4,6 +4,7 @@
 //! |--------|---------------------------|-------|-------------------------------------------------------------------|
 //! | e_dir  | [`Measure::DirectionP95`] | deg   | angle between F and the ideal, where the ideal is above 0.1 N      |
 //! | e_mag  | [`Measure::MagnitudeP95`] | %     | error of the norm of F over the ideal's, there                     |
+//! | e_F    | [`Measure::ForceP95`]     | N     | norm of the difference of forces                                   |
 //! | e_tau  | [`Measure::TorqueP95`]    | N m   | norm of the difference of torques                                  |
 //! | dF     | [`Measure::Step`]         | N     | largest change of F in a millisecond                               |
 //! | E_inj  | [`Measure::Energy`]       | J     | most that the hand has got out, hold of the samples left out        |
@@ -70,6 +71,8 @@ measures! {
     MagnitudeP95 "magnitude_p95" "%",
     /// 95th percentile of the error of torque.
     TorqueP95 "torque_p95" "N m",
+    /// 95th percentile of the norm of the difference of forces.
+    ForceP95 "force_p95" "N",
     /// Largest change of force in a millisecond.
     Step "step" "N/ms",
     /// The same, less what the ideal changes then or a millisecond beside.
@@ -92,19 +95,23 @@ measures! {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measures {
     values: Vec<f64>,
+    /// Of the recipe's own probes, in their order.
+    pub probes: Vec<f64>,
 }
 
 impl Measures {
     /// Of a run of a recipe.
     #[must_use]
     pub fn of(recipe: &Recipe, checker: &PenetrationChecker, ticks: &[Tick]) -> Self {
-        let ideal: Vec<Vector6> = ticks.iter().map(|tick| (recipe.ideal)(tick.time)).collect();
-        let errors = ForceErrors::new(ticks, &ideal);
+        let ideal = &recipe.answer().wrenches;
+        let errors = ForceErrors::new(ticks, ideal);
         let values = Measure::ALL
             .iter()
             .map(|measure| match measure {
                 Measure::Penetration => largest(ticks.iter().map(|t| (recipe.depth)(&t.body))),
-                Measure::Intersections => intersections(checker, ticks),
+                Measure::Intersections => {
+                    intersections(checker, ticks, recipe.check_every, recipe.moving.is_some())
+                }
                 Measure::Astray => largest(ticks.iter().map(|t| (recipe.astray)(t.time, &t.body))),
                 Measure::DirectionP95 => quantile(&errors.direction, 0.95),
                 Measure::DirectionMean => {
@@ -113,17 +120,22 @@ impl Measures {
                 Measure::DirectionMax => quantile(&errors.direction, 1.0),
                 Measure::MagnitudeP95 => 100.0 * quantile(&errors.magnitude, 0.95),
                 Measure::TorqueP95 => quantile(&errors.torque, 0.95),
+                Measure::ForceP95 => quantile(&errors.force, 0.95),
                 Measure::Step => errors.step,
                 Measure::ExcessStep => errors.excess_step,
                 Measure::Energy => energy(ticks),
                 Measure::Friction => errors.friction,
-                Measure::FirstForceDepth => first_force(ticks, &ideal) / recipe.scene.stiffness(),
+                Measure::FirstForceDepth => first_force(ticks, ideal) / recipe.scene.stiffness(),
                 Measure::FalseForce => errors.false_force,
                 Measure::NotFinite => ticks.iter().filter(|tick| !is_finite(tick)).count() as f64,
                 Measure::Felt => errors.felt(),
             })
             .collect();
-        Self { values }
+        let probes = recipe.probes.iter().map(|probe| (probe.value)(ticks));
+        Self {
+            values,
+            probes: probes.collect(),
+        }
     }
 
     /// One of them.
@@ -145,12 +157,19 @@ fn is_finite(tick: &Tick) -> bool {
         && pose.rotation.coords.iter().all(|x| x.is_finite())
 }
 
-fn intersections(checker: &PenetrationChecker, ticks: &[Tick]) -> f64 {
+/// NaN where the obstacle moves: the check knows obstacles at rest, and those recipes have a depth of their own.
+fn intersections(checker: &PenetrationChecker, ticks: &[Tick], every: u32, moving: bool) -> f64 {
+    if moving {
+        return f64::NAN;
+    }
     let mut last = None;
-    let mut count = 0;
+    let (mut published, mut count) = (0_u32, 0);
     for tick in ticks {
         if last != Some(tick.body) {
-            count += u32::from(checker.penetrated(&tick.body).is_some());
+            if published.is_multiple_of(every) {
+                count += u32::from(checker.penetrated(&tick.body).is_some());
+            }
+            published += 1;
             last = Some(tick.body);
         }
     }
@@ -177,6 +196,7 @@ fn first_force(ticks: &[Tick], ideal: &[Vector6]) -> f64 {
 
 /// Errors of force, tick by tick where there is an ideal to compare with.
 struct ForceErrors {
+    force: Vec<f64>,
     direction: Vec<f64>,
     magnitude: Vec<f64>,
     torque: Vec<f64>,
@@ -192,6 +212,7 @@ impl ForceErrors {
     fn new(ticks: &[Tick], ideal: &[Vector6]) -> Self {
         let force = |i: usize| linear(&ticks[i].wrench);
         let mut errors = Self {
+            force: Vec::new(),
             direction: Vec::new(),
             magnitude: Vec::new(),
             torque: Vec::new(),
@@ -205,6 +226,7 @@ impl ForceErrors {
         let mut wrong = 0_u32;
         for (i, ideal) in ideal.iter().enumerate() {
             let (right, torque) = (linear(ideal), angular(ideal));
+            errors.force.push((force(i) - right).norm());
             wrong += u32::from((force(i) - right).norm() > FELT_FORCE);
             let off = (angular(&ticks[i].wrench) - torque).norm();
             errors.torque.push(off);
@@ -215,6 +237,16 @@ impl ForceErrors {
             }
         }
         errors.false_force = f64::from(wrong) * crate::clock::TICK;
+        if ideal.is_empty() {
+            // Nothing to compare with: no error is known, and none is claimed to be small.
+            errors.false_force = f64::NAN;
+            errors.friction = f64::NAN;
+            errors.excess_step = f64::NAN;
+            errors.step_jnd = f64::NAN;
+            for i in 1..ticks.len() {
+                errors.step = errors.step.max((force(i) - force(i - 1)).norm());
+            }
+        }
 
         let ideal_step: Vec<f64> = ideal
             .windows(2)
@@ -245,6 +277,9 @@ impl ForceErrors {
     }
 
     fn felt(&self) -> f64 {
+        if self.force.is_empty() {
+            return f64::NAN;
+        }
         [
             quantile(&self.direction, 0.95) / JND_DIRECTION,
             quantile(&self.magnitude, 0.95) / JND_MAGNITUDE,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use god_object::{Pose, Settings, Vector6, World};
 
-use crate::methods::{Discrete, GodObjectMethod, Penalty, VirtualCoupling};
+use crate::methods::{Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling};
 
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
 /// an update is made, and one while it is used.
@@ -15,6 +15,11 @@ const TOUCHING: [f64; 2] = [10e-6, 50e-6];
 /// Inertias and damping ratios that are tried for virtual coupling.
 const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
 const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
+
+/// Spacings of the points of the penalty method that are tried, over the body's longest side: an eighth, or the vertices alone.
+const SHELL_SPACINGS: [f64; 2] = [0.125, f64::INFINITY];
+/// Distances within which the point god-object counts faces as touched that are tried, in rest distances.
+const TOUCH_SHARES: [f64; 2] = [2.0, 10.0];
 
 /// A method on its way through a recipe.
 ///
@@ -32,6 +37,9 @@ pub trait HapticMethod {
 
     /// World from body, as published.
     fn pose(&self) -> Pose;
+
+    /// Tells where obstacle 0 is as of the next update. Recipes with one that moves leave out the methods that do not know of it.
+    fn move_obstacle(&mut self, _pose: &Pose) {}
 }
 
 /// A body, its obstacles, a free start, and the settings that every method takes its gains and limits from.
@@ -84,11 +92,13 @@ pub enum Method {
     Discrete,
     /// Points of the body pushed out of the obstacles.
     Penalty,
+    /// A god-object of three degrees of freedom: the body moves, held by up to three planes, and never turns.
+    Point,
 }
 
 impl Method {
     /// In the order of the tables.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Ours,
         Self::OursByDefault,
         Self::Paper,
@@ -96,6 +106,7 @@ impl Method {
         Self::VirtualCoupling,
         Self::Discrete,
         Self::Penalty,
+        Self::Point,
     ];
 
     /// Name in tables and files.
@@ -109,6 +120,7 @@ impl Method {
             Self::VirtualCoupling => "virtual coupling",
             Self::Discrete => "discrete",
             Self::Penalty => "penalty",
+            Self::Point => "3-dof god-object",
         }
     }
 
@@ -122,8 +134,15 @@ impl Method {
                 [Tuning::Default].into_iter().chain(touching).collect()
             }
             Self::Penalty => [ShellForce::Deepest, ShellForce::Mean, ShellForce::Sum]
-                .map(Tuning::Shell)
-                .into(),
+                .iter()
+                .flat_map(|force| {
+                    SHELL_SPACINGS.map(|spacing| Tuning::Shell {
+                        force: *force,
+                        spacing,
+                    })
+                })
+                .collect(),
+            Self::Point => TOUCH_SHARES.map(Tuning::Touch).into(),
             Self::VirtualCoupling => PROXY_SHARES
                 .iter()
                 .flat_map(|share| {
@@ -181,11 +200,18 @@ impl Method {
             }
             Self::Discrete => Box::new(Discrete::new(scene)),
             Self::Penalty => {
-                let shell_force = match tuning {
-                    Tuning::Shell(shell_force) => shell_force,
-                    _ => ShellForce::Deepest,
+                let (force, spacing) = match tuning {
+                    Tuning::Shell { force, spacing } => (force, spacing),
+                    _ => (ShellForce::Deepest, SHELL_SPACINGS[0]),
                 };
-                Box::new(Penalty::new(scene, shell_force))
+                Box::new(Penalty::new(scene, force, spacing))
+            }
+            Self::Point => {
+                let share = match tuning {
+                    Tuning::Touch(share) => share,
+                    _ => TOUCH_SHARES[0],
+                };
+                Box::new(PointGodObject::new(scene, share))
             }
         }
     }
@@ -205,8 +231,15 @@ pub enum Tuning {
         /// Damping over critical damping.
         damping_ratio: f64,
     },
-    /// What the points of the penalty method add up to.
-    Shell(ShellForce),
+    /// The points of the penalty method.
+    Shell {
+        /// What they add up to.
+        force: ShellForce,
+        /// Between points, over the body's longest side; infinite: the vertices alone.
+        spacing: f64,
+    },
+    /// Distance within which the point god-object counts faces as touched, in rest distances.
+    Touch(f64),
 }
 
 /// What the forces of all points in an obstacle add up to; each is the stiffness times its depth.
@@ -224,9 +257,19 @@ impl fmt::Display for Tuning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Default => write!(f, "default"),
-            Self::Shell(ShellForce::Sum) => write!(f, "sum of the points"),
-            Self::Shell(ShellForce::Mean) => write!(f, "mean of the points"),
-            Self::Shell(ShellForce::Deepest) => write!(f, "deepest point"),
+            Self::Shell { force, spacing } => {
+                let force = match force {
+                    ShellForce::Sum => "sum",
+                    ShellForce::Mean => "mean",
+                    ShellForce::Deepest => "deepest",
+                };
+                if spacing.is_finite() {
+                    write!(f, "{force} of points; spacing {spacing} of the body")
+                } else {
+                    write!(f, "{force} of vertices")
+                }
+            }
+            Self::Touch(share) => write!(f, "touching within {share} rest distances"),
             Self::Touching(distance) => write!(f, "rest distance {:.0} um", distance * 1e6),
             Self::Proxy {
                 share,

@@ -1,9 +1,13 @@
-//! What a recipe is.
+//! What a recipe is: a scene, a motion of the device, the right answer, and what passes.
+
+use std::sync::OnceLock;
 
 use god_object::{Pose, Vector6};
 
+use crate::clock::{TICK, Tick};
 use crate::measure::Measure;
-use crate::method::Scene;
+use crate::method::{Method, Scene};
+use crate::reference::{self, Answer};
 
 /// A limit for a measure, over all start phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +29,66 @@ impl Line {
 /// A length at a time, s, of a body at a pose.
 pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64>;
 
+/// A number of a whole run.
+pub type OfRun = Box<dyn Fn(&[Tick]) -> f64>;
+
+/// A number of one recipe alone, with its own limit.
+pub struct Probe {
+    /// Name in tables and files.
+    pub key: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Of a whole run.
+    pub value: OfRun,
+    /// Most that passes at a rate of updates, Hz; infinite where it is only shown.
+    pub limit: Box<dyn Fn(u32) -> f64>,
+}
+
+impl Probe {
+    /// A number with the same limit at every rate.
+    pub fn at_most(
+        key: &'static str,
+        unit: &'static str,
+        limit: f64,
+        value: impl Fn(&[Tick]) -> f64 + 'static,
+    ) -> Self {
+        Self {
+            key,
+            unit,
+            value: Box::new(value),
+            limit: Box::new(move |_| limit),
+        }
+    }
+}
+
+/// Where the right answer comes from.
+pub enum Ideal {
+    /// A formula: the wrench of the exact quasi-static problem at a time, s, in N and N m.
+    Closed(Box<dyn Fn(f64) -> Vector6>),
+    /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`reference`].
+    Reference,
+    /// None: the recipe is judged by what must hold of any answer.
+    None,
+}
+
+impl Ideal {
+    /// A formula.
+    pub fn closed(formula: impl Fn(f64) -> Vector6 + 'static) -> Self {
+        Self::Closed(Box::new(formula))
+    }
+}
+
+/// A pass line that this project's method does not keep, said openly: it is shown with its figure and is not a pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Open {
+    /// Which line or probe, by its key.
+    pub key: &'static str,
+    /// At this rate of updates, Hz.
+    pub rate: u32,
+    /// Why, as far as it is known.
+    pub reason: &'static str,
+}
+
 /// A scene, a motion, the right answer and what passes.
 pub struct Recipe {
     /// Short name, such as `R11`.
@@ -39,8 +103,8 @@ pub struct Recipe {
     pub device: Box<dyn Fn(f64) -> Pose>,
     /// How long it takes, s.
     pub duration: f64,
-    /// The force of the exact quasi-static problem at a time, N and N m.
-    pub ideal: Box<dyn Fn(f64) -> Vector6>,
+    /// The right answer.
+    pub ideal: Ideal,
     /// How deep the body at a pose is in an obstacle, m; 0 where it is free.
     pub depth: Box<dyn Fn(&Pose) -> f64>,
     /// How far the body at a time and a pose is beyond the side that it belongs to, m; 0 where it is on it.
@@ -49,6 +113,66 @@ pub struct Recipe {
     pub phases: u32,
     /// What passes at a rate of updates, Hz.
     pub lines: Box<dyn Fn(u32) -> Vec<Line>>,
+    /// Numbers of this recipe alone.
+    pub probes: Vec<Probe>,
+    /// Why a method has no part in it; `None` where it has.
+    pub out_of_scope: fn(Method) -> Option<&'static str>,
+    /// Where obstacle 0 is at a time, s; `None` where it stands still.
+    pub moving: Option<Box<dyn Fn(f64) -> Pose>>,
+    /// One published pose in so many is given to the independent check for intersections.
+    pub check_every: u32,
+    /// Lines that this project's method is known not to keep.
+    pub open: Vec<Open>,
+    pub(crate) answer: OnceLock<Answer>,
+}
+
+impl Recipe {
+    /// A recipe without a right answer, lines or probes yet: the rest is filled in by struct update.
+    #[must_use]
+    pub fn new(
+        (name, case): (&'static str, String),
+        about: &'static str,
+        scene: Scene,
+        duration: f64,
+        device: impl Fn(f64) -> Pose + 'static,
+    ) -> Self {
+        Self {
+            name,
+            case,
+            about,
+            scene,
+            device: Box::new(device),
+            duration,
+            ideal: Ideal::None,
+            depth: Box::new(|_| 0.0),
+            astray: Box::new(|_, _| 0.0),
+            phases: 1,
+            lines: Box::new(|_| Vec::new()),
+            probes: Vec::new(),
+            out_of_scope: |_| None,
+            moving: None,
+            check_every: 1,
+            open: Vec::new(),
+            answer: OnceLock::new(),
+        }
+    }
+
+    /// How many ticks it takes.
+    #[must_use]
+    pub fn ticks(&self) -> u32 {
+        (self.duration / TICK).round() as u32 + 1
+    }
+
+    /// The right answer at every tick; a reference run is made, or read from its cache, on the first call.
+    pub fn answer(&self) -> &Answer {
+        self.answer.get_or_init(|| match &self.ideal {
+            Ideal::Closed(formula) => {
+                Answer::exact((0..self.ticks()).map(|tick| formula(f64::from(tick) * TICK)))
+            }
+            Ideal::Reference => reference::of(self),
+            Ideal::None => Answer::exact(std::iter::empty()),
+        })
+    }
 }
 
 impl std::fmt::Debug for Recipe {

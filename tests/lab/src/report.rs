@@ -1,11 +1,13 @@
-//! The table of all outcomes, and the files behind it.
+//! The table of all rows, and the files behind it.
 //!
-//! | file           | a row is                                                                  |
-//! |----------------|---------------------------------------------------------------------------|
-//! | `lines.csv`    | a pass line of a recipe, for a method at a rate, with the worst over phases |
-//! | `measures.csv` | a run from one start phase, with every measure                            |
-//! | `times.csv`    | a recipe for a method at a rate, with its CPU times: these alone differ    |
-//! | `chart.csv`    | a point of the chart                                                      |
+//! | file           | a row is                                                                          |
+//! |----------------|-----------------------------------------------------------------------------------|
+//! | `table.md`     | a recipe for a player at a rate: what it missed                                   |
+//! | `rows.csv`     | a measure of that, the worst over start phases, against its pass line: a [`Row`]  |
+//! | `measures.csv` | a run from one start phase, with every measure                                    |
+//! | `trials.csv`   | a tuning that was tried                                                           |
+//! | `times.csv`    | a recipe for a method at a rate, with its CPU times: these alone differ           |
+//! | `chart.csv`    | a point of the chart                                                              |
 
 use std::fmt::Write as _;
 use std::fs;
@@ -14,84 +16,127 @@ use std::path::Path;
 
 use crate::measure::Measure;
 use crate::outcome::Outcome;
+use crate::row::{Row, Verdict};
 
-/// The pass lines that were missed, each by how much, or `pass`.
+/// What was missed of these rows, each by how much; `pass` where nothing was, `open` where that is known.
 #[must_use]
-pub fn verdict(outcome: &Outcome) -> String {
-    let missed: Vec<String> = outcome
-        .lines
-        .iter()
-        .filter(|(_, passes)| !passes)
-        .map(|(line, _)| {
-            let (key, unit) = (line.measure.key(), line.measure.unit());
-            let worst = outcome.worst(line.measure);
-            format!("{key} {} > {} {unit}", brief(worst), brief(line.limit))
-        })
-        .collect();
-    if missed.is_empty() {
-        "pass".into()
-    } else {
-        format!("FAIL: {}", missed.join("; "))
+pub fn verdict(rows: &[Row]) -> String {
+    let mut missed = Vec::new();
+    let (mut failed, mut lines) = (false, false);
+    for row in rows {
+        lines |= row.limit.is_some();
+        let by = || {
+            let limit = row.limit.map_or_else(|| "none".to_owned(), brief);
+            format!(
+                "{} {} > {limit} {}",
+                row.measure,
+                brief(row.value),
+                row.unit
+            )
+        };
+        match &row.verdict {
+            Verdict::Pass | Verdict::Shown => {}
+            Verdict::Fail => {
+                failed = true;
+                missed.push(by());
+            }
+            Verdict::Open(reason) => missed.push(format!("{} ({reason})", by())),
+            Verdict::OutOfScope(reason) => return format!("out of scope: {reason}"),
+        }
+    }
+    match (missed.is_empty(), failed) {
+        (false, true) => format!("FAIL: {}", missed.join("; ")),
+        (false, false) => format!("OPEN: {}", missed.join("; ")),
+        (true, _) if lines => "pass".to_owned(),
+        (true, _) => "shown".to_owned(),
     }
 }
 
 /// The table for people: no times, the same in every run.
 #[must_use]
-pub fn table(outcomes: &[Outcome]) -> String {
-    let mut text = String::from("| recipe | case | method | tuning | rate | J | verdict |\n");
-    text.push_str("|--------|------|--------|--------|------|---|---------|\n");
-    for o in outcomes {
-        let felt = brief(o.worst(Measure::Felt));
-        let (name, verdict) = (o.method.name(), verdict(o));
+pub fn table(rows: &[Row]) -> String {
+    let mut text = String::from("| recipe | case | method | settings | rate | J | verdict |\n");
+    text.push_str("|--------|------|--------|----------|------|---|---------|\n");
+    for group in rows.chunk_by(|a, b| player(a) == player(b)) {
+        let (recipe, case, method, settings, rate) = player(&group[0]);
+        let rate = rate.map_or_else(String::new, |rate| format!("{rate} Hz"));
+        let felt = group.iter().find(|row| row.measure == Measure::Felt.key());
+        let felt = felt.map_or_else(String::new, |row| brief(row.value));
+        let verdict = verdict(group);
         let _ = writeln!(
             text,
-            "| {} | {} | {name} | {} | {} Hz | {felt} | {verdict} |",
-            o.recipe, o.case, o.tuning, o.rate
+            "| {recipe} | {case} | {method} | {settings} | {rate} | {felt} | {verdict} |"
         );
     }
     text
 }
 
-/// Writes `table.md`, `lines.csv`, `measures.csv` and `times.csv`.
-pub fn write(outcomes: &[Outcome], directory: &Path) -> io::Result<()> {
+fn player(row: &Row) -> (&str, &str, &str, &str, Option<u32>) {
+    (row.recipe, &row.case, &row.method, &row.settings, row.rate)
+}
+
+/// Writes all files but those of the chart.
+pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> io::Result<()> {
     fs::create_dir_all(directory)?;
-    fs::write(directory.join("table.md"), table(outcomes))?;
-    fs::write(directory.join("lines.csv"), lines(outcomes))?;
+    fs::write(directory.join("table.md"), table(rows))?;
+    fs::write(directory.join("rows.csv"), rows_csv(rows))?;
     fs::write(directory.join("measures.csv"), measures(outcomes))?;
+    fs::write(directory.join("trials.csv"), trials(outcomes))?;
     fs::write(directory.join("times.csv"), times(outcomes))
 }
 
+/// Rows as CSV, without their times.
+#[must_use]
+pub fn rows_csv(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "recipe,case,method,settings,rate_hz,measure,value,unit,limit,verdict,reason\n",
+    );
+    for row in rows {
+        let rate = row.rate.map_or_else(String::new, |rate| rate.to_string());
+        let limit = row.limit.map_or_else(String::new, |l| format!("{l:.6e}"));
+        let reason = match &row.verdict {
+            Verdict::Open(reason) => reason,
+            Verdict::OutOfScope(reason) => reason.as_str(),
+            Verdict::Pass | Verdict::Fail | Verdict::Shown => "",
+        };
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{rate},{},{:.6e},{},{limit},{},{}",
+            row.recipe,
+            quoted(&row.case),
+            quoted(&row.method),
+            quoted(&row.settings),
+            quoted(&row.measure),
+            row.value,
+            quoted(&row.unit),
+            row.verdict,
+            quoted(reason)
+        );
+    }
+    text
+}
+
+/// A text as one field of a CSV.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
 /// The columns that name an outcome.
-pub(crate) const KEYS: &str = "recipe,case,method,tuning,rate_hz";
+pub(crate) const KEYS: &str = "recipe,case,method,settings,rate_hz";
 
 pub(crate) fn keys(outcome: &Outcome) -> String {
     format!(
-        "{},\"{}\",{},{},{}",
+        "{},{},{},{},{}",
         outcome.recipe,
-        outcome.case,
+        quoted(&outcome.case),
         outcome.method.name(),
         outcome.tuning,
         outcome.rate
     )
-}
-
-fn lines(outcomes: &[Outcome]) -> String {
-    let mut text = format!("{KEYS},measure,unit,worst,mean,limit,passes\n");
-    for outcome in outcomes {
-        for (line, passes) in &outcome.lines {
-            let _ = writeln!(
-                text,
-                "{},{},{},{:.6e},{:.6e},{:.6e},{passes}",
-                keys(outcome),
-                line.measure.key(),
-                line.measure.unit(),
-                outcome.worst(line.measure),
-                outcome.mean(line.measure),
-                line.limit
-            );
-        }
-    }
-    text
 }
 
 fn measures(outcomes: &[Outcome]) -> String {
@@ -111,6 +156,21 @@ fn measures(outcomes: &[Outcome]) -> String {
                 let _ = write!(text, ",{:.6e}", values.get(*measure));
             }
             text.push('\n');
+        }
+    }
+    text
+}
+
+fn trials(outcomes: &[Outcome]) -> String {
+    let mut text = String::from("recipe,case,method,chosen,rate_hz,tried,missed_lines,j\n");
+    for outcome in outcomes {
+        for trial in &outcome.trials {
+            let keys = keys(outcome);
+            let _ = writeln!(
+                text,
+                "{keys},{},{},{:.6e}",
+                trial.tuning, trial.missed, trial.felt
+            );
         }
     }
     text

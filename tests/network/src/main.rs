@@ -1,13 +1,17 @@
 //! Prints the table of the cluster's targets with what this machine keeps of them now:
 //! `cargo run --release -p taut-network-tests -- [--quick] [--soak S] [--seconds S] [--taut PROGRAM] [--csv FILE] [SECTION...]`.
 //!
+//! `-- --node SERVER NAME udp|quic KEY SECONDS` is one node of a network of namespaces or machines, see `scripts/netns-cluster`.
+//!
 //! Exit code 1 where a measured target is not met, 2 where something could not be measured at all.
 
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
-use taut_network_tests::bench::isolation;
+use taut_link::Transport;
+use taut_network_tests::bench::{isolation, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
 
 struct Arguments {
@@ -26,6 +30,32 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         };
         isolation::client(server, node, transport, key.as_ref())?;
         return Ok(ExitCode::SUCCESS);
+    }
+    // One node of a network of namespaces or machines.
+    if arguments.next_if(|first| first == "--node").is_some() {
+        let words: Vec<String> = arguments.collect();
+        let [server, node, transport, key, seconds] = &words[..] else {
+            return Err("--node takes SERVER NODE udp|quic KEY SECONDS".into());
+        };
+        let transport = match transport.as_str() {
+            "quic" => Transport::QuicDatagram,
+            _ => Transport::Udp,
+        };
+        let seconds = Duration::from_secs_f64(positive(seconds)?);
+        let got = node::run(server, node, transport, key.as_ref(), seconds)?;
+        println!(
+            "{node}: joined in {:.3} s, {} states, {} lost, {} refused, {} out of order; latency p50 {:.2} ms, p99 {:.2} ms, clock +-{:.3} ms",
+            got.joined_s,
+            got.states,
+            got.lost,
+            got.refused,
+            got.disordered,
+            got.latency_ms.p50,
+            got.latency_ms.p99,
+            got.clock_ms
+        );
+        let good = got.states > 0 && got.disordered == 0;
+        return Ok(ExitCode::from(u8::from(!good)));
     }
     let Arguments {
         extent,

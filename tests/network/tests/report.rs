@@ -46,6 +46,11 @@ fn join() {
 }
 
 #[test]
+fn death() {
+    check("death");
+}
+
+#[test]
 fn soak() {
     check("soak");
 }

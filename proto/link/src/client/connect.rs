@@ -17,7 +17,10 @@ use crate::{
 use quinn::{Connection, ConnectionError, Endpoint, RecvStream, SendStream};
 use std::{
     net::{Ipv4Addr, Ipv6Addr, SocketAddr},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 use taut_proto::{
@@ -53,9 +56,16 @@ pub(crate) async fn connect_with(
     let addresses = timeout_at(deadline, resolve(&options.server))
         .await
         .map_err(|_| unreachable())??;
-    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses))
+    let turned_away = AtomicBool::new(false);
+    let (endpoint, connection) = timeout_at(deadline, reach(&options, &addresses, &turned_away))
         .await
-        .map_err(|_| unreachable())??;
+        .map_err(|_| match turned_away.load(Ordering::Relaxed) {
+            true => LinkError::TurnedAway {
+                server: options.server.clone(),
+                seconds: options.connect_timeout.as_secs_f64(),
+            },
+            false => unreachable(),
+        })??;
 
     let joining = timeout_at(deadline, join(&options, &connection));
     let Joined {
@@ -144,6 +154,7 @@ async fn resolve(server: &str) -> Result<Vec<SocketAddr>, LinkError> {
 async fn reach(
     options: &ClientOptions,
     addresses: &[SocketAddr],
+    turned_away: &AtomicBool,
 ) -> Result<(Endpoint, Connection), LinkError> {
     let pinned = Arc::new(PinnedServer::new(options.key.pin()));
     let config = transport::client_config(pinned.clone(), options.idle_timeout)?;
@@ -178,7 +189,11 @@ async fn reach(
                         },
                     });
                 }
-                Err(_) => {} // nobody there, or too busy: try again
+                // It is there, and will not listen yet: try again.
+                Err(ConnectionError::ConnectionClosed(_)) => {
+                    turned_away.store(true, Ordering::Relaxed);
+                }
+                Err(_) => {} // nobody there: try again
             }
         }
         sleep_until(round + RETRY_PERIOD).await;

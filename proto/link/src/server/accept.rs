@@ -47,6 +47,8 @@ const REFUSAL_TIMEOUT: Duration = Duration::from_millis(500);
 const MESSAGES_PER_SECOND: u64 = 100;
 /// See [`MESSAGES_PER_SECOND`].
 const MESSAGE_BURST: u64 = 256;
+/// Time for one of these to come, once it has begun.
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(3);
 /// Priority of a mesh's stream, below that of control, which has 0.
 const MESH_PRIORITY: i32 = -1;
 /// Bytes of a mesh that are written at a time: 1 ms at the pace of all meshes.
@@ -287,7 +289,7 @@ async fn attend(
 async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream) -> String {
     let mut pace = Pace::new(MESSAGES_PER_SECOND, MESSAGE_BURST);
     loop {
-        let message = read_whole_message(recv, MAX_FRAME_BYTES).await;
+        let message = read_whole_message(recv, MAX_FRAME_BYTES, MESSAGE_TIMEOUT).await;
         at_pace(shared, &mut pace).await;
         let message = match message {
             Ok(message) => message,

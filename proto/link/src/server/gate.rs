@@ -47,7 +47,6 @@ pub(crate) fn permits(shared: &Shared, session: &Session, act: Act) -> bool {
     }
     shared.counters.forbidden.one();
     if session.rights.note_forbidden(act) {
-        tracing::warn!(node = session.node, role = %session.role, "may not {act}");
         shared.tell(LinkEvent::Forbidden {
             node: session.node.clone(),
             role: session.role,

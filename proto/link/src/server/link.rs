@@ -133,6 +133,11 @@ impl ServerLink {
         self.shared.key.server_pin()
     }
 
+    /// Incarnation of this server, in every datagram's header: no secret, it is sent clear.
+    pub fn epoch(&self) -> u32 {
+        self.shared.epoch
+    }
+
     /// Address of the control plane, with the port that was taken.
     pub fn quic_addr(&self) -> SocketAddr {
         self.quic_address
@@ -146,11 +151,6 @@ impl ServerLink {
     /// The clock of the session.
     pub fn clock(&self) -> SessionClock {
         self.shared.clock
-    }
-
-    /// Incarnation of this server, in every datagram's header.
-    pub fn epoch(&self) -> u32 {
-        self.shared.epoch
     }
 
     /// A sender of states, for the broadcast thread.

@@ -66,6 +66,12 @@ fn every_fault_names_file_line_and_key() {
             "`quic_port` in [network] is 70000, but must be between 0 and 65535",
         ),
         (
+            "node_timeout = 0.5 ",
+            "node_timeout = 0 ",
+            "node_timeout",
+            "`node_timeout` in [network] is 0, but must be greater than zero and at most 60",
+        ),
+        (
             "bind = \"127.0.0.1\"",
             "bind = \"here\"",
             "\"here\"",

@@ -124,3 +124,48 @@ fn a_simulated_device_may_be_made_of_strings() {
     let error = with_device("kind = \"trace\"\npath = \"a.csv\"\nstrings = \"wb\"");
     assert!(error.is_err_and(|text| text.contains("strings")));
 }
+
+#[test]
+fn a_tracker_on_the_network_takes_the_place_of_the_sway() {
+    let sway = "sway = { amplitude = 0.05, period = 8.0 }";
+    let workbench = with_viewer(sway, "remote_tracker = true").expect("valid");
+    assert_eq!(workbench.viewer.tracking, HeadTracking::Remote);
+    let workbench = with_viewer(sway, &format!("{sway}\nremote_tracker = false")).expect("valid");
+    assert!(matches!(
+        workbench.viewer.tracking,
+        HeadTracking::Sway { .. }
+    ));
+    let error = with_viewer(sway, &format!("{sway}\nremote_tracker = true")).expect_err("both");
+    assert!(error.contains("excludes"), "{error}");
+}
+
+fn with_admission(keys: &str) -> Result<Workbench, String> {
+    let text = SHIPPED_WORKBENCH.replace("max_clients = 16", keys);
+    assert_ne!(text, SHIPPED_WORKBENCH);
+    Workbench::parse("w.toml", &text, Path::new("")).map_err(|error| error.to_string())
+}
+
+#[test]
+fn roles_and_revoked_credentials_are_read_and_faults_have_their_line() {
+    let everybody = &with_admission("").expect("valid").network.admission;
+    assert_eq!(everybody.roles.len(), 5);
+    assert!(everybody.revoked.is_empty());
+    let some = with_admission("roles = [\"render\"]\nrevoked = [\"front#2\", \"observer:*\"]")
+        .expect("valid")
+        .network
+        .admission;
+    assert_eq!(some.roles.len(), 1);
+    let texts: Vec<String> = some.revoked.iter().map(ToString::to_string).collect();
+    assert_eq!(texts, ["front#2", "observer:*"]);
+    for (keys, part) in [
+        ("roles = []", "lets nobody in"),
+        ("roles = [\"admin\"]", "no role \"admin\""),
+        ("roles = \"render\"", "an array"),
+        ("revoked = [\"*\"]", "shut everybody out"),
+        ("revoked = [\"front#0\"]", "names no issue"),
+        ("revoke = [\"front\"]", "did you mean `revoked`?"),
+    ] {
+        let error = with_admission(keys).expect_err(keys);
+        assert!(error.contains(part), "{keys}: {error}");
+    }
+}

@@ -1,7 +1,7 @@
 //! The god-object method of this project, with whatever settings: its defaults, or as published.
 
 use god_object::spatial::{angular, linear, pose_difference};
-use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, Vector6};
+use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, ShadedAcceleration, Vector6};
 use nalgebra::Vector3;
 
 use crate::method::{HapticMethod, Scene};
@@ -13,6 +13,7 @@ pub struct GodObjectMethod {
     coupling: Coupling,
     published: ConstraintSet,
     last_device: Pose,
+    shaded: Option<ShadedAcceleration>,
 }
 
 impl GodObjectMethod {
@@ -28,6 +29,7 @@ impl GodObjectMethod {
             published: simulation.constraint_set().clone(),
             simulation,
             last_device: scene.start,
+            shaded: None,
         }
     }
 }
@@ -39,7 +41,7 @@ impl HapticMethod for GodObjectMethod {
         self.last_device = *device;
         let ahead = linear(&moved).norm() + self.simulation.radius() * angular(&moved).norm();
         self.simulation.set_device_ahead(ahead);
-        let _ = self.simulation.step(device, None);
+        let _ = self.simulation.step(device, self.shaded.as_ref());
     }
 
     fn publish(&mut self) {
@@ -47,7 +49,13 @@ impl HapticMethod for GodObjectMethod {
     }
 
     fn force(&mut self, time: f64, device: &Pose) -> Vector6 {
-        self.coupling.step(time, device, &self.published).wrench
+        let output = self.coupling.step(time, device, &self.published);
+        self.shaded = output.shaded;
+        output.wrench
+    }
+
+    fn move_obstacle(&mut self, pose: &Pose) {
+        self.simulation.move_obstacle(0, pose);
     }
 
     fn pose(&self) -> Pose {

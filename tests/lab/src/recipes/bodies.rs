@@ -3,9 +3,12 @@
 use god_object::{Body, Mesh, Obstacle, Pose, Primitive, Vector6};
 use nalgebra::{Point3, Vector3};
 use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_scene::RawMesh;
 use taut_scene::shapes::{cuboid, sphere};
 
+use crate::clock::Tick;
 use crate::measure::Measure;
+use crate::method::Method;
 use crate::recipe::Line;
 
 /// Deepest penetration that passes, m.
@@ -131,4 +134,52 @@ impl Path {
         let place = self.at(time);
         Pose::translation(place.x, place.y, place.z)
     }
+}
+
+/// Why the god-object of three degrees of freedom has no part in a recipe that turns its body.
+pub(super) fn turns(method: Method) -> Option<&'static str> {
+    (method == Method::Point).then_some("its body does not turn")
+}
+
+/// Why only this project's method has a part in a recipe.
+pub(super) fn ours_alone(method: Method, reason: &'static str) -> Option<&'static str> {
+    let ours = matches!(method, Method::Ours | Method::OursByDefault);
+    (!ours).then_some(reason)
+}
+
+/// The largest of a number of the ticks from `begin` on, s.
+pub(super) fn largest_from(
+    begin: f64,
+    value: impl Fn(&Tick) -> f64 + 'static,
+) -> impl Fn(&[Tick]) -> f64 + 'static {
+    move |ticks| {
+        let late = ticks.iter().filter(|tick| tick.time >= begin);
+        // f64::max drops NaN: a number that is none must not be dropped.
+        late.map(&value)
+            .fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+    }
+}
+
+/// A convex outline in x and z, anticlockwise seen against y, drawn out to `half` on both sides along y.
+pub(super) fn drawn_out(outline: &[[f64; 2]], half: f64) -> Mesh {
+    let count = outline.len() as u32;
+    let mut raw = RawMesh::default();
+    for y in [-half, half] {
+        let corners = outline.iter().map(|[x, z]| Point3::new(*x, y, *z));
+        raw.vertices.extend(corners);
+    }
+    for i in 0..count {
+        let (a, b) = (i, (i + 1) % count);
+        raw.triangles
+            .extend([[a, b, b + count], [a, b + count, a + count]]);
+    }
+    for i in 1..count - 1 {
+        raw.triangles
+            .extend([[0, i + 1, i], [count, count + i, count + i + 1]]);
+    }
+    // Seen against y, x to the right and z up turn clockwise about y: whichever way is outward.
+    Mesh::new(raw.vertices.clone(), raw.triangles.clone()).unwrap_or_else(|_| {
+        raw.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh(raw)
+    })
 }

@@ -10,7 +10,7 @@ use super::bodies::{ball, force, ghost_time, smooth, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 
 /// Of the ball, m: the point that it stands for goes round at the cylinder's radius and this.
 const TIP: f64 = 1e-3;
@@ -24,24 +24,35 @@ const APPROACH_SPEED: f64 = 0.05;
 /// How long the device waits before it goes round, s.
 const WAIT: f64 = 0.2;
 
-pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
-    [(0.02, 0.05), (0.02, 0.2), (0.05, 0.05), (0.05, 0.2)]
-        .map(|(radius, speed)| recipe(radius, speed))
-        .into()
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    let mut recipes: Vec<Recipe> = [(0.02, 0.05), (0.02, 0.2), (0.05, 0.05), (0.05, 0.2)]
+        .map(|(radius, speed)| recipe(radius, speed, None))
+        .into();
+    let facets = extent.choose(&[16, 64, 256][..], &[64][..]);
+    recipes.extend(facets.iter().map(|n| recipe(0.02, 0.2, Some(*n))));
+    recipes
 }
 
-/// `radius`: of the way of the ball's centre on the cylinder, m.
-fn recipe(radius: f64, speed: f64) -> Recipe {
+/// `radius`: of the way of the ball's centre on the cylinder, m; `sides`: of the prism that stands for it, `None` for the true one.
+fn recipe(radius: f64, speed: f64, sides: Option<usize>) -> Recipe {
     let solid = radius - TIP;
     let mut round = obstacle(
         "cylinder",
-        mesh(cylinder(solid, HALF_LENGTH, FACETS, Axis::Y)),
+        mesh(cylinder(
+            solid,
+            HALF_LENGTH,
+            sides.unwrap_or(FACETS),
+            Axis::Y,
+        )),
         Pose::identity(),
     );
-    round.primitive = Some(Primitive::Cylinder {
+    round.primitive = sides.is_none().then(|| Primitive::Cylinder {
         ends: [-HALF_LENGTH, HALF_LENGTH].map(|y| Point3::new(0.0, y, 0.0)),
         radius: solid,
     });
+    let facet = sides.map_or(0.0, |sides| 180.0 / sides as f64);
+    // The middle of a side is nearer to the axis than a corner.
+    let sunk = solid * (1.0 - facet.to_radians().cos());
     let world = World {
         body: ball(TIP),
         obstacles: vec![round],
@@ -61,21 +72,17 @@ fn recipe(radius: f64, speed: f64) -> Recipe {
     };
     let scene = Scene::new(world, 2.0 * TIP, speed.max(APPROACH_SPEED), device(0.0));
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
+    let prism = sides.map_or_else(String::new, |n| format!(", {n} sides"));
+    let duration = begin + std::f64::consts::PI * radius / speed;
     Recipe {
-        name: "R12",
-        case: format!("radius {} mm, {speed} m/s", radius * 1e3),
-        about: "sliding on a cylinder: stale normals",
-        duration: begin + std::f64::consts::PI * radius / speed,
-        scene,
-        device: Box::new(device),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             let (depth, out) = place(time);
             let pushed = out * (stiffness * depth.max(0.0));
             force(pushed.x, pushed.y, pushed.z)
         }),
         depth: Box::new(move |body| {
             let place = body.translation;
-            (radius - place.x.hypot(place.z)).max(0.0)
+            (radius - sunk - place.x.hypot(place.z)).max(0.0)
         }),
         astray: Box::new(|_, _| 0.0),
         phases: 1,
@@ -83,9 +90,25 @@ fn recipe(radius: f64, speed: f64) -> Recipe {
             // As far as the ball goes round while a set is made and used.
             let stale = speed / radius * (ghost_time(k_s, rate) + TICK);
             let mut lines = sound();
-            lines.push(smooth(stiffness, speed));
-            lines.push(Line::at_most(Measure::DirectionMax, stale.to_degrees()));
+            if sides.is_none() {
+                lines.push(smooth(stiffness, speed));
+                lines.push(Line::at_most(Measure::DirectionMax, stale.to_degrees()));
+            } else {
+                // At a corner of the prism the ideal itself turns by a facet.
+                let late = stale.to_degrees() + facet;
+                lines.push(Line::at_most(Measure::DirectionMean, late));
+            }
             lines
         }),
+        ..Recipe::new(
+            (
+                "R12",
+                format!("radius {} mm, {speed} m/s{prism}", radius * 1e3),
+            ),
+            "sliding on a cylinder: stale normals",
+            scene,
+            duration,
+            device,
+        )
     }
 }

@@ -7,7 +7,7 @@ use super::Extent;
 use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 use crate::vertex_depth::Convex;
 
 const HALF: f64 = 0.5e-3;
@@ -36,14 +36,9 @@ fn recipe(extent: Extent, speed: f64) -> Recipe {
     let ideal = path.clone();
     let rest = path.duration() - AT_REST;
     let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));
+    let duration = path.duration();
     Recipe {
-        name: "R10a",
-        case: format!("{speed} m/s"),
-        about: "fast impact: stops at first contact",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             let depth = (HALF - ideal.at(time).z).max(0.0);
             force(0.0, 0.0, (stiffness * depth).min(limit))
         }),
@@ -63,5 +58,12 @@ fn recipe(extent: Extent, speed: f64) -> Recipe {
             lines.push(Line::at_most(Measure::Astray, REST_ERROR));
             lines
         }),
+        ..Recipe::new(
+            ("R10a", format!("{speed} m/s")),
+            "fast impact: stops at first contact",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }
 }

@@ -8,7 +8,7 @@ use super::bodies::{Path, ball, block, force, ghost_time, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 use crate::vertex_depth::Convex;
 
 const TIP: f64 = 1e-3;
@@ -34,14 +34,9 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let (stiffness, k_s) = (scene.stiffness(), scene.settings.k_s);
     let ideal = path.clone();
     let plate = Convex::cuboid(low, high);
+    let duration = path.duration();
     vec![Recipe {
-        name: "R13",
-        case: "end of a plate".into(),
-        about: "ghost plane: no force past the end",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             // Past the end the ball falls to the side of the plate, which holds its centre one radius away.
             let place = ideal.at(time);
             if place.x < 0.0 {
@@ -69,5 +64,12 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::FalseForce, push));
             lines
         }),
+        ..Recipe::new(
+            ("R13", "end of a plate".into()),
+            "ghost plane: no force past the end",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }]
 }

@@ -8,7 +8,7 @@ use super::bodies::{Path, ball, force, ground, sound};
 use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 
 const RADIUS: f64 = 5e-3;
 /// Where the device begins, turns and ends, m above the plane.
@@ -37,14 +37,9 @@ fn recipe(speed: f64) -> Recipe {
     let scene = Scene::new(world, 2.0 * RADIUS, speed, path.pose(0.0));
     let stiffness = scene.stiffness();
     let ideal = path.clone();
+    let duration = path.duration();
     Recipe {
-        name: "R11",
-        case: format!("{speed} m/s"),
-        about: "late contact: force begins where the hand crosses the surface",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             force(0.0, 0.0, stiffness * (RADIUS - ideal.at(time).z).max(0.0))
         }),
         depth: Box::new(|body| (RADIUS - body.translation.z).max(0.0)),
@@ -58,5 +53,12 @@ fn recipe(speed: f64) -> Recipe {
             lines.push(Line::at_most(Measure::Friction, FRICTION));
             lines
         }),
+        ..Recipe::new(
+            ("R11", format!("{speed} m/s")),
+            "late contact: force begins where the hand crosses the surface",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }
 }

@@ -1,15 +1,35 @@
 //! All recipes.
 
+mod arrival;
+mod bad_meshes;
 mod bodies;
+mod bunny;
+mod comb;
+mod control;
+mod convex_edge;
 mod cylinder;
 mod fast_impact;
+mod flat_on_flat;
+mod free_space;
+mod friction;
 mod ghost_plane;
+mod groove;
 mod late_contact;
+mod moving_plate;
+mod nut;
+mod oracles;
+mod peg;
 mod push_slide_lift;
+mod scale;
+mod shading_energy;
+mod spinning_bar;
+mod start_inside;
+mod texture;
 mod thin_plate;
 mod wrong_side;
 
 use crate::recipe::Recipe;
+use crate::study::Study;
 
 /// How much of each recipe is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,15 +54,55 @@ impl Extent {
 #[must_use]
 pub fn all(extent: Extent) -> Vec<Recipe> {
     [
+        free_space::recipes,
         push_slide_lift::recipes,
+        flat_on_flat::recipes,
+        groove::recipes,
+        convex_edge::recipes,
         thin_plate::recipes,
         fast_impact::recipes,
+        spinning_bar::recipes,
         late_contact::recipes,
         cylinder::recipes,
         ghost_plane::recipes,
+        peg::recipes,
+        comb::recipes,
+        nut::recipes,
+        bunny::recipes,
         wrong_side::recipes,
+        texture::recipes,
+        friction::recipes,
+        shading_energy::recipes,
+        scale::recipes,
+        moving_plate::recipes,
     ]
     .into_iter()
     .flat_map(|recipes| recipes(extent))
     .collect()
 }
+
+/// Every recipe that is no run along a path. A new one is one line here.
+#[rustfmt::skip]
+pub const STUDIES: &[Study] = &[
+    Study { name: "R03", about: "one contact off centre: closed form", run: oracles::one_contact::run },
+    Study { name: "R04", about: "flat on flat: any number of contacts", run: oracles::flat_on_flat::run },
+    Study { name: "R05", about: "near-parallel normals", run: oracles::near_parallel::run },
+    Study { name: "R06", about: "V-groove", run: oracles::groove::run },
+    Study { name: "R07", about: "corner of three planes", run: oracles::corner::run },
+    Study { name: "R09", about: "thin plate: a sheet of no thickness", run: control::sheet },
+    Study { name: "R14", about: "a wall that arrives late", run: arrival::run },
+    Study { name: "R15", about: "critical stiffness of a wall", run: |extent| control::run("R15", extent) },
+    Study { name: "R16", about: "limit cycles of a quantised encoder", run: |extent| control::run("R16", extent) },
+    Study { name: "R17", about: "handle released in the hole", run: |extent| control::run("R17", extent) },
+    Study { name: "R20", about: "rotation past a half turn", run: |extent| control::run("R20", extent) },
+    Study { name: "R21", about: "wind-up of two turns", run: |extent| control::run("R21", extent) },
+    Study { name: "R22", about: "bad samples of the device", run: |extent| control::run("R22", extent) },
+    Study { name: "R23", about: "saturation", run: |extent| control::run("R23", extent) },
+    Study { name: "R24", about: "cluster", run: control::cluster },
+    Study { name: "R27", about: "bunny on bunny: where its data are not there", run: bunny::unavailable },
+    Study { name: "R32", about: "bad meshes", run: bad_meshes::run },
+    Study { name: "R33", about: "start in penetration", run: start_inside::run },
+    Study { name: "R35", about: "loops that stall", run: |extent| control::run("R35", extent) },
+    Study { name: "R36", about: "faults of a string-driven device", run: |extent| control::run("R36", extent) },
+    Study { name: "R38", about: "thousands of contacts", run: oracles::many_contacts::run },
+];

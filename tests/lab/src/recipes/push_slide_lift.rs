@@ -7,7 +7,7 @@ use super::Extent;
 use super::bodies::{Path, ball, force, ground, smooth, sound};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 
 const RADIUS: f64 = 0.01;
 const DEPTH: f64 = 5e-3;
@@ -40,14 +40,9 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
     );
     let stiffness = scene.stiffness();
     let ideal = path.clone();
+    let duration = path.duration();
     vec![Recipe {
-        name: "R02",
-        case: "ball on a plane".into(),
-        about: "push, slide, lift: no artificial friction",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             force(0.0, 0.0, stiffness * (RADIUS - ideal.at(time).z).max(0.0))
         }),
         depth: Box::new(|body| (RADIUS - body.translation.z).max(0.0)),
@@ -60,5 +55,12 @@ pub(super) fn recipes(_extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::FalseForce, 0.0));
             lines
         }),
+        ..Recipe::new(
+            ("R02", "ball on a plane".into()),
+            "push, slide, lift: no artificial friction",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }]
 }

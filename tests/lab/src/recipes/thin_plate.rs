@@ -7,7 +7,7 @@ use super::Extent;
 use super::bodies::{Path, block, cube, cube_mesh, force, smooth, sound};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 use crate::vertex_depth::Convex;
 
 const HALF: f64 = 0.5e-3;
@@ -40,14 +40,9 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let (plate, body) = (Convex::cuboid(low, high), cube_mesh(HALF));
+    let duration = path.duration();
     Recipe {
-        name: "R09",
-        case: format!("plate of {} mm", thickness * 1e3),
-        about: "thin plate: no pop-through",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             let depth = (HALF - ideal.at(time).z).max(0.0);
             force(0.0, 0.0, (stiffness * depth).min(limit))
         }),
@@ -61,5 +56,12 @@ fn recipe(extent: Extent, thickness: f64) -> Recipe {
             lines.push(Line::at_most(Measure::FalseForce, 0.0));
             lines
         }),
+        ..Recipe::new(
+            ("R09", format!("plate of {} mm", thickness * 1e3)),
+            "thin plate: no pop-through",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }
 }

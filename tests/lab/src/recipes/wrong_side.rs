@@ -8,7 +8,7 @@ use super::Extent;
 use super::bodies::{Path, ball, force, sound};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 
 const RADIUS: f64 = 4e-3;
 /// Inner and outer face of the walls, and their upper end, m.
@@ -39,14 +39,9 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
     let ideal = path.clone();
     let device = path.clone();
+    let duration = path.duration();
     vec![Recipe {
-        name: "R28",
-        case: "wall of a U".into(),
-        about: "wrong side: the body stays on its side until the way is free",
-        duration: path.duration(),
-        scene,
-        device: Box::new(move |time| path.pose(time)),
-        ideal: Box::new(move |time| {
+        ideal: Ideal::closed(move |time| {
             // The ball slides up the wall and, once its centre is above the rim, round it.
             let place = ideal.at(time);
             let depth = (place.x - (INNER - RADIUS)).max(0.0);
@@ -79,5 +74,12 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::Astray, ASTRAY));
             lines
         }),
+        ..Recipe::new(
+            ("R28", "wall of a U".into()),
+            "wrong side: the body stays on its side until the way is free",
+            scene,
+            duration,
+            move |time| path.pose(time),
+        )
     }]
 }

@@ -6,11 +6,11 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use taut_bridge::realtime::{Ticker, request_fifo};
 use taut_link::{ClientLink, ClusterKey, ReceivedState, Role, SessionClock, connect, serve};
 
 use super::{
-    BenchError, Quantiles, client_options, server_options, small_content, state, wait_until,
+    BenchError, Quantiles, Ticker, client_options, request_fifo, server_options, small_content,
+    state, wait_until,
 };
 use crate::relay::{Direction, Impairment, RelayCounts, Treatment, Waiting};
 
@@ -55,7 +55,7 @@ pub fn measure(duration: Duration, impairment: &Impairment, seed: u64) -> Result
     let run = std::thread::Builder::new()
         .name("age".to_owned())
         .spawn(move || {
-            let fifo = request_fifo(PRIORITY).is_granted();
+            let fifo = request_fifo(PRIORITY);
             measure_here(duration, impairment, seed, fifo)
         })?;
     run.join().unwrap_or_else(|_| {

@@ -17,8 +17,10 @@ use taut_proto::{InputSample, PoseF64, version::MAGIC};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
-use super::BenchError;
+use super::{BenchError, request_fifo};
 
+/// The workbench file that is shipped.
+const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
 /// Longest wait for the program to serve or to end.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
@@ -189,9 +191,7 @@ impl Drop for Served {
 /// The shipped workbench on free ports, and a key; their paths.
 fn write_workbench(directory: &Path) -> Result<(PathBuf, PathBuf), BenchError> {
     let broken = || BenchError::Missing("the shipped workbench file is no TOML".to_owned());
-    let mut file: toml::Table = taut_scene::SHIPPED_WORKBENCH
-        .parse()
-        .map_err(|_| broken())?;
+    let mut file: toml::Table = SHIPPED_WORKBENCH.parse().map_err(|_| broken())?;
     file.insert("scene".to_owned(), "sphere-on-plane".into());
     let network = file.get_mut("network").and_then(toml::Value::as_table_mut);
     let network = network.ok_or_else(broken)?;
@@ -215,7 +215,7 @@ fn run(
     result: &mut Isolation,
 ) -> Result<(), BenchError> {
     let served = Served::start(program)?;
-    let crowd = crowded.then(|| Crowd::join(&served, this)).transpose()?;
+    let crowd = crowded.then(|| awake(&served, this)).transpose()?;
     std::thread::sleep(duration);
     let flooded = crowd.map_or(Ok(0), Crowd::leave)?;
     let report = served.stop()?;
@@ -239,6 +239,23 @@ fn run(
         result.alone.push(period);
     }
     Ok(())
+}
+
+/// The eight, with threads of the lowest real-time priority where the system grants it: on a loaded machine they would be thrown out for their
+/// silence. The program, started before, does not inherit it.
+fn awake(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+    const PRIORITY: u8 = 1;
+    std::thread::scope(|scope| {
+        let joined = std::thread::Builder::new()
+            .name("crowd".to_owned())
+            .spawn_scoped(scope, || {
+                let _ = request_fifo(PRIORITY);
+                Crowd::join(served, this)
+            })?;
+        joined
+            .join()
+            .unwrap_or_else(|_| Err(BenchError::Missing("a client panicked".to_owned())))
+    })
 }
 
 /// The eight.
@@ -386,6 +403,34 @@ struct Stalled {
     thread: Option<std::thread::JoinHandle<()>>,
 }
 
+/// Starts a client as a process of its own, and waits until it has joined.
+pub(super) fn start_client(
+    this: &Path,
+    server: &str,
+    key: &Path,
+    node: &str,
+    transport: &str,
+) -> Result<Child, BenchError> {
+    let mut child = Command::new(this)
+        .args(["--client", server, node, transport])
+        .arg(key)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let mut line = String::new();
+    if let Some(out) = child.stdout.take() {
+        BufReader::new(out).read_line(&mut line)?;
+    }
+    if line.trim() == "joined" {
+        return Ok(child);
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    Err(BenchError::Missing(format!(
+        "a client did not join: {line}"
+    )))
+}
+
 impl Stalled {
     fn start(
         this: &Path,
@@ -394,23 +439,7 @@ impl Stalled {
         node: &str,
         transport: &str,
     ) -> Result<Stalled, BenchError> {
-        let mut child = Command::new(this)
-            .args(["--client", server, node, transport])
-            .arg(key)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
-        let mut line = String::new();
-        if let Some(out) = child.stdout.take() {
-            BufReader::new(out).read_line(&mut line)?;
-        }
-        if line.trim() != "joined" {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Err(BenchError::Missing(format!(
-                "a client did not join: {line}"
-            )));
-        }
+        let child = start_client(this, server, key, node, transport)?;
         let id = rustix::process::Pid::from_child(&child);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();

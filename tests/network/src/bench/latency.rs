@@ -8,12 +8,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_bridge::realtime::{Ticker, request_fifo};
 use taut_link::{ClusterKey, ReceivedState, Role, Transport, connect, serve};
 use taut_proto::{Payload, header::MAX_DATAGRAM_BYTES};
 
 use super::{
-    BenchError, Quantiles, client_options, server_options, small_content, state, wait_until,
+    BenchError, Quantiles, Ticker, client_options, request_fifo, server_options, small_content,
+    state, wait_until,
 };
 use crate::forge::OneWay;
 
@@ -52,7 +52,7 @@ pub fn measure(duration: Duration, full: bool) -> Result<Latency, BenchError> {
     let run = std::thread::Builder::new()
         .name("latency".to_owned())
         .spawn(move || {
-            let fifo = request_fifo(PRIORITY).is_granted();
+            let fifo = request_fifo(PRIORITY);
             measure_here(duration, full, fifo)
         })?;
     run.join().unwrap_or_else(|_| {

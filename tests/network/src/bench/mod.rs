@@ -1,16 +1,20 @@
 //! What is measured of the network, on loopback, each figure beside a control of the same run.
 
 pub mod age;
+pub mod death;
 pub mod isolation;
 pub mod join;
 pub mod latency;
 mod memory;
+pub mod node;
 mod quantiles;
+mod realtime;
 mod session;
 pub mod soak;
 
 pub use memory::resident_bytes;
 pub use quantiles::Quantiles;
+pub use realtime::{Ticker, request_fifo};
 pub use session::{
     BenchError, client_options, content_with, server_options, small_content, state, wait_until,
 };

@@ -6,12 +6,11 @@
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
-use taut_bridge::realtime::Ticker;
 use taut_link::{
     ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerOptions, Transport, connect, serve,
 };
 
-use super::{BenchError, resident_bytes, server_options, small_content, state};
+use super::{BenchError, Ticker, resident_bytes, server_options, small_content, state};
 use crate::forge::{FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
 use crate::random::Random;
 use crate::relay::{Burst, Direction, Impairment, RelayCounts, Treatment, Waiting};

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::row::{Row, brief};
-use crate::bench::{BenchError, age, isolation, join, latency, soak};
+use crate::bench::age::{self, Age};
+use crate::bench::death::{self, Aftermath, Death};
+use crate::bench::{BenchError, isolation, join, latency, soak};
 use crate::forge::attack;
 use crate::relay::{Burst, Impairment};
 
@@ -17,6 +19,8 @@ pub struct Extent {
     pub forgeries: u64,
     /// Joins.
     pub joins: usize,
+    /// Deaths of each sort.
+    pub deaths: usize,
     /// Turns of the isolation runs, each without and with clients.
     pub turns: usize,
     /// Time of each, s.
@@ -41,7 +45,7 @@ pub struct Section {
 }
 
 /// All parts, in the order of the table.
-pub const SECTIONS: [Section; 7] = [
+pub const SECTIONS: [Section; 8] = [
     Section {
         name: "latency",
         about: "one-way latency, sealed UDP and QUIC datagrams beside raw UDP",
@@ -66,6 +70,11 @@ pub const SECTIONS: [Section; 7] = [
         name: "join",
         about: "time to join a scene of 10 MB",
         run: join_rows,
+    },
+    Section {
+        name: "death",
+        about: "a node that is killed or stopped, and the others",
+        run: death_rows,
     },
     Section {
         name: "soak",
@@ -129,55 +138,75 @@ fn latency_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     Ok(rows)
 }
 
-fn loss_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
-    let alone = Impairment::losing(0.05);
-    let bursts = Impairment {
-        bursts: Some(Burst {
-            chance: 1.0 / 4000.0,
-            length: 20,
-        }),
+/// Bursts of 20, with this chance at each state.
+fn bursts_of_20(chance: f64) -> Impairment {
+    Impairment {
+        bursts: Some(Burst { chance, length: 20 }),
         ..Impairment::default()
-    };
+    }
+}
+
+fn loss_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let duration = Duration::from_secs_f64(extent.seconds);
     let both = Impairment {
         lost: 0.05,
-        ..bursts.clone()
+        ..bursts_of_20(1.0 / 4000.0)
     };
     let mut rows = Vec::new();
-    for (number, (what, impairment)) in [
-        ("5 % lost", alone),
-        ("5 % lost and bursts of 20, one in 4 s", both),
-        ("bursts of 20, one in 4 s", bursts),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let duration = Duration::from_secs_f64(extent.seconds);
-        let run = age::measure(duration, &impairment, 11 + number as u64)?;
+    for (what, impairment, seed) in [
+        ("5 % lost", Impairment::losing(0.05), 11),
+        ("5 % lost and bursts of 20, one in 4 s", both, 12),
+    ] {
+        let run = age::measure(duration, &impairment, seed)?;
         rows.push(Row::at_most(
             format!("{what}: age p99 over the control's"),
             run.impaired.p99 - run.control.p99,
             2.0,
             "ms",
             format!(
-                "p99 {} against {} ms, {} by the losses alone, largest {} against {} ms; {} of {} states lost, longest run {}",
+                "p99 {} against {} ms, {} by the losses alone; {}",
                 brief(run.impaired.p99),
                 brief(run.control.p99),
                 brief(run.by_loss_alone.p99),
-                brief(run.impaired.max),
-                brief(run.control.max),
-                run.sent - run.arrived[1],
-                run.sent,
-                run.longest_gap
+                losses(&run)
             ),
         ));
-        rows.push(Row::invariant(
-            format!("{what}: states that are not what was sent, or out of order"),
-            "0",
-            run.wrong,
-            run.wrong == 0 && run.arrived[1] > run.sent / 2,
-        ));
+        rows.push(truth(what, &run));
     }
+    let what = "bursts of 20, two in 1 s";
+    let run = age::measure(duration, &bursts_of_20(1.0 / 500.0), 13)?;
+    rows.push(Row::at_most(
+        format!("{what}: largest age over the control's, by the losses alone"),
+        run.by_loss_alone.max - run.control.max,
+        20.0,
+        "ms",
+        format!(
+            "{} against {} ms; {}",
+            brief(run.by_loss_alone.max),
+            brief(run.control.max),
+            losses(&run)
+        ),
+    ));
+    rows.push(truth(what, &run));
     Ok(rows)
+}
+
+fn losses(run: &Age) -> String {
+    format!(
+        "{} of {} states lost, longest run {}",
+        run.sent - run.arrived[1],
+        run.sent,
+        run.longest_gap
+    )
+}
+
+fn truth(what: &str, run: &Age) -> Row {
+    Row::invariant(
+        format!("{what}: states that are not what was sent, or out of order"),
+        "0",
+        run.wrong,
+        run.wrong == 0 && run.arrived[1] > run.sent / 2,
+    )
 }
 
 fn isolation_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
@@ -253,6 +282,42 @@ fn join_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     )])
 }
 
+fn death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    /// Three frames at 60 Hz, ms.
+    const THREE_FRAMES_MS: f64 = 50.0;
+    let mut rows = Vec::new();
+    for (death, signal) in [(Death::Killed, "SIGKILL"), (Death::Stopped, "SIGSTOP")] {
+        let mut runs = Vec::new();
+        for _ in 0..extent.deaths {
+            runs.push(death::measure(&extent.this, death)?);
+        }
+        let worst = |of: fn(&Aftermath) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+        let times = format!("largest of {}", runs.len());
+        rows.push(Row::at_most(
+            format!("{signal} of a node: others' longest time without a state"),
+            worst(|run| run.longest_gap_ms),
+            THREE_FRAMES_MS,
+            "ms",
+            format!("{times}; {} states missed", worst(|run| run.missed as f64)),
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: let go by the server"),
+            worst(|run| run.let_go_s * 1e3),
+            600.0,
+            "ms",
+            &times,
+        ));
+        rows.push(Row::at_most(
+            format!("{signal} of a node: joined again, from the start of its process"),
+            worst(|run| run.back_s),
+            1.0,
+            "s",
+            &times,
+        ));
+    }
+    Ok(rows)
+}
+
 fn soak_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let Some(seconds) = extent.soak_seconds else {
         let why = "--soak SECONDS runs it";
@@ -314,11 +379,6 @@ fn elsewhere(_: &Extent) -> Result<Vec<Row>, BenchError> {
         ),
         Row::unknown("equal state hash on released frames", "100 %", "not here"),
         Row::unknown(
-            "SIGKILL or SIGSTOP of a node",
-            "gap <= 3 frames, evicted <= 600 ms, back <= 1 s",
-            "not here",
-        ),
-        Row::unknown(
             "SIGKILL of the server",
             "clients back <= 2 s, zero force <= 120 ms",
             "not here",
@@ -339,6 +399,7 @@ impl Extent {
             seconds: 20.0,
             forgeries: 1_000_000,
             joins: 10,
+            deaths: 5,
             turns: 6,
             turn_seconds: 8.0,
             soak_seconds: None,
@@ -354,6 +415,7 @@ impl Extent {
             seconds: 1.0,
             forgeries: 20_000,
             joins: 1,
+            deaths: 1,
             turns: 1,
             turn_seconds: 2.0,
             soak_seconds: Some(3.0),

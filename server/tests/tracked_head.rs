@@ -1,0 +1,132 @@
+//! The viewer's head from a tracker on the network, to the states that every screen draws: `taut track` with a credential of its own, beside
+//! an observer with his.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use taut::cli::{Cli, Command, TrackArgs};
+use taut::config::{Overrides, session_setup};
+use taut::session::Session;
+use taut::terminal::Terminal;
+use taut_link::{
+    ClientLink, ClientOptions, ClusterKey, Holder, LinkError, Role, connect, write_credential_file,
+};
+use taut_proto::state::HEAD_TRACKED;
+use taut_scene::{HeadTracking, SHIPPED_WORKBENCH, Workbench};
+
+/// Much longer than anything here takes; the machine may be busy.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// A head that stands half a metre beside its rest, for as long as the test wants.
+const TRACE: &str = "t,x,y,z,qw,qx,qy,qz\n0,0.5,-1.3,0.9,1,0,0,0\n1,0.5,-1.3,0.9,1,0,0,0\n";
+
+fn session(key: ClusterKey) -> Session {
+    let text = SHIPPED_WORKBENCH
+        .lines()
+        .map(|line| match line.starts_with("sway") {
+            true => "remote_tracker = true",
+            false => line,
+        })
+        .collect::<Vec<_>>()
+        .join("\n");
+    let overrides = [
+        "network.quic_port=0",
+        "network.udp_port=0",
+        "scene=\"sphere-on-plane\"",
+        "network.roles=[\"tracker\", \"observer\"]",
+    ];
+    let workbench = Workbench::parse_with_overrides("w.toml", &text, Path::new(""), &overrides)
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(workbench.viewer.tracking, HeadTracking::Remote);
+    let no_monitor = Overrides {
+        no_monitor: true,
+        ..Overrides::default()
+    };
+    session_setup(&workbench, key, &no_monitor)
+        .and_then(Session::start)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn track_arguments(server: &str, key: &Path, trace: &Path) -> TrackArgs {
+    let line = [
+        "taut".to_owned(),
+        "track".to_owned(),
+        format!("--server={server}"),
+        format!("--key={}", key.display()),
+        format!("--source=trace:{}", trace.display()),
+        "--duration=4".to_owned(),
+    ];
+    match Cli::try_parse_from(line).map(|cli| cli.command) {
+        Ok(Some(Command::Track(args))) => args,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Waits until the head in the states is at `x`, m; how many states had it tracked.
+async fn head_at(link: &ClientLink, x: f32) {
+    let begun = Instant::now();
+    let mut states = Vec::new();
+    let mut last = None;
+    while begun.elapsed() < PATIENCE {
+        link.drain_states(&mut states);
+        for received in states.drain(..) {
+            let head = received.state.head;
+            assert_eq!(head.flags & HEAD_TRACKED, HEAD_TRACKED);
+            last = Some(head.pose.position);
+            if (head.pose.position[0] - x).abs() < 1e-6 {
+                return;
+            }
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    panic!("the head did not come to {x}: {last:?}");
+}
+
+#[test]
+fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_back_to_rest() {
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
+    let session = session(key.clone());
+    let server = session
+        .quic_address()
+        .map(|address| address.to_string())
+        .unwrap_or_else(|| panic!("no address"));
+    let trace = folder.path().join("head.csv");
+    assert!(std::fs::write(&trace, TRACE).is_ok());
+    let credential = |role: Role| {
+        let path = folder.path().join(format!("{role}.key"));
+        let made = key.credential(role, Holder::AnyNode, 1);
+        write_credential_file(&path, &made).unwrap_or_else(|error| panic!("{error}"));
+        (path, made)
+    };
+    let (tracker_key, _) = credential(Role::Tracker);
+    let (_, observer) = credential(Role::Observer);
+    let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
+    runtime.block_on(async {
+        let options = ClientOptions::new(&server, observer, Role::Observer, "web");
+        let observer = connect(options)
+            .await
+            .unwrap_or_else(|error| panic!("{error}"));
+        head_at(&observer, 0.0).await;
+        let args = track_arguments(&server, &tracker_key, &trace);
+        let tracking = tokio::spawn(async move { taut::track::run(&args).await });
+        head_at(&observer, 0.5).await;
+        match tracking.await {
+            Ok(Ok(sent)) => assert!(sent > 0),
+            other => panic!("{other:?}"),
+        }
+        head_at(&observer, 0.0).await;
+
+        // The roles that this workbench does not let in, although the key could make them.
+        let options = ClientOptions::new(&server, key.clone(), Role::Operator, "o");
+        match connect(options).await {
+            Err(LinkError::Refused { text, .. }) => assert!(text.contains("network.roles")),
+            Err(other) => panic!("{other}"),
+            Ok(_) => panic!("let in"),
+        }
+        observer.close().await;
+    });
+    let (_, failure) = session.stop(&Terminal::standard_error());
+    assert!(failure.is_none());
+}

@@ -1,0 +1,75 @@
+//! R27: a bunny on a bunny: approached, slid, an ear pressed in, twisted. The meshes are test data; without them there is no recipe.
+
+use std::f64::consts::PI;
+
+use god_object::{Pose, World};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_scene::{data_file, read_mesh};
+
+use super::Extent;
+use super::bodies::{sound, turns};
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Ideal, Line, Recipe};
+use crate::row::Row;
+
+/// Which mesh: that of 5,000 triangles, so that every method at every rate is done within an hour.
+const FILE: &str = "bunny_5k.ply";
+const SIZE: f64 = 0.15;
+/// Where the held one is at the start and when it is pressed, m above the other: their centres.
+const APART: f64 = 0.2;
+const PRESSED: f64 = 0.115;
+/// N.
+const FORCE_ERROR: f64 = 0.2;
+
+/// Says why there is none, where there is none.
+pub(super) fn unavailable(extent: Extent) -> Vec<Row> {
+    let row = Row::new("R27", FILE, "all methods");
+    if data_file(FILE).is_none() {
+        vec![row.out_of_scope(format!("test data are not there: {FILE}"))]
+    } else if extent == Extent::Quick {
+        vec![row.out_of_scope("a quarter of an hour: in the full extent only")]
+    } else {
+        Vec::new()
+    }
+}
+
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    let file = data_file(FILE).filter(|_| extent == Extent::Full);
+    let Some(file) = file else {
+        return Vec::new();
+    };
+    let raw = read_mesh(&file).unwrap_or_else(|error| panic!("{error}"));
+    let bunny = mesh(raw);
+    let world = World {
+        body: body(bunny.clone()),
+        obstacles: vec![obstacle("bunny", bunny, Pose::identity())],
+    };
+    let device = |time: f64| {
+        // Down in half a second; sideways along the back; then a twist.
+        let down = (time / 0.5).min(1.0);
+        let slide = ((time - 0.6) / 0.6).clamp(0.0, 1.0);
+        let twist = ((time - 1.3) / 0.4).clamp(0.0, 1.0);
+        let smooth = |share: f64| 0.5 - 0.5 * (PI * share).cos();
+        let height = APART + (PRESSED - APART) * smooth(down);
+        Pose::from_parts(
+            Translation3::new(0.03 * smooth(slide), height, 0.01 * smooth(slide)),
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.4, 0.1) * smooth(twist)),
+        )
+    };
+    let scene = Scene::new(world, SIZE, 0.27, device(0.0));
+    let case = ("R27", "bunny on bunny, 5,000 triangles each".to_owned());
+    let about = "free forms: approach, slide, press, twist";
+    vec![Recipe {
+        ideal: Ideal::Reference,
+        lines: Box::new(|_| {
+            let mut lines = sound();
+            lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));
+            lines
+        }),
+        check_every: 10,
+        out_of_scope: turns,
+        ..Recipe::new(case, about, scene, 1.8, device)
+    }]
+}

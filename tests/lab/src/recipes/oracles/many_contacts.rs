@@ -1,0 +1,155 @@
+//! R38: thousands of random contacts, against non-negative least squares written apart from the solvers.
+//!
+//! | symbol | name in code | meaning                                                       |
+//! |--------|--------------|---------------------------------------------------------------|
+//! | y      |              | `L^T (a - a_u)`, M = L L^T: least in norm                      |
+//! | G, h   |              | `G y >= h`: rows in y, and what the wish lacks                |
+//! | E, f   | `e`, `f`     | `[G^T; h^T]` and the last unit vector: `min abs(E u - f), u >= 0` |
+//!
+//! Source: Lawson and Hanson 1974, chapter 23: least distance programming by non-negative least squares.
+
+use god_object::Vector6;
+use god_object::quasi_statics::{HalfSpace, Metric};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::{Random, contact, for_solvers};
+use crate::recipes::Extent;
+use crate::row::Row;
+
+/// Of the norm of the wish.
+const RELATIVE_ERROR: f64 = 1e-9;
+/// Rounds of the oracle, at most.
+const ROUNDS: usize = 1000;
+/// Slope of the oracle's objective that counts as none, for columns and residuals of length about 1.
+const FLAT: f64 = 1e-12;
+
+pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
+    let sizes: &[(usize, usize)] = extent.choose(
+        &[(1, 50), (7, 50), (40, 50), (300, 20), (1000, 10), (5000, 6)],
+        &[(1, 10), (7, 10), (40, 10), (300, 4)],
+    );
+    let inertia = Matrix3::from_diagonal(&Vector3::new(2e-3, 3e-3, 4e-3));
+    let metric = Metric::new(1.0, &inertia).expect("the tensor is positive definite");
+    for_solvers("R38", |solver| {
+        let mut random = Random(38);
+        let mut rows = Vec::new();
+        for (count, repeats) in sizes {
+            solver.forget_times();
+            let (mut worst, mut most_active): (f64, usize) = (0.0, 0);
+            for _ in 0..*repeats {
+                let up = random.direction();
+                let set: Vec<HalfSpace> = (0..*count)
+                    .map(|_| {
+                        let normal = random.direction();
+                        let normal = normal * normal.dot(&up).signum();
+                        let bound = -0.5e-3 * (1.0 + random.number());
+                        let arm = random.vector() * 0.05;
+                        HalfSpace {
+                            bound,
+                            ..contact(&arm, &normal)
+                        }
+                    })
+                    .collect();
+                let wish = random.wish();
+                let answer = solver.project(&metric, &wish, &set);
+                let expected = oracle(&inertia, &wish, &set);
+                let error = metric.norm(&(answer.acceleration - expected)) / metric.norm(&wish);
+                worst = worst.max(error);
+                most_active = most_active.max(answer.active.len());
+            }
+            let row = solver.row("R38", &format!("{count} contacts"));
+            rows.push(
+                row.clone()
+                    .at_most("relative_error", worst, "-", RELATIVE_ERROR),
+            );
+            rows.push(row.shown("active_rows", most_active as f64, "rows"));
+        }
+        rows
+    })
+}
+
+/// The projection for a body of 1 kg with this diagonal tensor.
+fn oracle(inertia: &Matrix3<f64>, wish: &Vector6, set: &[HalfSpace]) -> Vector6 {
+    let roots = Vector6::from_fn(|i, _| {
+        if i < 3 {
+            1.0
+        } else {
+            inertia[(i - 3, i - 3)].sqrt()
+        }
+    });
+    let length = roots.component_mul(wish).norm(); // y in units of the wish
+    let mut e = DMatrix::zeros(7, set.len());
+    for (k, row) in set.iter().enumerate() {
+        let g = row.jacobian.component_div(&roots);
+        let h = (row.bound - row.jacobian.dot(wish)) / length;
+        e.fixed_view_mut::<6, 1>(0, k).copy_from(&(g / g.norm()));
+        e[(6, k)] = h / g.norm();
+    }
+    let mut f = DVector::zeros(7);
+    f[6] = 1.0;
+    let u = non_negative_least_squares(&e, &f);
+    let residual = &e * u - f;
+    let y = Vector6::from_fn(|i, _| -residual[i] / residual[6]) * length;
+    wish + y.component_div(&roots)
+}
+
+/// `argmin abs(E u - f)` with `u >= 0`.
+fn non_negative_least_squares(e: &DMatrix<f64>, f: &DVector<f64>) -> DVector<f64> {
+    let mut u = DVector::zeros(e.ncols());
+    let mut passive: Vec<usize> = Vec::new();
+    for _ in 0..ROUNDS {
+        let slope = e.tr_mul(&(f - e * &u));
+        let steepest = (0..e.ncols())
+            .filter(|k| !passive.contains(k))
+            .max_by(|a, b| slope[*a].total_cmp(&slope[*b]));
+        match steepest {
+            Some(k) if slope[k] > FLAT => passive.push(k),
+            _ => break,
+        }
+        // Solve on the passive columns; while one would turn negative, go as far as allowed and drop it.
+        loop {
+            let columns = e.select_columns(&passive);
+            let solved = columns
+                .svd(true, true)
+                .solve(f, 1e-14)
+                .expect("U and V are there");
+            let share = passive
+                .iter()
+                .zip(solved.iter())
+                .filter(|(_, new)| **new <= 0.0)
+                .map(|(k, new)| u[*k] / (u[*k] - new))
+                .fold(1.0, f64::min);
+            for (k, new) in passive.iter().zip(solved.iter()) {
+                u[*k] += share * (new - u[*k]);
+            }
+            if share >= 1.0 {
+                break;
+            }
+            let before = passive.len();
+            passive.retain(|k| u[*k] > 0.0);
+            if passive.len() == before || passive.is_empty() {
+                break;
+            }
+        }
+    }
+    u
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plane;
+    use super::*;
+
+    #[test]
+    fn the_oracle_clips_each_axis_of_a_corner() {
+        let inertia = Matrix3::identity() * 1e-3;
+        let faces = [
+            plane(1.0, 0.0, 0.0),
+            plane(0.0, 1.0, 0.0),
+            plane(0.0, 0.0, 1.0),
+        ];
+        let wish = Vector6::new(-1e-3, 2e-3, -3e-3, 0.1, 0.2, 0.3);
+        let expected = Vector6::new(0.0, 2e-3, 0.0, 0.1, 0.2, 0.3);
+        assert!((oracle(&inertia, &wish, &faces) - expected).norm() < 1e-13);
+    }
+}

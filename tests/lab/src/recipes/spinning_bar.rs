@@ -1,0 +1,87 @@
+//! R10b: a thin bar spins past a pin, a third of a radian between updates at 70 Hz. It stops at first contact.
+
+use god_object::{Pose, Primitive, World};
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use taut_method_tests::solids::{body, mesh, obstacle};
+use taut_scene::shapes::{Axis, cuboid, cylinder};
+
+use super::Extent;
+use super::bodies::{sound, turns};
+use crate::measure::Measure;
+use crate::method::Scene;
+use crate::recipe::{Ideal, Line, Recipe};
+
+/// Of the bar, m.
+const HALF: [f64; 3] = [0.1, 1e-3, 1e-3];
+const PIN: f64 = 1e-3;
+/// Where the pin stands, m from the axis and rad from the bar.
+const PLACE: f64 = 0.09;
+const ANGLE: f64 = 1.0;
+/// rad/s.
+const SPIN: f64 = 25.0;
+/// How far the device turns on behind the pin, rad.
+const BEYOND: f64 = 0.2;
+/// Farthest that the pin may get into the bar, or through it, m.
+const ASTRAY: f64 = 1e-5;
+
+pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
+    let at = Point3::new(PLACE * ANGLE.cos(), PLACE * ANGLE.sin(), 0.0);
+    let mut pin = obstacle(
+        "pin",
+        mesh(cylinder(PIN, 0.02, 32, Axis::Z)),
+        Pose::translation(at.x, at.y, 0.0),
+    );
+    pin.primitive = Some(Primitive::Cylinder {
+        ends: [-0.02, 0.02].map(|z| Point3::new(0.0, 0.0, z)),
+        radius: PIN,
+    });
+    let world = World {
+        body: body(mesh(cuboid(HALF))),
+        obstacles: vec![pin],
+    };
+    let device = |time: f64| {
+        let turned = (SPIN * time).min(ANGLE + BEYOND);
+        Pose::from_parts(
+            Translation3::identity(),
+            UnitQuaternion::from_scaled_axis(Vector3::z() * turned),
+        )
+    };
+    let scene = Scene::new(world, 2.0 * HALF[0], SPIN * HALF[0], device(0.0));
+    // The pin in the bar's frame.
+    let seen = move |bar: &Pose| {
+        let pin = bar.inverse_transform_point(&at);
+        Vector2::new(pin.x, pin.y)
+    };
+    let case = ("R10b", "bar past a pin".to_owned());
+    let about = "fast spin: stops at first contact";
+    let duration = (ANGLE + BEYOND) / SPIN + extent.choose(0.5, 0.25);
+    vec![Recipe {
+        ideal: Ideal::Reference,
+        depth: Box::new(move |bar| {
+            let pin = seen(bar);
+            let nearest = Vector2::new(
+                pin.x.clamp(-HALF[0], HALF[0]),
+                pin.y.clamp(-HALF[1], HALF[1]),
+            );
+            (PIN - (pin - nearest).norm()).max(0.0)
+        }),
+        astray: Box::new(move |_, bar| {
+            // It belongs before the bar's leading face.
+            let pin = seen(bar);
+            let over_it = pin.x.abs() < HALF[0];
+            if over_it {
+                (HALF[1] + PIN - pin.y).max(0.0)
+            } else {
+                0.0
+            }
+        }),
+        phases: extent.choose(20, 4),
+        lines: Box::new(|_| {
+            let mut lines = sound();
+            lines.push(Line::at_most(Measure::Astray, ASTRAY));
+            lines
+        }),
+        out_of_scope: turns,
+        ..Recipe::new(case, about, scene, duration, device)
+    }]
+}
