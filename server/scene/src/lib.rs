@@ -6,6 +6,7 @@
 
 mod check;
 mod document;
+pub mod fidelity;
 mod files;
 mod height_map_file;
 mod mesh_file;
@@ -19,6 +20,7 @@ mod workbench;
 
 pub use check::{FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
+pub use fidelity::FidelityPlan;
 pub use files::{
     DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file,
 };

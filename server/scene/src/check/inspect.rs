@@ -6,6 +6,7 @@ use god_object::Mesh;
 
 use super::report::{FileKind, FileReport, MeshFigures};
 use crate::document::{Document, Value};
+use crate::fidelity::FidelityPlan;
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::mesh_file::{is_mesh_path, read_mesh};
 use crate::problem::{FileError, Problem};
@@ -33,7 +34,7 @@ fn check_one(path: &Path) -> FileReport {
     } else if extension == "csv" {
         let trace = DeviceTrace::load(path).map(|trace| {
             let (count, duration) = (trace.samples().len(), trace.duration());
-            format!("trace, {count} samples, {duration} s")
+            (format!("trace, {count} samples, {duration} s"), None)
         });
         report(path, FileKind::Trace, trace)
     } else if extension == "toml" {
@@ -54,10 +55,14 @@ fn check_one(path: &Path) -> FileReport {
     }
 }
 
-fn report(path: &Path, kind: FileKind, outcome: Result<String, FileError>) -> FileReport {
-    let (summary, problems) = match outcome {
-        Ok(summary) => (summary, Vec::new()),
-        Err(error) => (String::new(), error.into_problems()),
+fn report(
+    path: &Path,
+    kind: FileKind,
+    outcome: Result<(String, Option<FidelityPlan>), FileError>,
+) -> FileReport {
+    let ((summary, fidelity), problems) = match outcome {
+        Ok(found) => (found, Vec::new()),
+        Err(error) => ((String::new(), None), error.into_problems()),
     };
     FileReport {
         file: path.display().to_string(),
@@ -66,6 +71,7 @@ fn report(path: &Path, kind: FileKind, outcome: Result<String, FileError>) -> Fi
         problems,
         notes: Vec::new(),
         mesh: None,
+        fidelity,
     }
 }
 
@@ -98,6 +104,7 @@ fn check_mesh(path: &Path) -> FileReport {
         problems,
         notes,
         mesh: Some(figures),
+        fidelity: None,
     }
 }
 
@@ -130,12 +137,13 @@ fn check_toml(path: &Path) -> FileReport {
     ]) {
         let workbench = Workbench::load(path).and_then(|workbench| {
             let scene = workbench.load_scene()?;
-            let inner = summarise_scene(&scene)?;
+            let (inner, fidelity) = summarise_scene(&scene)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
-            Ok(format!(
+            let summary = format!(
                 "workbench \"{}\", {screens} screens, {nodes} nodes, {inner}",
                 workbench.name
-            ))
+            );
+            Ok((summary, fidelity))
         });
         report(path, FileKind::Workbench, workbench)
     } else {
@@ -148,7 +156,7 @@ fn check_toml(path: &Path) -> FileReport {
     }
 }
 
-fn summarise_scene(scene: &Scene) -> Result<String, FileError> {
+fn summarise_scene(scene: &Scene) -> Result<(String, Option<FidelityPlan>), FileError> {
     let built = scene.build()?;
     let triangles: Vec<String> = built
         .bodies
@@ -176,5 +184,5 @@ fn summarise_scene(scene: &Scene) -> Result<String, FileError> {
     for simplified in &built.simplified {
         summary += &format!("; {simplified}");
     }
-    Ok(summary)
+    Ok((summary, built.fidelity))
 }

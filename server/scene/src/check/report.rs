@@ -5,6 +5,7 @@ use std::fmt;
 use god_object::geometry::MeshReport;
 use serde::Serialize;
 
+use crate::fidelity::FidelityPlan;
 use crate::mesh_file::RawMesh;
 use crate::problem::Problem;
 
@@ -39,6 +40,8 @@ pub struct FileReport {
     pub notes: Vec<String>,
     /// Figures, if it is a mesh.
     pub mesh: Option<MeshFigures>,
+    /// What fidelity was chosen, if it is a scene that asks for that, or a workbench with one.
+    pub fidelity: Option<FidelityPlan>,
 }
 
 impl FileReport {
@@ -151,6 +154,9 @@ impl fmt::Display for FileReport {
         }
         for problem in &self.problems {
             write!(f, "\n  {problem}")?;
+        }
+        for line in self.fidelity.iter().flat_map(FidelityPlan::lines) {
+            write!(f, "\n  {line}")?;
         }
         for note in &self.notes {
             write!(f, "\n  note: {note}")?;

@@ -5,9 +5,11 @@ use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::auto_fidelity::AutoFidelity;
 use super::load::Scene;
 use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
 use crate::document::At;
+use crate::fidelity::FidelityPlan;
 use crate::mesh_file::RawMesh;
 use crate::problem::{FileError, Problem};
 use crate::shapes;
@@ -101,6 +103,8 @@ pub struct BuiltScene {
     pub view: View,
     /// Longest side of the box around the god-object, m.
     pub size: f64,
+    /// What fidelity was chosen for the scene, if it asks for that.
+    pub fidelity: Option<FidelityPlan>,
 }
 
 impl Scene {
@@ -135,6 +139,14 @@ impl Scene {
             })
             .collect();
         FileError::unless_empty(problems)?;
+        let auto = match &body_mesh {
+            Some(mesh) if spec.fidelity.is_some() => {
+                let as_written = self.settings(longest_side(mesh), None)?;
+                let hand = hand_path.as_ref();
+                self.auto_fidelity(mesh, &obstacle_meshes, &as_written, hand, &motions)
+            }
+            _ => None,
+        };
         let named = std::iter::once((&spec.god_object.shape, GOD_OBJECT_NAME, &mut body_mesh))
             .chain(
                 spec.obstacles
@@ -143,7 +155,11 @@ impl Scene {
                     .map(|(o, mesh)| (&o.shape, o.name.as_str(), mesh)),
             );
         let simplified = named
-            .filter_map(|(shape, name, mesh)| simplify_as_asked(shape, name, mesh))
+            .enumerate()
+            .filter_map(|(index, (shape, name, mesh))| {
+                let chosen = auto.as_ref().and_then(|auto| auto.mesh_errors[index]);
+                simplify_as_asked(shape, chosen, name, mesh)
+            })
             .collect();
 
         let Some(mesh) = body_mesh else {
@@ -152,10 +168,9 @@ impl Scene {
                 .problem("has no god-object mesh")
                 .into());
         };
-        let [low, high] = mesh.bounding_box();
-        let size = (high - low).max();
+        let size = longest_side(&mesh);
         let body = self.body(mesh)?;
-        let settings = self.settings(size)?;
+        let settings = self.settings(size, auto.as_ref())?;
         if body
             .metric(settings.rotation_metric, &spec.god_object.pose)
             .is_none()
@@ -168,8 +183,12 @@ impl Scene {
             .iter()
             .zip(obstacle_meshes)
             .zip(textures)
-            .filter_map(|((o, mesh), texture)| {
+            .enumerate()
+            .filter_map(|(index, ((o, mesh), texture))| {
                 let mut surface = o.surface.clone();
+                if let Some(auto) = &auto {
+                    auto.shade(index, &mut surface);
+                }
                 surface.texture = surface.texture.or(texture);
                 Some(Obstacle {
                     name: o.name.clone(),
@@ -204,6 +223,7 @@ impl Scene {
             simplified,
             view: spec.view,
             size,
+            fidelity: auto.map(|auto| auto.plan),
         })
     }
 
@@ -317,11 +337,17 @@ impl Scene {
         })
     }
 
-    /// Defaults for the body's size, then `[coupling]`, `[limits]` and `[method]`.
-    fn settings(&self, size: f64) -> Result<Settings, FileError> {
+    /// Defaults for the body's size, then what was chosen for the scene, then `[coupling]`, `[limits]` and `[method]`.
+    fn settings(&self, size: f64, auto: Option<&AutoFidelity>) -> Result<Settings, FileError> {
         let (coupling, limits, method) =
             (&self.spec.coupling, &self.spec.limits, &self.spec.method);
-        let defaults = Settings::for_size(size);
+        let mut defaults = Settings::for_size(size);
+        if let Some(auto) = auto {
+            defaults.gap_tolerance = auto.gap_tolerance;
+            defaults.implicit_rounds = auto.rounds;
+            // A budget of time is kept, not only hoped for.
+            defaults.work_budget = auto.plan.time_us.map(|time| time.ceil() as u64);
+        }
         let settings = Settings {
             k_s: coupling.k_s.unwrap_or(defaults.k_s),
             k_h: coupling.k_h.unwrap_or(defaults.k_h),
@@ -361,16 +387,23 @@ impl Scene {
     }
 }
 
-/// Puts a simplified mesh in the place of the file's, if the shape asks for it.
-fn simplify_as_asked(shape: &Shape, name: &str, mesh: &mut Option<Mesh>) -> Option<Simplified> {
-    let Shape::Mesh {
-        simplify: Some(max_error),
-        ..
-    } = shape
-    else {
+fn longest_side(mesh: &Mesh) -> f64 {
+    let [low, high] = mesh.bounding_box();
+    (high - low).max()
+}
+
+/// Puts a simplified mesh in the place of the file's, if the shape asks for it or it was `chosen`, m.
+fn simplify_as_asked(
+    shape: &Shape,
+    chosen: Option<f64>,
+    name: &str,
+    mesh: &mut Option<Mesh>,
+) -> Option<Simplified> {
+    let Shape::Mesh { simplify: set, .. } = shape else {
         return None;
     };
-    let (coarser, report) = simplify(mesh.take()?, *max_error, name);
+    let max_error = set.or(chosen)?;
+    let (coarser, report) = simplify(mesh.take()?, max_error, name);
     *mesh = Some(coarser);
     Some(report)
 }

@@ -1,5 +1,6 @@
 //! Scenes: what the hand holds, what it may touch, how it feels.
 
+mod auto_fidelity;
 mod build;
 mod load;
 mod parse;

@@ -11,6 +11,8 @@ use super::spec::{
     MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, View,
 };
 use crate::document::{Document, Range, Section, Value};
+use crate::fidelity::FidelitySpec;
+use crate::fidelity::spec::fidelity;
 use crate::problem::FileError;
 
 /// Most obstacles: the method counts them in 16 bits.
@@ -29,6 +31,7 @@ pub(super) struct SceneSpec {
     pub(super) method: MethodSpec,
     pub(super) hand: Option<HandPathSpec>,
     pub(super) view: View,
+    pub(super) fidelity: Option<FidelitySpec>,
 }
 
 pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
@@ -52,6 +55,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     let method = root.section("method").map(method).unwrap_or_default();
     let hand = root.section("hand").and_then(hand);
     let view = root.section("view").map(view).unwrap_or_default();
+    let fidelity = fidelity(&root);
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
@@ -73,6 +77,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         method,
         hand,
         view,
+        fidelity,
     })
 }
 

@@ -1,0 +1,321 @@
+//! The cheapest settings whose predicted error is within the budget: every setting of a small grid is looked at.
+
+use super::cost::{triangles_within, update_us};
+use super::errors;
+use super::need::{BodyNeed, SceneNeed};
+
+/// Rates of updates to choose from, Hz. More than the device's rate brings nothing new.
+pub const RATES: [f64; 8] = [70.0, 100.0, 140.0, 200.0, 300.0, 500.0, 700.0, 1000.0];
+/// Gap tolerances to choose from, over the size of the body; the finest is the method's default.
+pub const TOLERANCES: [f64; 3] = [1e-6, 1e-5, 4.5e-5];
+/// Rounds of implicit constraints to choose from.
+pub const ROUNDS: [u32; 3] = [0, 1, 2];
+/// Most errors of a simplified mesh to choose from, over the size of the body; 0 is the mesh in the file.
+pub const MESH_ERRORS: [f64; 5] = [0.0, 1e-4, 3e-4, 1e-3, 3e-3];
+
+/// What is not free: the file names it, or the command line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fixed {
+    /// Hz.
+    pub rate: Option<f64>,
+    /// m.
+    pub gap_tolerance: Option<f64>,
+    /// Implicit rounds.
+    pub rounds: Option<u32>,
+    /// For each body, god-object first: the most error of its mesh, m.
+    pub mesh_errors: Vec<Option<f64>>,
+}
+
+/// Settings and what is predicted of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chosen {
+    /// Hz.
+    pub rate: f64,
+    /// m.
+    pub gap_tolerance: f64,
+    /// Implicit rounds.
+    pub rounds: u32,
+    /// For each body, god-object first: the most error of its mesh, m; 0 is the mesh as it is.
+    pub mesh_errors: Vec<f64>,
+    /// Predicted error in just-noticeable differences.
+    pub j: f64,
+    /// Predicted nominal time of an update, us.
+    pub update_us: f64,
+}
+
+impl Chosen {
+    /// Predicted nominal time per second, us.
+    #[must_use]
+    pub fn cost(&self) -> f64 {
+        self.rate * self.update_us
+    }
+}
+
+/// Error of direction and of force, in just-noticeable differences: the parts that [`predicted`] puts together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parts {
+    /// Turned normals of late sets.
+    pub direction: f64,
+    /// Surface off its tangent plane.
+    pub sagitta: f64,
+    /// Rows that are linear in the rotation.
+    pub linearisation: f64,
+    /// Meshes off their files.
+    pub mesh: f64,
+    /// Facets of simplified meshes.
+    pub facets: f64,
+    /// Gaps off their places.
+    pub tolerance: f64,
+    /// Obstacles that moved on.
+    pub obstacles: f64,
+}
+
+impl Parts {
+    /// Of settings in a scene.
+    #[must_use]
+    pub fn of(need: &SceneNeed, rate: f64, tolerance: f64, rounds: u32, meshes: &[f64]) -> Self {
+        let lag = errors::longest_lag(need.k_s, rate);
+        let curvature = need.curvature();
+        let way = need.speed * lag;
+        let felt = |distance: f64| errors::force_jnd(need.stiffness * distance, need.force);
+        let moved = errors::obstacle_lag(need.obstacle_speed(), rate);
+        let stepped = errors::obstacle_step(need.obstacle_speed(), rate);
+        // Both bodies of a contact are off; of the obstacles, the worst.
+        let off = meshes.first().copied().unwrap_or(0.0)
+            + meshes.iter().skip(1).copied().fold(0.0, f64::max);
+        let bodies = std::iter::once(&need.body).chain(&need.obstacles);
+        let facets = bodies
+            .zip(meshes)
+            .filter(|(_, error)| **error > 0.0)
+            .map(|(body, error)| 0.5 * errors::facet_angle(*error, body.curvature));
+        Self {
+            direction: errors::direction_jnd(errors::normal_turn(curvature, way)),
+            sagitta: felt(errors::sagitta(curvature, way)),
+            linearisation: felt(errors::linearisation(
+                need.lever,
+                need.turn_rate * lag,
+                rounds,
+            )),
+            mesh: felt(off),
+            facets: errors::direction_jnd(facets.fold(0.0, f64::max)),
+            tolerance: felt(tolerance),
+            obstacles: felt(moved).max(need.stiffness * stepped / errors::JND_CHANGE),
+        }
+    }
+
+    /// The larger of direction and force; errors of force add up.
+    #[must_use]
+    pub fn j(&self) -> f64 {
+        let force = self.sagitta + self.linearisation + self.mesh + self.tolerance + self.obstacles;
+        force.max(self.direction + self.facets)
+    }
+}
+
+/// The settings with what is predicted of them.
+#[must_use]
+pub fn predicted(
+    need: &SceneNeed,
+    rate: f64,
+    gap_tolerance: f64,
+    rounds: u32,
+    mesh_errors: Vec<f64>,
+) -> Chosen {
+    let bodies = std::iter::once(&need.body).chain(&need.obstacles);
+    let triangles: f64 = bodies
+        .zip(&mesh_errors)
+        .map(|(body, error)| triangles(body, *error))
+        .sum();
+    Chosen {
+        j: Parts::of(need, rate, gap_tolerance, rounds, &mesh_errors).j(),
+        update_us: update_us(triangles, gap_tolerance / need.size, rounds),
+        rate,
+        gap_tolerance,
+        rounds,
+        mesh_errors,
+    }
+}
+
+fn triangles(body: &BodyNeed, error: f64) -> f64 {
+    triangles_within(body.triangles, body.area, body.curvature, error)
+}
+
+/// The cheapest settings within `budget_j`, and within `time_us` for an update if that is given. Where nothing is within both, the time counts, and the
+/// least error within it; where nothing is within the time, the fastest.
+#[must_use]
+pub fn decide(need: &SceneNeed, fixed: &Fixed, budget_j: f64, time_us: Option<f64>) -> Chosen {
+    let mut best: Option<(Rank, Chosen)> = None;
+    for candidate in grid(need, fixed) {
+        let rank = Rank::of(&candidate, budget_j, time_us);
+        if best.as_ref().is_none_or(|(least, _)| rank.before(least)) {
+            best = Some((rank, candidate));
+        }
+    }
+    best.map_or_else(
+        || predicted(need, RATES[7], TOLERANCES[0] * need.size, 0, Vec::new()),
+        |(_, chosen)| chosen,
+    )
+}
+
+/// Every setting that is free to be chosen.
+#[must_use]
+pub fn grid(need: &SceneNeed, fixed: &Fixed) -> Vec<Chosen> {
+    let rates = fixed.rate.map_or(RATES.to_vec(), |rate| vec![rate]);
+    let tolerances = fixed.gap_tolerance.map_or_else(
+        || {
+            let scaled = TOLERANCES.map(|share| share * need.size);
+            let in_order = scaled.iter().copied();
+            let fitting: Vec<f64> = in_order.filter(|t| *t <= need.widest_tolerance).collect();
+            if fitting.is_empty() {
+                vec![need.widest_tolerance]
+            } else {
+                fitting
+            }
+        },
+        |tolerance| vec![tolerance],
+    );
+    let rounds = fixed.rounds.map_or(ROUNDS.to_vec(), |rounds| vec![rounds]);
+    let mut found = Vec::new();
+    for level in levels(need) {
+        for rate in &rates {
+            for tolerance in &tolerances {
+                for rounds in &rounds {
+                    let meshes = meshes(need, fixed, level);
+                    found.push(predicted(need, *rate, *tolerance, *rounds, meshes));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Mesh levels, if any mesh may be simplified.
+fn levels(need: &SceneNeed) -> Vec<f64> {
+    let mut bodies = std::iter::once(&need.body).chain(&need.obstacles);
+    if bodies.any(|body| body.simplifiable) {
+        MESH_ERRORS.to_vec()
+    } else {
+        vec![0.0]
+    }
+}
+
+fn meshes(need: &SceneNeed, fixed: &Fixed, level: f64) -> Vec<f64> {
+    let bodies = std::iter::once(&need.body).chain(&need.obstacles);
+    bodies
+        .enumerate()
+        .map(|(index, body)| {
+            let set = fixed.mesh_errors.get(index).copied().flatten();
+            let free = if body.simplifiable {
+                level * need.size
+            } else {
+                0.0
+            };
+            set.unwrap_or(free)
+        })
+        .collect()
+}
+
+/// What is compared, the first that differs decides; smaller is better.
+struct Rank([f64; 3]);
+
+impl Rank {
+    fn of(candidate: &Chosen, budget_j: f64, time_us: Option<f64>) -> Self {
+        let late = time_us.map_or(0.0, |time| (candidate.update_us - time).max(0.0));
+        let over = (candidate.j - budget_j).max(0.0);
+        Self([late, over, candidate.cost()])
+    }
+
+    fn before(&self, other: &Self) -> bool {
+        let pairs = self.0.iter().zip(&other.0);
+        pairs
+            .map(|(a, b)| a.total_cmp(b))
+            .find(|order| order.is_ne())
+            .is_some_and(std::cmp::Ordering::is_lt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use god_object::Primitive;
+    use nalgebra::Point3;
+
+    fn sphere(radius: f64) -> BodyNeed {
+        let center = Point3::origin();
+        BodyNeed::of_primitive("a", &Primitive::Sphere { center, radius })
+    }
+
+    fn need(body: BodyNeed, obstacle: BodyNeed) -> SceneNeed {
+        SceneNeed {
+            body,
+            obstacles: vec![obstacle],
+            size: 0.04,
+            lever: 0.0,
+            stiffness: 1000.0,
+            k_s: 0.5,
+            speed: 0.2,
+            turn_rate: 1.0,
+            force: 1.43,
+            widest_tolerance: 1.8e-6,
+        }
+    }
+
+    #[test]
+    fn a_plane_needs_the_slowest_rate_and_a_sphere_more() {
+        let plane = BodyNeed {
+            curvature: 0.0,
+            ..sphere(1.0)
+        };
+        let flat = decide(&need(sphere(0.02), plane), &Fixed::default(), 0.5, None);
+        assert_eq!((flat.rate, flat.rounds), (RATES[0], 0));
+        let round = decide(
+            &need(sphere(0.02), sphere(0.02)),
+            &Fixed::default(),
+            0.5,
+            None,
+        );
+        assert!(round.rate > flat.rate && round.j <= 0.5);
+    }
+
+    #[test]
+    fn nothing_of_the_grid_within_the_budget_is_cheaper() {
+        let need = SceneNeed {
+            lever: 0.05,
+            ..need(sphere(0.02), sphere(0.02))
+        };
+        let chosen = decide(&need, &Fixed::default(), 0.5, None);
+        for other in grid(&need, &Fixed::default()) {
+            assert!(other.j > 0.5 || other.cost() >= chosen.cost(), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_set_is_kept_and_a_budget_that_cannot_be_met_takes_the_least_error() {
+        let need = need(sphere(0.005), sphere(0.005));
+        let fixed = Fixed {
+            rate: Some(70.0),
+            rounds: Some(2),
+            ..Fixed::default()
+        };
+        let chosen = decide(&need, &fixed, 0.5, None);
+        assert_eq!((chosen.rate, chosen.rounds), (70.0, 2));
+        assert!(chosen.j > 0.5);
+        let all = grid(&need, &fixed);
+        assert!(all.iter().all(|other| other.j >= chosen.j));
+    }
+
+    #[test]
+    fn a_time_that_cannot_be_met_takes_the_fastest() {
+        let need = need(sphere(0.02), sphere(0.02));
+        let chosen = decide(&need, &Fixed::default(), 0.5, Some(1e-3));
+        let all = grid(&need, &Fixed::default());
+        assert!(all.iter().all(|other| other.update_us >= chosen.update_us));
+    }
+
+    #[test]
+    fn a_tighter_budget_is_never_cheaper() {
+        let need = need(sphere(0.02), sphere(0.03));
+        let costs = [2.0, 1.0, 0.5, 0.2, 0.1]
+            .map(|budget| decide(&need, &Fixed::default(), budget, None).cost());
+        assert!(costs.windows(2).all(|pair| pair[0] <= pair[1]), "{costs:?}");
+    }
+}

@@ -1,0 +1,177 @@
+//! What a setting costs in accuracy: closed forms, in metres and radians, and in just-noticeable differences.
+//!
+//! | symbol | unit  | meaning                                                                    |
+//! |--------|-------|----------------------------------------------------------------------------|
+//! | f      | Hz    | updates of the constraint set per second                                   |
+//! | k_s    | –     | share of the pose difference that one update covers                        |
+//! | d      | m     | way of the device beyond the god-object when its set is replaced           |
+//! | kappa  | 1/m   | curvature of the contact: how fast its normal turns along the way          |
+//! | omega  | rad/s | turn rate of the device                                                    |
+//! | K      | N/m   | stiffness that the hand feels                                              |
+//! | J      | –     | error over the just-noticeable difference                                  |
+//!
+//! **Lag.** An update that covers the share k_s of the difference leaves, at a constant speed v with a period T, the difference v T (1/k_s - 1)
+//! behind it: x <- (1 - k_s) x + v T has that limit less v T. Its set is in use from one period after its device pose to two, so the
+//! device is at most v T (1/k_s + 1) ahead.
+//!
+//! **Curvature.** A tangent plane that is d late is turned by kappa d and lies kappa d^2 / 2 off the surface (the sagitta).
+//!
+//! **Rows.** Rows are linear in the rotation; a point at radius r that turns by phi is r (1 - cos phi) = r phi^2 / 2 beside its row. A round of
+//! implicit constraints is a Newton step: phi <- phi^2 / 2.
+//!
+//! **Facets.** A chord that is at most e off a circle of curvature kappa spans the angle 2 acos(1 - e kappa).
+//!
+//! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006); 7 % of the force (Pang, Tan, Durlach 1991), at least 0.1 N for a change.
+
+/// Just-noticeable angle between forces, rad.
+pub const JND_DIRECTION: f64 = 18.4 * std::f64::consts::PI / 180.0;
+/// Just-noticeable share of a force.
+pub const JND_MAGNITUDE: f64 = 0.07;
+/// Just-noticeable change of a small force, N.
+pub const JND_CHANGE: f64 = 0.1;
+/// Time between two forces at the hand, s.
+pub const TICK: f64 = 1e-3;
+
+/// Most that the god-object is behind the device while a set is used, s: (1/k_s + 1) / f.
+#[must_use]
+pub fn longest_lag(k_s: f64, rate: f64) -> f64 {
+    (k_s.recip() + 1.0) / rate
+}
+
+/// Least that it is behind while a set is used, s: 1 / (k_s f).
+#[must_use]
+pub fn shortest_lag(k_s: f64, rate: f64) -> f64 {
+    (k_s * rate).recip()
+}
+
+/// Turn of a normal along a way, rad.
+#[must_use]
+pub fn normal_turn(curvature: f64, way: f64) -> f64 {
+    curvature * way
+}
+
+/// Distance of a surface from its tangent plane a way on, m.
+#[must_use]
+pub fn sagitta(curvature: f64, way: f64) -> f64 {
+    0.5 * curvature * way * way
+}
+
+/// Distance of a point at `radius`, m, from its linear row, after the body turned by `angle`, rad, and so many Newton rounds, m.
+#[must_use]
+pub fn linearisation(radius: f64, angle: f64, rounds: u32) -> f64 {
+    let left = (0..rounds).fold(angle, |angle, _| 0.5 * angle * angle);
+    0.5 * radius * left * left
+}
+
+/// Angle between two facets that are at most `error`, m, off a circle of this curvature, rad.
+#[must_use]
+pub fn facet_angle(error: f64, curvature: f64) -> f64 {
+    2.0 * (1.0 - error * curvature).clamp(-1.0, 1.0).acos()
+}
+
+/// The error at which facets of a circle meet at this angle, m: the inverse of [`facet_angle`].
+#[must_use]
+pub fn facet_error(angle: f64, curvature: f64) -> f64 {
+    (1.0 - (0.5 * angle).cos()) / curvature
+}
+
+/// How far behind an obstacle that moves its row is when its set is replaced, m: two periods.
+#[must_use]
+pub fn obstacle_lag(speed: f64, rate: f64) -> f64 {
+    2.0 * speed / rate
+}
+
+/// Step of an obstacle from one set to the next, beyond what it goes in a millisecond anyway, m.
+#[must_use]
+pub fn obstacle_step(speed: f64, rate: f64) -> f64 {
+    (speed * (rate.recip() - TICK)).max(0.0)
+}
+
+/// An angle between forces in just-noticeable differences.
+#[must_use]
+pub fn direction_jnd(angle: f64) -> f64 {
+    angle / JND_DIRECTION
+}
+
+/// An error of force, N, at a force, N, in just-noticeable differences.
+#[must_use]
+pub fn force_jnd(error: f64, force: f64) -> f64 {
+    error / (JND_MAGNITUDE * force).max(JND_CHANGE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use god_object::nalgebra::Vector2;
+
+    #[test]
+    fn the_lag_is_the_limit_of_the_recursion() {
+        // The device goes 1 m per second; one update a period, published a period later, used for one.
+        for k_s in [0.25, 0.5, 1.0] {
+            let rate = 200.0;
+            let (mut body, mut last) = (0.0, 0.0);
+            for update in 0..200 {
+                let device = f64::from(update) / rate;
+                last = body;
+                body += k_s * (device - body);
+            }
+            // At the end of the use of `last`, the newest update has its period behind it.
+            let end_of_use = 200.0 / rate;
+            assert!((end_of_use - last - longest_lag(k_s, rate)).abs() < 1e-9);
+            assert!((end_of_use - rate.recip() - last - shortest_lag(k_s, rate)).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_rate_for_a_direction_is_that_of_the_rule() {
+        // R = 20 mm, 0.2 m/s, k_s = 0.5, half a difference of direction: 187 Hz; k_s = 1: 125 Hz.
+        for (k_s, rate) in [(0.5, 187.0), (1.0, 125.0)] {
+            let turn = normal_turn(50.0, 0.2 * longest_lag(k_s, rate));
+            assert!((direction_jnd(turn) - 0.5).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn a_sagitta_is_the_distance_of_a_circle_from_its_tangent() {
+        let (radius, way) = (0.02_f64, 1e-3_f64);
+        let exact = radius - (radius * radius - way * way).sqrt();
+        assert!((sagitta(radius.recip(), way) / exact - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_turned_point_leaves_its_row_by_the_cosine() {
+        let (radius, angle) = (0.05_f64, 0.05_f64);
+        let exact = radius * (1.0 - angle.cos());
+        assert!((linearisation(radius, angle, 0) / exact - 1.0).abs() < 1e-3);
+        // Newton on cos: the error of the next round is that of half the square of the angle.
+        assert_eq!(
+            linearisation(radius, angle, 1),
+            linearisation(radius, 0.5 * angle * angle, 0)
+        );
+    }
+
+    #[test]
+    fn facets_are_chords() {
+        let (radius, sides) = (0.02, 24.0);
+        let angle = std::f64::consts::TAU / sides;
+        let middle = 0.5 * (Vector2::new(1.0, 0.0) + Vector2::new(angle.cos(), angle.sin()));
+        let error = radius * (1.0 - middle.norm());
+        assert!((facet_angle(error, 1.0 / radius) - angle).abs() < 1e-9);
+        assert!((facet_error(angle, 1.0 / radius) - error).abs() < 1e-12);
+        // 39 sides: half of 18.4 degrees.
+        assert!(direction_jnd(std::f64::consts::TAU / 39.0) < 0.51);
+    }
+
+    #[test]
+    fn a_force_is_felt_by_its_share_and_never_below_a_tenth_of_a_newton() {
+        assert_eq!(force_jnd(0.1, 1.0), 1.0);
+        assert!((force_jnd(0.1, 10.0) - 1.0 / 7.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_obstacle_at_the_rate_of_the_forces_makes_no_further_step() {
+        assert_eq!(obstacle_step(0.1, 1000.0), 0.0);
+        assert!((obstacle_step(0.1, 100.0) - 0.9e-3).abs() < 1e-12);
+        assert!((obstacle_lag(0.1, 100.0) - 2e-3).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,205 @@
+//! What of a scene decides how much fidelity it needs.
+
+use god_object::geometry::mass_properties;
+use god_object::{Mesh, Primitive};
+
+/// Faces that meet at more than this are an edge and no curvature, rad: 40 degrees.
+pub const CREASE: f64 = 0.7;
+/// Faces that meet at less than this are one face, rad.
+const FLAT: f64 = 1e-3;
+/// Share of the surface whose curvature is covered; the rest is for slivers.
+const COVERED: f64 = 0.95;
+
+/// One body, as far as it decides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyNeed {
+    /// `god-object`, or the obstacle's name.
+    pub name: String,
+    /// Curvature of its smooth convex parts, 1/m.
+    pub curvature: f64,
+    /// It has convex edges.
+    pub sharp: bool,
+    /// Angle at which the facets of its smooth parts meet, rad; 0 of an exact form.
+    pub facet_angle: f64,
+    /// Triangles; 0 of an exact form.
+    pub triangles: usize,
+    /// m^2.
+    pub area: f64,
+    /// It may be simplified: it is a mesh file whose texture does not hang on its vertices.
+    pub simplifiable: bool,
+    /// It may be shaded: an obstacle out of facets that stand for a smooth surface.
+    pub shadable: bool,
+    /// How fast it moves, m/s; 0 stands still.
+    pub speed: f64,
+}
+
+impl BodyNeed {
+    /// An exact form.
+    #[must_use]
+    pub fn of_primitive(name: &str, primitive: &Primitive) -> Self {
+        let (radius, sharp) = match *primitive {
+            Primitive::Sphere { radius, .. } | Primitive::Capsule { radius, .. } => (radius, false),
+            Primitive::Cylinder { radius, .. } => (radius, true),
+            Primitive::Plane { .. } => (f64::INFINITY, false),
+        };
+        Self {
+            name: name.to_owned(),
+            curvature: radius.recip(),
+            sharp,
+            facet_angle: 0.0,
+            triangles: 0,
+            area: 0.0,
+            simplifiable: false,
+            shadable: false,
+            speed: 0.0,
+        }
+    }
+
+    /// A mesh: the curvature that the edges of its smooth convex parts stand for, their angle over a third of the heights of
+    /// the two faces beside them (the distance of centroids in a regular mesh).
+    #[must_use]
+    pub fn of_mesh(name: &str, mesh: &Mesh) -> Self {
+        let (mut bends, mut total, mut sharp) = (Vec::new(), 0.0, false);
+        for edge in mesh.edges() {
+            let [a, b] = edge.vertices.map(|v| mesh.vertices()[v as usize]);
+            let length = (b - a).norm();
+            let doubled = edge.faces.map(|face| {
+                let [p, q, r] = mesh.corners(face);
+                (q - p).cross(&(r - p)).norm()
+            });
+            let across = (doubled[0] + doubled[1]) / (3.0 * length);
+            total += length * across;
+            if edge.convexity > CREASE {
+                sharp = true;
+            } else if edge.convexity > FLAT {
+                bends.push((edge.convexity / across, edge.convexity, length * across));
+            }
+        }
+        bends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // From the most curved down, until the share that is left out is spent.
+        let mut left_out = (1.0 - COVERED) * total;
+        let mut found = (0.0, 0.0);
+        for (curvature, angle, area) in bends.into_iter().rev() {
+            left_out -= area;
+            if left_out < 0.0 {
+                found = (curvature, angle);
+                break;
+            }
+        }
+        Self {
+            name: name.to_owned(),
+            curvature: found.0,
+            sharp,
+            facet_angle: found.1,
+            triangles: mesh.triangles().len(),
+            area: surface_area(mesh),
+            simplifiable: false,
+            shadable: false,
+            speed: 0.0,
+        }
+    }
+}
+
+fn surface_area(mesh: &Mesh) -> f64 {
+    let triangles = 0..mesh.triangles().len() as u32;
+    triangles
+        .map(|t| {
+            let [p, q, r] = mesh.corners(t);
+            0.5 * (q - p).cross(&(r - p)).norm()
+        })
+        .sum()
+}
+
+/// Volume of a mesh, m^3: for a mass that is given as a density.
+pub(crate) fn volume(mesh: &Mesh) -> f64 {
+    mass_properties(mesh).volume
+}
+
+/// All that decides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneNeed {
+    /// The god-object.
+    pub body: BodyNeed,
+    /// The rest.
+    pub obstacles: Vec<BodyNeed>,
+    /// Longest side of the god-object, m.
+    pub size: f64,
+    /// Distance of the god-object's farthest point from where it turns, m; 0 where turning does not move its surface.
+    pub lever: f64,
+    /// Translational stiffness, N/m.
+    pub stiffness: f64,
+    /// Share of the pose difference that one update covers.
+    pub k_s: f64,
+    /// Fastest that the hand goes, m/s.
+    pub speed: f64,
+    /// Fastest that it turns, rad/s.
+    pub turn_rate: f64,
+    /// A usual force of contact, N.
+    pub force: f64,
+    /// Largest gap tolerance for which the settings are in order, m.
+    pub widest_tolerance: f64,
+}
+
+impl SceneNeed {
+    /// How fast a contact's normal turns along the way, 1/m: two convex bodies of curvature a and b turn about each other like
+    /// ab / (a + b); an edge is as curved as can be, and turns by the other's.
+    #[must_use]
+    pub fn curvature(&self) -> f64 {
+        let pairs = self.obstacles.iter().flat_map(|o| turning(&self.body, o));
+        pairs.fold(0.0, f64::max)
+    }
+
+    /// The fastest obstacle, m/s.
+    #[must_use]
+    pub fn obstacle_speed(&self) -> f64 {
+        self.obstacles.iter().fold(0.0, |v, o| v.max(o.speed))
+    }
+}
+
+fn turning(a: &BodyNeed, b: &BodyNeed) -> [f64; 3] {
+    let sum = a.curvature + b.curvature;
+    let smooth = if sum > 0.0 {
+        a.curvature * b.curvature / sum
+    } else {
+        0.0
+    };
+    let edge_of_a = if a.sharp { b.curvature } else { 0.0 };
+    let edge_of_b = if b.sharp { a.curvature } else { 0.0 };
+    [smooth, edge_of_a, edge_of_b]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes;
+
+    fn mesh(raw: crate::RawMesh) -> Mesh {
+        Mesh::new(raw.vertices, raw.triangles).expect("a closed shape")
+    }
+
+    #[test]
+    fn a_tessellated_sphere_is_as_curved_as_the_sphere() {
+        for subdivisions in [2, 3] {
+            let found = BodyNeed::of_mesh("a", &mesh(shapes::sphere(0.02, subdivisions)));
+            assert!((found.curvature * 0.02 - 1.0).abs() < 0.3, "{found:?}");
+            assert!(!found.sharp);
+        }
+    }
+
+    #[test]
+    fn a_box_has_edges_and_no_curvature() {
+        let found = BodyNeed::of_mesh("a", &mesh(shapes::cuboid([0.01, 0.02, 0.03])));
+        assert_eq!((found.curvature, found.sharp), (0.0, true));
+        assert!((found.area - 8.0 * 1e-4 * 11.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_spheres_turn_about_each_other_like_the_sum_of_their_radii() {
+        let sphere = |radius| {
+            let center = nalgebra::Point3::origin();
+            BodyNeed::of_primitive("a", &Primitive::Sphere { center, radius })
+        };
+        let [smooth, ..] = turning(&sphere(0.02), &sphere(0.03));
+        assert!((smooth - 20.0).abs() < 1e-9);
+    }
+}
