@@ -10,6 +10,7 @@
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
 //! - [`row`]: the one type of row that tables and files are made of.
+//! - [`fidelity`]: is what a scene chooses for itself the cheapest that is good enough?
 //! - [`report`]: table and CSV; [`chart`]: error against time.
 //!
 //! Same machine type, same answers: only times differ between runs, and those stand in a file of their own.
@@ -17,6 +18,7 @@
 pub mod chart;
 pub mod clock;
 pub mod cpu_time;
+pub mod fidelity;
 pub mod measure;
 pub mod method;
 pub mod methods;

@@ -21,6 +21,9 @@ const OWN_RATE: u32 = 1000;
 fn main() -> Result<ExitCode, Box<dyn Error>> {
     let (mut extent, mut directory, mut wanted) =
         (Extent::Full, PathBuf::from(DIRECTORY), Vec::new());
+    if std::env::args().nth(1).as_deref() == Some("fidelity") {
+        return taut_lab::fidelity::command::run(std::env::args().skip(2));
+    }
     let mut methods = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {

@@ -185,7 +185,9 @@ impl Scene {
             MassSpec::Density(density) => density * volume(body),
         };
         let [low, high] = body.bounding_box();
-        let [speed, turn_rate] = hand.map_or([HAND_SPEED, HAND_TURN_RATE], fastest);
+        let [speed, turn_rate] = hand.map_or([HAND_SPEED, HAND_TURN_RATE], |path| {
+            fastest(path).map(|mean| PEAK * mean)
+        });
         let mut needs = Vec::new();
         for (index, (o, mesh)) in self.spec.obstacles.iter().zip(obstacles).enumerate() {
             let Some(mesh) = mesh else { continue };
@@ -242,15 +244,15 @@ fn body_need(name: &str, shape: &Shape, mesh: &Mesh) -> BodyNeed {
     }
 }
 
-/// Highest speed, m/s, and turn rate, rad/s, of minimum-jerk motions between the poses.
+/// Highest mean speed, m/s, and turn rate, rad/s, between two poses. A hand peaks above it; an obstacle goes straight and evenly.
 fn fastest(path: &DeviceTrace) -> [f64; 2] {
     let pairs = path.samples().windows(2);
     pairs.fold([0.0_f64, 0.0], |[speed, turn], pair| {
         let time = pair[1].time - pair[0].time;
         let way = pose_difference(&pair[1].pose, &pair[0].pose, &Vector3::zeros());
         [
-            speed.max(PEAK * linear(&way).norm() / time),
-            turn.max(PEAK * angular(&way).norm() / time),
+            speed.max(linear(&way).norm() / time),
+            turn.max(angular(&way).norm() / time),
         ]
     })
 }

@@ -1,0 +1,127 @@
+//! `taut-lab fidelity`: the table, and the files that it is made of.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use super::scenes;
+use super::sweep::{BUDGET, Measured, Swept, sweep};
+
+/// Runs every scene. Exit code 1 where a choice is over the budget although some setting is within it.
+///
+/// # Errors
+///
+/// Where an option is unknown, a file cannot be written or a scene is wrong.
+pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn Error>> {
+    let (mut quick, mut directory) = (false, PathBuf::from("target/lab"));
+    let mut arguments = arguments;
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--quick" => quick = true,
+            "--out" => directory = arguments.next().ok_or("--out needs a directory")?.into(),
+            other => return Err(format!("fidelity has no option `{other}`").into()),
+        }
+    }
+    let files = directory.join("fidelity");
+    fs::create_dir_all(&files)?;
+    let mut swept = Vec::new();
+    for scene in scenes::all(&files)? {
+        eprintln!("{}", scene.name);
+        swept.push(sweep(&scene, &files, quick)?);
+    }
+    fs::write(directory.join("fidelity.csv"), every_setting(&swept))?;
+    fs::write(directory.join("fidelity_choice.csv"), choices(&swept))?;
+    print!("{}", table(&swept));
+    println!("files in {}", directory.display());
+    let missed = swept
+        .iter()
+        .any(|s| !s.is_within() && s.cheapest().is_some());
+    Ok(ExitCode::from(u8::from(missed)))
+}
+
+/// The choice of each scene beside the cheapest setting within the budget.
+#[must_use]
+pub fn table(swept: &[Swept]) -> String {
+    let mut text = format!(
+        "{:<17} {:>7} {:>9} {:>6} {:>9} {:>11} {:>10} {:>9} {:>10} {:>6}  budget J <= {BUDGET}\n",
+        "scene",
+        "rate Hz",
+        "tol um",
+        "rounds",
+        "mesh um",
+        "J predicted",
+        "J measured",
+        "cost us/s",
+        "least us/s",
+        "ratio"
+    );
+    for s in swept {
+        let (auto, best) = (&s.auto, s.cheapest());
+        let number = |value: Option<f64>, places: usize| {
+            value.map_or("-".to_owned(), |v| format!("{v:.places$}"))
+        };
+        let verdict = match (s.is_within(), best) {
+            (true, _) => "within".to_owned(),
+            (false, Some(_)) => "OVER although some are within".to_owned(),
+            (false, None) => format!("over; so is every setting, least J {:.2}", s.least_error()),
+        };
+        let _ = writeln!(
+            text,
+            "{:<17} {:>7} {:>9.3} {:>6} {:>9.1} {:>11.3} {:>10.3} {:>9.0} {:>10} {:>6}  {verdict}",
+            s.name,
+            auto.setting.rate,
+            auto.setting.gap_tolerance * 1e6,
+            auto.setting.rounds,
+            auto.setting.mesh_error * 1e6,
+            s.plan.predicted_j,
+            auto.j,
+            auto.cost,
+            number(best.map(|b| b.cost), 0),
+            number(s.ratio(), 2),
+        );
+    }
+    text
+}
+
+fn fields(m: &Measured) -> String {
+    let s = &m.setting;
+    format!(
+        "{},{:e},{},{:e},{:.6},{:.3}",
+        s.rate, s.gap_tolerance, s.rounds, s.mesh_error, m.j, m.cost
+    )
+}
+
+/// CSV of every setting.
+#[must_use]
+pub fn every_setting(swept: &[Swept]) -> String {
+    let mut text = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,cost_us_per_s\n".to_owned();
+    for s in swept {
+        for measured in &s.all {
+            let _ = writeln!(text, "{},{}", s.name, fields(measured));
+        }
+    }
+    text
+}
+
+/// CSV of the choices.
+#[must_use]
+pub fn choices(swept: &[Swept]) -> String {
+    let mut text =
+        "scene,chosen_by,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,cost_us_per_s,predicted_j\n"
+            .to_owned();
+    for s in swept {
+        let _ = writeln!(
+            text,
+            "{},auto,{},{:.6}",
+            s.name,
+            fields(&s.auto),
+            s.plan.predicted_j
+        );
+        if let Some(best) = s.cheapest() {
+            let _ = writeln!(text, "{},sweep,{},", s.name, fields(best));
+        }
+    }
+    text
+}

@@ -1,0 +1,76 @@
+//! The method of this project as a session runs it, with its work counted.
+
+use god_object::collision::Work;
+use god_object::spatial::{angular, linear, pose_difference};
+use god_object::{ConstraintSet, Coupling, GodObject, Pose, ShadedAcceleration, Vector6};
+use nalgebra::Vector3;
+
+use crate::method::{HapticMethod, Scene};
+
+/// Simulation, coupling, and what the updates did.
+#[derive(Debug)]
+pub struct Counted {
+    simulation: GodObject,
+    coupling: Coupling,
+    published: ConstraintSet,
+    last_device: Pose,
+    shaded: Option<ShadedAcceleration>,
+    moves: bool,
+    /// Of all updates so far.
+    pub work: Work,
+}
+
+impl Counted {
+    /// # Panics
+    ///
+    /// Where the start is not free: scenes are checked when they are built.
+    #[must_use]
+    pub fn new(scene: &Scene) -> Self {
+        let simulation = GodObject::new(scene.world.clone(), scene.settings, scene.start)
+            .unwrap_or_else(|error| panic!("{error}"));
+        Self {
+            coupling: Coupling::new(&scene.world, &scene.settings),
+            published: simulation.constraint_set().clone(),
+            simulation,
+            last_device: scene.start,
+            shaded: None,
+            moves: false,
+            work: Work::default(),
+        }
+    }
+}
+
+impl HapticMethod for Counted {
+    fn update(&mut self, _time: f64, device: &Pose) {
+        // A set is used from one period after its device pose to two: the device goes on as it came.
+        let moved = pose_difference(device, &self.last_device, &Vector3::zeros());
+        self.last_device = *device;
+        let ahead = linear(&moved).norm() + self.simulation.radius() * angular(&moved).norm();
+        self.simulation.set_device_ahead(ahead);
+        self.work += self.simulation.step(device, self.shaded.as_ref()).work;
+    }
+
+    fn publish(&mut self) {
+        self.published.clone_from(self.simulation.constraint_set());
+        if self.moves
+            && let Some(pose) = self.simulation.obstacle_poses().next()
+        {
+            self.coupling.place_obstacle(0, pose);
+        }
+    }
+
+    fn force(&mut self, time: f64, device: &Pose) -> Vector6 {
+        let output = self.coupling.step(time, device, &self.published);
+        self.shaded = output.shaded;
+        output.wrench
+    }
+
+    fn pose(&self) -> Pose {
+        self.published.god_object_pose
+    }
+
+    fn move_obstacle(&mut self, pose: &Pose) {
+        self.moves = true;
+        self.simulation.move_obstacle(0, pose);
+    }
+}

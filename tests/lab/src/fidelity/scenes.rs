@@ -1,0 +1,250 @@
+//! Scenes of different need, each as a file says it, with the hand's motion and the right answer.
+//!
+//! | scene           | what it needs                                                    |
+//! |-----------------|------------------------------------------------------------------|
+//! | box on plane    | nothing: a plane's rows are exact however old they are           |
+//! | sphere on sphere| a rate: the normal turns                                         |
+//! | peg in hole     | rows for turns in a clearance of 0.5 mm                          |
+//! | curved mesh     | a rate, and as many triangles as can be felt                     |
+//! | thin plate      | no rate either: continuous collision detection stops a fast body |
+//! | moving plate    | a rate, for an obstacle that moves by itself                     |
+//! | tilted rod      | rounds: the body turns quickly on a long lever                   |
+
+use std::fs;
+use std::path::Path;
+
+use god_object::nalgebra::{UnitQuaternion, Vector3};
+use god_object::{Pose, Vector6};
+use taut_scene::shapes;
+
+/// 1/(k_h k_s m): 2000 / s^2, 0.5, 1 kg.
+const STIFFNESS: f64 = 1000.0;
+/// How deep the device goes, m: 2 N.
+const DEPTH: f64 = 2e-3;
+/// Radii of the spheres, m.
+const BALL: f64 = 0.02;
+const MESH_BALL: f64 = 0.03;
+const SMALL_BALL: f64 = 0.01;
+/// Speeds of the hand, m/s, and of the moving plate.
+const SLIDE: f64 = 0.1;
+const FAST: f64 = 1.0;
+const PLATE: f64 = 0.01;
+/// Turns of the rod, rad/s, and half its length, m.
+const TURN: f64 = 2.0;
+const ROD: f64 = 0.04;
+/// Time to press before anything else, s.
+const PRESS: f64 = 0.1;
+
+/// The hand's pose at a time, s.
+pub type Motion = fn(f64) -> Pose;
+
+/// One scene.
+pub struct FidelityScene {
+    /// Name in tables and files.
+    pub name: &'static str,
+    /// The scene file; `{simplify}` stands where a mesh may be simplified.
+    pub text: String,
+    /// The hand.
+    pub device: Motion,
+    /// s.
+    pub duration: f64,
+    /// The right wrench at a time, s; `None` takes a reference run.
+    pub ideal: Option<fn(f64) -> Vector6>,
+}
+
+/// All of them; their mesh files and traces are written into `directory`.
+///
+/// # Errors
+///
+/// Where a file cannot be written.
+pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
+    let ball = shapes::sphere(MESH_BALL, 4);
+    fs::write(directory.join("ball.ply"), taut_scene::write_ply(&ball))?;
+    let rise = 2.0 * DEPTH / PLATE;
+    let trace = format!(
+        "t,x,y,z,qw,qx,qy,qz\n0,0,0,{0},1,0,0,0\n{rise},0,0,{DEPTH},1,0,0,0\n{1},0,0,{DEPTH},1,0,0,0\n",
+        -DEPTH,
+        rise + 1.0
+    );
+    fs::write(directory.join("plate.csv"), trace)?;
+    Ok(vec![
+        box_on_plane(),
+        sphere_on_sphere(),
+        peg_in_hole(),
+        curved_mesh(),
+        thin_plate(),
+        moving_plate(rise),
+        rod_on_plane(),
+    ])
+}
+
+/// A scene file: body, its start, obstacle, and how fast the hand is.
+fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn]: [f64; 2]) -> String {
+    let [x, y, z] = start;
+    format!(
+        "name = \"fidelity\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [{x:?}, {y:?}, {z:?}] }}\n\
+         [coupling]\nk_s = 0.5\nk_h = 2000.0\nadaptation = false\n[fidelity]\nmode = \"auto\"\nspeed = {speed:?}\nturn_rate = {turn:?}\n\
+         [[obstacle]]\nname = \"a\"\n{obstacle}\n"
+    )
+}
+
+/// Pressed in `PRESS` seconds, and then for how long it has been so, s.
+fn pressed(time: f64) -> (f64, f64) {
+    let share = (time / PRESS).min(1.0);
+    (share * DEPTH, (time - PRESS).max(0.0))
+}
+
+fn force(vector: Vector3<f64>) -> Vector6 {
+    Vector6::new(vector.x, vector.y, vector.z, 0.0, 0.0, 0.0)
+}
+
+const PLANE: &str = "shape = { plane = {} }";
+
+fn box_on_plane() -> FidelityScene {
+    let device = |time| {
+        let (depth, slid) = pressed(time);
+        Pose::translation(SLIDE * slid, 0.0, SMALL_BALL - depth)
+    };
+    FidelityScene {
+        name: "box on plane",
+        text: text(
+            "box = { half_extents = [0.01, 0.01, 0.01] }",
+            [0.0, 0.0, 0.0101],
+            PLANE,
+            [SLIDE, 0.0],
+        ),
+        device,
+        duration: 0.6,
+        ideal: Some(|time| force(Vector3::z() * (STIFFNESS * pressed(time).0))),
+    }
+}
+
+/// On a circle about the obstacle's centre, at the depth of [`pressed`]; distance of the centres where they touch.
+fn around(time: f64, distance: f64) -> Pose {
+    let (depth, slid) = pressed(time);
+    let angle = SLIDE * slid / distance;
+    let radius = distance - depth;
+    Pose::translation(radius * angle.sin(), 0.0, radius * angle.cos())
+}
+
+fn outward(time: f64, distance: f64) -> Vector6 {
+    let (depth, slid) = pressed(time);
+    let angle = SLIDE * slid / distance;
+    force(Vector3::new(angle.sin(), 0.0, angle.cos()) * (STIFFNESS * depth))
+}
+
+fn sphere_on_sphere() -> FidelityScene {
+    FidelityScene {
+        name: "sphere on sphere",
+        text: text(
+            "sphere = { radius = 0.02 }",
+            [0.0, 0.0, 0.0401],
+            "shape = { sphere = { radius = 0.02 } }",
+            [SLIDE, 0.0],
+        ),
+        device: |time| around(time, 2.0 * BALL),
+        duration: 0.5,
+        ideal: Some(|time| outward(time, 2.0 * BALL)),
+    }
+}
+
+fn curved_mesh() -> FidelityScene {
+    FidelityScene {
+        name: "curved mesh",
+        text: text(
+            "sphere = { radius = 0.01 }",
+            [0.0, 0.0, 0.0401],
+            "shape = { mesh = \"ball.ply\"{simplify} }",
+            [SLIDE, 0.0],
+        ),
+        device: |time| around(time, MESH_BALL + SMALL_BALL),
+        duration: 0.5,
+        ideal: Some(|time| outward(time, MESH_BALL + SMALL_BALL)),
+    }
+}
+
+fn peg_in_hole() -> FidelityScene {
+    FidelityScene {
+        name: "peg in hole",
+        text: text(
+            "cylinder = { radius = 0.01, half_length = 0.03, facets = 24, axis = \"z\" }",
+            [0.0, 0.0, 0.0],
+            "shape = { box_with_hole = { half_extents = [0.03, 0.03, 0.03], radius = 0.0105, facets = 24, axis = \"z\" } }",
+            [0.05, 0.5],
+        ),
+        // Against the wall, along it, and leaned.
+        device: |time| {
+            let (depth, on) = pressed(time);
+            let lean = 0.05 * (10.0 * on).sin();
+            Pose::from_parts(
+                Vector3::new(5e-4 + depth, 1e-3 * (20.0 * on).sin(), 0.02 * on).into(),
+                UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean),
+            )
+        },
+        duration: 0.4,
+        ideal: None,
+    }
+}
+
+fn thin_plate() -> FidelityScene {
+    FidelityScene {
+        name: "thin plate",
+        text: text(
+            "sphere = { radius = 0.01 }",
+            [0.0, 0.0, 0.1],
+            "shape = { box = { half_extents = [0.1, 0.1, 0.0005] } }\npose = { position = [0.0, 0.0, -0.0005] }",
+            [FAST, 0.0],
+        ),
+        device: |time| Pose::translation(0.0, 0.0, arrival(time)),
+        duration: 0.4,
+        ideal: Some(|time| {
+            let depth = (SMALL_BALL - arrival(time)).max(0.0);
+            force(Vector3::z() * (STIFFNESS * depth))
+        }),
+    }
+}
+
+/// Height of a hand that comes at full speed and stops with the body's middle beneath the plate, m.
+fn arrival(time: f64) -> f64 {
+    (0.1 - FAST * time).max(SMALL_BALL - 0.012)
+}
+
+fn moving_plate(rise: f64) -> FidelityScene {
+    FidelityScene {
+        name: "moving plate",
+        text: text(
+            "box = { half_extents = [0.01, 0.01, 0.01] }",
+            [0.0, 0.0, 0.0101],
+            "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }",
+            [0.01, 0.0],
+        ),
+        device: |_| Pose::translation(0.0, 0.0, SMALL_BALL + 1e-4),
+        duration: rise + 0.1,
+        ideal: Some(|time| {
+            let height = (PLATE * time - DEPTH).min(DEPTH);
+            force(Vector3::z() * (STIFFNESS * (height - 1e-4).max(0.0)))
+        }),
+    }
+}
+
+fn rod_on_plane() -> FidelityScene {
+    FidelityScene {
+        name: "turning rod",
+        text: text(
+            "box = { half_extents = [0.04, 0.005, 0.005] }",
+            [0.0, 0.0, 0.0051],
+            PLANE,
+            [0.05, TURN],
+        ),
+        // Its end goes down and up again while its middle stays.
+        device: |time| {
+            let swing = 0.5 * (TURN / 0.5 * time).sin();
+            Pose::from_parts(
+                Vector3::new(0.0, 0.0, 0.005 + ROD * 0.1).into(),
+                UnitQuaternion::from_axis_angle(&Vector3::y_axis(), swing),
+            )
+        },
+        duration: 0.8,
+        ideal: None,
+    }
+}

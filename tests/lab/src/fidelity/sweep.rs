@@ -1,0 +1,210 @@
+//! Every setting of the grid, run and measured, and the verdict on the scene's own choice.
+//!
+//! Error: J of [`measure`](crate::measure), the worst of the start phases. Cost: nominal microseconds of the god-object loop a second, counted and so the
+//! same on every machine of a type.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use taut_method_tests::checker::PenetrationChecker;
+use taut_scene::fidelity::decide::{MESH_ERRORS, RATES, ROUNDS, TOLERANCES};
+use taut_scene::{BuiltScene, FidelityPlan, Scene as SceneFile, SceneError};
+
+use super::counted::Counted;
+use super::scenes::FidelityScene;
+use crate::clock::{TICK, run};
+use crate::measure::{Measure, Measures};
+use crate::method::Scene;
+use crate::recipe::{Ideal, Recipe};
+
+/// Shares of a period at which the first update begins.
+const PHASES: [f64; 2] = [0.25, 0.75];
+/// What is spent of the error, J.
+pub const BUDGET: f64 = 0.5;
+
+/// One setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// Hz.
+    pub rate: f64,
+    /// m.
+    pub gap_tolerance: f64,
+    /// Implicit rounds.
+    pub rounds: u32,
+    /// m; 0 is the mesh in the file.
+    pub mesh_error: f64,
+}
+
+/// A setting and what was measured of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Which.
+    pub setting: Setting,
+    /// Error, in just-noticeable differences.
+    pub j: f64,
+    /// Nominal us of the god-object loop a second.
+    pub cost: f64,
+}
+
+/// A scene's sweep.
+#[derive(Clone, Debug)]
+pub struct Swept {
+    /// Which scene.
+    pub name: &'static str,
+    /// What the scene chose, with its reasons.
+    pub plan: FidelityPlan,
+    /// The choice, measured.
+    pub auto: Measured,
+    /// Every setting.
+    pub all: Vec<Measured>,
+}
+
+impl Swept {
+    /// The cheapest within the budget, if any is.
+    #[must_use]
+    pub fn cheapest(&self) -> Option<&Measured> {
+        let within = self.all.iter().filter(|measured| measured.j <= BUDGET);
+        within.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// The least error of all settings.
+    #[must_use]
+    pub fn least_error(&self) -> f64 {
+        self.all.iter().map(|m| m.j).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Cost of the choice over the cheapest that is within the budget.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        self.cheapest().map(|best| self.auto.cost / best.cost)
+    }
+
+    /// Whether the choice is within the budget.
+    #[must_use]
+    pub fn is_within(&self) -> bool {
+        self.auto.j <= BUDGET
+    }
+}
+
+/// Builds, runs and measures. `quick` takes every other rate and the ends of the other lists.
+///
+/// # Errors
+///
+/// Where a scene file is wrong.
+pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swept, SceneError> {
+    let plain = scene.text.replace("{simplify}", "");
+    let parsed = SceneFile::parse("fidelity.toml", &plain, directory)?;
+    let chosen = parsed.build()?;
+    let size = chosen.size;
+    let plan = chosen
+        .fidelity
+        .clone()
+        .unwrap_or_else(|| panic!("the scene chooses"));
+    let setting = Setting {
+        rate: plan.update_rate_hz,
+        gap_tolerance: chosen.settings.gap_tolerance,
+        rounds: chosen.settings.implicit_rounds,
+        mesh_error: chosen.simplified.first().map_or(0.0, |s| s.max_error),
+    };
+    let off = parsed.with_override("fidelity.mode=\"off\"")?.build()?;
+    let right = answer(scene, &off);
+    let auto = measure(scene, &chosen, setting, &right);
+    let has_meshes = scene.text.contains("{simplify}");
+    let mesh_errors = if has_meshes { &MESH_ERRORS[..] } else { &[0.0] };
+    let mut all = Vec::new();
+    for mesh_error in mesh_errors.iter().map(|share| share * size) {
+        let simplify = if mesh_error > 0.0 {
+            format!(", simplify = {{ max_error = {mesh_error:?} }}")
+        } else {
+            String::new()
+        };
+        let text = scene.text.replace("{simplify}", &simplify);
+        let base = SceneFile::parse("fidelity.toml", &text, directory)?
+            .with_override("fidelity.mode=\"off\"")?
+            .build()?;
+        let step = if quick { 2 } else { 1 };
+        for rate in RATES.iter().step_by(step) {
+            for tolerance in TOLERANCES.iter().step_by(step) {
+                for rounds in ROUNDS.iter().step_by(step) {
+                    let setting = Setting {
+                        rate: *rate,
+                        gap_tolerance: tolerance * size,
+                        rounds: *rounds,
+                        mesh_error,
+                    };
+                    all.push(measure(scene, &base, setting, &right));
+                }
+            }
+        }
+    }
+    all.push(auto);
+    Ok(Swept {
+        name: scene.name,
+        plan,
+        auto,
+        all,
+    })
+}
+
+fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
+    let lab_scene = Scene {
+        world: built.world.clone().into(),
+        start: built.start,
+        settings: built.settings,
+        speed: 0.0,
+    };
+    let moving = built.motions.first().cloned();
+    Recipe {
+        ideal,
+        moving: moving.map(|motion| -> Box<dyn Fn(f64) -> god_object::Pose> {
+            Box::new(move |time| motion.pose_at(time))
+        }),
+        check_every: u32::MAX,
+        answer: OnceLock::new(),
+        ..Recipe::new(
+            ("fidelity", scene.name.to_owned()),
+            "fidelity",
+            lab_scene,
+            scene.duration,
+            scene.device,
+        )
+    }
+}
+
+/// The right wrench at every tick.
+fn answer(scene: &FidelityScene, built: &BuiltScene) -> Vec<god_object::Vector6> {
+    let ideal = scene.ideal.map_or(Ideal::Reference, Ideal::closed);
+    recipe(scene, built, ideal).answer().wrenches.clone()
+}
+
+fn measure(
+    scene: &FidelityScene,
+    built: &BuiltScene,
+    setting: Setting,
+    right: &[god_object::Vector6],
+) -> Measured {
+    let right = right.to_vec();
+    let at = move |time: f64| right[(time / TICK).round() as usize];
+    let mut recipe = recipe(scene, built, Ideal::closed(at));
+    recipe.scene.settings.gap_tolerance = setting.gap_tolerance;
+    recipe.scene.settings.implicit_rounds = setting.rounds;
+    let checker = PenetrationChecker::new(&recipe.scene.world);
+    let (mut j, mut work) = (0.0_f64, 0);
+    for phase in PHASES {
+        let mut method = Counted::new(&recipe.scene);
+        let ran = run(&mut method, &recipe, setting.rate as u32, phase);
+        let felt = Measures::of(&recipe, &checker, &ran.ticks).get(Measure::Felt);
+        // What is not a number is no small error.
+        j = if felt.is_nan() {
+            f64::INFINITY
+        } else {
+            j.max(felt)
+        };
+        work += method.work.nominal_us();
+    }
+    Measured {
+        setting,
+        j,
+        cost: work as f64 / (PHASES.len() as f64 * scene.duration),
+    }
+}
