@@ -95,6 +95,7 @@ pub struct StateWriter {
     state: HotState,
     motion: MotionEstimate,
     events: EventSource,
+    most_contacts: usize,
 }
 
 impl StateWriter {
@@ -113,6 +114,16 @@ impl StateWriter {
             state: HotState::empty(),
             motion: MotionEstimate::default(),
             events: EventSource::default(),
+            most_contacts: MAX_CONTACTS,
+        }
+    }
+
+    /// The same with no more than so many contacts in a state, the nearest.
+    #[must_use]
+    pub fn with_most_contacts(self, most_contacts: usize) -> Self {
+        Self {
+            most_contacts,
+            ..self
         }
     }
 
@@ -152,6 +163,7 @@ impl StateWriter {
         state.bodies.clear();
         state.bodies.extend(contacts.moving.iter().map(body_state));
         nearest_contacts(&contacts.set, &mut state.contacts);
+        state.contacts.truncate(self.most_contacts);
         self.events.take(&mut state.events);
         Some(&self.state)
     }

@@ -111,7 +111,15 @@ pub fn session_setup(
         .recording
         .as_ref()
         .map(|directory| recording(directory.clone(), &scene, &built));
+    let mut realtime = realtime(workbench);
+    let mut fidelity = built.fidelity.clone();
+    if let Some(plan) = &mut fidelity {
+        let rate_is_set = workbench.realtime.god_object_rate.is_some();
+        let at_bridge = overrides.input.is_none() && workbench.device == Device::Remote;
+        crate::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
+    }
     Ok(SessionSetup {
+        fidelity,
         recording,
         device: match &overrides.input {
             Some(choice) => input(choice, &built, &workbench_from_scene)?,
@@ -126,7 +134,7 @@ pub fn session_setup(
         content,
         link,
         looking_on: LookingOnSettings::of(workbench)?,
-        realtime: realtime(workbench),
+        realtime,
         monitor: monitor(&workbench.monitoring, overrides),
     })
 }

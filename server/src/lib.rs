@@ -30,6 +30,7 @@ pub mod doctor;
 pub mod doctor_device;
 pub mod edge_sets;
 pub mod failure;
+pub mod fidelity;
 pub mod finished_file;
 pub mod frames;
 pub mod head;

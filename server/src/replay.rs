@@ -14,21 +14,23 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use god_object::nalgebra::{Point3, Vector3};
-use god_object::spatial::{Pose, at_reference_point, linear};
+use god_object::spatial::{Pose, angular, at_reference_point, linear, pose_difference};
 use god_object::surface::EnergyObserver;
 use god_object::{
     Coupling, GodObject, Settings, ShadedAcceleration, StartError, StepReport, World,
 };
 use indicatif::ProgressBar;
-use taut_scene::{BuiltMotion, DeviceTrace, ReplayRow, ReplayWriter, Scene};
+use taut_scene::{BuiltMotion, DeviceTrace, FidelityPlan, ReplayRow, ReplayWriter, Scene};
 
 use crate::cli::{MethodChoice, ReplayArgs};
 use crate::failure::Failure;
+use crate::fidelity::FidelityWatch;
 use crate::finished_file::FinishedFile;
 use crate::realtime::thread_cpu_time;
 use crate::report::{ReplayReport, WorkReport};
 use crate::shutdown::Shutdown;
 use crate::signals::BlockingEndSignal;
+use crate::terminal::Terminal;
 use crate::timing::distribution_of;
 
 /// A replay that takes longer shows its progress.
@@ -58,9 +60,18 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
         Arc::new(built.world),
         settings,
         built.start,
-        args.god_object_rate,
+        args.god_object_rate
+            .or(built.fidelity.as_ref().map(|plan| plan.update_rate_hz)),
     )?
     .with_motions(built.motions);
+    if let Some(mut plan) = built.fidelity {
+        if let Some(rate) = args.god_object_rate {
+            plan.use_update_rate(rate, "--god-object-rate");
+        }
+        let terminal = Terminal::standard_error();
+        plan.lines().iter().for_each(|line| terminal.say(line));
+        replay = replay.with_fidelity(plan);
+    }
 
     let interrupted = BlockingEndSignal::listen()
         .and_then(BlockingEndSignal::into_request)
@@ -126,6 +137,11 @@ pub struct Replay {
     reference_point: Point3<f64>,
     energy: EnergyObserver,
     last_force: Option<Vector3<f64>>,
+    fidelity: Option<(FidelityPlan, FidelityWatch)>,
+    /// The device at the row before.
+    last_row: Option<(f64, Pose)>,
+    /// Speed and turn rate of the device at this row, m/s and rad/s.
+    rates: [f64; 2],
     seen: Seen,
 }
 
@@ -177,6 +193,9 @@ impl Replay {
             reference_point,
             energy: EnergyObserver::new(),
             last_force: None,
+            fidelity: None,
+            last_row: None,
+            rates: [0.0; 2],
             seen: Seen {
                 gap_min: f64::INFINITY,
                 ..Seen::default()
@@ -191,10 +210,24 @@ impl Replay {
         self
     }
 
+    /// The same with the budget of the scene's fidelity watched.
+    #[must_use]
+    pub fn with_fidelity(mut self, plan: FidelityPlan) -> Self {
+        let watch = FidelityWatch::new(&plan);
+        self.fidelity = Some((plan, watch));
+        self
+    }
+
     /// One row of the trace: the device is at `device_pose` at `time`, s; times never run back.
     pub fn row(&mut self, time: f64, device_pose: &Pose) -> ReplayRow {
         let mut update_time = Duration::ZERO;
         let elapsed = time - *self.began.get_or_insert(time);
+        if let Some((before, pose)) = self.last_row.replace((time, *device_pose))
+            && time > before
+        {
+            let way = pose_difference(device_pose, &pose, &Vector3::zeros());
+            self.rates = [linear(&way).norm(), angular(&way).norm()].map(|w| w / (time - before));
+        }
         while self.clock.is_due(time) {
             for motion in &self.motions {
                 self.god_object
@@ -205,6 +238,9 @@ impl Replay {
             let took = thread_cpu_time().saturating_sub(before);
             update_time += took;
             self.seen.update(&report, took);
+            if let Some((_, watch)) = &self.fidelity {
+                watch.look(took, self.rates[0], self.rates[1]);
+            }
             self.clock.updated(time);
         }
 
@@ -265,6 +301,10 @@ impl Replay {
             energy_injected_j: self.energy.highest(),
             energy_from_obstacles_j: self.coupling.obstacle_work(),
             energy_generated_j: self.energy.generated(),
+            fidelity: self
+                .fidelity
+                .as_ref()
+                .map(|(plan, watch)| watch.report(plan)),
             ..self.seen.report.clone()
         }
     }

@@ -6,6 +6,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::fidelity::FidelityReport;
 use crate::frames::FramesReport;
 use crate::timing::{Bin, Distribution};
 
@@ -64,6 +65,8 @@ pub struct SessionReport {
     pub clients: Vec<ClientReport>,
     /// Clients that looked on as observers.
     pub observers: u64,
+    /// The fidelity that the scene chose for itself, and how it held; `null` where it does not choose.
+    pub fidelity: Option<FidelityReport>,
 }
 
 /// What was enforced of the operating system, and what was not, and why.
@@ -131,6 +134,8 @@ pub struct ReplayReport {
     pub max_force_n: f64,
     /// What the god-object loop did, counted.
     pub work: WorkReport,
+    /// The fidelity that the scene chose for itself, and how it held; `null` where it does not choose.
+    pub fidelity: Option<FidelityReport>,
 }
 
 /// What came of computing a recorded session again.
@@ -230,6 +235,9 @@ impl fmt::Display for SessionReport {
             "safety events       {}, energy injected {:.2e} J",
             self.safety_events, self.energy_injected_j
         )?;
+        if let Some(fidelity) = &self.fidelity {
+            writeln!(f, "fidelity            {fidelity}")?;
+        }
         if let Some(frames) = &self.frames {
             writeln!(f, "frames              {frames}")?;
         }
@@ -326,6 +334,9 @@ impl fmt::Display for ReplayReport {
             self.energy_generated_j,
             self.obstacle_blocked_updates,
         )?;
+        if let Some(fidelity) = &self.fidelity {
+            writeln!(f, "fidelity            {fidelity}")?;
+        }
         match self.gap_min_m {
             Some(gap) => writeln!(f, "smallest gap        {gap:.3e} m")?,
             None => writeln!(f, "smallest gap        never near")?,

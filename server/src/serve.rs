@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use taut_link::ClusterKey;
-use taut_scene::Workbench;
+use taut_scene::{FidelityPlan, Workbench};
 
 use crate::cli::ServeArgs;
 use crate::config::{Overrides, session_setup};
@@ -65,6 +65,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
         if let Some(stream) = monitor.stream_address() {
             terminal.say(&format!("or in the rerun viewer: rerun {stream}"));
         }
+    }
+    for line in session.fidelity().into_iter().flat_map(FidelityPlan::lines) {
+        terminal.say(&line);
     }
     for line in session.looking_on().lines() {
         terminal.say(&line);

@@ -19,6 +19,7 @@ use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, ServerPin, proto};
 use taut_recording::{EventRecord, Recorder};
+use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
 
 use crate::broadcast::{self, BridgeCommands, StateWriter};
@@ -27,6 +28,7 @@ use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::edge_sets::EdgeSets;
 use crate::failure::Failure;
+use crate::fidelity::FidelityWatch;
 use crate::frames::FramesReport;
 use crate::looking_on::{LookingOn, Outlets};
 use crate::loops::coupling::CouplingLoop;
@@ -53,6 +55,13 @@ const SCHEDULING_TIME: Duration = Duration::from_millis(200);
 /// Threads of the network runtime: one for packets, one for joins.
 const NETWORK_THREADS: usize = 2;
 
+/// The scene's choice of its fidelity, and the watch over it.
+struct Fidelity {
+    plan: FidelityPlan,
+    watch: Arc<FidelityWatch>,
+    told: [bool; 2],
+}
+
 /// A running session. Dropped, it ends.
 pub struct Session {
     clock: SessionClock,
@@ -63,6 +72,7 @@ pub struct Session {
     wrench: Subscriber<WrenchCommand>,
     arm_switch: Arc<ArmSwitch>,
     incidents: IncidentNews,
+    fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     /// In the order of their start.
@@ -133,6 +143,14 @@ impl Session {
             None => (None, None),
         };
 
+        let fidelity = setup.fidelity.map(|plan| Fidelity {
+            watch: Arc::new(FidelityWatch::new(&plan)),
+            plan,
+            told: [false; 2],
+        });
+        let most_contacts = fidelity
+            .as_ref()
+            .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
         // Figure 3.
         let loops = WiredLoops::new(
             &setup.world,
@@ -153,6 +171,7 @@ impl Session {
             wrench: loops.observers.status,
             arm_switch: loops.arm_switch.clone(),
             incidents: IncidentNews::default(),
+            fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
             threads: Vec::new(),
@@ -188,13 +207,16 @@ impl Session {
             head,
             &setup.world.body.reference_point,
             scene_revision,
-        );
+        )
+        .with_most_contacts(most_contacts);
         session.start_coupling(
             loops.coupling,
             loops.coupling_waker.clone(),
             &setup.realtime,
         )?;
-        session.start_god_object(loops.god_object, loops.coupling_waker, &setup.realtime)?;
+        let watch = session.fidelity.as_ref().map(|f| f.watch.clone());
+        let god_object = loops.god_object.with_fidelity(watch);
+        session.start_god_object(god_object, loops.coupling_waker, &setup.realtime)?;
         session.start_checker(checker, loops.observers.checker)?;
         session.start_broadcast(
             states,
@@ -430,6 +452,11 @@ impl Session {
         self.ledger.report()
     }
 
+    /// What fidelity the scene chose for itself, if it does.
+    pub fn fidelity(&self) -> Option<&FidelityPlan> {
+        self.fidelity.as_ref().map(|fidelity| &fidelity.plan)
+    }
+
     /// Asks for force at the device, or for none.
     pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
         &self.arm_switch
@@ -449,6 +476,12 @@ impl Session {
     /// second.
     pub fn follow_network(&mut self, terminal: &Terminal) {
         self.tell_incidents();
+        if let Some(fidelity) = &mut self.fidelity {
+            for line in fidelity.watch.notices(&mut fidelity.told) {
+                terminal.say(&line);
+                tracing::info!("{line}");
+            }
+        }
         let Some(link) = &self.link else {
             return;
         };
@@ -540,6 +573,7 @@ impl Session {
         self.follow_network(terminal);
         let duration = self.age();
         let mut report = self.statistics.report(duration);
+        report.fidelity = self.fidelity.as_ref().map(|f| f.watch.report(&f.plan));
         if let Some(monitor) = &self.monitor {
             monitor.log(
                 Severity::Info,

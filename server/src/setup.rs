@@ -10,7 +10,7 @@ use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::BuiltMotion;
+use taut_scene::{BuiltMotion, FidelityPlan};
 
 use crate::head::HeadSource;
 use crate::looking_on::LookingOnSettings;
@@ -46,6 +46,8 @@ pub struct SessionSetup {
     pub monitor: Option<MonitorSettings>,
     /// Where the session is recorded; `None` does without.
     pub recording: Option<RecordingSettings>,
+    /// What fidelity the scene chose for itself, if it does.
+    pub fidelity: Option<FidelityPlan>,
 }
 
 /// Where a session is recorded, so that it can be computed again.

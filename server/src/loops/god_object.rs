@@ -10,7 +10,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
+use crate::fidelity::FidelityWatch;
 use crate::realtime::thread_cpu_time;
+use god_object::spatial::{angular, linear};
 use god_object::{GodObject, Pose, ShadedAcceleration};
 use taut_bridge::edge::{device_ahead, device_predicted};
 use taut_proto::ArrayVec;
@@ -37,6 +39,7 @@ pub struct GodObjectLoop {
     contacts: Publisher<ContactSnapshot>,
     snapshot: ContactSnapshot,
     recording: Option<UpdateTaps>,
+    fidelity: Option<Arc<FidelityWatch>>,
     statistics: Arc<GodObjectStatistics>,
 }
 
@@ -84,6 +87,7 @@ impl GodObjectLoop {
             contacts,
             snapshot,
             recording,
+            fidelity: None,
             statistics: Arc::default(),
         }
     }
@@ -98,6 +102,12 @@ impl GodObjectLoop {
         note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);
         self.contacts.publish(&self.snapshot);
         self
+    }
+
+    /// The same with the budget of the scene's fidelity watched.
+    #[must_use]
+    pub fn with_fidelity(self, fidelity: Option<Arc<FidelityWatch>>) -> Self {
+        Self { fidelity, ..self }
     }
 
     /// The counters that this loop writes.
@@ -117,9 +127,12 @@ impl GodObjectLoop {
 
         let before = thread_cpu_time();
         let report = self.god_object.step(&device_pose, shaded.as_ref());
-        self.statistics
-            .update
-            .record_time(thread_cpu_time().saturating_sub(before));
+        let took = thread_cpu_time().saturating_sub(before);
+        self.statistics.update.record_time(took);
+        if let Some(watch) = &self.fidelity {
+            let velocity = &device.velocity;
+            watch.look(took, linear(velocity).norm(), angular(velocity).norm());
+        }
 
         self.statistics.contacts.record(report.contacts as u64);
         let add = |counter: &AtomicU64, more: u64| {

@@ -99,7 +99,9 @@ impl Parts {
             mesh: felt(off),
             facets: errors::direction_jnd(facets.fold(0.0, f64::max)),
             tolerance: felt(tolerance),
-            obstacles: felt(moved).max(need.stiffness * stepped / errors::JND_CHANGE),
+            obstacles: (need.stiffness * moved
+                / (errors::JND_MAGNITUDE * errors::ramp_force(need.force)))
+            .max(need.stiffness * stepped / errors::JND_CHANGE),
         }
     }
 

@@ -142,7 +142,8 @@ pub struct SceneNeed {
 
 impl SceneNeed {
     /// How fast a contact's normal turns along the way, 1/m: two convex bodies of curvature a and b turn about each other like
-    /// ab / (a + b); an edge is as curved as can be, and turns by the other's.
+    /// ab / (a + b); an edge of the body slides over an obstacle and turns by its curvature. An edge of an obstacle is passed and not stayed
+    /// on: it counts for nothing here.
     #[must_use]
     pub fn curvature(&self) -> f64 {
         let pairs = self.obstacles.iter().flat_map(|o| turning(&self.body, o));
@@ -156,7 +157,7 @@ impl SceneNeed {
     }
 }
 
-fn turning(a: &BodyNeed, b: &BodyNeed) -> [f64; 3] {
+fn turning(a: &BodyNeed, b: &BodyNeed) -> [f64; 2] {
     let sum = a.curvature + b.curvature;
     let smooth = if sum > 0.0 {
         a.curvature * b.curvature / sum
@@ -164,8 +165,7 @@ fn turning(a: &BodyNeed, b: &BodyNeed) -> [f64; 3] {
         0.0
     };
     let edge_of_a = if a.sharp { b.curvature } else { 0.0 };
-    let edge_of_b = if b.sharp { a.curvature } else { 0.0 };
-    [smooth, edge_of_a, edge_of_b]
+    [smooth, edge_of_a]
 }
 
 #[cfg(test)]

@@ -53,6 +53,18 @@ pub struct FidelityPlan {
 }
 
 impl FidelityPlan {
+    /// Takes another rate of updates than the chosen one, named by `by`.
+    pub fn use_update_rate(&mut self, rate: f64, by: &str) {
+        self.update_rate_hz = rate;
+        for choice in &mut self.choices {
+            if choice.key == "fidelity.update_rate" {
+                choice.value = format!("{rate} Hz");
+                choice.origin = Origin::Set;
+                choice.reason = format!("{by}; the predicted J is that of the choice");
+            }
+        }
+    }
+
     /// Most time that an update may take, us: the budget's, or else the period.
     #[must_use]
     pub fn update_limit_us(&self) -> f64 {

@@ -28,12 +28,12 @@ const SMALL_BALL: f64 = 0.01;
 /// Speeds of the hand, m/s, and of the moving plate.
 const SLIDE: f64 = 0.1;
 const FAST: f64 = 1.0;
-const PLATE: f64 = 0.01;
+const PLATE: f64 = 5e-3;
 /// Turns of the rod, rad/s, and half its length, m.
 const TURN: f64 = 2.0;
 const ROD: f64 = 0.04;
-/// Time to press before anything else, s.
-const PRESS: f64 = 0.1;
+/// Time to come down and press before anything else, s.
+const PRESS: f64 = 0.2;
 
 /// The hand's pose at a time, s.
 pub type Motion = fn(f64) -> Pose;
@@ -58,7 +58,7 @@ pub struct FidelityScene {
 ///
 /// Where a file cannot be written.
 pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
-    let ball = shapes::sphere(MESH_BALL, 4);
+    let ball = shapes::sphere(MESH_BALL, 5);
     fs::write(directory.join("ball.ply"), taut_scene::write_ply(&ball))?;
     let rise = 2.0 * DEPTH / PLATE;
     let trace = format!(
@@ -88,10 +88,16 @@ fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn]: [f64; 2]) ->
     )
 }
 
-/// Pressed in `PRESS` seconds, and then for how long it has been so, s.
+/// Share of a minimum-jerk motion of `PRESS` seconds, as hands make them.
+fn share(time: f64) -> f64 {
+    let t = (time / PRESS).clamp(0.0, 1.0);
+    t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
+}
+
+/// Depth, m, from above the surface to [`DEPTH`] in `PRESS` seconds, and then for how long it has been so, s.
 fn pressed(time: f64) -> (f64, f64) {
-    let share = (time / PRESS).min(1.0);
-    (share * DEPTH, (time - PRESS).max(0.0))
+    let depth = DEPTH * (2.0 * share(time) - 1.0);
+    (depth, (time - PRESS).max(0.0))
 }
 
 fn force(vector: Vector3<f64>) -> Vector6 {
@@ -115,7 +121,7 @@ fn box_on_plane() -> FidelityScene {
         ),
         device,
         duration: 0.6,
-        ideal: Some(|time| force(Vector3::z() * (STIFFNESS * pressed(time).0))),
+        ideal: Some(|time| force(Vector3::z() * (STIFFNESS * pressed(time).0.max(0.0)))),
     }
 }
 
@@ -130,7 +136,7 @@ fn around(time: f64, distance: f64) -> Pose {
 fn outward(time: f64, distance: f64) -> Vector6 {
     let (depth, slid) = pressed(time);
     let angle = SLIDE * slid / distance;
-    force(Vector3::new(angle.sin(), 0.0, angle.cos()) * (STIFFNESS * depth))
+    force(Vector3::new(angle.sin(), 0.0, angle.cos()) * (STIFFNESS * depth.max(0.0)))
 }
 
 fn sphere_on_sphere() -> FidelityScene {
@@ -143,7 +149,7 @@ fn sphere_on_sphere() -> FidelityScene {
             [SLIDE, 0.0],
         ),
         device: |time| around(time, 2.0 * BALL),
-        duration: 0.5,
+        duration: 0.6,
         ideal: Some(|time| outward(time, 2.0 * BALL)),
     }
 }
@@ -158,7 +164,7 @@ fn curved_mesh() -> FidelityScene {
             [SLIDE, 0.0],
         ),
         device: |time| around(time, MESH_BALL + SMALL_BALL),
-        duration: 0.5,
+        duration: 0.6,
         ideal: Some(|time| outward(time, MESH_BALL + SMALL_BALL)),
     }
 }
@@ -174,14 +180,19 @@ fn peg_in_hole() -> FidelityScene {
         ),
         // Against the wall, along it, and leaned.
         device: |time| {
-            let (depth, on) = pressed(time);
+            let on = pressed(time).1;
             let lean = 0.05 * (10.0 * on).sin();
             Pose::from_parts(
-                Vector3::new(5e-4 + depth, 1e-3 * (20.0 * on).sin(), 0.02 * on).into(),
+                Vector3::new(
+                    share(time) * (5e-4 + DEPTH),
+                    1e-3 * (20.0 * on).sin(),
+                    0.02 * on,
+                )
+                .into(),
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean),
             )
         },
-        duration: 0.4,
+        duration: 0.6,
         ideal: None,
     }
 }
@@ -217,7 +228,8 @@ fn moving_plate(rise: f64) -> FidelityScene {
             [0.0, 0.0, 0.0101],
             "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }",
             [0.01, 0.0],
-        ),
+        )
+        .replace("[fidelity]", "[fidelity]\nforce = 4.0"),
         device: |_| Pose::translation(0.0, 0.0, SMALL_BALL + 1e-4),
         duration: rise + 0.1,
         ideal: Some(|time| {
