@@ -2,6 +2,7 @@
 
 mod checks;
 mod exact_shapes;
+mod fidelity;
 mod generated_shapes;
 mod scene_faults;
 mod shipped;

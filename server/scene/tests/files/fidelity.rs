@@ -1,0 +1,151 @@
+//! `fidelity = "auto"`: chosen by the scene, overridden key by key, and nothing at all without the key.
+
+use std::path::Path;
+
+use taut_scene::fidelity::Origin;
+use taut_scene::{FidelityPlan, Scene, SceneError, check, shapes, write_ply};
+
+const BODY: &str = "name = \"s\"\n[god_object]\nshape = { sphere = { radius = 0.02 } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.05] }\n";
+const BALL: &str = "[[obstacle]]\nname = \"a\"\nshape = { sphere = { radius = 0.02 } }\n";
+const PLANE: &str = "[[obstacle]]\nname = \"a\"\nshape = { plane = {} }\n";
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse("s.toml", text, Path::new(""))
+}
+
+fn plan(text: &str) -> FidelityPlan {
+    let built = parse(text).and_then(|scene| scene.build()).unwrap();
+    built.fidelity.expect("a choice")
+}
+
+fn complaint(text: &str) -> String {
+    parse(text).expect_err("a fault").to_string()
+}
+
+#[test]
+fn without_the_key_nothing_changes() {
+    let plain = parse(&format!("{BODY}{BALL}")).unwrap().build().unwrap();
+    assert_eq!(plain.fidelity, None);
+    let off = format!("fidelity = \"off\"\n{BODY}{BALL}");
+    let off = parse(&off).unwrap().build().unwrap();
+    assert_eq!((off.settings, off.fidelity), (plain.settings, None));
+}
+
+#[test]
+fn a_curved_scene_is_updated_more_often_than_a_flat_one() {
+    let flat = plan(&format!("fidelity = \"auto\"\n{BODY}{PLANE}"));
+    let round = plan(&format!("fidelity = \"auto\"\n{BODY}{BALL}"));
+    assert!(flat.update_rate_hz < round.update_rate_hz);
+    assert!(flat.is_within() && round.is_within());
+    assert_eq!((round.budget_j, round.time_us), (0.5, None));
+}
+
+#[test]
+fn the_choice_reaches_the_settings_and_keys_of_the_file_win() {
+    let text = format!("fidelity = \"auto\"\n{BODY}{BALL}");
+    let built = parse(&text).unwrap().build().unwrap();
+    let default = parse(&format!("{BODY}{BALL}")).unwrap().build().unwrap();
+    assert!(built.settings.gap_tolerance > default.settings.gap_tolerance);
+    let set = parse(&format!("{text}[method]\ngap_tolerance = 2e-7\n"))
+        .unwrap()
+        .with_override("method.implicit_rounds=2")
+        .unwrap()
+        .build()
+        .unwrap();
+    assert_eq!(
+        (set.settings.gap_tolerance, set.settings.implicit_rounds),
+        (2e-7, 2)
+    );
+    let plan = set.fidelity.expect("a choice");
+    for choice in &plan.choices {
+        let named = ["method.gap_tolerance", "method.implicit_rounds"];
+        let expected = if named.contains(&choice.key.as_str()) {
+            Origin::Set
+        } else {
+            Origin::Auto
+        };
+        assert_eq!(choice.origin, expected, "{choice:?}");
+    }
+    assert!(plan.to_string().contains("(set)"));
+}
+
+#[test]
+fn rates_and_contacts_can_be_set_and_a_time_bounds_the_work() {
+    let table = "[fidelity]\nbudget_j = 0.3\ntime_us = 150.0\nupdate_rate = 250\nbroadcast_rate = 90\ncontacts = 3\n";
+    let built = parse(&format!("{BODY}{BALL}{table}"))
+        .unwrap()
+        .build()
+        .unwrap();
+    assert_eq!(built.settings.work_budget, Some(150));
+    let plan = built.fidelity.expect("a choice");
+    assert_eq!(
+        (plan.update_rate_hz, plan.broadcast_rate_hz, plan.contacts),
+        (250.0, 90.0, 3)
+    );
+    assert_eq!((plan.budget_j, plan.update_limit_us()), (0.3, 150.0));
+}
+
+#[test]
+fn a_mesh_is_simplified_as_far_as_the_budget_allows() {
+    let folder = tempfile::tempdir().unwrap();
+    // Far finer than anyone feels: flat parts cut into many triangles.
+    let raw = shapes::sphere(0.03, 5);
+    std::fs::write(folder.path().join("a.ply"), write_ply(&raw)).unwrap();
+    let mesh = "[[obstacle]]\nname = \"a\"\nshape = { mesh = \"a.ply\" }\npose = { position = [0.0, 0.0, -0.01] }\n";
+    let text = |head: &str| format!("{head}{BODY}{mesh}[coupling]\nk_h = 400.0\n");
+    let of = |head: &str| {
+        Scene::parse("s.toml", &text(head), folder.path())
+            .and_then(|scene| scene.build())
+            .unwrap()
+    };
+    let (auto, plain) = (of("fidelity = \"auto\"\n"), of(""));
+    let triangles = |built: &taut_scene::BuiltScene| built.bodies[1].mesh.triangles.len();
+    assert!(
+        triangles(&auto) < triangles(&plain) / 2,
+        "{}",
+        triangles(&auto)
+    );
+    assert_eq!(auto.simplified.len(), 1);
+    assert!(auto.simplified[0].to_original <= auto.simplified[0].max_error);
+}
+
+#[test]
+fn a_budget_that_cannot_be_met_is_said() {
+    let small = BODY
+        .replace("0.02", "0.001")
+        .replace("[god_object]", "[fidelity]\nspeed = 1.0\n[god_object]");
+    let plan = plan(&format!("{small}{}", BALL.replace("0.02", "0.001")));
+    assert!(!plan.is_within());
+    assert_eq!(plan.update_rate_hz, 1000.0);
+    assert!(plan.to_string().contains("NOT within the budget"));
+}
+
+#[test]
+fn faults_name_the_line_and_the_nearest_key() {
+    let said = complaint(&format!("fidelity = \"best\"\n{BODY}{BALL}"));
+    assert!(said.contains("s.toml:1") && said.contains("auto"), "{said}");
+    let said = complaint(&format!(
+        "[fidelity]\nbudget = 0.3\n{}",
+        BODY.replace("name = \"s\"\n", "")
+    ));
+    assert!(
+        said.contains("s.toml:2") && said.contains("budget_j"),
+        "{said}"
+    );
+    let said = complaint(&format!("{BODY}{BALL}[fidelity]\ncontacts = 9\n"));
+    assert!(said.contains("contacts") && said.contains('8'), "{said}");
+}
+
+#[test]
+fn check_prints_the_choice_with_its_reasons() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("s.toml");
+    std::fs::write(&file, format!("fidelity = \"auto\"\n{BODY}{BALL}")).unwrap();
+    let reports = check(&[&file]);
+    let said = reports[0].to_string();
+    assert!(reports[0].fidelity.is_some());
+    assert!(
+        said.contains("fidelity.update_rate") && said.contains("per m at"),
+        "{said}"
+    );
+}
