@@ -83,13 +83,13 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
 
-    /// Limits of the force.
-    #[command(flatten)]
-    pub safety: SafetyArgs,
-
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+
+    /// Limits of the force.
+    #[command(flatten)]
+    pub safety: SafetyArgs,
 }
 
 /// Where the force is computed.
@@ -210,7 +210,7 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
     let (report, code) = match run(args) {
         Ok(report) => (Some(report), ExitCode::SUCCESS),
         Err(error) => {
-            eprintln!("{error}");
+            eprintln!("taut: {error}");
             let code = ExitCode::from(error.exit_code());
             match error {
                 BridgeError::ServerLost { report, .. } => (Some(*report), code),

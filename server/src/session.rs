@@ -115,9 +115,9 @@ impl Session {
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
-        // QUIC must not give up a node on a network whose pauses the workbench bears.
+        // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
         let options = ServerOptions {
-            idle_timeout: options.idle_timeout.max(options.node_timeout),
+            idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
             ..options
         };
         let (looking_on, outlets) =

@@ -44,8 +44,6 @@ const NODE_TIMEOUTS_MS: std::ops::RangeInclusive<u32> = 100..=60_000;
 ///
 /// Runs on the current tokio runtime, which must live as long as the link; over UDP, states arrive in a thread named `taut-states`.
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
-    // Nobody is asked for what the key does not allow.
-    options.key.secret_for(options.role, &options.node)?;
     let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
     connect_with(options, meshes).await
 }
@@ -55,6 +53,8 @@ pub(crate) async fn connect_with(
     options: ClientOptions,
     meshes: Arc<Meshes>,
 ) -> Result<ClientLink, LinkError> {
+    // Nobody is asked for what the key does not allow.
+    options.key.secret_for(options.role, &options.node)?;
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
