@@ -14,7 +14,7 @@ use crate::port::{Passivity, PassivitySettings, Rearm, SafetySettings};
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key device.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.

@@ -44,7 +44,7 @@ pub struct RenderArgs {
     /// Name of this node in the server's workbench file.
     #[arg(long, value_name = "NAME")]
     pub node: String,
-    /// File with this node's credential, or with the cluster key, copied from the server.
+    /// File with this node's credential, made by `taut keys` on the haptic PC, or with the cluster key.
     #[arg(long, value_name = "FILE", env = "TAUT_KEY_FILE")]
     pub key: PathBuf,
     /// How states travel to this node.

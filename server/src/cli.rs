@@ -28,7 +28,7 @@ pub enum Command {
     Serve(ServeArgs),
     /// One node of the render cluster
     #[command(
-        after_help = "Example: taut render --server haptic-pc:4857 --node front --key cluster.key"
+        after_help = "Example: taut render --server haptic-pc:4857 --node front --key render-front.key"
     )]
     Render(crate::rendering::RenderArgs),
     /// The device side, on this or another PC
@@ -182,7 +182,7 @@ pub struct ReplayArgs {
 /// `taut record`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example: taut record --server haptic-pc:4857 --key cluster.key --out hand.csv --duration 60"
+    after_help = "Example: taut record --server haptic-pc:4857 --key operator.key --out hand.csv --duration 60"
 )]
 pub struct RecordArgs {
     /// The haptic PC
@@ -204,7 +204,7 @@ pub struct RecordArgs {
 
 /// `taut arm`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key cluster.key")]
+#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key operator.key")]
 pub struct ArmArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]

@@ -316,7 +316,7 @@ async fn an_observer_takes_no_part() {
     let leader = Leader::start(Some(Swap::Immediate), None).await;
     let shown = Shown::default();
     let observer = Screen::start(&leader, Role::Observer, "observer", 2, &shown).await;
-    wait_until("refusal", || leader.server.counters().garbage > 3).await;
+    wait_until("refusal", || leader.server.counters().forbidden > 3).await;
     assert_eq!(observer.frames(), 0);
     let report = leader.server.frame_report().unwrap_or_default();
     assert_eq!(report.counts.released, 0);
