@@ -223,13 +223,13 @@ impl Statistics {
         Some(stats)
     }
 
-    /// What the HUD says of the frames drawn so far.
-    pub(crate) fn status(&self, node: &str, link: LinkHealth, frames: FrameMode) -> NodeStatus {
+    /// What the HUD says of the frames drawn so far, of a node that draws by itself.
+    pub(crate) fn status(&self, node: &str, link: LinkHealth) -> NodeStatus {
         let (fps, pose_age_ms) = self.recent;
         NodeStatus {
             node: node.to_owned(),
             link,
-            frames,
+            frames: FrameMode::Free,
             frame: self.frames,
             fps,
             pose_age_ms,
