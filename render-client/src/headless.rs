@@ -56,6 +56,7 @@ pub(crate) fn run(
         match session.turn(timeline) {
             Turn::Same => {}
             Turn::Renewed(other) => {
+                statistics.renewed();
                 if let Some(scene) = other {
                     canvas.restage(scene.0);
                     show = scene.1;

@@ -279,6 +279,7 @@ impl App<'_> {
         match self.session.turn(self.timeline) {
             Turn::Same => {}
             Turn::Renewed(other) => {
+                self.statistics.renewed();
                 if let Some(scene) = other {
                     self.show = scene.1;
                     self.restage(events, scene.0)?;

@@ -20,7 +20,7 @@ pub fn read_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
         JoinKey::Credential(credential) => Err(LinkError::KeyFile {
             path: path.to_owned(),
             reason: format!(
-                "it is a credential (role: {}), with which nobody can serve or make others; give the cluster key",
+                "it is a credential (role: {}), which cannot serve or make others; give the cluster key",
                 credential.role().title()
             ),
         }),
