@@ -62,7 +62,9 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=10_000.0;
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
     /// No key file was named.
-    #[error("no cluster key: give --key FILE or set TAUT_KEY_FILE to the server's key file")]
+    #[error(
+        "no credential is named: give the device's, which `taut keys` made on the haptic PC, by --key FILE or TAUT_KEY_FILE"
+    )]
     NoKey,
     /// A number on the command line is out of range.
     #[error("{option} is {value}, which is out of range; use {range}")]
@@ -623,7 +625,8 @@ impl Run<'_> {
                 cause,
             })?;
 
-        let mut watch = LinkWatch::new(Instant::now(), self.rejoiner.policy().dead_after);
+        let dead_after = self.rejoiner.policy().dead_after;
+        let mut watch = LinkWatch::new(Instant::now(), dead_after.unwrap_or(link.node_timeout()));
         let mut end = None;
         while end.is_none() && !thread.is_finished() {
             thread::sleep(WATCH_PERIOD);

@@ -14,7 +14,7 @@ use crate::port::{Passivity, PassivitySettings, Rearm, SafetySettings};
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key cluster.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key device.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.
@@ -83,13 +83,13 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "CORE")]
     pub core: Option<usize>,
 
-    /// Limits of the force.
-    #[command(flatten)]
-    pub safety: SafetyArgs,
-
     /// Print the end report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+
+    /// Limits of the force.
+    #[command(flatten)]
+    pub safety: SafetyArgs,
 }
 
 /// Where the force is computed.
@@ -210,7 +210,7 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
     let (report, code) = match run(args) {
         Ok(report) => (Some(report), ExitCode::SUCCESS),
         Err(error) => {
-            eprintln!("{error}");
+            eprintln!("taut: {error}");
             let code = ExitCode::from(error.exit_code());
             match error {
                 BridgeError::ServerLost { report, .. } => (Some(*report), code),

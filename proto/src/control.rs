@@ -101,6 +101,8 @@ pub struct Welcome {
     pub udp_port: u16,
     /// Session time when this was written, ns.
     pub session_time_ns: u64,
+    /// Silence on the hot plane after which either end gives the other up, ms.
+    pub node_timeout_ms: u32,
 }
 
 /// The server does not let the client in.
@@ -305,7 +307,8 @@ wire_struct!(Welcome {
     session,
     epoch,
     udp_port,
-    session_time_ns
+    session_time_ns,
+    node_timeout_ms
 });
 wire_struct!(Refusal {
     code,

@@ -247,7 +247,10 @@ fn check_of(lines: &str) -> String {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotAllowed {
     /// Another role.
-    #[error("it lets its holder join as {has}, not as {wanted}: use the credential for {wanted}")]
+    #[error(
+        "its holder may join as {}, not as {}: give the credential of the {} (--key)",
+        .has.title(), .wanted.title(), .wanted.title()
+    )]
     Role {
         /// What it is for.
         has: Role,
@@ -318,6 +321,14 @@ impl JoinKey {
                 ..
             }) => Some(node),
             _ => None,
+        }
+    }
+
+    /// The one role that it is for; `None` if any will do.
+    pub fn role(&self) -> Option<Role> {
+        match self {
+            JoinKey::Master(_) => None,
+            JoinKey::Credential(credential) => Some(credential.role),
         }
     }
 

@@ -15,23 +15,30 @@ fn vertex(@builtin(vertex_index) index: u32) -> Fragment {
     return fragment;
 }
 
-// Coverage of lines every `spacing`, a pixel or `width` wide, whichever is more.
+// Mean of the lines `width` wide around each multiple of `spacing`, over the pixel: lines thinner than a pixel are faint rather than broken,
+// lines nearer than a pixel are an even tone, and a finer picture is as bright as a coarse one.
 fn lines(place: vec2<f32>, spacing: f32, width: f32) -> f32 {
-    let cell = place / spacing;
-    let pixel = max(fwidth(cell), vec2(1e-6));
-    let wide = max(vec2(width / spacing), pixel);
-    let away = abs(fract(cell - 0.5) - 0.5);
-    let line = (1.0 - smoothstep(0.5 * wide, 0.5 * wide + pixel, away)) * min(width / spacing / pixel + 0.35, vec2(1.0));
-    // Where lines are nearer than two pixels they melt into the plane.
-    let open = 1.0 - smoothstep(vec2(0.25), vec2(0.6), pixel);
-    return max(line.x * open.x, line.y * open.y);
+    let cell = place / spacing + 0.5;
+    let pixel = max(fwidth(cell), vec2(1e-4));
+    let first = cell - 0.5 * pixel;
+    let last = cell + 0.5 * pixel;
+    let wide = width / spacing;
+    // Whole lines between, less the part of the first that is before, and that of the last that is in.
+    let along = (floor(last) - floor(first)) * wide + covered(fract(last), wide) - covered(fract(first), wide);
+    let line = clamp(along / pixel, vec2(0.0), vec2(1.0));
+    return 1.0 - (1.0 - line.x) * (1.0 - line.y);
+}
+
+// How much of [0, `share`] a line of this width around 0.5 covers.
+fn covered(share: vec2<f32>, wide: f32) -> vec2<f32> {
+    return clamp(share - 0.5 + 0.5 * wide, vec2(0.0), vec2(wide));
 }
 
 @fragment
 fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let from_middle = distance(in.position.xy, frame.floor.xy) / frame.floor.w;
     let place = in.position.xy - frame.floor.xy;
-    let line = max(0.35 * lines(place, 0.2 * frame.grid.x, 0.0), lines(place, frame.grid.x, 0.02 * frame.grid.x));
+    let line = max(0.35 * lines(place, 0.2 * frame.grid.x, 0.012 * frame.grid.x), lines(place, frame.grid.x, 0.028 * frame.grid.x));
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
     let light = MATT_SHARE * colour * falling_light(in.position, normal).rgb;

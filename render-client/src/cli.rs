@@ -44,7 +44,7 @@ pub struct RenderArgs {
     /// Name of this node in the server's workbench file.
     #[arg(long, value_name = "NAME")]
     pub node: String,
-    /// File with this node's credential, or with the cluster key, copied from the server.
+    /// File with this node's credential, made by `taut keys` on the haptic PC, or with the cluster key.
     #[arg(long, value_name = "FILE", env = "TAUT_KEY_FILE")]
     pub key: PathBuf,
     /// How states travel to this node.
@@ -94,7 +94,8 @@ pub struct RenderArgs {
     /// Write text about the node over the pictures, whatever the server says.
     #[arg(long)]
     pub hud: bool,
-    /// Time from handing a picture over to its light, for which a tracked head is predicted: display and half a frame.
+    /// Time from handing a picture over to its light, for which a tracked head is predicted: display and half a frame; the
+    /// same for nodes whose screens are shown together.
     #[arg(long, value_name = "MS", default_value_t = DISPLAY_MS)]
     pub display_ms: f64,
     /// Draw the world of this many milliseconds ago, so that late states can be interpolated.
@@ -218,6 +219,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             duration,
             frame_time,
             out: args.out.clone().map(|folder| (folder, args.node.clone())),
+            display_ns,
             show,
             node: args.node.clone(),
         };

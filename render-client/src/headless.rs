@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::canvas::Canvas;
 use crate::error::RenderError;
-use crate::node_status::{FrameMode, LinkHealth};
+use crate::node_status::LinkHealth;
 use crate::pacing::Pacer;
 use crate::session::{Session, Turn};
 use crate::stage::Show;
@@ -23,6 +23,8 @@ pub(crate) struct Plan {
     pub(crate) frame_time: Duration,
     /// Where pictures are written, and what their names begin with.
     pub(crate) out: Option<(PathBuf, String)>,
+    /// From showing a picture to its light, in nanoseconds: where other nodes, with displays, show the same frame.
+    pub(crate) display_ns: u64,
     pub(crate) show: Show,
     /// Name of the node.
     pub(crate) node: String,
@@ -45,7 +47,7 @@ pub(crate) fn run(
     let start = Instant::now();
     let mut next_frame = start;
     let mut last_drawn = None;
-    let mut pacer = Pacer::new(session, plan.frame_time);
+    let mut pacer = Pacer::new(session, plan.frame_time, plan.display_ns);
     let mut show = plan.show;
     loop {
         if session.interrupted() {
@@ -54,11 +56,12 @@ pub(crate) fn run(
         match session.turn(timeline) {
             Turn::Same => {}
             Turn::Renewed(other) => {
+                statistics.renewed();
                 if let Some(scene) = other {
                     canvas.restage(scene.0);
                     show = scene.1;
                 }
-                pacer = Pacer::new(session, plan.frame_time);
+                pacer = Pacer::new(session, plan.frame_time, plan.display_ns);
                 last_drawn = None;
             }
             Turn::Told => return Ok(Ended::ServerStopped),
@@ -78,9 +81,9 @@ pub(crate) fn run(
         session.take_states(timeline);
         let now_ns = session.now_ns();
         if let Some((taken_ns, latched)) =
-            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns)?)))
+            now_ns.and_then(|now_ns| Some((now_ns, pacer.next(now_ns, timeline.newest_ns())?)))
         {
-            canvas.set_status(statistics.status(&plan.node, link, pacer.mode()));
+            canvas.set_status(pacer.complete(statistics.status(&plan.node, link)));
             canvas.draw(&latched, show, plan.out.is_some())?;
             pacer.wait();
             let late = pacer.shown();
@@ -104,7 +107,7 @@ pub(crate) fn run(
             let drawn = Some((latched.state.time_ns, latched.stale, shown(link)));
             if drawn != last_drawn {
                 last_drawn = drawn;
-                canvas.set_status(statistics.status(&plan.node, link, FrameMode::Free));
+                canvas.set_status(statistics.status(&plan.node, link));
                 // Off-screen a picture is looked at when it is done.
                 latched.state.head = timeline.head_at(taken_ns).or(latched.state.head);
                 canvas.draw(&latched, show, plan.out.is_some())?;

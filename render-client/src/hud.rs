@@ -6,8 +6,8 @@
 
 use crate::node_status::{FrameMode, LinkHealth, NodeStatus};
 
-/// Height of a line of the HUD over that of the screen: 50 mm on a wall of 1.2 m.
-const LINE_HEIGHT: f32 = 1.0 / 22.0;
+/// Height of a line of the HUD over that of the screen: 40 mm on a wall of 1.2 m, so that it hides little of what stands there.
+const LINE_HEIGHT: f32 = 1.0 / 30.0;
 
 /// The same for the banner: to be read from across the room.
 const BANNER_HEIGHT: f32 = 1.0 / 7.0;
@@ -128,7 +128,8 @@ fn lines(status: &NodeStatus, stale: bool) -> Vec<String> {
         FrameMode::Free => "free".to_owned(),
         FrameMode::Synchronised { late, members } => {
             let late = if late { ", late" } else { "" };
-            format!("synchronised, {members} nodes{late}")
+            let nodes = if members == 1 { "node" } else { "nodes" };
+            format!("synchronised, {members} {nodes}{late}")
         }
     };
     let skew = match status.swap_skew_us {
@@ -260,6 +261,30 @@ mod tests {
             "18 us",
         ] {
             assert!(text.contains(part), "{part} in {text}");
+        }
+        let mut alone = status(LinkHealth::Connected);
+        alone.frames = FrameMode::Synchronised {
+            late: false,
+            members: 1,
+        };
+        let text = Overlay::of(&alone, false, true).lines.join("\n");
+        assert!(text.contains("synchronised, 1 node\n"), "{text}");
+    }
+
+    #[test]
+    fn banner_and_lines_do_not_lie_over_each_other() {
+        for shape in [0.3, 1.0, 1.5, 4.0] {
+            let marks =
+                Overlay::of(&status(LinkHealth::Lost { since_s: 3.0 }), true, true).marks(shape);
+            let mut boxes = marks.iter().filter(|mark| mark.letter.is_none());
+            let (lines, banner) = (
+                boxes.next().expect("lines"),
+                boxes.next().expect("a banner"),
+            );
+            assert!(
+                lines.place[1] >= banner.place[3],
+                "{lines:?} {banner:?} at shape {shape}"
+            );
         }
     }
 

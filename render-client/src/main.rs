@@ -12,7 +12,7 @@ use tracing_subscriber::EnvFilter;
 #[derive(Parser)]
 #[command(
     version,
-    after_help = "Example: taut-render --server haptic-pc:4857 --node wall --key cluster.key"
+    after_help = "Example: taut-render --server haptic-pc:4857 --node wall --key render-wall.key"
 )]
 struct CommandLine {
     #[command(flatten)]

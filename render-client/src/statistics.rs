@@ -193,6 +193,13 @@ impl Statistics {
         self.swaps_since_report.saturating_record(late_us);
     }
 
+    /// A new session: its server is told of its own states alone. Ticks begin again there, and those of the last session would be taken for its own.
+    pub(crate) fn renewed(&mut self) {
+        self.drawn.clear();
+        self.since_report.reset();
+        self.swaps_since_report.reset();
+    }
+
     /// The report that is due, if one is, else (with `last`) the one at the end.
     pub(crate) fn report(&mut self, last: bool) -> Option<ClientStats> {
         let elapsed = self.last_report.elapsed();
@@ -223,13 +230,13 @@ impl Statistics {
         Some(stats)
     }
 
-    /// What the HUD says of the frames drawn so far.
-    pub(crate) fn status(&self, node: &str, link: LinkHealth, frames: FrameMode) -> NodeStatus {
+    /// What the HUD says of the frames drawn so far, of a node that draws by itself.
+    pub(crate) fn status(&self, node: &str, link: LinkHealth) -> NodeStatus {
         let (fps, pose_age_ms) = self.recent;
         NodeStatus {
             node: node.to_owned(),
             link,
-            frames,
+            frames: FrameMode::Free,
             frame: self.frames,
             fps,
             pose_age_ms,
@@ -350,6 +357,18 @@ mod tests {
             held: false,
             stale: false,
         }
+    }
+
+    #[test]
+    fn the_server_of_a_new_session_is_told_nothing_of_the_last_one() {
+        let mut statistics = Statistics::new();
+        statistics.frame(&shown(1_000_000), 4_000_000, 14_000_000);
+        statistics.renewed();
+        statistics.frame(&shown(2_000_000), 4_000_000, 14_000_000);
+        let report = statistics.report(true).expect("asked for");
+        let ticks: Vec<u64> = report.drawn.iter().map(|drawn| drawn.tick).collect();
+        assert_eq!((ticks, report.frames), (vec![2_000_000], 2));
+        assert!((report.pose_age_ms_max - 2.0).abs() < 0.01);
     }
 
     #[test]

@@ -279,6 +279,7 @@ impl App<'_> {
         match self.session.turn(self.timeline) {
             Turn::Same => {}
             Turn::Renewed(other) => {
+                self.statistics.renewed();
                 if let Some(scene) = other {
                     self.show = scene.1;
                     self.restage(events, scene.0)?;
@@ -304,11 +305,12 @@ impl App<'_> {
             self.next_frame = Instant::now() + MOMENT;
             return Ok(None);
         };
-        let (session, frame_time) = (&*self.session, self.plan.frame_time);
+        let (session, plan) = (&*self.session, &self.plan);
+        let frame_time = plan.frame_time;
         let pacer = self
             .pacer
-            .get_or_insert_with(|| Pacer::new(session, frame_time));
-        let released = pacer.next(taken_ns);
+            .get_or_insert_with(|| Pacer::new(session, frame_time, plan.display_ns));
+        let released = pacer.next(taken_ns, self.timeline.newest_ns());
         let locked = released.is_some();
         let now = Instant::now();
         if locked {
@@ -333,13 +335,11 @@ impl App<'_> {
             panes,
         } = screen;
         renderer.set_state(gpu, &self.stage, &latched, self.show);
-        let status = self
-            .statistics
-            .status(&self.plan.node, health, pacer.mode());
+        let status = pacer.complete(self.statistics.status(&self.plan.node, health));
         renderer.set_overlay(Overlay::of(&status, latched.stale, self.show.hud));
         if !locked {
             // As late as can be: the head where it will be when the picture lights up. Screens that are shown together are drawn for
-            // one head, that of their frame: a line across their edge would break otherwise.
+            // one head, which follows from their frame: a line across their edge would break otherwise.
             self.session.take_states(self.timeline);
             let photon_ns = self.session.now_ns().unwrap_or(taken_ns) + self.plan.display_ns;
             latched.state.head = self.timeline.head_at(photon_ns).or(latched.state.head);

@@ -88,6 +88,12 @@ fn content() -> Content {
         screens: vec![
             screen("wall", [-0.9, 0.0, 0.0], [0.9, 0.0, 0.0], [-0.9, 0.0, 1.2]),
             screen(
+                "again",
+                [-0.9, -1.2, 0.0],
+                [0.9, -1.2, 0.0],
+                [-0.9, 0.0, 0.0],
+            ),
+            screen(
                 "table",
                 [-0.9, -1.2, 0.0],
                 [0.9, -1.2, 0.0],
@@ -98,6 +104,7 @@ fn content() -> Content {
             node("both", &["wall", "table"], Stereo::Mono),
             node("pair", &["wall"], Stereo::TwoWindows),
             node("lost", &["ceiling"], Stereo::Mono),
+            node("twice", &["table", "again"], Stereo::Mono),
         ],
         viewer: pose([0.12, -1.1, 0.85]),
         eye_separation: 0.065,
@@ -370,6 +377,40 @@ fn nodes_show_the_frames_that_the_barrier_releases() {
             assert!(report.locked_frames >= 3, "{report:?}");
             assert!(report.locked_frames <= report.frames);
         }
+    }
+}
+
+/// Two screens at the same place: whatever moves between two frames, a node's pictures of one frame are the same to the last pixel.
+#[test]
+fn a_node_with_two_screens_shows_one_instant_on_both_with_a_barrier_and_without() {
+    if !can_draw() {
+        return;
+    }
+    let barrier = MasterSettings {
+        swap: Swap::Immediate,
+        period_ns: 16_666_667,
+    };
+    for frames in [Some(barrier), None] {
+        let is_locked = frames.is_some();
+        let server = Server::start_with(frames);
+        let mut args = server.args("twice");
+        args.fps = Some(8.0);
+        args.frames = Some(12);
+        args.out = Some(server.pictures());
+        let report = taut_render::run(args).expect("draws");
+        assert_eq!(report.locked_frames > 0, is_locked, "{report:?}");
+        let mut distinct = std::collections::HashSet::new();
+        for frame in 1..=12 {
+            let [table, again] = ["table", "again"].map(|screen| {
+                let file = format!("twice-{screen}-{frame:05}.png");
+                let path = server.pictures().join(file);
+                image::open(path).expect("a picture").to_rgba8().into_raw()
+            });
+            assert!(table == again, "frame {frame}");
+            distinct.insert(table);
+        }
+        assert!(distinct.len() > 3, "the body moves: {}", distinct.len());
+        server.stop();
     }
 }
 

@@ -28,7 +28,7 @@ pub enum Command {
     Serve(ServeArgs),
     /// One node of the render cluster
     #[command(
-        after_help = "Example: taut render --server haptic-pc:4857 --node front --key cluster.key"
+        after_help = "Example: taut render --server haptic-pc:4857 --node front --key render-front.key"
     )]
     Render(crate::rendering::RenderArgs),
     /// The device side, on this or another PC
@@ -182,7 +182,7 @@ pub struct ReplayArgs {
 /// `taut record`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example: taut record --server haptic-pc:4857 --key cluster.key --out hand.csv --duration 60"
+    after_help = "Example: taut record --server haptic-pc:4857 --key observer.key --out hand.csv --duration 60"
 )]
 pub struct RecordArgs {
     /// The haptic PC
@@ -191,7 +191,7 @@ pub struct RecordArgs {
     /// Where the trace goes, a CSV file
     #[arg(long, value_name = "T")]
     pub out: PathBuf,
-    /// An operator's credential, or the cluster key; else TAUT_KEY_FILE names it
+    /// An observer's or operator's credential, or the cluster key; else TAUT_KEY_FILE names it
     #[arg(long, value_name = "FILE")]
     pub key: Option<PathBuf>,
     /// How states come here
@@ -204,7 +204,7 @@ pub struct RecordArgs {
 
 /// `taut arm`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key cluster.key")]
+#[command(after_help = "Example: taut arm --server haptic-pc:4857 --key operator.key")]
 pub struct ArmArgs {
     /// The haptic PC
     #[arg(long, value_name = "H:P")]

@@ -12,25 +12,31 @@ pub const KEY_VARIABLE: &str = "TAUT_KEY_FILE";
 
 /// Reads the cluster key from `named`, else from the file that [`KEY_VARIABLE`] names.
 pub fn read(named: Option<&Path>) -> Result<ClusterKey, Failure> {
-    Ok(read_key_file(&file(named)?)?)
+    let file = file(named).ok_or_else(|| {
+        Failure::BadInput(format!(
+            "no cluster key is named: make one with `taut keys --out FILE`, and give it by --key FILE or {KEY_VARIABLE}"
+        ))
+    })?;
+    Ok(read_key_file(&file)?)
 }
 
 /// Reads what to join with, the cluster key or a credential, from `named`, else from the file that [`KEY_VARIABLE`] names.
 pub fn read_to_join(named: Option<&Path>) -> Result<JoinKey, Failure> {
-    Ok(read_join_key(&file(named)?)?)
+    let file = file(named).ok_or_else(|| {
+        Failure::BadInput(format!(
+            "no credential is named: give the one that `taut keys` made for this on the haptic PC by --key FILE or {KEY_VARIABLE}"
+        ))
+    })?;
+    Ok(read_join_key(&file)?)
 }
 
-fn file(named: Option<&Path>) -> Result<PathBuf, Failure> {
+fn file(named: Option<&Path>) -> Option<PathBuf> {
     let from_environment = || {
         std::env::var_os(KEY_VARIABLE)
             .filter(|value| !value.is_empty())
             .map(PathBuf::from)
     };
-    named.map(Path::to_path_buf).or_else(from_environment).ok_or_else(|| {
-        Failure::BadInput(format!(
-            "no cluster key is named: make one with `taut keys --out FILE`, and give it by --key FILE or {KEY_VARIABLE}"
-        ))
-    })
+    named.map(Path::to_path_buf).or_else(from_environment)
 }
 
 #[cfg(test)]

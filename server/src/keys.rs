@@ -296,8 +296,8 @@ mod tests {
         let master = place.path("cluster.key");
         assert!(keys(&["--out", &master]).is_ok());
         let text = SHIPPED_WORKBENCH.replace(
-            "max_clients = 16",
-            "roles = [\"render\", \"device\"]\nrevoked = [\"front#1\"]",
+            "[network]",
+            "[network]\nroles = [\"render\", \"device\"]\nrevoked = [\"front#1\"]",
         );
         let config = place.write("workbench.toml", &text);
         let out = place.path("out");

@@ -28,9 +28,14 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
     let mut signal = EndSignal::listen().map_err(Failure::failed)?;
     let any_name = || format!("record-{}", std::process::id());
     let node = key.node_name().map_or_else(any_name, str::to_owned);
+    // It takes states and nothing else, so an observer's credential will do.
+    let role = match key.role() {
+        Some(Role::Observer) => Role::Observer,
+        _ => Role::Operator,
+    };
     let options = ClientOptions {
         transport: args.transport.into(),
-        ..ClientOptions::new(&args.server, key, Role::Operator, node)
+        ..ClientOptions::new(&args.server, key, role, node)
     };
     let link = connect(options).await?;
     let mut trace = TraceWriter::begin(FinishedFile::create(&args.out).map_err(cannot_write)?)

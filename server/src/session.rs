@@ -125,6 +125,11 @@ impl Session {
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
         };
+        // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
+        let options = ServerOptions {
+            idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
+            ..options
+        };
         let (looking_on, outlets) =
             LookingOn::start(&setup.looking_on, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;

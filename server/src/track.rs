@@ -8,7 +8,7 @@ use god_object::spatial::Pose;
 use taut_bridge::{
     DeviceChoice, InputChoice, Trace, TrackerFeed, UnknownDevice, VrpnSettings, read_trace,
 };
-use taut_link::{ClientLink, ClientOptions, Role, connect};
+use taut_link::{ClientLink, ClientOptions, Role, SessionEnd, connect};
 use taut_proto::{HeadSample, PoseF64};
 
 use crate::cli::TrackArgs;
@@ -84,14 +84,14 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         *pose = link.description().viewer.to_isometry();
     }
     let sent = send_readings(&link, &mut source, args, &mut signal).await;
-    let closed = link.is_closed();
+    let ended = link.ended();
     link.close().await;
-    match closed {
-        Some(reason) => Err(Failure::Failed(format!(
+    match ended {
+        Some(SessionEnd::Lost(reason)) => Err(Failure::Failed(format!(
             "the link to {} is closed: {reason}",
             args.server
         ))),
-        None => Ok(sent),
+        Some(SessionEnd::ServerStopped) | None => Ok(sent),
     }
 }
 

@@ -13,7 +13,7 @@ use crate::process::{Ended, Process};
 /// Longest wait for a server to serve: a debug build on a busy machine loads a scene of 27,000 triangles.
 pub const START_LIMIT: Duration = Duration::from_secs(60);
 /// Longest wait for the end of a process that was asked to end.
-pub const END_LIMIT: Duration = Duration::from_secs(15);
+pub const END_LIMIT: Duration = Duration::from_secs(60);
 /// Longest wait for the end of a process that is given bad input.
 const REFUSAL_LIMIT: Duration = Duration::from_secs(30);
 

@@ -17,7 +17,10 @@ const SCENE: &str = "sphere-on-plane";
 /// Longest wait for a node that joins: a debug build on a busy machine.
 const JOIN_LIMIT: Duration = Duration::from_secs(60);
 /// Longest gap between two frames of an undisturbed node: the processor draws ten a second, other nodes and tests have it too.
-const UNDISTURBED_MS: f64 = 2000.0;
+const UNDISTURBED_MS: f64 = 3000.0;
+/// Silence after which the workbench gives a node up: above what a busy machine starves one for, and above [`UNDISTURBED_MS`], so that who
+/// waited for a dead node is told from who did not.
+const NODE_TIMEOUT_S: f64 = 4.0;
 /// The watchdog's promise: no force that is older, as long as the loop is on time.
 const ZERO_FORCE_MS: f64 = 120.0;
 
@@ -103,7 +106,7 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
         return;
     }
     workbench.set("scene", SCENE);
-    workbench.set("network.node_timeout", 0.5);
+    workbench.set("network.node_timeout", NODE_TIMEOUT_S);
     let mut server = workbench.serve(&[]);
     let steady = node(&workbench, "table", &server, &[]);
     let mut victim = node(&workbench, "front", &server, &[]);
@@ -119,7 +122,10 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
         number_before(&line, " ms"),
         killed.elapsed()
     );
-    assert!(number_before(&line, " ms") >= 500.0, "{line}");
+    assert!(
+        number_before(&line, " ms") >= 1e3 * NODE_TIMEOUT_S,
+        "{line}"
+    );
 
     // Its name is free: the same node again.
     let victim = node(&workbench, "front", &server, &[]);

@@ -20,9 +20,8 @@ pub fn read_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
         JoinKey::Credential(credential) => Err(LinkError::KeyFile {
             path: path.to_owned(),
             reason: format!(
-                "it is a credential of {} {}, which cannot serve; give the cluster key",
-                credential.role(),
-                credential.holder()
+                "it is a credential (role: {}), which cannot serve or make others; give the cluster key",
+                credential.role().title()
             ),
         }),
     }

@@ -4,7 +4,7 @@ mod support;
 
 use std::{net::UdpSocket, time::Duration};
 use support::{relay::Impairment, *};
-use taut_link::{ClientLink, LinkEvent, Role, ServerLink};
+use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 
 /// Sends states until `client` has `count` of them.

@@ -23,8 +23,8 @@ use taut_proto::barrier::{MasterSettings, Swap};
 /// Fast enough for many frames, slow enough for a busy machine.
 const PERIOD: Duration = Duration::from_millis(33);
 
-/// Which state each frame showed, by all nodes.
-type Shown = Arc<Mutex<HashMap<u64, Vec<u64>>>>;
+/// Which state each frame showed and when it was planned to be shown, by all nodes.
+type Shown = Arc<Mutex<HashMap<u64, Vec<(u64, u64)>>>>;
 
 /// A server that broadcasts and leads frames, in threads, until it is dropped.
 struct Leader {
@@ -134,6 +134,9 @@ impl Screen {
                     continue;
                 };
                 assert_eq!(released.state.hash(), Ok(released.state_hash));
+                assert!(
+                    released.planned_ns >= released.state.sample_time_ns + PERIOD.as_nanos() as u64
+                );
                 std::thread::sleep(Duration::from_millis(draws_ms));
                 gate.arrive();
                 if gate.wait().is_some() {
@@ -144,7 +147,7 @@ impl Screen {
                     shown
                         .entry(released.frame)
                         .or_default()
-                        .push(released.state_hash);
+                        .push((released.state_hash, released.planned_ns));
                     frames.fetch_add(1, Ordering::SeqCst);
                 }
             }
@@ -171,7 +174,7 @@ impl Drop for Screen {
     }
 }
 
-/// Equal frames showed equal states, and enough of them were shown by more than one node.
+/// Equal frames showed equal states and had one plan, and enough of them were shown by more than one node.
 fn assert_equal_frames(shown: &Shown, at_least: usize) {
     let shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
     for (frame, states) in shown.iter() {
@@ -313,7 +316,7 @@ async fn an_observer_takes_no_part() {
     let leader = Leader::start(Some(Swap::Immediate), None).await;
     let shown = Shown::default();
     let observer = Screen::start(&leader, Role::Observer, "observer", 2, &shown).await;
-    wait_until("refusal", || leader.server.counters().garbage > 3).await;
+    wait_until("refusal", || leader.server.counters().forbidden > 3).await;
     assert_eq!(observer.frames(), 0);
     let report = leader.server.frame_report().unwrap_or_default();
     assert_eq!(report.counts.released, 0);

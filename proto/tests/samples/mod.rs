@@ -318,6 +318,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         epoch: 0xdead_beef,
         udp_port: 4858,
         session_time_ns: 1_000_000_000,
+        node_timeout_ms: 500,
     };
     let stats = ClientStats {
         frames: 600,

@@ -376,6 +376,8 @@ mod tests {
             nodes: Vec::new(),
             viewer: PoseF64::IDENTITY,
             eye_separation: 0.064,
+            separation_scale: 1.0,
+            nearest_disparity: 0.0,
             near: 0.1,
             far: 10.0,
             show: taut_proto::scene::ShowOptions::default(),

@@ -197,13 +197,13 @@ fn typical_state() -> HotState {
     state.run = RunState::Running;
     state.scene_revision = 1;
     let mut tool = ToolState::default();
-    tool.god_object.position = [0.012_345_678, -0.023_456_789, 0.034_567_89];
+    tool.god_object.position = [0.012_345_678, -0.023_456_79, 0.034_567_89];
     tool.god_object.rotation = [0.182_574_19, 0.365_148_37, 0.547_722_6, 0.730_296_7];
     tool.device = tool.god_object;
     tool.linear_velocity = [0.012_345_67, 0.023_456_78, -0.034_567_89];
     tool.angular_velocity = [0.123_456_7, 0.234_567_8, -0.345_678_9];
     tool.force = [1.234_567_8, -2.345_678_9, 3.456_789];
-    tool.torque = [0.012_345_678, 0.023_456_789, 0.034_567_89];
+    tool.torque = [0.012_345_678, 0.023_456_79, 0.034_567_89];
     state.tools.push(tool);
     state.head.pose = tool.god_object;
     for _ in 0..2 {
@@ -241,6 +241,8 @@ fn hello(rate: f64) -> Hello {
             nodes: Vec::new(),
             viewer: PoseF64::IDENTITY,
             eye_separation: 0.064,
+            separation_scale: 1.0,
+            nearest_disparity: 0.0,
             near: 0.1,
             far: 10.0,
             show: ShowOptions::default(),

@@ -71,6 +71,8 @@ fn hello() -> Hello {
             nodes: Vec::new(),
             viewer: PoseF64::IDENTITY,
             eye_separation: 0.064,
+            separation_scale: 1.0,
+            nearest_disparity: 0.0,
             near: 0.1,
             far: 10.0,
             show: ShowOptions::default(),
@@ -91,7 +93,7 @@ fn workbench(stop: &Arc<AtomicBool>) -> StateFeed {
             while !stop.load(Ordering::Relaxed) {
                 state.tick += 1;
                 state.tools[0].force = [0.0, 0.0, state.tick as f32];
-                if state.tick % 20 == 0 {
+                if state.tick.is_multiple_of(20) {
                     let id = state.tick as u32 / 20;
                     state.events.clear();
                     state.events.push(EventRecord {

@@ -119,7 +119,10 @@ fn everything_at_once_leaves_a_session_that_holds() {
         doubled: 0.05,
         flipped: 0.02,
         longest: Some(1200),
-        black_holes: vec![1000..1200],
+        black_holes: Vec::from([std::ops::Range {
+            start: 1000,
+            end: 1200,
+        }]),
     };
     let run = age::measure(Duration::from_secs(4), &everything, 4)
         .unwrap_or_else(|error| panic!("{error}"));

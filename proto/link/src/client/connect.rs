@@ -29,17 +29,21 @@ use taut_proto::{
     control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
     proof::Claim,
 };
-use tokio::time::{Instant, sleep_until, timeout_at};
+use tokio::time::{Instant, sleep_until, timeout, timeout_at};
 
 /// Distance between attempts where the network says at once that nobody is there.
 const RETRY_PERIOD: Duration = Duration::from_millis(200);
+
+/// How long an address is given before the next one is tried, and the same one anew: the first packet of an attempt goes out again after 0.3 s
+/// and after 0.9 s.
+const ATTEMPT: Duration = Duration::from_millis(1500);
+/// What a server may tell as the silence after which it is to be given up.
+const NODE_TIMEOUTS_MS: std::ops::RangeInclusive<u32> = 100..=60_000;
 
 /// Joins a server's session: proves the key, takes the scene, starts receiving.
 ///
 /// Runs on the current tokio runtime, which must live as long as the link; over UDP, states arrive in a thread named `taut-states`.
 pub async fn connect(options: ClientOptions) -> Result<ClientLink, LinkError> {
-    // Nobody is asked for what the key does not allow.
-    options.key.secret_for(options.role, &options.node)?;
     let meshes = Arc::new(Meshes::new(options.mesh_cache.clone()));
     connect_with(options, meshes).await
 }
@@ -49,6 +53,8 @@ pub(crate) async fn connect_with(
     options: ClientOptions,
     meshes: Arc<Meshes>,
 ) -> Result<ClientLink, LinkError> {
+    // Nobody is asked for what the key does not allow.
+    options.key.secret_for(options.role, &options.node)?;
     let deadline = Instant::now() + options.connect_timeout;
     let unreachable = || LinkError::Unreachable {
         server: options.server.clone(),
@@ -108,6 +114,12 @@ pub(crate) async fn connect_with(
         hot,
         AtJoin {
             session: welcome.session,
+            node_timeout: Duration::from_millis(
+                welcome
+                    .node_timeout_ms
+                    .clamp(*NODE_TIMEOUTS_MS.start(), *NODE_TIMEOUTS_MS.end())
+                    .into(),
+            ),
             description,
             coupling,
         },
@@ -176,7 +188,10 @@ async fn reach(
             else {
                 continue;
             };
-            match connecting.await {
+            let Ok(connected) = timeout(ATTEMPT, connecting).await else {
+                continue; // nobody there
+            };
+            match connected {
                 Ok(connection) => return Ok((endpoint, connection)),
                 Err(ConnectionError::TransportError(error)) => {
                     let server = options.server.clone();

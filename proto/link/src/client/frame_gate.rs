@@ -7,7 +7,7 @@ use std::{
 };
 use taut_proto::{
     HotState, Payload,
-    barrier::{Arrive, Drawn, Node, Turn},
+    barrier::{Arrive, Drawn, Node, ReleaseHead, Turn},
 };
 
 /// The last of the way to a planned swap is waited for without sleep, because no timer is that sharp.
@@ -52,6 +52,9 @@ pub struct ReleasedState {
     pub state: HotState,
     /// Its fingerprint, as the server broadcast it.
     pub state_hash: u64,
+    /// When the frame is to be shown by the plan: session time, ns. Follows from the RELEASE alone, so that all nodes have the same;
+    /// no node waits for it.
+    pub planned_ns: u64,
 }
 
 /// How the node stands in the barrier.
@@ -92,25 +95,30 @@ impl FrameGate {
                 Turn::Draw { frame } => Some(frame),
                 Turn::Free | Turn::Wait { .. } | Turn::Swap { .. } => None,
             };
-            (message, frame.zip(part.state.clone()))
+            let drawn = frame.and_then(|frame| {
+                let (state, state_hash) = part.state.clone()?;
+                Some(ReleasedState {
+                    frame,
+                    planned_ns: planned_ns(part.node.newest()?, state.sample_time_ns),
+                    state,
+                    state_hash,
+                })
+            });
+            (message, drawn)
         });
         let Some((message, drawn)) = turn else {
             return FrameTurn::Free;
         };
         self.send(message);
-        let Some((frame, (state, state_hash))) = drawn else {
+        let Some(released) = drawn else {
             return FrameTurn::Free;
         };
         self.drawing = Some(Drawing {
-            state_hash,
-            state_time_ns: state.sample_time_ns,
+            state_hash: released.state_hash,
+            state_time_ns: released.state.sample_time_ns,
             began,
         });
-        FrameTurn::Draw(ReleasedState {
-            frame,
-            state,
-            state_hash,
-        })
+        FrameTurn::Draw(released)
     }
 
     /// The frame is drawn, to the last pixel: tells the master.
@@ -227,6 +235,15 @@ impl FrameGate {
         }
         swap
     }
+}
+
+/// The frame after the one that `release` shows is due a period after it: after its swap where that has a time, else after the sample of the
+/// state that was the newest when it was released.
+fn planned_ns(release: &ReleaseHead, sample_ns: u64) -> u64 {
+    release
+        .swap_ns
+        .max(sample_ns)
+        .saturating_add(u64::from(release.period_us) * 1000)
 }
 
 impl Drop for FrameGate {

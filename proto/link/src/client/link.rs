@@ -40,6 +40,7 @@ pub struct ClientLink {
     endpoint: Endpoint,
     hot: Arc<Hot>,
     session: u16,
+    node_timeout: Duration,
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
     meshes: Arc<Meshes>,
@@ -49,6 +50,7 @@ pub struct ClientLink {
 /// What the server tells at join.
 pub(crate) struct AtJoin {
     pub(crate) session: u16,
+    pub(crate) node_timeout: Duration,
     pub(crate) description: SceneDescription,
     /// For a device bridge.
     pub(crate) coupling: Option<CouplingOffer>,
@@ -72,6 +74,7 @@ impl ClientLink {
             endpoint,
             hot,
             session: told.session,
+            node_timeout: told.node_timeout,
             description: told.description,
             coupling: told.coupling,
             meshes,
@@ -92,6 +95,11 @@ impl ClientLink {
     /// Number of this session at the server.
     pub fn session(&self) -> u16 {
         self.session
+    }
+
+    /// Silence on the hot plane after which the server gives a node up, and after which it is to be given up itself.
+    pub fn node_timeout(&self) -> Duration {
+        self.node_timeout
     }
 
     /// The mesh of `hash`, from memory, from the cache on disk, or from the server. Its hash has been checked.

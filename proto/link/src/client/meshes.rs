@@ -5,7 +5,7 @@ use super::mesh_cache::{Cached, MeshCache};
 use crate::{
     LinkError, MeshCounters,
     counters::MeshCounterCells,
-    framing::{read_message, write_message},
+    framing::{close_text, read_message, write_message},
 };
 use quinn::Connection;
 use std::{
@@ -132,9 +132,12 @@ async fn fetch(
     server: &str,
     hash: MeshHash,
 ) -> Result<Vec<u8>, LinkError> {
+    // Where the whole connection is gone, why it is says more than that this stream ended.
     let ended = |reason: String| LinkError::Closed {
         server: server.to_owned(),
-        reason,
+        reason: connection
+            .close_reason()
+            .map_or(reason, |error| close_text(&error, "the server")),
     };
     let (mut send, mut recv) = connection
         .open_bi()

@@ -7,6 +7,9 @@ use std::{
 };
 use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
 
+/// Longer than any server's own: QUIC takes the shorter one of both ends.
+const LONGEST_IDLE: Duration = Duration::from_secs(120);
+
 /// How to connect.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
@@ -24,14 +27,14 @@ pub struct ClientOptions {
     pub rate_hz: u32,
     /// How long to try.
     pub connect_timeout: Duration,
-    /// Silence after which the server counts as gone.
+    /// Silence on the control plane after which the server counts as gone, if the server has named no shorter one.
     pub idle_timeout: Duration,
     /// Where meshes are kept on disk; `None`: nowhere.
     pub mesh_cache: Option<Arc<MeshCache>>,
 }
 
 impl ClientOptions {
-    /// UDP, every state, 3 s to connect, no meshes on disk.
+    /// UDP, every state, 3 s to connect, silences as the server has them, no meshes on disk.
     pub fn new(
         server: impl Into<String>,
         key: impl Into<JoinKey>,
@@ -46,7 +49,7 @@ impl ClientOptions {
             transport: Transport::Udp,
             rate_hz: 0,
             connect_timeout: Duration::from_secs(3),
-            idle_timeout: crate::transport::IDLE_TIMEOUT,
+            idle_timeout: LONGEST_IDLE,
             mesh_cache: None,
         }
     }

@@ -25,17 +25,17 @@ pub struct RejoinPolicy {
     pub stay: bool,
     /// Time without a server after which to end; `None`: never.
     pub give_up: Option<Duration>,
-    /// Silence of the hot plane after which a session counts as lost.
-    pub dead_after: Duration,
+    /// Silence of the hot plane after which a session counts as lost; `None`: as the server has it.
+    pub dead_after: Option<Duration>,
 }
 
 impl Default for RejoinPolicy {
-    /// Ends when the server says so, never for a lost link; 500 ms of silence.
+    /// Ends when the server says so, never for a lost link; silence as the server has it.
     fn default() -> RejoinPolicy {
         RejoinPolicy {
             stay: false,
             give_up: None,
-            dead_after: Duration::from_millis(500),
+            dead_after: None,
         }
     }
 }

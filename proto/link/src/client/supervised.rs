@@ -156,7 +156,12 @@ async fn supervise<T, P, F, E>(
 }
 
 /// Looks until the session has ended; how.
-async fn watch<T>(link: &ClientLink, dead_after: Duration, slot: &Mutex<Slot<T>>) -> SessionEnd {
+async fn watch<T>(
+    link: &ClientLink,
+    dead_after: Option<Duration>,
+    slot: &Mutex<Slot<T>>,
+) -> SessionEnd {
+    let dead_after = dead_after.unwrap_or(link.node_timeout());
     let mut watch = LinkWatch::new(Instant::now(), dead_after);
     loop {
         tokio::time::sleep(LOOK_PERIOD).await;

@@ -216,6 +216,7 @@ fn admit(
         epoch: shared.epoch,
         udp_port: shared.udp_port,
         session_time_ns: now_ns,
+        node_timeout_ms: u32::try_from(shared.node_timeout.as_millis()).unwrap_or(u32::MAX),
     };
     Ok((session, welcome))
 }

@@ -91,6 +91,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         unknown: Mutex::new(options.limits.unknown()),
         heads,
         clock: options.clock,
+        node_timeout: options.node_timeout,
         epoch,
         content,
         udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),

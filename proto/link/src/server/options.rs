@@ -29,9 +29,11 @@ pub struct ServerOptions {
     pub limits: FloodLimits,
     /// Most clients at a time.
     pub max_clients: usize,
-    /// Silence on the control plane after which a client counts as gone and its name is free.
+    /// Silence on the control plane after which a client counts as gone and its name is free, and the server for a client that named no
+    /// shorter one.
     pub idle_timeout: Duration,
-    /// Silence on the hot plane after which a node that others wait for counts as gone: a render node, a device.
+    /// Silence on the hot plane after which a node that others wait for counts as gone: a render node, a device. Clients are told, and
+    /// give the server up after the same.
     pub node_timeout: Duration,
     /// The clock that the server's loops stamp with.
     pub clock: SessionClock,

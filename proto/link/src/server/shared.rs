@@ -19,6 +19,7 @@ use std::{
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::SyncSender,
     },
+    time::Duration,
 };
 use taut_proto::{
     ClusterKey, JoinPolicy, Role,
@@ -33,6 +34,8 @@ pub(crate) struct Shared {
     pub(crate) joins: Mutex<JoinGuard>,
     pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,
+    /// Silence after which a node is gone, and after which it gives this server up.
+    pub(crate) node_timeout: Duration,
     pub(crate) epoch: u32,
     pub(crate) content: EncodedContent,
     pub(crate) udp: UdpSocket,

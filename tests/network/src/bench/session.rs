@@ -92,6 +92,8 @@ pub fn content_with(triangles: u32) -> Content {
         nodes: Vec::new(),
         viewer: PoseF64::IDENTITY,
         eye_separation: 0.064,
+        separation_scale: 1.0,
+        nearest_disparity: 0.0,
         near: 0.05,
         far: 10.0,
         show: ShowOptions::default(),
