@@ -15,14 +15,15 @@ use crate::sweeps::{self, MISSING, Point, Sweep};
 use crate::{chart, provenance};
 
 const STYLE: &str = "
-body{font:14px/1.45 system-ui,sans-serif;color:#222;max-width:1440px;margin:24px auto;padding:0 20px}
+body{font:14px/1.45 system-ui,sans-serif;color:#222;max-width:1500px;margin:24px auto;padding:0 20px}
 h1{font-size:26px;margin:0 0 12px}h2{font-size:19px;margin:34px 0 6px;border-top:1px solid #ddd;padding-top:14px}
 h3{font-size:15px;margin:16px 0 4px}table{border-collapse:collapse;margin:6px 0}
 td,th{border:1px solid #ddd;padding:3px 8px;text-align:left;vertical-align:top}th{background:#f5f5f5;font-weight:600}
 .pass{background:#e3f4e5}.fail{background:#fbdfdc}.open{background:#fdf0cf}.shown,.scope{background:#f6f6f6;color:#777}
 .row{display:flex;flex-wrap:wrap;gap:16px;align-items:flex-start}.row svg{flex:none;max-width:100%;height:auto}
+.case{flex-wrap:nowrap}.case table{flex:0 1 auto;min-width:0}.key{white-space:nowrap}
 small{color:#777}.dot{display:inline-block;border-radius:50%;margin:0 5px 0 14px}
-nav a{display:inline-block;margin-right:10px}p{margin:6px 0;max-width:980px}summary{cursor:pointer}
+nav a{display:inline-block;margin-right:10px}p{margin:6px 0;max-width:1200px}summary{cursor:pointer}
 ";
 
 /// Sizes of the legend's dots for the rates, pixels across, as in the charts.
@@ -178,15 +179,19 @@ fn not_kept(page: &mut String, results: &Results) -> std::fmt::Result {
 /// One recipe: case by case its table, and its chart where there is an error to draw.
 fn section(page: &mut String, results: &Results, rows: &[Row]) -> Result<(), Box<dyn Error>> {
     let name = rows[0].recipe;
-    let about = results.about.iter().find(|(of, _)| *of == name);
+    let about = results.about.iter().rfind(|(of, _)| *of == name); // a recipe comes after its study
     let about = about.map_or("", |(_, about)| about);
     writeln!(page, "<h2 id={name}>{name}: {}</h2>", escaped(about))?;
     let panels = chart::panels(&results.outcomes);
     if panels.iter().any(|(recipe, _)| *recipe == name) {
-        legend(page)?;
+        legend(page);
     }
     for case in rows.chunk_by(|a, b| a.case == b.case) {
-        writeln!(page, "<h3>{}</h3><div class=row>", escaped(&case[0].case))?;
+        writeln!(
+            page,
+            "<h3>{}</h3><div class=\"row case\">",
+            escaped(&case[0].case)
+        )?;
         case_table(page, results, case)?;
         let panel = (name, case[0].case.as_str());
         if panels.contains(&panel) {
@@ -198,26 +203,27 @@ fn section(page: &mut String, results: &Results, rows: &[Row]) -> Result<(), Box
     Ok(())
 }
 
-fn dot(colour: RGBColor, across: u32) -> String {
+/// A dot and what it stands for.
+fn key(colour: RGBColor, across: u32, text: &str) -> String {
     let RGBColor(red, green, blue) = colour;
     format!(
-        "<span class=dot style=\"background:rgb({red},{green},{blue});width:{across}px;height:{across}px\"></span>"
+        "<span class=key><span class=dot style=\"background:rgb({red},{green},{blue});width:{across}px;height:{across}px\"></span>{}</span> ",
+        escaped(text)
     )
 }
 
-fn legend(page: &mut String) -> std::fmt::Result {
+fn legend(page: &mut String) {
     page.push_str("<p>");
     for method in Method::ALL {
-        write!(page, "{}{}", dot(chart::colour(method), 10), method.name())?;
+        page.push_str(&key(chart::colour(method), 10, method.name()));
     }
     for (rate, across) in RATES.iter().zip(DOTS) {
-        write!(page, "{}{rate} Hz", dot(RGBColor(0, 0, 0), across))?;
+        page.push_str(&key(RGBColor(0, 0, 0), across, &format!("{rate} Hz")));
     }
     page.push_str(
         "<br><small>Error felt, in just-noticeable differences J, against the 99th percentile of an update. Grey: J = 1 and 1 ms. Black: \
          Pareto front. Cross: a pass line is missed. What is beyond an axis is drawn at its end.</small></p>\n",
     );
-    Ok(())
 }
 
 /// A line for each player, a column for each rate.
@@ -252,7 +258,8 @@ fn case_table(page: &mut String, results: &Results, case: &[Row]) -> std::fmt::R
 fn cell_of(page: &mut String, results: &Results, cell: &[Row], wide: usize) -> std::fmt::Result {
     let text = verdict(cell);
     let (short, long) = text.split_once(": ").unwrap_or((&text, ""));
-    write!(page, "<td class={} colspan={wide}>{short}", class(cell))?;
+    let outcome = short.to_lowercase();
+    write!(page, "<td class={} colspan={wide}>{outcome}", class(cell))?;
     if short.starts_with("out") {
         return write!(page, ": {}", escaped(long));
     }
@@ -317,7 +324,7 @@ fn sweep_section(page: &mut String, sweep: &Sweep, points: &[Point]) -> Result<(
         escaped(sweep.about)
     )?;
     for (setting, colour) in sweeps::legend(points) {
-        write!(page, "{}{}", dot(colour, 10), escaped(setting))?;
+        page.push_str(&key(colour, 10, setting));
     }
     page.push_str("</p>\n<div class=row>");
     for (frame, marks) in sweeps::panels(sweep, points) {

@@ -12,7 +12,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         &[
             ("R02", "ball on a plane"),
             ("R07", "ball in a corner"),
-            ("R10a", "1 m/s"),
+            ("R10a", "2 m/s"),
             ("R11", "0.3 m/s"),
         ],
         variants,

@@ -11,9 +11,9 @@ pub(super) const SWEEP: Sweep = Sweep {
     runs: Runs::Settings(
         &[
             ("R09", "plate of 0.1 mm"),
-            ("R10a", "1 m/s"),
+            ("R10a", "2 m/s"),
             ("R10b", "bar past a pin"),
-            ("R18", "onto the face and in"),
+            ("R18", "in the hole, clearance 0.5 mm"),
         ],
         variants,
     ),

@@ -12,7 +12,7 @@ pub(super) const SWEEP: Sweep = Sweep {
         &[
             ("R04", "box on a plane, tilted"),
             ("R10b", "bar past a pin"),
-            ("R18", "onto the face and in"),
+            ("R18", "in the hole, clearance 0.5 mm"),
             ("R19", "pulled out askew"),
         ],
         variants,
