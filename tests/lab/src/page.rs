@@ -186,7 +186,17 @@ fn section(page: &mut String, results: &Results, rows: &[Row]) -> Result<(), Box
     if panels.iter().any(|(recipe, _)| *recipe == name) {
         legend(page);
     }
-    for case in rows.chunk_by(|a, b| a.case == b.case) {
+    // Runs along a path have a table for each case, whatever else a recipe has one for all.
+    let is_run = |row: &Row| {
+        let runs = results.outcomes.iter();
+        let mut same = runs.filter(|run| (run.recipe, &run.case) == (row.recipe, &row.case));
+        same.next().is_some()
+    };
+    for case in rows.chunk_by(|a, b| a.case == b.case || !(is_run(a) || is_run(b))) {
+        if !is_run(&case[0]) {
+            study_table(page, results, case)?;
+            continue;
+        }
         writeln!(
             page,
             "<h3>{}</h3><div class=\"row case\">",
@@ -224,6 +234,21 @@ fn legend(page: &mut String) {
         "<br><small>Error felt, in just-noticeable differences J, against the 99th percentile of an update. Grey: J = 1 and 1 ms. Black: \
          Pareto front. Cross: a pass line is missed. What is beyond an axis is drawn at its end.</small></p>\n",
     );
+}
+
+/// A line for each case and player.
+fn study_table(page: &mut String, results: &Results, rows: &[Row]) -> std::fmt::Result {
+    page.push_str("<table><tr><th>case<th>method<th>outcome\n");
+    for cell in players(rows) {
+        let (case, method) = (escaped(&cell[0].case), escaped(&cell[0].method));
+        let rate = cell[0].rate.map(|rate| format!(", {rate} Hz"));
+        let rate = rate.unwrap_or_default();
+        write!(page, "<tr><td>{case}<td>{method}{rate}")?;
+        cell_of(page, results, cell, 1)?;
+        page.push('\n');
+    }
+    page.push_str("</table>\n");
+    Ok(())
 }
 
 /// A line for each player, a column for each rate.

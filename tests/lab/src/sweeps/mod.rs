@@ -105,7 +105,7 @@ pub struct Point {
     pub error: f64,
     /// 99th percentile of the CPU time, us: no other field differs between runs.
     pub p99_us: f64,
-    /// Those of [`SHOWN`]; empty where there are none.
+    /// Other measures, in the order of the CSV; empty where there are none.
     pub measures: Vec<f64>,
 }
 
