@@ -13,20 +13,18 @@ use crate::clock::RATES;
 use crate::measure::Measure;
 use crate::method::Method;
 use crate::outcome::Outcome;
+use crate::plot::{Frame, Mark, PANEL, front};
 use crate::report::{KEYS, keys};
 use crate::row::{Row, Verdict};
 
-/// Least J of the axis.
-const FLOOR: f64 = 1e-3;
 /// Range of the axes: us and just-noticeable differences.
 const TIMES: [f64; 2] = [0.5, 3000.0];
 const ERRORS: [f64; 2] = [0.7e-3, 500.0];
-const PANEL: (u32, u32) = (460, 340);
 const COLUMNS: usize = 3;
 /// Sizes of points, by rate.
 const SIZES: [i32; 3] = [7, 5, 3];
 
-fn colour(method: Method) -> RGBColor {
+pub(crate) fn colour(method: Method) -> RGBColor {
     match method {
         Method::Ours => RGBColor(0, 90, 170),
         Method::OursByDefault => RGBColor(110, 170, 225),
@@ -56,23 +54,8 @@ fn passes(outcome: &Outcome, rows: &[Row]) -> bool {
     !rows.iter().filter(of_it).any(missed)
 }
 
-/// Those that no other one beats in time and J, by time.
-fn front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let mut least = f64::INFINITY;
-    sorted.retain(|(_, error)| {
-        let better = *error < least; // false for NaN
-        if better {
-            least = *error;
-        }
-        better
-    });
-    sorted
-}
-
-/// Writes `speed-accuracy.svg` and `chart.csv`.
-pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
+/// The panels that have errors to draw: recipe and case, in their order.
+pub(crate) fn panels(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
     let mut panels: Vec<(&str, &str)> = Vec::new();
     for outcome in outcomes {
         let panel = (outcome.recipe, outcome.case.as_str());
@@ -81,6 +64,39 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
             panels.push(panel);
         }
     }
+    panels
+}
+
+/// Axes and points of a panel.
+pub(crate) fn panel(
+    (recipe, case): (&str, &str),
+    outcomes: &[Outcome],
+    rows: &[Row],
+) -> (Frame, Vec<Mark>) {
+    let frame = Frame {
+        title: format!("{recipe}: {case}"),
+        times: TIMES,
+        errors: ERRORS,
+        unit: "J",
+        error_line: Some(1.0),
+    };
+    let of_panel = |o: &&Outcome| (o.recipe, o.case.as_str()) == (recipe, case);
+    let drawn = outcomes.iter().filter(of_panel);
+    let marks = drawn.filter(|o| !point(o).1.is_nan()).map(|outcome| {
+        let size = RATES.iter().position(|rate| *rate == outcome.rate);
+        Mark {
+            place: point(outcome),
+            colour: colour(outcome.method),
+            size: SIZES[size.unwrap_or(0)],
+            passes: passes(outcome, rows),
+        }
+    });
+    (frame, marks.collect())
+}
+
+/// Writes `speed-accuracy.svg` and `chart.csv`.
+pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
+    let panels = panels(outcomes);
     let lines = panels.len().div_ceil(COLUMNS).max(1);
     let svg = directory.join("speed-accuracy.svg");
     let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 90);
@@ -106,7 +122,8 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
             .collect();
         let points: Vec<_> = of_panel.iter().map(|o| point(o)).collect();
         let front = front(&points);
-        draw_panel(area, panel, &of_panel, &front, rows)?;
+        let (frame, marks) = self::panel(*panel, outcomes, rows);
+        frame.draw(area, &marks)?;
         for outcome in of_panel {
             let (time, felt) = point(outcome);
             let on_front = front.contains(&(time, felt));
@@ -118,13 +135,6 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
     drop(grid);
     std::fs::write(directory.join("chart.csv"), csv)?;
     Ok(())
-}
-
-fn shown((time, error): (f64, f64)) -> (f64, f64) {
-    (
-        time.clamp(TIMES[0], TIMES[1]),
-        error.clamp(FLOOR, ERRORS[1]),
-    )
 }
 
 fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn Error>> {
@@ -143,70 +153,4 @@ fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn 
     let note = "grey: J = 1 and 1 ms; black: Pareto front; cross: a pass line is missed; J below 0.001 is drawn at 0.001";
     area.draw(&Text::new(note, (24, 32), ("sans-serif", 14)))?;
     Ok(())
-}
-
-fn draw_panel(
-    area: &DrawingArea<SVGBackend<'_>, Shift>,
-    (recipe, case): &(&str, &str),
-    outcomes: &[&Outcome],
-    front: &[(f64, f64)],
-    rows: &[Row],
-) -> Result<(), Box<dyn Error>> {
-    let mut chart = ChartBuilder::on(area)
-        .margin(10)
-        .caption(format!("{recipe}: {case}"), ("sans-serif", 17))
-        .x_label_area_size(34)
-        .y_label_area_size(54)
-        .build_cartesian_2d(
-            (TIMES[0]..TIMES[1]).log_scale(),
-            (ERRORS[0]..ERRORS[1]).log_scale(),
-        )?;
-    chart
-        .configure_mesh()
-        .x_desc("us")
-        .y_desc("J")
-        .x_labels(5)
-        .y_labels(6)
-        .label_style(("sans-serif", 13))
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(238, 238, 238))
-        .draw()?;
-    let grey = RGBColor(120, 120, 120).stroke_width(1);
-    for line in [
-        [(TIMES[0], 1.0), (TIMES[1], 1.0)],
-        [(1000.0, ERRORS[0]), (1000.0, ERRORS[1])],
-    ] {
-        chart.draw_series(LineSeries::new(line, grey))?;
-    }
-    let front: Vec<_> = front.iter().map(|place| shown(*place)).collect();
-    chart.draw_series(LineSeries::new(front, BLACK.stroke_width(1)))?;
-    for outcome in outcomes {
-        let size = RATES.iter().position(|rate| *rate == outcome.rate);
-        let size = SIZES[size.unwrap_or(0)];
-        let place = shown(point(outcome));
-        let ink = colour(outcome.method);
-        if passes(outcome, rows) {
-            chart.draw_series([Circle::new(place, size, ink.filled())])?;
-        } else {
-            chart.draw_series([Cross::new(place, size, ink.stroke_width(2))])?;
-        }
-    }
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::front;
-
-    #[test]
-    fn the_front_has_what_nothing_beats() {
-        let points = [
-            (1.0, 5.0),
-            (2.0, 6.0),
-            (3.0, 1.0),
-            (3.0, 2.0),
-            (4.0, f64::NAN),
-        ];
-        assert_eq!(front(&points), [(1.0, 5.0), (3.0, 1.0)]);
-    }
 }

@@ -9,6 +9,9 @@
 //! - [`mod@reference`]: right answers for recipes without a formula, with their own error.
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
+//! - [`measured`]: what is measured of runs from every start phase; [`store`]: results that a later run need not make again.
+//! - [`sweeps`]: one setting of this project's method at a time, error against time.
+//! - [`run`]: all of it, with progress; [`page`]: the report as one HTML file; [`provenance`]: on what it was made.
 //! - [`row`]: the one type of row that tables and files are made of.
 //! - [`fidelity`]: is what a scene chooses for itself the cheapest that is good enough?
 //! - [`report`]: table and CSV; [`chart`]: error against time.
@@ -20,13 +23,20 @@ pub mod clock;
 pub mod cpu_time;
 pub mod fidelity;
 pub mod measure;
+pub mod measured;
 pub mod method;
 pub mod methods;
 pub mod outcome;
+pub mod page;
+mod plot;
+pub mod provenance;
 pub mod recipe;
 pub mod recipes;
 pub mod reference;
 pub mod report;
 pub mod row;
+pub mod run;
+pub mod store;
 pub mod study;
+pub mod sweeps;
 pub mod vertex_depth;

@@ -1,6 +1,9 @@
-//! Runs the recipes for every method and rate: `cargo run --release -p taut-lab -- [--quick] [--out DIRECTORY] [--method NAME]... [RECIPE...]`.
+//! Runs the recipes for every method and rate:
+//! `cargo run --release -p taut-lab -- [report] [--quick] [--out DIRECTORY] [--method NAME]... [--sweep NAME]... [--fresh] [RECIPE...]`.
 //!
-//! Prints the table and writes it, the CSV files and the chart. Exit code 1 where this project's own method fails at 1 kHz, or a study or
+//! Prints the table and writes it, the CSV files and the charts. `report` (or `--report`) adds all sweeps and writes `report.html`, a page
+//! of everything. `--sweep NAME` runs that sweep, and recipes only where they are named. Results that are finished are kept in `done`
+//! beside the files, and not run again; `--fresh` runs everything. Exit code 1 where this project's own method fails at 1 kHz, or a study or
 //! a reference answer does.
 
 use std::error::Error;
@@ -8,79 +11,99 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use taut_lab::method::Method;
-use taut_lab::outcome::run_recipe;
-use taut_lab::recipes::{Extent, STUDIES, all};
-use taut_lab::row::{Row, Verdict};
-use taut_lab::{chart, report};
+use taut_lab::recipes::Extent;
+use taut_lab::report;
+use taut_lab::run::{Plan, own_failure};
+use taut_lab::store::Store;
+use taut_lab::sweeps::SWEEPS;
 
 /// Where files go unless told otherwise.
 const DIRECTORY: &str = "target/lab";
-/// The rate at which this project's method must pass every recipe, Hz.
-const OWN_RATE: u32 = 1000;
+
+/// What the command line says.
+struct Arguments {
+    plan: Plan,
+    directory: PathBuf,
+    page: bool,
+    fresh: bool,
+}
 
 fn main() -> Result<ExitCode, Box<dyn Error>> {
-    let (mut extent, mut directory, mut wanted) =
-        (Extent::Full, PathBuf::from(DIRECTORY), Vec::new());
     if std::env::args().nth(1).as_deref() == Some("fidelity") {
         return taut_lab::fidelity::command::run(std::env::args().skip(2));
     }
-    let mut methods = Vec::new();
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
+    let Arguments {
+        plan,
+        directory,
+        page,
+        fresh,
+    } = arguments(std::env::args().skip(1))?;
+    plan.validate()?;
+    let store = if fresh {
+        Store::none()
+    } else {
+        Store::in_directory(&directory.join("done"))
+    };
+    let results = plan.run(&store);
+    results.write(&directory, page)?;
+    print!("{}", report::table(&results.rows));
+    println!("\nfiles in {}", directory.display());
+    if store.read() > 0 {
+        println!("{} results were kept from before", store.read());
+    }
+    let failed = results.rows.iter().any(own_failure);
+    Ok(ExitCode::from(u8::from(failed)))
+}
+
+fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, String> {
+    let (mut extent, mut directory) = (Extent::Full, PathBuf::from(DIRECTORY));
+    let (mut methods, mut sweeps, mut names) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut page, mut fresh) = (false, false);
+    while let Some(argument) = given.next() {
         match argument.as_str() {
+            "report" | "--report" => page = true,
             "--quick" => extent = Extent::Quick,
-            "--out" => directory = arguments.next().ok_or("--out needs a directory")?.into(),
+            "--fresh" => fresh = true,
+            "--out" => directory = given.next().ok_or("--out needs a directory")?.into(),
             "--method" => {
-                let name = arguments.next().ok_or("--method needs a name")?;
+                let name = given.next().ok_or("--method needs a name")?;
                 let known = Method::ALL.iter().find(|method| method.name() == name);
                 methods.push(*known.ok_or_else(|| {
                     let all = Method::ALL.map(Method::name).join(", ");
                     format!("there is no method `{name}`; there are {all}")
                 })?);
             }
-            option if option.starts_with('-') => {
-                return Err(format!("there is no option `{option}`").into());
+            "--sweep" => {
+                let name = given.next().ok_or("--sweep needs a name")?;
+                let known = SWEEPS.iter().find(|sweep| sweep.name == name);
+                sweeps.push(*known.ok_or_else(|| {
+                    let all = SWEEPS.map(|sweep| sweep.name).join(", ");
+                    format!("there is no sweep `{name}`; there are {all}")
+                })?);
             }
-            name => wanted.push(name.to_owned()),
+            option if option.starts_with('-') => {
+                return Err(format!("there is no option `{option}`"));
+            }
+            _ => names.push(argument),
         }
     }
     if methods.is_empty() {
         methods.extend(Method::ALL);
     }
-    let is_wanted = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
-    let recipes = all(extent);
-    let known = |name: &str| {
-        recipes.iter().any(|recipe| recipe.name == name)
-            || STUDIES.iter().any(|study| study.name == name)
-    };
-    if let Some(unknown) = wanted.iter().find(|name| !known(name.as_str())) {
-        return Err(format!("there is no recipe `{unknown}`").into());
+    // A sweep alone runs no recipes, recipes alone no sweeps, and a report of everything all of both.
+    let everything = names.is_empty() && sweeps.is_empty();
+    if everything && page {
+        sweeps.extend(SWEEPS);
     }
-    let mut rows: Vec<Row> = Vec::new();
-    for study in STUDIES.iter().filter(|study| is_wanted(study.name)) {
-        eprintln!("{}: {}", study.name, study.about);
-        rows.extend((study.run)(extent));
-    }
-    let mut outcomes = Vec::new();
-    for recipe in recipes.iter().filter(|recipe| is_wanted(recipe.name)) {
-        eprint!("{recipe:?}: {} ", recipe.about);
-        let (of_recipe, its_rows) = run_recipe(recipe, &methods, |_| eprint!("."));
-        eprintln!();
-        outcomes.extend(of_recipe);
-        rows.extend(its_rows);
-    }
-    rows.sort_by(|a, b| a.recipe.cmp(b.recipe)); // stable: cases stay in their order
-    print!("{}", report::table(&rows));
-    report::write(&rows, &outcomes, &directory)?;
-    chart::write(&rows, &outcomes, &directory)?;
-    println!("\nfiles in {}", directory.display());
-    let failed = rows.iter().any(own_failure);
-    Ok(ExitCode::from(u8::from(failed)))
-}
-
-/// Whether a row is a failure of this project's own: of its method at the rate that counts, or of something that has no rate.
-fn own_failure(row: &Row) -> bool {
-    let own =
-        row.rate.is_none() || (row.method == Method::Ours.name() && row.rate == Some(OWN_RATE));
-    own && row.verdict == Verdict::Fail
+    Ok(Arguments {
+        plan: Plan {
+            extent,
+            recipes: (!everything).then_some(names),
+            methods,
+            sweeps,
+        },
+        directory,
+        page,
+        fresh,
+    })
 }

@@ -138,6 +138,19 @@ impl Measures {
         }
     }
 
+    /// As they were kept; `None` where it is not one for each measure.
+    pub(crate) fn kept(values: &[f64], probes: &[f64]) -> Option<Self> {
+        (values.len() == Measure::ALL.len()).then(|| Self {
+            values: values.to_vec(),
+            probes: probes.to_vec(),
+        })
+    }
+
+    /// One for each of [`Measure::ALL`].
+    pub(crate) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
     /// One of them.
     #[must_use]
     pub fn get(&self, measure: Measure) -> f64 {

@@ -67,6 +67,16 @@ impl Scene {
         }
     }
 
+    /// The settings of [`Method::Ours`]: the look-ahead limit fitted to the speed of the device and the time between updates, s.
+    #[must_use]
+    pub fn fitted(&self, period: f64) -> Settings {
+        let reach = LOOK_AHEAD_PERIODS * self.speed * period;
+        Settings {
+            look_ahead_limit: self.settings.look_ahead_limit.max(reach),
+            ..self.settings
+        }
+    }
+
     /// Translational stiffness that the hand is to feel, N/m.
     #[must_use]
     pub fn stiffness(&self) -> f64 {
@@ -174,14 +184,7 @@ impl Method {
             paper.activation_distance = paper.activation_distance.max(2.0 * rest_distance);
         }
         match self {
-            Self::Ours => {
-                let reach = LOOK_AHEAD_PERIODS * scene.speed * period;
-                let fitted = Settings {
-                    look_ahead_limit: by_default.look_ahead_limit.max(reach),
-                    ..by_default
-                };
-                Box::new(GodObjectMethod::new(scene, &fitted))
-            }
+            Self::Ours => Box::new(GodObjectMethod::new(scene, &scene.fitted(period))),
             Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),
             Self::PaperAdapted => Box::new(GodObjectMethod::new(scene, &paper)),
             Self::Paper => {

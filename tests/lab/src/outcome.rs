@@ -1,14 +1,13 @@
 //! A recipe run for one method at one rate, over all start phases, against its pass lines.
 
-use taut_method_tests::checker::PenetrationChecker;
-
-use crate::clock::{self, RATES};
-use crate::cpu_time::quantile;
+use crate::clock::RATES;
 use crate::measure::{Measure, Measures};
+use crate::measured::{Measured, Times};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
 use crate::row::{Row, Verdict};
+use crate::store::{Store, recipe_key};
 
 /// What came of it.
 #[derive(Clone, Debug)]
@@ -42,15 +41,6 @@ pub struct Trial {
     pub missed: usize,
     /// Its error in just-noticeable differences; NaN where there is no right answer.
     pub felt: f64,
-}
-
-/// Median and 99th percentile of CPU times, us.
-#[derive(Clone, Copy, Debug)]
-pub struct Times {
-    /// Of updates.
-    pub update: [f64; 2],
-    /// Of forces.
-    pub force: [f64; 2],
 }
 
 impl Outcome {
@@ -90,37 +80,90 @@ impl Outcome {
     }
 
     fn from_phases(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning, count: u32) -> Self {
-        let checker = PenetrationChecker::new(&recipe.scene.world);
-        let (mut updates, mut forces) = (Vec::new(), Vec::new());
-        let phases: Vec<Measures> = (0..count)
-            .map(|k| {
-                let phase = (f64::from(k) + 0.5) / f64::from(count);
-                let mut started = method.start(&recipe.scene, 1.0 / f64::from(rate), tuning);
-                let run = clock::run(started.as_mut(), recipe, rate, phase);
-                updates.extend(run.update_us);
-                forces.extend(run.force_us);
-                Measures::of(recipe, &checker, &run.ticks)
-            })
-            .collect();
+        let period = 1.0 / f64::from(rate);
+        let start = || method.start(&recipe.scene, period, tuning);
+        let measured = Measured::of(recipe, rate, count, start);
+        Self::judged(recipe, method, rate, tuning, measured)
+    }
+
+    /// With the pass lines of the recipe.
+    fn judged(
+        recipe: &Recipe,
+        method: Method,
+        rate: u32,
+        tuning: Tuning,
+        measured: Measured,
+    ) -> Self {
         let mut outcome = Self {
             recipe: recipe.name,
             case: recipe.case.clone(),
             method,
             rate,
             tuning,
-            phases,
+            phases: measured.phases,
             lines: Vec::new(),
             trials: Vec::new(),
-            times: Times {
-                update: [0.5, 0.99].map(|share| quantile(&updates, share)),
-                force: [0.5, 0.99].map(|share| quantile(&forces, share)),
-            },
+            times: measured.times,
         };
         for line in (recipe.lines)(rate) {
             let passes = outcome.worst(line.measure) <= line.limit; // false for NaN
             outcome.lines.push((line, passes));
         }
         outcome
+    }
+
+    /// [`Outcome::of`], or what it came to before, where `store` has it.
+    pub fn kept(store: &Store, recipe: &Recipe, method: Method, rate: u32) -> Self {
+        let key = format!(
+            "{} {:?} {rate} {:?}",
+            recipe_key(recipe),
+            method,
+            method.tunings()
+        );
+        store.get(
+            recipe.name,
+            &key,
+            |numbers| Self::from_numbers(recipe, method, rate, numbers),
+            || {
+                let outcome = Self::of(recipe, method, rate);
+                let numbers = outcome.to_numbers();
+                (outcome, numbers)
+            },
+        )
+    }
+
+    /// Tuning, trials, and what was measured; the rest follows from the recipe.
+    fn to_numbers(&self) -> Vec<f64> {
+        let tunings = self.method.tunings();
+        let index = |tuning| tunings.iter().position(|known| *known == tuning);
+        let index = |tuning| index(tuning).map_or(f64::NAN, |index| index as f64);
+        let mut numbers = vec![index(self.tuning), self.trials.len() as f64];
+        for trial in &self.trials {
+            numbers.extend([index(trial.tuning), trial.missed as f64, trial.felt]);
+        }
+        numbers.extend(Measured::to_numbers(&self.phases, &self.times));
+        numbers
+    }
+
+    fn from_numbers(recipe: &Recipe, method: Method, rate: u32, numbers: &[f64]) -> Option<Self> {
+        let tunings = method.tunings();
+        let tuning = |index: f64| tunings.get(index as usize).copied();
+        let (head, rest) = numbers.split_first_chunk::<2>()?;
+        let (trials, measured) = rest.split_at_checked(3 * head[1] as usize)?;
+        let trials: Option<Vec<Trial>> = trials
+            .chunks(3)
+            .map(|trial| {
+                Some(Trial {
+                    tuning: tuning(trial[0])?,
+                    missed: trial[1] as usize,
+                    felt: trial[2],
+                })
+            })
+            .collect();
+        let measured = Measured::from_numbers(measured)?;
+        let mut outcome = Self::judged(recipe, method, rate, tuning(head[0])?, measured);
+        outcome.trials = trials?;
+        Some(outcome)
     }
 
     /// The largest value over the phases; NaN where one is.
@@ -205,10 +248,12 @@ impl Outcome {
     }
 }
 
-/// Everything about one recipe: its reference answer, and each of these methods at every rate or why not. Calls `done` after each.
+/// Everything about one recipe: its reference answer, and each of these methods at every rate or why not. What `store` has is not run
+/// again. Calls `done` after each.
 pub fn run_recipe(
     recipe: &Recipe,
     methods: &[Method],
+    store: &Store,
     mut done: impl FnMut(&Outcome),
 ) -> (Vec<Outcome>, Vec<Row>) {
     let (mut outcomes, mut rows) = (Vec::new(), Vec::new());
@@ -221,7 +266,7 @@ pub fn run_recipe(
             continue;
         }
         for rate in RATES {
-            let outcome = Outcome::of(recipe, method, rate);
+            let outcome = Outcome::kept(store, recipe, method, rate);
             rows.extend(outcome.rows(recipe));
             done(&outcome);
             outcomes.push(outcome);

@@ -185,7 +185,7 @@ fn run(recipe: &Recipe, steps: u32) -> Vec<Vector6> {
 }
 
 /// Names scene, settings, motion and method.
-fn content(recipe: &Recipe) -> String {
+pub(crate) fn content(recipe: &Recipe) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(env!("TAUT_METHOD_SOURCES").as_bytes());
     let world = &recipe.scene.world;

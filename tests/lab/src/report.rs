@@ -117,7 +117,7 @@ pub fn rows_csv(rows: &[Row]) -> String {
 }
 
 /// A text as one field of a CSV.
-fn quoted(text: &str) -> String {
+pub(crate) fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

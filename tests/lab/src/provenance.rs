@@ -1,0 +1,143 @@
+//! On what a report was made: machine, compiler, crates, commit, date.
+
+use std::fs;
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Versions of all crates of this build.
+const LOCK: &str = include_str!("../../../Cargo.lock");
+/// The crates whose versions can change a figure.
+const CRATES: [&str; 5] = [
+    "god-object",
+    "nalgebra",
+    "parry3d-f64",
+    "clarabel",
+    "plotters",
+];
+const SECONDS_A_DAY: u64 = 86_400;
+
+/// The model of the first processor, as Linux names it.
+#[must_use]
+pub fn processor() -> String {
+    value_of("/proc/cpuinfo", "model name")
+}
+
+/// Names and values, in the order in which they are shown.
+#[must_use]
+pub fn all() -> Vec<(&'static str, String)> {
+    let cores = std::thread::available_parallelism().map_or(0, usize::from);
+    let kernel = fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
+    let build = if cfg!(debug_assertions) {
+        "debug: its times say nothing"
+    } else {
+        "release"
+    };
+    vec![
+        ("processor", format!("{}, {cores} cores", processor())),
+        ("memory", value_of("/proc/meminfo", "MemTotal")),
+        (
+            "system",
+            format!("{} {}", std::env::consts::OS, kernel.trim()),
+        ),
+        ("load at the end", load()),
+        ("compiler", env!("TAUT_COMPILER").to_owned()),
+        ("build", build.to_owned()),
+        ("crates", CRATES.map(version).join(", ")),
+        ("commit", commit()),
+        ("date", date(SystemTime::now())),
+        ("command", command()),
+    ]
+}
+
+/// The value after the first colon behind `key` in a file of the kernel.
+fn value_of(file: &str, key: &str) -> String {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let line = text.lines().find_map(|line| line.strip_prefix(key));
+    let value = line.and_then(|line| line.split_once(':'));
+    value.map_or("not known".into(), |(_, value)| value.trim().to_owned())
+}
+
+/// Processes that wanted to run in the last minutes: times of a busy machine are longer.
+fn load() -> String {
+    let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let averages: Vec<_> = text.split(' ').take(3).collect();
+    format!("{} (1, 5, 15 minutes)", averages.join(", "))
+}
+
+fn version(name: &str) -> String {
+    let entry = format!("name = \"{name}\"\nversion = \"");
+    let found = LOCK
+        .split_once(&entry)
+        .and_then(|(_, rest)| rest.split_once('"'));
+    format!(
+        "{name} {}",
+        found.map_or("not known", |(version, _)| version)
+    )
+}
+
+/// Of the sources that the command stands in.
+fn commit() -> String {
+    let asked = Command::new("git")
+        .args(["-C", env!("CARGO_MANIFEST_DIR")])
+        .args(["describe", "--always", "--dirty", "--abbrev=12"])
+        .output();
+    match asked {
+        Ok(answer) if answer.status.success() => {
+            String::from_utf8_lossy(&answer.stdout).trim().to_owned()
+        }
+        _ => "not known".into(),
+    }
+}
+
+/// Without the path of the program.
+fn command() -> String {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    format!("taut-lab {}", arguments.join(" "))
+}
+
+/// Day and time in UTC. Source: Gregorian calendar, years counted from March.
+fn date(now: SystemTime) -> String {
+    let seconds = now.duration_since(UNIX_EPOCH).map_or(0, |s| s.as_secs());
+    let days = seconds / SECONDS_A_DAY + 719_468; // since 1 March of the year 0
+    let era = days / 146_097;
+    let day = days % 146_097;
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let (month, next) = if month < 10 {
+        (month + 3, 0)
+    } else {
+        (month - 9, 1)
+    };
+    let minutes = seconds % SECONDS_A_DAY / 60;
+    format!(
+        "{}-{month:02}-{day:02} {:02}:{:02} UTC",
+        era * 400 + year + next,
+        minutes / 60,
+        minutes % 60
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        let at = |seconds| date(UNIX_EPOCH + Duration::from_secs(seconds));
+        assert_eq!(at(0), "1970-01-01 00:00 UTC");
+        assert_eq!(at(951_782_399), "2000-02-28 23:59 UTC");
+        assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
+        assert_eq!(at(1_767_225_600), "2026-01-01 00:00 UTC");
+    }
+
+    #[test]
+    fn versions_are_those_of_the_lock() {
+        for name in CRATES {
+            assert!(!version(name).contains("not known"), "{name}");
+        }
+    }
+}
