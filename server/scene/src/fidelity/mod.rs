@@ -3,7 +3,7 @@
 //! - [`errors`]: what each setting costs in accuracy, as closed forms.
 //! - [`cost`]: what each costs in time, roughly: enough to put settings in order.
 //! - [`need`]: what of a scene decides: curvature, size, speed, stiffness.
-//! - [`decide`]: the cheapest settings whose predicted error is within the budget.
+//! - [`mod@decide`]: the cheapest settings whose predicted error is within the budget.
 //! - [`plan`]: the choice with its reasons, as it is printed.
 //! - [`spec`]: `fidelity = "auto"` and `[fidelity]` as written.
 
