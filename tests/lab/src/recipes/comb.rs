@@ -74,14 +74,19 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
     let case = ("R25", format!("combs, clearance {} mm", clearance * 1e3));
     let about = "many contacts: locks after its clearance, whatever their number";
     let duration = path.duration();
-    let tight = extent == Extent::Full && clearance == CLEARANCES[1];
-    let open = tight.then_some(Open {
+    let tight = clearance == CLEARANCES[1];
+    let torque = tight.then_some(Open {
+        key: "torque",
+        rate: 1000,
+        reason: "a seventh of what is felt, while the teeth meet: of rows that are equally near some are taken in before others",
+    });
+    let step = (tight && extent == Extent::Full).then_some(Open {
         key: Measure::Step.key(),
         rate: 1000,
         reason: "from some start phases a step when the teeth meet; not traced yet",
     });
     Recipe {
-        open: open.into_iter().collect(),
+        open: torque.into_iter().chain(step).collect(),
         ideal: Ideal::closed(move |time| {
             let x = ideal.at(time).x;
             force(
