@@ -8,7 +8,7 @@
 //! Header flags tell a group datagram from a pairwise one: bit 15 is [`FLAG_GROUP`], bits 0 and 1 are the low bits of the generation.
 //!
 //! **A group key proves "a member" and no more**: any member can derive the key of any sender. So it may carry only what harms nobody's hand,
-//! see [`may_carry`]: pictures from the server and signs of life. Device input, wrenches and constraint sets stay under the pairwise keys of a session; the
+//! see [`may_carry`]: pictures from the server, frames from node to node, signs of life. Device input, wrenches and constraint sets stay under the pairwise keys of a session; the
 //! server opens nothing that is sealed by a group key.
 //!
 //! Generations change without a gap: sealers begin with a new one [`SPREAD_NS`] after they learned it, so that the others have it too, and openers
