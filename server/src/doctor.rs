@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 use taut_bridge::realtime::{
-    RealtimeGrant, monotonic_now, request_fifo, sharpen_timers, sleep_until,
+    AWAKE, RealtimeGrant, keep_cores_awake, monotonic_now, request_fifo, sharpen_timers,
+    sleep_until,
 };
 use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
 
@@ -90,6 +91,7 @@ pub fn examine() -> std::io::Result<DoctorReport> {
     let mut findings = vec![
         scheduling(&grant),
         memory_lock(limit_of("Max locked memory")),
+        idle_cores(&keep_cores_awake().0),
         timers(&lateness),
         kernel(
             std::fs::read_to_string("/sys/kernel/realtime")
@@ -177,6 +179,20 @@ fn memory_lock(limit: Option<String>) -> Finding {
     }
 }
 
+fn idle_cores(grant: &RealtimeGrant) -> Finding {
+    const WHAT: &str = "idle cores";
+    match grant {
+        RealtimeGrant::Granted { .. } => Finding::good(WHAT, "are kept awake while a session runs"),
+        RealtimeGrant::Waived { .. } => Finding::lacking(
+            WHAT,
+            format!(
+                "may sleep deeply between two ticks and wake late and cold: {AWAKE} cannot be written"
+            ),
+            "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee /etc/udev/rules.d/99-taut.rules && sudo groupadd -f realtime && sudo usermod -aG realtime $USER && sudo udevadm control --reload && sudo udevadm trigger --name-match=cpu_dma_latency  # then log in again",
+        ),
+    }
+}
+
 fn timers(lateness: &Distribution) -> Finding {
     const WHAT: &str = "timers";
     let found = format!(
@@ -253,6 +269,10 @@ mod tests {
             }),
             scheduling(&RealtimeGrant::Waived {
                 what: "SCHED_FIFO".into(),
+                why: "no".into(),
+            }),
+            idle_cores(&RealtimeGrant::Waived {
+                what: "cores awake while idle".into(),
                 why: "no".into(),
             }),
         ];

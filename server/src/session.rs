@@ -14,7 +14,7 @@ use std::time::Duration;
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
-use taut_bridge::realtime::{lock_memory, pin_to_core, sleep_until};
+use taut_bridge::realtime::{Awake, keep_cores_awake, lock_memory, pin_to_core, sleep_until};
 use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{Broadcaster, LinkEvent, ServerLink, ServerOptions, ServerPin, proto};
@@ -82,6 +82,8 @@ pub struct Session {
     looking_on: LookingOn,
     link: Option<ServerLink>,
     runtime: Runtime,
+    /// While it is held, idle cores wait at work.
+    awake: Option<Awake>,
 }
 
 impl Session {
@@ -185,6 +187,7 @@ impl Session {
             looking_on,
             link: Some(link),
             runtime,
+            awake: None,
         };
 
         // From here on a failure drops the session, which ends what was started.
@@ -207,6 +210,9 @@ impl Session {
         if setup.realtime.lock_memory {
             session.ledger.note("process", lock_memory());
         }
+        let (grant, awake) = keep_cores_awake();
+        session.ledger.note("process", grant);
+        session.awake = awake;
         let states = StateWriter::new(
             loops.observers.broadcast,
             head,

@@ -178,7 +178,7 @@ impl TensionSolver {
             return None;
         }
         let mut ray = Ray::UNKNOWN;
-        let mut search = self.search(&rows, SEARCH_REGULARISATION);
+        let mut search = Search::new(BoxProgram::new(&rows, SEARCH_REGULARISATION), self.bounds());
         search.largest_scale(&target, &mut ray)
     }
 
@@ -189,13 +189,14 @@ impl TensionSolver {
         target: &[f64; 6],
     ) -> TensionAnswer {
         let mut memory = self.memory;
-        let mut search = self.search(rows, self.settings.regularisation);
+        let program = BoxProgram::new(rows, self.settings.regularisation);
+        let mut search = Search::new(program, self.bounds());
         let mut found = search.nearest(target, &mut memory.command);
         let (mut status, mut scale) = (TensionStatus::Rendered, 1.0);
         let gap = distance(&found.image, target);
         if gap > nearness(target) {
             // How far inside the workspace: 1 is far enough to keep the direction.
-            let mut rays = self.search(rows, SEARCH_REGULARISATION);
+            let mut rays = Search::new(program.regularised(SEARCH_REGULARISATION), self.bounds());
             let inside = self.insideness(&mut rays, &mut memory.rest);
             let along = if inside > 0.0 {
                 rays.largest_scale(target, &mut memory.direction)
@@ -207,7 +208,7 @@ impl TensionSolver {
             let aim = target.map(|f| scale * f);
             let softest = inside * SOFTNESS.0 + (1.0 - inside) * SOFTNESS.1;
             let soft = self.settings.regularisation + softest * gap / (gap + 1.0);
-            let mut softer = self.search(rows, soft);
+            let mut softer = Search::new(program.regularised(soft), self.bounds());
             found = softer.nearest(&aim, &mut memory.direction.sides);
             search.factorisations += softer.factorisations;
             let off = distance(&found.image, target);
@@ -250,14 +251,6 @@ impl TensionSolver {
         let found = search.largest_scale(&direction, ray);
         search.bounds = all;
         found.unwrap_or(0.0)
-    }
-
-    fn search(&self, rows: &[PerString; 6], regularisation: f64) -> Search {
-        Search {
-            program: BoxProgram::new(rows, regularisation),
-            bounds: self.bounds(),
-            factorisations: 0,
-        }
     }
 
     fn scaled(&self, wrench: &Vector6<f64>) -> [f64; 6] {
