@@ -82,6 +82,12 @@ pub fn lock_memory() -> RealtimeGrant {
     )
 }
 
+/// Whether this process may lock any amount of memory; it locks none.
+#[must_use]
+pub fn may_lock_memory() -> bool {
+    os::may_lock_memory()
+}
+
 /// Asks to run this thread on one core only, counted from 0.
 pub fn pin_to_core(core: usize) -> RealtimeGrant {
     let what = format!("core {core}");
@@ -194,18 +200,22 @@ mod os {
 
     pub(super) fn lock_memory() -> Result<(), String> {
         // Under a finite limit the lock might succeed now and let a later allocation fail: never that.
+        if !may_lock_memory() {
+            return Err("the limit on locked memory is finite".to_owned());
+        }
+        // SAFETY: takes flags only and changes no memory that Rust can see.
+        done(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
+    }
+
+    /// Raises the limit where this process may.
+    pub(super) fn may_lock_memory() -> bool {
         let unlimited = libc::rlimit {
             rlim_cur: libc::RLIM_INFINITY,
             rlim_max: libc::RLIM_INFINITY,
         };
         // SAFETY: `unlimited` is a valid rlimit for the call.
-        let raised =
-            done(unsafe { libc::setrlimit(libc::RLIMIT_MEMLOCK, &raw const unlimited) }).is_ok();
-        if !raised && memory_limit_binds() {
-            return Err("the limit on locked memory is finite".to_owned());
-        }
-        // SAFETY: takes flags only and changes no memory that Rust can see.
-        done(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
+        let raised = unsafe { libc::setrlimit(libc::RLIMIT_MEMLOCK, &raw const unlimited) } == 0;
+        raised || !memory_limit_binds()
     }
 
     /// Whether the limit on locked memory holds for this process: it does not for one with the capability to lock memory, which
@@ -299,6 +309,10 @@ mod os {
         unknown()
     }
 
+    pub(super) fn may_lock_memory() -> bool {
+        false
+    }
+
     pub(super) fn pin_to_core(_core: usize) -> Result<(), String> {
         unknown()
     }
@@ -333,6 +347,12 @@ mod tests {
         let offset = (ticker.next - first).as_nanos() % period.as_nanos();
         assert_eq!(offset, 0);
         assert!(ticker.next > first + 3 * period);
+    }
+
+    #[test]
+    fn memory_is_locked_where_it_may_be_and_only_there() {
+        // Locked for the whole process of this test binary, which is small.
+        assert_eq!(lock_memory().is_granted(), may_lock_memory());
     }
 
     #[test]

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 use taut_bridge::realtime::{
-    AWAKE, RealtimeGrant, keep_cores_awake, monotonic_now, request_fifo, sharpen_timers,
-    sleep_until,
+    AWAKE, RealtimeGrant, keep_cores_awake, may_lock_memory, monotonic_now, request_fifo,
+    sharpen_timers, sleep_until,
 };
 use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
 
@@ -84,13 +84,39 @@ impl fmt::Display for DoctorReport {
     }
 }
 
+/// Graphics drivers complain on standard error, once for each way in which they look for a screen, where nobody has set a directory for
+/// what a login session needs. Nothing is put there: this program begins anew, in the same process, with one. Returns only if
+/// there is no need, or with the reason why that failed.
+pub fn begin_anew_without_complaints() -> Option<std::io::Error> {
+    const DIRECTORY: &str = "XDG_RUNTIME_DIR";
+    let is_set = std::env::var_os(DIRECTORY).is_some_and(|directory| !directory.is_empty());
+    if is_set || !crate::rendering::BUILT_IN {
+        return None;
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+
+        let program = match std::env::current_exe() {
+            Ok(program) => program,
+            Err(error) => return Some(error),
+        };
+        let mut again = std::process::Command::new(program);
+        again.args(std::env::args_os().skip(1));
+        again.env(DIRECTORY, std::env::temp_dir());
+        Some(again.exec())
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// Looks at this machine; takes a second and a little.
 pub fn examine() -> std::io::Result<DoctorReport> {
     let (grant, lateness) = measure_timers()?;
     let timer_realtime = grant.is_granted();
     let mut findings = vec![
         scheduling(&grant),
-        memory_lock(limit_of("Max locked memory")),
+        memory_lock(may_lock_memory(), limit_of("Max locked memory")),
         idle_cores(&keep_cores_awake().0),
         timers(&lateness),
         kernel(
@@ -164,10 +190,10 @@ fn scheduling(grant: &RealtimeGrant) -> Finding {
     }
 }
 
-fn memory_lock(limit: Option<String>) -> Finding {
+fn memory_lock(allowed: bool, limit: Option<String>) -> Finding {
     const WHAT: &str = "memory lock";
     match limit.as_deref() {
-        Some("unlimited") => Finding::good(WHAT, "any amount of memory may be locked"),
+        _ if allowed => Finding::good(WHAT, "any amount of memory may be locked"),
         Some(bytes) => Finding::lacking(
             WHAT,
             format!(
@@ -262,7 +288,7 @@ mod tests {
     #[test]
     fn whatever_is_lacking_comes_with_a_command() {
         let lacking = [
-            memory_lock(Some("65536".into())),
+            memory_lock(false, Some("65536".into())),
             timers(&Distribution {
                 p99: 900.0,
                 ..Distribution::default()
@@ -279,7 +305,7 @@ mod tests {
         for finding in lacking {
             assert!(!finding.good && finding.mend.is_some(), "{finding:?}");
         }
-        assert!(memory_lock(Some("unlimited".into())).good);
+        assert!(memory_lock(true, Some("65536".into())).good);
     }
 
     #[test]
