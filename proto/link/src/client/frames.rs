@@ -317,6 +317,7 @@ impl Frames {
             return Led::Over;
         };
         while master.take_change().is_some() {} // nobody asks
+        master.hear(part.session, now); // slow pictures are no silence
         let Some((_, state_hash)) = part.state.as_ref() else {
             return Led::Over;
         };
