@@ -330,11 +330,18 @@ impl Frames {
         };
         let head: ReleaseHead = head.clone();
         part.succession.release(now, &head);
-        let _ = part.node.release(now, &head);
-        let release = part.own_release();
-        drop(inner);
-        self.released.notify_one();
-        release.map_or(Led::Over, Led::Released)
+        part.own_release().map_or(Led::Over, Led::Released)
+    }
+
+    /// For the thread that leads: the RELEASE is on its way to the others, so that this node may show the frame, too.
+    pub(crate) fn release_own(&self, head: &ReleaseHead, local_ns: u64) {
+        let mut inner = self.lock();
+        if let Some(part) = &mut *inner
+            && part.node.release(local_ns, head)
+        {
+            drop(inner);
+            self.released.notify_one();
+        }
     }
 
     /// The newest RELEASE of this node's reign; `None` where it leads nobody.
