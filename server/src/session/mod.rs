@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use taut_bridge::ArmSwitch;
 use taut_bridge::realtime::Awake;
-use taut_link::{ServerLink, ServerPin};
+use taut_link::{JoinPolicy, ServerLink, ServerPin};
 use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
@@ -79,6 +79,11 @@ impl Session {
     /// Address of the state plane, with the port that it got.
     pub fn udp_address(&self) -> Option<SocketAddr> {
         self.link.as_ref().map(ServerLink::udp_addr)
+    }
+
+    /// Lets in by another policy from now on; how many clients that shut out.
+    pub fn set_admission(&self, policy: JoinPolicy) -> usize {
+        self.link.as_ref().map_or(0, |link| link.set_policy(policy))
     }
 
     /// Those who look on without taut's own client.

@@ -317,6 +317,7 @@ impl Frames {
             return Led::Over;
         };
         while master.take_change().is_some() {} // nobody asks
+        master.hear(part.session, now); // slow pictures are no silence
         let Some((_, state_hash)) = part.state.as_ref() else {
             return Led::Over;
         };
@@ -329,11 +330,18 @@ impl Frames {
         };
         let head: ReleaseHead = head.clone();
         part.succession.release(now, &head);
-        let _ = part.node.release(now, &head);
-        let release = part.own_release();
-        drop(inner);
-        self.released.notify_one();
-        release.map_or(Led::Over, Led::Released)
+        part.own_release().map_or(Led::Over, Led::Released)
+    }
+
+    /// For the thread that leads: the RELEASE is on its way to the others, so that this node may show the frame, too.
+    pub(crate) fn release_own(&self, head: &ReleaseHead, local_ns: u64) {
+        let mut inner = self.lock();
+        if let Some(part) = &mut *inner
+            && part.node.release(local_ns, head)
+        {
+            drop(inner);
+            self.released.notify_one();
+        }
     }
 
     /// The newest RELEASE of this node's reign; `None` where it leads nobody.

@@ -269,6 +269,7 @@ impl Hot {
 
     fn request_time(&self) {
         let client_sent = self.inbound.local_ns(Instant::now());
+        self.sealer.roll_by_time(client_sent);
         self.send(&Payload::TimeRequest(TimeRequest { client_sent }));
     }
 

@@ -113,7 +113,9 @@ impl Hot {
             match frames.lead(clock, longest) {
                 Led::Over => return,
                 Led::Released(release) => {
+                    let head = release.head.clone();
                     self.send_to_screens(&Payload::Release(release));
+                    frames.release_own(&head, clock());
                     again_ns = Some(clock() + REPEAT_NS);
                 }
                 Led::Waited => {}

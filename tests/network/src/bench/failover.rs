@@ -41,6 +41,8 @@ pub struct Failover {
     pub return_gap_ms: f64,
     /// Last swap call of a frame less first while a node led, us.
     pub skew_us: Quantiles,
+    /// The same while the server led: the control.
+    pub server_skew_us: Quantiles,
     /// Frames while a node led that showed different states: must be 0.
     pub different: u64,
     /// From the start of the next server until all had joined it, s.
@@ -84,6 +86,7 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
     wait_until("frames", || {
         screens.iter().all(|screen| screen.frame() > 2 * RATE)
     })?;
+    let in_step = Instant::now();
     std::thread::sleep(WARM_UP);
     let before = screens.iter().map(Screen::frame).max().unwrap_or(0);
 
@@ -122,6 +125,7 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
     let by_two = together(&shown[1..], |swapped| {
         of_nodes(swapped) && swapped.at >= leader_died
     });
+    let by_server = together(&shown, |swapped| swapped.at > in_step && swapped.at < died);
     let skews = by_all.skew_us.into_iter().chain(by_two.skew_us);
     Ok(Failover {
         fifo,
@@ -129,6 +133,7 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
         second_gap_ms: longest(&shown[1..], leader_died, again),
         return_gap_ms: longest(&shown[1..], again, end),
         skew_us: Quantiles::of(skews.collect()),
+        server_skew_us: Quantiles::of(by_server.skew_us),
         different: by_all.different + by_two.different,
         back_s,
     })

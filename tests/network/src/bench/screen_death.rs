@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use taut_link::{ClientLink, ClientOptions, Role};
+use tokio::runtime::Runtime;
 
 use super::death::Death;
 use super::program::{Process, Workbench, set};
 use super::screen::{Screen, longest_gap_ms};
-use super::{BenchError, wait_until};
+use super::{BenchError, request_fifo, wait_until};
 
 /// Frames per second of the drawing processes: what two processors draw without a graphics card.
 pub const RATE: u64 = 20;
@@ -20,6 +21,8 @@ pub const RATE: u64 = 20;
 const VICTIM: &str = "front";
 /// Name of the other one.
 const OTHER: &str = "table";
+/// Real-time priority of the witness, where the system grants it.
+const PRIORITY: u8 = 60;
 /// Time in which all fall in step.
 const WARM_UP: Duration = Duration::from_secs(3);
 /// Time after the return that counts.
@@ -48,17 +51,13 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
     let rate = RATE.to_string();
     let workbench = Workbench::new(program, |file| set(file, "frames.rate", RATE as i64))?;
     let server = workbench.serve(None)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()?;
     let options = ClientOptions::new(
         server.quic.clone(),
         workbench.key()?,
         Role::Render,
         "witness",
     );
-    let witness = Screen::start(&runtime, options, 1)?;
+    let (witness, _runtime) = start_witness(options)?;
     let small = [
         "--headless",
         "--width",
@@ -101,6 +100,10 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
         number_of(witness.link(), VICTIM).is_some_and(|now| Some(now) != number)
     })?;
     let back_s = again.elapsed().as_secs_f64();
+    if witness.sessions() != 1 {
+        let why = "the machine was too busy: the witness was let go itself";
+        return Err(BenchError::Missing(why.to_owned()));
+    }
     std::thread::sleep(RETURN);
     let end = Instant::now();
     let shown = witness.end()?;
@@ -117,6 +120,25 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
             .as_array()
             .map_or(0.0, |list| list.len() as f64),
     })
+}
+
+/// The node that sees every swap, with the runtime that it lives on: of the real-time class where the system grants it, as the threads of the processes that
+/// draw are not, and the processes that are started later.
+fn start_witness(options: ClientOptions) -> Result<(Screen, Runtime), BenchError> {
+    let start = move || -> Result<(Screen, Runtime), BenchError> {
+        let _ = request_fifo(PRIORITY);
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()?;
+        Ok((Screen::start(&runtime, options, 1)?, runtime))
+    };
+    let started = std::thread::Builder::new()
+        .name("witness".to_owned())
+        .spawn(start)?;
+    started
+        .join()
+        .unwrap_or_else(|_| Err(BenchError::Missing("the witness panicked".to_owned())))
 }
 
 /// Session number of a node, if it is in.

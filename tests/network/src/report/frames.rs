@@ -134,11 +134,17 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
             FAILOVER_MS,
             "ms",
         ),
-        row(
-            "swap-call skew while a node leads: p99",
+        Row::at_most(
+            "fail-over: swap-call skew while a node leads: p99",
             worst(|run| run.skew_us.p99),
             SKEW_US.1,
             "us",
+            format!(
+                "p50 {} us; while the server led {}/{} us; {setting}",
+                brief(worst(|run| run.skew_us.p50)),
+                brief(worst(|run| run.server_skew_us.p50)),
+                brief(worst(|run| run.server_skew_us.p99)),
+            ),
         ),
         row(
             "nodes back, from the start of the next server's process",
