@@ -1,4 +1,4 @@
-//! What a periodic loop asks of the operating system: absolute sleeps, priority, locked memory, a core.
+//! What a periodic loop asks of the operating system: absolute sleeps, priority, locked memory, a core, cores that stay awake.
 //!
 //! Each request says what was granted or why not; nothing is lost silently, and whether a loop goes on
 //! without is the caller's decision. This is the only place with operating system calls. Where a system

@@ -37,13 +37,10 @@ struct Reflection {
 impl Reflection {
     #[inline]
     fn apply(&self, x: &mut PerString) {
-        let mut along = 0.0;
-        for i in 0..STRINGS {
-            along += self.v[i] * x[i];
-        }
+        let along: f64 = self.v.iter().zip(x.iter()).map(|(v, x)| v * x).sum();
         let change = self.beta * along;
-        for i in 0..STRINGS {
-            x[i] -= change * self.v[i];
+        for (x, v) in x.iter_mut().zip(&self.v) {
+            *x -= change * v;
         }
     }
 }
@@ -91,7 +88,7 @@ impl NullSpace {
         space.basis = std::array::from_fn(|column| {
             let mut unit = [0.0; STRINGS];
             unit[COMPONENTS + column] = 1.0;
-            space.from_reflected(unit)
+            space.unreflected(unit)
         });
         Some(space)
     }
@@ -103,11 +100,11 @@ impl NullSpace {
             let known: f64 = (0..j).map(|k| self.triangle[j][k] * x[k]).sum();
             x[j] = (f[j] - known) * self.triangle[j][j];
         }
-        self.from_reflected(x)
+        self.unreflected(x)
     }
 
     /// `Q x`.
-    fn from_reflected(&self, mut x: PerString) -> PerString {
+    fn unreflected(&self, mut x: PerString) -> PerString {
         for reflection in self.reflections.iter().rev() {
             reflection.apply(&mut x);
         }

@@ -62,7 +62,7 @@ pub struct Session {
     link: Option<ServerLink>,
     runtime: Runtime,
     /// While it is held, idle cores wait at work.
-    awake: Option<Awake>,
+    _awake: Option<Awake>,
 }
 
 impl Session {

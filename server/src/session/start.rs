@@ -114,6 +114,8 @@ impl Session {
         )
         .with_motions(setup.motions.clone());
         let broadcaster = link.broadcaster();
+        let (grant, awake) = keep_cores_awake();
+        ledger.note("process", grant);
         let mut session = Self {
             clock,
             started: clock.now(),
@@ -132,7 +134,7 @@ impl Session {
             looking_on,
             link: Some(link),
             runtime,
-            awake: None,
+            _awake: awake,
         };
 
         // From here on a failure drops the session, which ends what was started.

@@ -14,7 +14,7 @@ use crate::looking_on::Outlets;
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
-use crate::loops::shell::{Waker, run_at_deadlines, spawn};
+use crate::loops::shell::{Beat, Waker, run_at_deadlines, spawn};
 use crate::realtime::{RealtimePolicy, Scheduling};
 use crate::setup::RealtimeSettings;
 use crate::shared::contact_snapshot::ContactSnapshot;
@@ -70,7 +70,11 @@ impl Session {
             move || {
                 // Updates that take longer than a period are no fault: the next one starts at once.
                 let late = AtomicU64::new(0);
-                run_at_deadlines(clock, period, &shutdown, &late, |_| {
+                let beat = Beat {
+                    period,
+                    phase: Beat::GOD_OBJECT,
+                };
+                run_at_deadlines(clock, beat, &shutdown, &late, |_| {
                     god_object.tick(|| clock.now());
                     waker.wake();
                 });
@@ -146,13 +150,13 @@ impl Session {
             realtime.haptics_core,
             move || {
                 let ticked = catch_unwind(AssertUnwindSafe(|| {
-                    run_at_deadlines(
-                        clock,
+                    let beat = Beat {
                         period,
-                        &shutdown,
-                        &statistics.deadline_misses,
-                        |now| haptics.tick(now),
-                    );
+                        phase: Beat::HAPTICS,
+                    };
+                    run_at_deadlines(clock, beat, &shutdown, &statistics.deadline_misses, |now| {
+                        haptics.tick(now)
+                    });
                 }));
                 // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
                 let released = catch_unwind(AssertUnwindSafe(|| {
