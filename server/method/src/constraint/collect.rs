@@ -3,6 +3,9 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
+use arrayvec::ArrayVec;
+
+use super::arc::Arc;
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
@@ -11,6 +14,9 @@ use crate::collision::{
 };
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
+
+/// The bits of owned features that stand for corners; those of sides follow.
+const CORNERS: u8 = 7;
 
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
 ///
@@ -61,7 +67,13 @@ pub(crate) fn collect_bounded(
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
     let trees = (body.wide_tree(), obstacle.wide_tree());
-    let volumes = FacingVolumes::still(trees, &placement, activation_distance, LOOK_AHEAD_TILT);
+    let volumes = FacingVolumes::still(
+        trees,
+        &placement,
+        activation_distance,
+        LOOK_AHEAD_TILT,
+        &mut workspace.turned,
+    );
     let facing = Facing {
         body,
         obstacle,
@@ -88,10 +100,10 @@ pub(crate) fn collect_bounded(
     };
     let mut complete_within = activation_distance;
     if pairs == u64::MAX {
-        let stack = &mut workspace.pairs;
+        let stack = (&mut workspace.pairs, &mut workspace.turned);
         for_facing_triangle_pairs(trees, &volumes, stack, work, can_touch, look);
     } else {
-        let bands = &mut workspace.bands;
+        let bands = (&mut workspace.bands, &mut workspace.turned);
         let volumes = (&volumes, activation_distance);
         let within = for_nearest_triangle_pairs(trees, volumes, bands, work, can_touch, &mut look);
         complete_within = complete_within.min(within);
@@ -122,7 +134,6 @@ pub(crate) fn collect_bounded(
 /// meets the other's face, sides meet sides.
 #[inline]
 fn can_touch(on_a: u8, on_b: u8) -> bool {
-    const CORNERS: u8 = 7;
     (on_a | on_b) & CORNERS != 0 || (on_a != 0 && on_b != 0)
 }
 
@@ -137,38 +148,54 @@ pub(super) fn for_contacts(
         facing.body.owned_features(pair.a),
         facing.obstacle.owned_features(pair.b),
     );
-    let corner = |owned: u8, k: usize| owned & (1 << k) != 0;
-    let side = |owned: u8, k: usize| owned & (8 << k) != 0;
-    for k in 0..3 {
-        if corner(on_a, k) {
-            work.feature_pairs += 1;
-            facing.vertex_face(pair, k).map(&mut found);
-        }
-        if corner(on_b, k) {
-            work.feature_pairs += 1;
-            facing.face_vertex(pair, k).map(&mut found);
-        }
+    let (corners_a, corners_b) = (on_a & CORNERS, on_b & CORNERS);
+    let (sides_a, sides_b) = (on_a >> 3, on_b >> 3);
+    for k in bits(corners_a) {
+        work.feature_pairs += 1;
+        facing.vertex_face(pair, k).map(&mut found);
+    }
+    for k in bits(corners_b) {
+        work.feature_pairs += 1;
+        facing.face_vertex(pair, k).map(&mut found);
     }
     if on_a == 0 || on_b == 0 {
         return;
     }
     work.feature_pairs += u64::from(on_a.count_ones() * on_b.count_ones());
-    for i in 0..3 {
-        for j in 0..3 {
-            if side(on_a, i) && side(on_b, j) {
-                facing.edge_edge(pair, i, j).map(&mut found);
-            }
-            if corner(on_a, i) && side(on_b, j) {
-                facing.vertex_edge(pair, i, j).map(&mut found);
-            }
-            if side(on_a, i) && corner(on_b, j) {
-                facing.edge_vertex(pair, i, j).map(&mut found);
-            }
-            if corner(on_a, i) && corner(on_b, j) {
-                facing.vertex_vertex(pair, i, j).map(&mut found);
+    let arcs_b: ArrayVec<Arc, 3> = bits(sides_b)
+        .map(|j| facing.arc_of_obstacle(pair, j))
+        .collect();
+    for i in bits(sides_a) {
+        let on_body = facing.arc_of_body(pair, i);
+        for on_obstacle in &arcs_b {
+            if on_body.may_cross(on_obstacle) {
+                facing.edge_edge(pair, i, on_obstacle.side).map(&mut found);
             }
         }
+        for j in bits(corners_b) {
+            facing.edge_vertex(pair, i, j).map(&mut found);
+        }
     }
+    for i in bits(corners_a) {
+        for j in bits(sides_b) {
+            facing.vertex_edge(pair, i, j).map(&mut found);
+        }
+        for j in bits(corners_b) {
+            facing.vertex_vertex(pair, i, j).map(&mut found);
+        }
+    }
+}
+
+/// The places of the bits that are set, lowest first.
+#[inline(always)]
+fn bits(mut mask: u8) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        (mask != 0).then(|| {
+            let k = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            k
+        })
+    })
 }
 
 /// The nearest of the contacts that it is given, at most `room` of them in the end.
