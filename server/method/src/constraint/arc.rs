@@ -11,6 +11,7 @@
 
 use nalgebra::Vector3;
 
+use super::collect::for_bits;
 use super::facing::{Facing, NORMAL_CONE_TOLERANCE, Pair};
 
 /// An arc is left by less than this, as the sine of an angle, for the tolerance of the cones and for rounding.
@@ -19,8 +20,6 @@ const ARC_TOLERANCE: f64 = 2.0 * NORMAL_CONE_TOLERANCE;
 /// An edge that a triangle owns, obstacle frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arc {
-    /// Which side of the triangle it is.
-    pub(super) side: usize,
     along: Vector3<f64>,
     normals: [Vector3<f64>; 2],
 }
@@ -41,26 +40,35 @@ impl Arc {
 }
 
 impl Facing<'_> {
-    /// Side `i` of the body's triangle, which owns it.
+    /// The sides of the body's triangle that it owns, by their bits; what the others are is not said.
     #[inline]
-    pub(super) fn arc_of_body(&self, pair: &Pair, i: usize) -> Arc {
-        let [left, right] = self.body.edges()[self.body.triangle_edges(pair.a)[i] as usize].faces;
-        Arc {
-            side: i,
-            along: pair.x[(i + 1) % 3] - pair.x[i],
-            normals: [left, right].map(|t| self.placement.rotation * self.body.face_normal(t)),
-        }
+    pub(super) fn arcs_of_body(&self, pair: &Pair, sides: u8) -> [Arc; 3] {
+        let turned = |t: u32| self.placement.rotation * self.body.face_normal(t);
+        let own = turned(pair.a);
+        let mut arcs = [Arc {
+            along: Vector3::zeros(),
+            normals: [own; 2],
+        }; 3];
+        for_bits(sides, |i| {
+            let edge = self.body.triangle_edges(pair.a)[i];
+            arcs[i].along = pair.x[(i + 1) % 3] - pair.x[i];
+            arcs[i].normals[1] = turned(self.body.edges()[edge as usize].faces[1]);
+        });
+        arcs
     }
 
     /// Side `j` of the obstacle's triangle, which owns it.
     #[inline]
     pub(super) fn arc_of_obstacle(&self, pair: &Pair, j: usize) -> Arc {
         let edge = self.obstacle.triangle_edges(pair.b)[j];
-        let [left, right] = self.obstacle.edges()[edge as usize].faces;
+        // The first of an edge's faces is its owner.
+        let other = self.obstacle.edges()[edge as usize].faces[1];
         Arc {
-            side: j,
             along: pair.y[(j + 1) % 3] - pair.y[j],
-            normals: [left, right].map(|t| *self.obstacle.face_normal(t)),
+            normals: [
+                *self.obstacle.face_normal(pair.b),
+                *self.obstacle.face_normal(other),
+            ],
         }
     }
 }

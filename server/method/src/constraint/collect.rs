@@ -3,9 +3,6 @@
 //! Both trees are descended together, by distance and by cones of normals: surfaces that do not face each other are left
 //! early. Each vertex and edge belongs to one triangle, so that a pair of features is looked at once.
 
-use arrayvec::ArrayVec;
-
-use super::arc::Arc;
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
@@ -150,52 +147,49 @@ pub(super) fn for_contacts(
     );
     let (corners_a, corners_b) = (on_a & CORNERS, on_b & CORNERS);
     let (sides_a, sides_b) = (on_a >> 3, on_b >> 3);
-    for k in bits(corners_a) {
+    for_bits(corners_a, |k| {
         work.feature_pairs += 1;
         facing.vertex_face(pair, k).map(&mut found);
-    }
-    for k in bits(corners_b) {
+    });
+    for_bits(corners_b, |k| {
         work.feature_pairs += 1;
         facing.face_vertex(pair, k).map(&mut found);
-    }
-    if on_a == 0 || on_b == 0 {
-        return;
-    }
+    });
     work.feature_pairs += u64::from(on_a.count_ones() * on_b.count_ones());
-    let arcs_b: ArrayVec<Arc, 3> = bits(sides_b)
-        .map(|j| facing.arc_of_obstacle(pair, j))
-        .collect();
-    for i in bits(sides_a) {
-        let on_body = facing.arc_of_body(pair, i);
-        for on_obstacle in &arcs_b {
-            if on_body.may_cross(on_obstacle) {
-                facing.edge_edge(pair, i, on_obstacle.side).map(&mut found);
-            }
-        }
-        for j in bits(corners_b) {
-            facing.edge_vertex(pair, i, j).map(&mut found);
-        }
+    if sides_a != 0 && sides_b != 0 {
+        let of_body = facing.arcs_of_body(pair, sides_a);
+        for_bits(sides_b, |j| {
+            let on_obstacle = facing.arc_of_obstacle(pair, j);
+            for_bits(sides_a, |i| {
+                if of_body[i].may_cross(&on_obstacle) {
+                    facing.edge_edge(pair, i, j).map(&mut found);
+                }
+            });
+        });
     }
-    for i in bits(corners_a) {
-        for j in bits(sides_b) {
+    for_bits(corners_a, |i| {
+        for_bits(sides_b, |j| {
             facing.vertex_edge(pair, i, j).map(&mut found);
-        }
-        for j in bits(corners_b) {
+        });
+        for_bits(corners_b, |j| {
             facing.vertex_vertex(pair, i, j).map(&mut found);
-        }
-    }
+        });
+    });
+    for_bits(corners_b, |j| {
+        for_bits(sides_a, |i| {
+            facing.edge_vertex(pair, i, j).map(&mut found);
+        });
+    });
 }
 
-/// The places of the bits that are set, lowest first.
+/// Calls `each` with the places of the bits that are set, lowest first; those of three.
 #[inline(always)]
-fn bits(mut mask: u8) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        (mask != 0).then(|| {
-            let k = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            k
-        })
-    })
+pub(super) fn for_bits(mask: u8, mut each: impl FnMut(usize)) {
+    for k in 0..3 {
+        if mask & (1 << k) != 0 {
+            each(k);
+        }
+    }
 }
 
 /// The nearest of the contacts that it is given, at most `room` of them in the end.
