@@ -15,7 +15,7 @@ use crate::spatial::{
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is not worth a search.
-const WORTH_SHARE: f64 = 0.05;
+const WORTH_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
 const TIGHT_GAP_SHARE: f64 = 0.5;
 /// Motions that turn back on each other more often than this go to and fro about where they end: the next update is nearer.
