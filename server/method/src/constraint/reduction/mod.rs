@@ -248,6 +248,7 @@ impl RowReduction {
                 placement: &placement,
                 obstacle_index: index,
                 activation_distance: distance,
+                past_hollows: false,
             };
             for passed in of_obstacle {
                 let pair = facing.pair(passed.triangles.0, passed.triangles.1);
