@@ -157,9 +157,6 @@ impl Session {
         if setup.realtime.lock_memory {
             session.ledger.note("process", lock_memory());
         }
-        let (grant, awake) = keep_cores_awake();
-        session.ledger.note("process", grant);
-        session.awake = awake;
         let states = StateWriter::new(
             loops.observers.broadcast,
             head,
