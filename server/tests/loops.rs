@@ -191,7 +191,8 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
     for age in 1..=200 {
         session.tick(1);
         assert!(before - felt() <= 0.5, "no step of {} N", before - felt());
-        assert_eq!(felt() == 0.0, age >= 120, "{} N after {age} ms", felt());
+        let gone = Duration::from_millis(age) >= SafetySettings::HOLD + SafetySettings::RAMP_OUT;
+        assert_eq!(felt() == 0.0, gone, "{} N after {age} ms", felt());
         before = felt();
     }
     assert!(session.loops.observers.monitor.device.newest().faulty);

@@ -263,8 +263,8 @@ mod tests {
                 };
                 let mut search = Search::new(BoxProgram::new(&rows, 1e-11), bounds);
                 let program = search.largest_scale(&f, &mut warm);
-                let mut fresh = Ray::UNKNOWN;
-                let planes = search.largest_scale_by_planes(&f, &mut fresh);
+                let mut cold = Ray::UNKNOWN;
+                let planes = search.largest_scale_by_planes(&f, &mut cold);
                 match (program, planes) {
                     (Some(program), Some(planes)) => {
                         found += 1;
