@@ -15,6 +15,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use taut_bridge::ArmSwitch;
+use taut_bridge::realtime::Awake;
 use taut_link::{JoinPolicy, ServerLink, ServerPin};
 use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
@@ -60,6 +61,8 @@ pub struct Session {
     looking_on: LookingOn,
     link: Option<ServerLink>,
     runtime: Runtime,
+    /// While it is held, idle cores wait at work.
+    awake: Option<Awake>,
 }
 
 impl Session {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
-use taut_bridge::realtime::lock_memory;
+use taut_bridge::realtime::{keep_cores_awake, lock_memory};
 use taut_bridge::{Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
@@ -132,6 +132,7 @@ impl Session {
             looking_on,
             link: Some(link),
             runtime,
+            awake: None,
         };
 
         // From here on a failure drops the session, which ends what was started.
@@ -154,6 +155,9 @@ impl Session {
         if setup.realtime.lock_memory {
             session.ledger.note("process", lock_memory());
         }
+        let (grant, awake) = keep_cores_awake();
+        session.ledger.note("process", grant);
+        session.awake = awake;
         let states = StateWriter::new(
             loops.observers.broadcast,
             head,

@@ -55,6 +55,8 @@ struct Known {
     contact: Contact,
     jacobian: Vector6,
     idle: u32,
+    /// Its pair faces no more: it slid into a hollow, where the row is implied by those that are there.
+    implied: bool,
 }
 
 /// Pairs up to this many rest distances apart touch.
@@ -145,8 +147,10 @@ impl RowReduction {
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
         self.known.retain_mut(|row| {
-            let contact = face(at, &row.contact.features, work);
-            *outdated |= contact.is_none() && row.contact.gap <= near;
+            let facing = face(at, &row.contact.features, false, work);
+            let was_implied = std::mem::replace(&mut row.implied, facing.is_none());
+            *outdated |= row.implied && !was_implied && row.contact.gap <= near;
+            let contact = facing.or_else(|| face(at, &row.contact.features, true, work));
             if let Some(contact) = contact {
                 row.contact = contact;
                 row.jacobian = jacobian(&contact, &at.center());
@@ -290,7 +294,7 @@ impl RowReduction {
             let contact = if self.candidates.moved == Vector6::zeros() {
                 Some(self.candidates.contacts[k])
             } else {
-                face(at, &features, work)
+                face(at, &features, false, work)
             };
             self.outdated |= contact.is_none();
             if let Some(contact) = contact {
@@ -342,6 +346,7 @@ impl RowReduction {
             contact: *contact,
             jacobian: jacobian(contact, &at.center()),
             idle: 0,
+            implied: false,
         });
     }
 
@@ -361,6 +366,7 @@ impl RowReduction {
                 placement: &placement,
                 obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
                 activation_distance: HINT_REST_DISTANCES * at.rest_distance,
+                past_hollows: false,
             };
             // The features that touch may be other triangles' to look at.
             for a in owners(body, a) {
@@ -395,8 +401,8 @@ fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
     owners
 }
 
-/// The contact between two features at a pose, world frame, when they face each other there.
-fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
+/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid into a hollow.
+fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) -> Option<Contact> {
     let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
     let placement = Placement::of(&at.pose, &obstacle.pose);
     let facing = Facing {
@@ -405,6 +411,7 @@ fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
         placement: &placement,
         obstacle_index: features.obstacle,
         activation_distance: f64::INFINITY,
+        past_hollows,
     };
     work.feature_pairs += 1;
     facing
