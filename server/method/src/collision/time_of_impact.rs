@@ -77,14 +77,14 @@ pub struct AdvancementSettings {
 }
 
 impl Default for AdvancementSettings {
-    /// For a body of 0.1 m: 1 um, 0.1 um.
+    /// For a body of 0.1 m: 1 um, 0.1 um; motions of any length, cut finely.
     fn default() -> Self {
         Self {
             minimum_gap: 1e-6,
             gap_tolerance: 1e-7,
             max_iterations: 200,
-            interval_edges: 1.0,
-            max_intervals: 64,
+            interval_edges: 0.125,
+            max_intervals: 256,
         }
     }
 }
