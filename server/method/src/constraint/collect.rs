@@ -77,6 +77,7 @@ pub(crate) fn collect_bounded(
         placement: &placement,
         obstacle_index,
         activation_distance,
+        past_hollows: false,
     };
     let mut nearest = Nearest {
         limit: workspace.candidate_limit,

@@ -14,6 +14,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::collect::triangle_of;
+use super::hollow;
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::Placement;
 use crate::geometry::distance::barycentric;
@@ -41,6 +42,8 @@ pub(super) struct Facing<'a> {
     pub(super) placement: &'a Placement,
     pub(super) obstacle_index: u16,
     pub(super) activation_distance: f64,
+    /// Rows count beyond the end of their feature, too, where that is a hollow ([`hollow`]): for rows that are known.
+    pub(super) past_hollows: bool,
 }
 
 /// One triangle of each, corners in both frames where needed.
@@ -59,7 +62,13 @@ impl Facing<'_> {
     pub(super) fn vertex_face(&self, pair: &Pair, k: usize) -> Option<Contact> {
         let normal = *self.obstacle.face_normal(pair.b);
         let gap = normal.dot(&(pair.x[k] - pair.y[0]));
-        if !self.is_near(gap) || !is_over(&pair.x[k], &pair.y, &normal, gap) {
+        let over = self.is_near(gap)
+            && (is_over(&pair.x[k], &pair.y, &normal, gap)
+                || self.past_hollows && {
+                    let place = |t| self.obstacle.corners(t);
+                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k], &normal)
+                });
+        if !over {
             return None;
         }
         let v = self.body.triangles()[pair.a as usize][k];
@@ -83,7 +92,13 @@ impl Facing<'_> {
     pub(super) fn face_vertex(&self, pair: &Pair, k: usize) -> Option<Contact> {
         let normal = -(self.placement.rotation * self.body.face_normal(pair.a));
         let gap = normal.dot(&(pair.x[0] - pair.y[k]));
-        if !self.is_near(gap) || !is_over(&pair.y[k], &pair.x, &-normal, gap) {
+        let over = self.is_near(gap)
+            && (is_over(&pair.y[k], &pair.x, &-normal, gap)
+                || self.past_hollows && {
+                    let place = |t| self.pair(t, pair.b).x;
+                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k], &-normal)
+                });
+        if !over {
             return None;
         }
         let v = self.obstacle.triangles()[pair.b as usize][k];
@@ -113,8 +128,8 @@ impl Facing<'_> {
         }
         let (c, f) = (u.dot(&r), v.dot(&r));
         let (s, t) = ((b * f - c * e) / denominator, (a * f - b * c) / denominator);
-        let inside = (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t);
-        if !inside {
+        let inside = [s, t].map(|at| (0.0..=1.0).contains(&at));
+        if inside != [true; 2] && !self.past_hollows {
             return None;
         }
         let cross = u.cross(&v);
@@ -129,9 +144,20 @@ impl Facing<'_> {
         let normal = if side < 0.0 { -unit } else { unit };
         let (x, y) = (p + u * s, q + v * t);
         let gap = normal.dot(&(x - y));
+        let into_body = -self.placement.rotation.tr_mul(&normal);
         let facing = self.is_near(gap)
             && is_in_edge_cone(self.obstacle, edge_b, &normal)
-            && is_in_edge_cone(self.body, edge_a, &-self.placement.rotation.tr_mul(&normal));
+            && is_in_edge_cone(self.body, edge_a, &into_body)
+            && (inside[0] || {
+                let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
+                let way = self.placement.rotation.tr_mul(&(u * past_end(s)));
+                hollow::covers_way(self.body, end, &way, &into_body)
+            })
+            && (inside[1] || {
+                let end =
+                    self.obstacle.triangles()[pair.b as usize][(j + usize::from(t > 0.5)) % 3];
+                hollow::covers_way(self.obstacle, end, &(v * past_end(t)), &normal)
+            });
         facing.then(|| {
             self.contact(
                 Feature::Edge(edge_a),
@@ -375,6 +401,12 @@ pub(crate) fn is_over(
             inside >= -length * (FOOT_TOLERANCE_PER_GAP * gap + FOOT_TOLERANCE_PER_SIDE * length)
         }
     })
+}
+
+/// How far past the nearer end of a side a place is, in sides; signed along it.
+#[inline]
+fn past_end(at: f64) -> f64 {
+    at - at.clamp(0.0, 1.0)
 }
 
 /// The foot of a point on a side and its fraction there, when it lies on the side.

@@ -5,6 +5,7 @@ mod collect;
 mod contact;
 mod facing;
 mod feature;
+mod hollow;
 mod reduction;
 mod separation;
 mod set;

@@ -55,6 +55,8 @@ struct Known {
     contact: Contact,
     jacobian: Vector6,
     idle: u32,
+    /// Its pair faces no more: it slid into a hollow, where the row is implied by those that are there.
+    implied: bool,
 }
 
 /// Pairs up to this many rest distances apart touch.
@@ -143,8 +145,10 @@ impl RowReduction {
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
         self.known.retain_mut(|row| {
-            let contact = face(at, &row.contact.features, work);
-            *outdated |= contact.is_none() && row.contact.gap <= near;
+            let facing = face(at, &row.contact.features, false, work);
+            let was_implied = std::mem::replace(&mut row.implied, facing.is_none());
+            *outdated |= row.implied && !was_implied && row.contact.gap <= near;
+            let contact = facing.or_else(|| face(at, &row.contact.features, true, work));
             if let Some(contact) = contact {
                 row.contact = contact;
                 row.jacobian = jacobian(&contact, &at.center());
@@ -244,6 +248,7 @@ impl RowReduction {
                 placement: &placement,
                 obstacle_index: index,
                 activation_distance: distance,
+                past_hollows: false,
             };
             for passed in of_obstacle {
                 let pair = facing.pair(passed.triangles.0, passed.triangles.1);
@@ -329,7 +334,7 @@ impl RowReduction {
             let contact = if self.candidates.moved == Vector6::zeros() {
                 Some(self.candidates.contacts[k])
             } else {
-                face(at, &features, work)
+                face(at, &features, false, work)
             };
             self.outdated |= contact.is_none();
             if let Some(contact) = contact {
@@ -381,6 +386,7 @@ impl RowReduction {
             contact: *contact,
             jacobian: jacobian(contact, &at.center()),
             idle: 0,
+            implied: false,
         });
     }
 
@@ -400,6 +406,7 @@ impl RowReduction {
                 placement: &placement,
                 obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
                 activation_distance: HINT_REST_DISTANCES * at.rest_distance,
+                past_hollows: false,
             };
             // The features that touch may be other triangles' to look at.
             for a in owners(body, a) {
@@ -434,8 +441,8 @@ fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
     owners
 }
 
-/// The contact between two features at a pose, world frame, when they face each other there.
-fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
+/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid into a hollow.
+fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) -> Option<Contact> {
     let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
     let placement = Placement::of(&at.pose, &obstacle.pose);
     let facing = Facing {
@@ -444,6 +451,7 @@ fn face(at: &At, features: &FeaturePair, work: &mut Work) -> Option<Contact> {
         placement: &placement,
         obstacle_index: features.obstacle,
         activation_distance: f64::INFINITY,
+        past_hollows,
     };
     work.feature_pairs += 1;
     facing
