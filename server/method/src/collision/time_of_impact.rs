@@ -260,14 +260,12 @@ impl Problem<'_> {
             stack,
             hints,
             intervals,
-            passed,
             turned,
             ..
         } = workspace;
         intervals.restart(first.time, search.gaps.stop);
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
-        passed.restart();
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
         while let Some((a, b, mut index)) = stack.pop() {
@@ -283,7 +281,6 @@ impl Problem<'_> {
             }
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
-                passed.push((t, s));
                 let pair = self.pair(t, s);
                 if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
                     && !hints.contains(&(t, s))
