@@ -77,14 +77,14 @@ pub struct AdvancementSettings {
 }
 
 impl Default for AdvancementSettings {
-    /// For a body of 0.1 m: 1 um, 0.1 um.
+    /// For a body of 0.1 m: 1 um, 0.1 um; motions of any length, cut finely.
     fn default() -> Self {
         Self {
             minimum_gap: 1e-6,
             gap_tolerance: 1e-7,
             max_iterations: 200,
-            interval_edges: 1.0,
-            max_intervals: 64,
+            interval_edges: 0.125,
+            max_intervals: 256,
         }
     }
 }
@@ -260,14 +260,12 @@ impl Problem<'_> {
             stack,
             hints,
             intervals,
-            passed,
             turned,
             ..
         } = workspace;
         intervals.restart(first.time, search.gaps.stop);
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
-        passed.restart();
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
         while let Some((a, b, mut index)) = stack.pop() {
@@ -283,7 +281,6 @@ impl Problem<'_> {
             }
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
-                passed.push((t, s));
                 let pair = self.pair(t, s);
                 if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
                     && !hints.contains(&(t, s))

@@ -6,7 +6,6 @@ use super::bands::Bands;
 use super::descent::WIDE_STACK_CAPACITY;
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
-use super::passed::PassedPairs;
 use super::still_box::STACK_CAPACITY;
 use super::turned::TurnedNodes;
 use crate::constraint::Contact;
@@ -28,7 +27,6 @@ pub struct CollisionWorkspace {
     pub(super) stack: Vec<(u32, u32, u32)>,
     pub(super) intervals: Intervals,
     pub(super) apart: KnownApart,
-    pub(crate) passed: PassedPairs,
     pub(crate) turned: TurnedNodes,
     pub(crate) candidates: Vec<Contact>,
     pub(crate) candidate_limit: usize,
@@ -49,7 +47,6 @@ impl CollisionWorkspace {
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),
-            passed: PassedPairs::new(),
             turned: TurnedNodes::new(),
             candidates: Vec::with_capacity(candidates),
             candidate_limit: candidates,

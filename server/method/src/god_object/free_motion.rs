@@ -4,16 +4,15 @@ use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;
 
+/// Motions of an update are about as long as a triangle: finer cuts cost more than their tighter volumes save.
+const INTERVAL_EDGES: f64 = 0.5;
+
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
     pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
         let settings = self.advancement();
         let mut free = 1.0;
-        self.collision.passed.clear();
-        let placed = self.world.obstacles.iter().zip(&self.obstacles);
-        for (index, (obstacle, placed)) in placed.enumerate() {
-            let index = u16::try_from(index).unwrap_or(u16::MAX);
-            self.collision.passed.begin(index);
+        for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
             let found = shape::time_of_impact(
                 &self.world.body,
                 &motion,
@@ -45,6 +44,7 @@ impl GodObject {
             minimum_gap: self.settings.minimum_gap,
             gap_tolerance: self.settings.gap_tolerance,
             max_iterations: self.settings.max_advancement_steps,
+            interval_edges: INTERVAL_EDGES,
             ..AdvancementSettings::default()
         }
     }

@@ -34,56 +34,28 @@ impl GodObject {
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 
-    /// The known rows at the present pose; and the facing pairs within `distance` (m) to choose from, where those that were
-    /// collected last do not reach as far: every one, or after a motion those that it passed. False where every pair becomes a row.
-    pub(super) fn refresh(&mut self, distance: f64, after_motion: bool, work: &mut Work) -> bool {
+    /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
+    /// collected last do not reach as far. False where every pair becomes a row.
+    pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
         let Some(mut reduction) = self.reduction.take() else {
             return false;
         };
         if let Some(at) = self.place() {
-            reduction.move_to(&at, work);
+            reduction.move_to(&at, &self.collision.hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection. What lies on that way was no candidate where it
             // began, either.
             let carried = CARRIED_REST_DISTANCES * at.rest_distance;
             let reaches = moved + distance.min(LONGER_WAY * within) <= within
                 || (reduction.was_given_up() && moved <= carried);
-            if reaches && !reduction.is_outdated() {
-                reduction.take_hints(&at, &self.collision.hints, work);
-                self.set.gap_min = reduction.gap_min();
-            } else if after_motion {
-                self.collect_passed(&mut reduction, &at, distance, work);
-            } else {
+            self.set.gap_min = reduction.gap_min();
+            if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
             }
         }
         self.reduction = Some(reduction);
         self.write_set();
         true
-    }
-
-    /// The facing pairs within `distance`, m, of those that the last motion's searches came across: what the next sub-step may press
-    /// against. Where there were too many, every facing pair.
-    ///
-    /// A row that this misses stops the next motion and is found there. A set that is published is collected as a whole.
-    fn collect_passed(
-        &mut self,
-        reduction: &mut RowReduction,
-        at: &At,
-        distance: f64,
-        work: &mut Work,
-    ) {
-        match self.collision.passed.all() {
-            Some(passed) => {
-                reduction.begin(at, 0.0);
-                reduction.offer_passed(at, passed, distance, work);
-                self.set.gap_min = reduction.gap_min();
-            }
-            None => {
-                reduction.take_hints(at, &self.collision.hints, work);
-                self.collect_candidates(reduction, at, distance, work);
-            }
-        }
     }
 
     /// The facing pairs within `distance`, m, nearest first, as far as the work allows: every obstacle has its share of it.
@@ -131,13 +103,13 @@ impl GodObject {
         }
     }
 
-    /// The candidates of the present pose, within the distance of the last collection, after a motion that left some behind.
+    /// The candidates of the present pose, within the distance of the last collection.
     fn collect_again(&mut self, work: &mut Work) {
         let Some(mut reduction) = self.reduction.take() else {
             return;
         };
         if let Some(at) = self.place() {
-            self.collect_passed(&mut reduction, &at, self.collected_within, work);
+            self.collect_candidates(&mut reduction, &at, self.collected_within, work);
         }
         self.reduction = Some(reduction);
     }

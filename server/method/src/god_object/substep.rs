@@ -99,7 +99,7 @@ impl GodObject {
                 .activation_distance
                 .min(2.0 * self.settings.rest_distance + covered)
         };
-        self.collect_after_motion(distance, &mut report.work);
+        self.collect(distance, &mut report.work);
 
         // The linear rows foretell no gap below the rest distance that was not there before.
         let lost = gap_before - self.set.gap_min;
