@@ -17,9 +17,6 @@ use crate::world::World;
 const TOLERANCE_PER_REST_DISTANCE: f64 = 0.01;
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
-/// Candidates of a collection that was given up are carried so many rest distances: features are larger, and to collect again would find some others
-/// of too many.
-const CARRIED_REST_DISTANCES: f64 = 4.0;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
@@ -43,11 +40,8 @@ impl GodObject {
         if let Some(at) = self.place() {
             reduction.move_to(&at, &self.collision.hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
-            // Where the work allows no more, a longer way is gone before the next collection. What lies on that way was no candidate where it
-            // began, either.
-            let carried = CARRIED_REST_DISTANCES * at.rest_distance;
-            let reaches = moved + distance.min(LONGER_WAY * within) <= within
-                || (reduction.was_given_up() && moved <= carried);
+            // Where the work allows no more, a longer way is gone before the next collection.
+            let reaches = moved + distance.min(LONGER_WAY * within) <= within;
             self.set.gap_min = reduction.gap_min();
             if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
