@@ -23,7 +23,7 @@ pub struct BodyNeed {
     pub sharp: bool,
     /// Angle at which the facets of its smooth parts meet, rad; 0 of an exact form.
     pub facet_angle: f64,
-    /// The largest such angle, rad.
+    /// The largest angle between two of them that share an edge or a corner, rad.
     pub largest_facet_angle: f64,
     /// It has smooth hollow parts out of facets.
     pub hollow: bool,
@@ -86,6 +86,7 @@ impl BodyNeed {
             }
         }
         let largest = bends.iter().map(|bend| bend.1).fold(0.0, f64::max);
+        let largest = largest.max(largest_at_corners(mesh));
         bends.sort_by(|a, b| a.0.total_cmp(&b.0));
         // From the most curved down, until the share that is left out is spent.
         let mut left_out = (1.0 - COVERED) * total;
@@ -111,6 +112,27 @@ impl BodyNeed {
             speed: 0.0,
         }
     }
+}
+
+/// The largest angle between two faces at a corner without a hollow, rad: what slides over the corner goes from one to the other at once.
+fn largest_at_corners(mesh: &Mesh) -> f64 {
+    let mut hollow = vec![false; mesh.vertices().len()];
+    for edge in mesh.edges().iter().filter(|edge| edge.convexity < -FLAT) {
+        for v in edge.vertices {
+            hollow[v as usize] = true;
+        }
+    }
+    let mut faces = vec![Vec::new(); mesh.vertices().len()];
+    for (t, corners) in (0..).zip(mesh.triangles()) {
+        for v in corners.iter().filter(|v| !hollow[**v as usize]) {
+            faces[*v as usize].push(mesh.face_normal(t));
+        }
+    }
+    let between = faces.iter().flat_map(|around| {
+        let pairs = around.iter().enumerate();
+        pairs.flat_map(|(i, a)| around[..i].iter().map(|b| a.angle(b)))
+    });
+    between.filter(|angle| *angle <= CREASE).fold(0.0, f64::max)
 }
 
 fn surface_area(mesh: &Mesh) -> f64 {
@@ -239,6 +261,15 @@ mod tests {
             assert!((found.curvature * 0.02 - 1.0).abs() < 0.3, "{found:?}");
             assert!(!found.sharp);
         }
+    }
+
+    #[test]
+    fn a_corner_of_a_ball_turns_more_than_an_edge_and_a_hole_does_not() {
+        let ball = BodyNeed::of_mesh("a", &mesh(shapes::sphere(0.02, 3)));
+        let ratio = ball.largest_facet_angle / ball.facet_angle;
+        assert!((1.3..3.0).contains(&ratio), "{ratio}");
+        let hole = shapes::box_with_hole([0.03; 3], 0.0105, 24, shapes::Axis::Z);
+        assert_eq!(BodyNeed::of_mesh("a", &mesh(hole)).largest_facet_angle, 0.0);
     }
 
     #[test]
