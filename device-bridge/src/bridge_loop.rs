@@ -319,7 +319,8 @@ mod tests {
             let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
             told.extend(output.events.iter().copied());
             let felt = bridge.port().rendered().norm();
-            assert_eq!(felt == 0.0, tick >= 1120, "{felt} N at {tick} ms");
+            // 5 ms before the promise: the margin for a loop that is late.
+            assert_eq!(felt == 0.0, tick >= 1115, "{felt} N at {tick} ms");
         }
         let told: Vec<_> = told.iter().map(|e| (e.kind, e.time, e.value)).collect();
         assert_eq!(told, [(EventKind::ForceStale, ms(1021), 0.021)]);

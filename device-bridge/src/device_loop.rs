@@ -16,7 +16,7 @@ use crate::arm_switch::{ArmSwitch, ArmWish};
 use crate::bridge_loop::{Arrival, BridgeLoop};
 use crate::device::DeviceFault;
 use crate::port::SafetyEvent;
-use crate::realtime::{self, RealtimeGrant, Ticker, monotonic_now};
+use crate::realtime::{self, Awake, RealtimeGrant, Ticker, monotonic_now};
 use crate::report::Durations;
 
 /// The device loop: the only thread that touches the device.
@@ -33,7 +33,7 @@ pub(crate) struct DeviceLoop {
 
 impl DeviceLoop {
     pub(crate) fn run(&mut self, bridge: &mut BridgeLoop) {
-        self.request_realtime();
+        let _awake = self.request_realtime();
         let mut ticker = Ticker::new(self.period);
         let mut last = None;
         let mut set = ConstraintSet::new();
@@ -77,18 +77,23 @@ impl DeviceLoop {
         }
     }
 
-    /// Asks for this thread; what was granted is told in the report, and what not also in the log.
-    fn request_realtime(&mut self) {
+    /// Asks for this thread; what was granted is told in the report, and what not also in the log. Cores are awake while the answer is held.
+    fn request_realtime(&mut self) -> Option<Awake> {
         let mut grants = vec![realtime::sharpen_timers()];
+        let mut awake = None;
         if self.priority > 0 {
             grants.push(realtime::lock_memory());
             grants.push(realtime::request_fifo(self.priority));
+            let (grant, held) = realtime::keep_cores_awake();
+            grants.push(grant);
+            awake = held;
         }
         grants.extend(self.core.map(realtime::pin_to_core));
         for grant in grants.iter().filter(|grant| !grant.is_granted()) {
             tracing::warn!("{grant}");
         }
         self.totals.realtime = grants;
+        awake
     }
 }
 

@@ -1,11 +1,15 @@
-//! What a periodic loop asks of the operating system: absolute sleeps, priority, locked memory, a core.
+//! What a periodic loop asks of the operating system: absolute sleeps, priority, locked memory, a core, cores that stay awake.
 //!
 //! Each request says what was granted or why not; nothing is lost silently, and whether a loop goes on
 //! without is the caller's decision. This is the only place with operating system calls. Where a system
 //! has no such call, the sleep falls back to the standard library and requests are waived.
 
+mod awake;
+
 use std::fmt;
 use std::time::Duration;
+
+pub use awake::{AWAKE, Awake, keep_cores_awake};
 
 /// The answer to one request to the operating system.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -76,6 +80,12 @@ pub fn lock_memory() -> RealtimeGrant {
         },
         |()| RealtimeGrant::Granted { what: what.clone() },
     )
+}
+
+/// Whether this process may lock any amount of memory; it locks none.
+#[must_use]
+pub fn may_lock_memory() -> bool {
+    os::may_lock_memory()
 }
 
 /// Asks to run this thread on one core only, counted from 0.
@@ -190,15 +200,54 @@ mod os {
 
     pub(super) fn lock_memory() -> Result<(), String> {
         // Under a finite limit the lock might succeed now and let a later allocation fail: never that.
+        if !may_lock_memory() {
+            return Err("the limit on locked memory is finite".to_owned());
+        }
+        // SAFETY: takes flags only and changes no memory that Rust can see.
+        done(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
+    }
+
+    /// Raises the limit where this process may.
+    pub(super) fn may_lock_memory() -> bool {
         let unlimited = libc::rlimit {
             rlim_cur: libc::RLIM_INFINITY,
             rlim_max: libc::RLIM_INFINITY,
         };
         // SAFETY: `unlimited` is a valid rlimit for the call.
-        done(unsafe { libc::setrlimit(libc::RLIMIT_MEMLOCK, &raw const unlimited) })
-            .map_err(|_| "the limit on locked memory is finite".to_owned())?;
-        // SAFETY: takes flags only and changes no memory that Rust can see.
-        done(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
+        let raised = unsafe { libc::setrlimit(libc::RLIMIT_MEMLOCK, &raw const unlimited) } == 0;
+        raised || !memory_limit_binds()
+    }
+
+    /// Whether the limit on locked memory holds for this process: it does not for one with the capability to lock memory, which
+    /// containers often have without that to raise limits. Tried with more address space than the limit, of which no page is ever used.
+    fn memory_limit_binds() -> bool {
+        let mut limit = libc::rlimit {
+            rlim_cur: 0,
+            rlim_max: 0,
+        };
+        // SAFETY: `limit` is a valid rlimit for the kernel to fill.
+        if unsafe { libc::getrlimit(libc::RLIMIT_MEMLOCK, &raw mut limit) } != 0 {
+            return true;
+        }
+        // A limit near the size of the address space finds no place, and then counts as one that binds.
+        let Some(length) = usize::try_from(limit.rlim_cur)
+            .ok()
+            .and_then(|limit| limit.checked_add(1 << 20))
+        else {
+            return true;
+        };
+        // SAFETY: a new private mapping at an address of the kernel's choice, without any right of access; it overlaps nothing. Locked on
+        // fault, so no page of it is made; unmapped at once, and nobody else knows of it.
+        unsafe {
+            let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_NORESERVE;
+            let place = libc::mmap(std::ptr::null_mut(), length, libc::PROT_NONE, flags, -1, 0);
+            if place == libc::MAP_FAILED {
+                return true;
+            }
+            let locked = libc::mlock2(place, length, libc::MLOCK_ONFAULT) == 0;
+            libc::munmap(place, length);
+            !locked
+        }
     }
 
     pub(super) fn pin_to_core(core: usize) -> Result<(), String> {
@@ -260,6 +309,10 @@ mod os {
         unknown()
     }
 
+    pub(super) fn may_lock_memory() -> bool {
+        false
+    }
+
     pub(super) fn pin_to_core(_core: usize) -> Result<(), String> {
         unknown()
     }
@@ -294,6 +347,12 @@ mod tests {
         let offset = (ticker.next - first).as_nanos() % period.as_nanos();
         assert_eq!(offset, 0);
         assert!(ticker.next > first + 3 * period);
+    }
+
+    #[test]
+    fn memory_is_locked_where_it_may_be_and_only_there() {
+        // Locked for the whole process of this test binary, which is small.
+        assert_eq!(lock_memory().is_granted(), may_lock_memory());
     }
 
     #[test]

@@ -14,7 +14,7 @@ use taut_bridge::{
     BridgeArgs, BridgeError, BridgeReport, DEFAULT_MAX_AGE, Device, DeviceLimits, RemoteDevice, run,
 };
 use taut_link::proto::mesh_blob::Positions;
-use taut_link::proto::scene::{BodyDescription, ShowOptions};
+use taut_link::proto::scene::BodyDescription;
 use taut_link::proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
 use taut_link::{Content, ServerLink, ServerOptions, create_key_file, read_key_file, serve};
 use tempfile::TempDir;
@@ -46,29 +46,15 @@ fn content() -> Content {
         ..PoseF64::IDENTITY
     };
     Content {
-        description: SceneDescription {
-            name: "wall".to_owned(),
-            revision: 1,
-            god_object: BodyDescription {
+        description: SceneDescription::of_body(
+            "wall",
+            BodyDescription {
                 name: "tip".to_owned(),
                 mesh: hash,
                 pose: start,
                 colour: [1.0; 4],
             },
-            obstacles: vec![],
-            reference_point: [0.0; 3],
-            scene_origin: PoseF64::IDENTITY,
-            display_scale: 1.0,
-            screens: vec![],
-            nodes: vec![],
-            viewer: PoseF64::IDENTITY,
-            eye_separation: 0.063,
-            near: 0.1,
-            far: 10.0,
-            separation_scale: 1.0,
-            nearest_disparity: 0.0,
-            show: ShowOptions::default(),
-        },
+        ),
         meshes: vec![mesh],
     }
 }

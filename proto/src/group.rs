@@ -204,7 +204,10 @@ impl GroupSealer {
         }
         self.advance(now_ns);
         match &self.present {
-            Some((_, sealer)) => Ok(sealer),
+            Some((_, sealer)) => {
+                sealer.roll_by_time(now_ns);
+                Ok(sealer)
+            }
             None => Err(SealError::NoGroup),
         }
     }

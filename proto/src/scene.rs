@@ -42,6 +42,31 @@ pub struct SceneDescription {
     pub show: ShowOptions,
 }
 
+impl SceneDescription {
+    /// A scene of one body and nothing else: no screens, the workbench's frame for its own, 64 mm between the pupils.
+    #[must_use]
+    pub fn of_body(name: &str, god_object: BodyDescription) -> Self {
+        Self {
+            name: name.to_owned(),
+            revision: 1,
+            god_object,
+            obstacles: Vec::new(),
+            reference_point: [0.0; 3],
+            scene_origin: PoseF64::IDENTITY,
+            display_scale: 1.0,
+            screens: Vec::new(),
+            nodes: Vec::new(),
+            viewer: PoseF64::IDENTITY,
+            eye_separation: 0.064,
+            near: 0.05,
+            far: 10.0,
+            separation_scale: 1.0,
+            nearest_disparity: 0.0,
+            show: ShowOptions::default(),
+        }
+    }
+}
+
 /// A body: mesh by hash, pose at start, colour.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDescription {

@@ -5,6 +5,7 @@
 //! Keys roll without a word between the ends: the packets of one direction are numbered from 0 to the end of the session, and number n
 //! belongs to the key generation n / [`ROLL_PACKETS`], whose key and salt are HKDF(secret, generation). So both ends know the
 //! generation of every packet from its authenticated header, in any order of arrival, and nothing has to be switched in step.
+//! Time rolls them as well: who seals leaves out the numbers that a key has left when it has been in use for [`ROLL_NS`].
 //! Numbers never start again: the [`Sealer`] alone hands them out, no nonce comes twice, no key is ever used up, and one replay window
 //! spans the generations. What is older than the window is refused whatever its key, so the [`Opener`] drops an old key when the window has
 //! left its numbers.
@@ -25,6 +26,8 @@ use std::sync::{
 pub const KEY_MATERIAL_BYTES: usize = 28;
 /// Packets that one key seals: 17 minutes at 1 kHz, and far below the limits of GCM.
 pub const ROLL_PACKETS: u64 = 1 << 20;
+/// Longest that one key is in use where few packets are sealed, ns: an hour.
+pub const ROLL_NS: u64 = 3_600_000_000_000;
 
 const ROOT_PURPOSE: &[u8] = b"taut datagram keys 1";
 /// 16 bytes of key, then the salt.
@@ -75,7 +78,7 @@ pub struct Opened {
     pub payload: Payload,
     /// [`crate::state::payload_hash`] of the state's bytes, for HOT and RELEASE; 0 for the others.
     pub state_hash: u64,
-    /// One past the highest sequence number seen before this one.
+    /// One past the highest sequence number seen before this one; where numbers were left out for a new key, the first of that key.
     pub expected: u64,
 }
 
@@ -112,6 +115,13 @@ impl GenerationKey {
     }
 }
 
+/// The number that was to come, `next` being one past the highest before `sequence`: numbers that were left out for a new key are not missing.
+fn expected(next: u64, sequence: u64) -> u64 {
+    let begins = generation_of(sequence) * ROLL_PACKETS;
+    let left_out = begins > next && sequence - next > WINDOW;
+    if left_out { begins } else { next }
+}
+
 fn generation_of(sequence: u64) -> u64 {
     sequence / ROLL_PACKETS
 }
@@ -125,6 +135,8 @@ pub struct Sealer {
     sender: u16,
     flags: u16,
     next: AtomicU64,
+    /// Since when the present key is in use, as [`Sealer::roll_by_time`] was told; 0 before.
+    in_use_since_ns: AtomicU64,
 }
 
 /// Room for one datagram. Reused, so that sending allocates nothing.
@@ -152,12 +164,34 @@ impl Sealer {
             sender,
             flags,
             next: AtomicU64::new(0),
+            in_use_since_ns: AtomicU64::new(0),
         }
     }
 
     /// The number of the next packet will be `sequence` at least. Never goes back: no number is given twice.
     pub fn skip_to(&self, sequence: u64) {
         self.next.fetch_max(sequence, Ordering::Relaxed);
+    }
+
+    /// Goes on with the next key if the present one has been in use for [`ROLL_NS`]. Call it now and then, with any clock that does not fall; costs
+    /// one load.
+    pub fn roll_by_time(&self, now_ns: u64) {
+        let now_ns = now_ns.max(1);
+        let since_ns = self.in_use_since_ns.load(Ordering::Relaxed);
+        if since_ns != 0 && now_ns.saturating_sub(since_ns) < ROLL_NS {
+            return;
+        }
+        // Of several threads one rolls.
+        let mine = self.in_use_since_ns.compare_exchange(
+            since_ns,
+            now_ns,
+            Ordering::Relaxed,
+            Ordering::Relaxed,
+        );
+        if mine.is_ok() && since_ns != 0 {
+            let present = generation_of(self.next.load(Ordering::Relaxed));
+            self.skip_to((present + 1) * ROLL_PACKETS);
+        }
     }
 
     /// Seals `payload` into `buffer` and returns the datagram. No allocation.
@@ -310,7 +344,7 @@ impl Opener {
                 room,
             )
             .map_err(|_| OpenError::Forged)?;
-        let expected = self.window.next();
+        let expected = expected(self.window.next(), header.sequence);
         self.window.mark(header.sequence);
         let payload = Payload::decode(header.kind, plain).map_err(OpenError::Payload);
         let state_hash = match header.kind {

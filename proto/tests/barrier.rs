@@ -5,7 +5,9 @@ mod barrier_support;
 use barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
-    Arrive, MAX_MISSES, Master, MasterSettings, Newest, Node, NodeState, SILENCE_NS, Swap, Turn,
+    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, MAX_MISSES, Master, MasterSettings, Newest, Node,
+    NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, SUCCESSION_NS, Succession, Swap,
+    TERMS_LEFT_OUT, Turn,
 };
 
 const MS: u64 = 1_000_000;
@@ -274,6 +276,94 @@ fn a_node_that_hears_nothing_draws_on_its_own_again() {
     assert_eq!(node.turn(now), Turn::Draw { frame: 10 });
 }
 
+/// An ARRIVE of the reign of a node.
+fn of_reign(term: u32, frame: u64) -> Arrive {
+    Arrive {
+        term,
+        frame,
+        ..Arrive::default()
+    }
+}
+
+#[test]
+fn the_server_takes_the_frames_back_from_a_node_that_led_meanwhile() {
+    let (mut master, now) = in_step(Swap::Immediate, &[1, 2]);
+    let before = master.newest().expect("released").clone();
+    for session in [1, 2] {
+        let _ = master.arrive(now + MS, session, &arrived(before.frame + 1));
+    }
+    let _ = master.arrive(now + MS, 3, &of_reign(4, before.frame + 3000));
+    assert_eq!(
+        released(&master),
+        before.frame,
+        "nothing is released by an appeal"
+    );
+    let _ = release_when_due(&mut master);
+    let after = master.newest().expect("released").clone();
+    assert_eq!((after.term, after.master), (4 + TERMS_LEFT_OUT, 0));
+    assert!(after.rank() > before.rank());
+    assert!(after.frame > before.frame + 3000, "frames ascend");
+    // Whoever was in step with the server is still.
+    assert_eq!(after.waited, before.waited);
+    assert_eq!(master.counts().reclaimed, 1);
+}
+
+#[test]
+fn a_node_that_claims_reign_after_reign_moves_the_server_once_a_second_and_never_to_the_end_of_numbers()
+ {
+    let (mut master, now) = in_step(Swap::Immediate, &[1, 2]);
+    let mut claim = |now, term| {
+        let _ = master.arrive(now, 1, &of_reign(term, u64::MAX));
+        let _ = release_when_due(&mut master);
+        let newest = master.newest().expect("released");
+        (newest.term, newest.frame)
+    };
+    let (term, first) = claim(now, 7);
+    assert_eq!(term, 7 + TERMS_LEFT_OUT);
+    let (term, next) = claim(now + RECLAIM_NS - 1, 1000);
+    assert_eq!((term, next), (7 + TERMS_LEFT_OUT, first + 1), "too soon");
+    let (term, far) = claim(now + RECLAIM_NS, u32::MAX);
+    assert_eq!(term, u32::MAX);
+    assert!(far <= next + FARTHEST_AHEAD + FRAMES_LEFT_OUT + 1);
+    // Of equal reigns the server's is followed, so that nothing is above it now.
+    let (term, _) = claim(now + 3 * RECLAIM_NS, u32::MAX);
+    assert_eq!(term, u32::MAX);
+    assert_eq!(master.counts().reclaimed, 2);
+}
+
+#[test]
+fn a_member_is_followed_only_while_the_server_is_silent() {
+    let of_server = ReleaseHead {
+        term: 1,
+        frame: 70,
+        members: [2, 3].into_iter().collect(),
+        ..ReleaseHead::default()
+    };
+    let of_member = |term, frame| ReleaseHead {
+        term,
+        master: 2,
+        frame,
+        ..of_server.clone()
+    };
+    let mut heir = Succession::new(3, 0);
+    assert!(
+        !heir.may_follow(1000 * MS, 2, &of_member(2, 1094)),
+        "no part"
+    );
+    heir.release(0, &of_server);
+    for now in (0..1000).step_by(20) {
+        heir.hear(now * MS);
+        assert!(!heir.may_follow(now * MS, 2, &of_member(2, 1094)));
+    }
+    let silent = 980 * MS + SUCCESSION_NS;
+    assert!(heir.may_follow(silent, 2, &of_member(2, 1094)));
+    // Only for itself, and not so far ahead that nobody could follow it any more.
+    assert!(!heir.may_follow(silent, 3, &of_member(2, 1094)));
+    assert!(!heir.may_follow(silent, 0, &of_server));
+    assert!(!heir.may_follow(silent, 2, &of_member(u32::MAX, 1094)));
+    assert!(!heir.may_follow(silent, 2, &of_member(2, u64::MAX)));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, cases: 48, ..ProptestConfig::default() })]
 
@@ -291,5 +381,13 @@ proptest! {
         let seen = world.run();
         seen.assert_truth()?;
         seen.assert_one_master(&world)?;
+    }
+
+    /// The same when the server was only away for a while: it leads all of them again.
+    #[test]
+    fn a_server_that_comes_back_leads_again(world in any_world_whose_server_pauses()) {
+        let seen = world.run();
+        seen.assert_truth()?;
+        seen.assert_server_leads(&world)?;
     }
 }

@@ -143,7 +143,7 @@ pub(crate) fn shown(link: LinkHealth) -> Option<u64> {
     match link {
         LinkHealth::Connected => None,
         LinkHealth::Rejoining => Some(u64::MAX), // no second of a loss: another text
-        LinkHealth::Lost { since_s } => Some(since_s as u64),
+        LinkHealth::Lost { since } => Some(since.as_secs()),
     }
 }
 

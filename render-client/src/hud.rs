@@ -121,7 +121,7 @@ impl Overlay {
 fn lines(status: &NodeStatus, stale: bool) -> Vec<String> {
     let link = match status.link {
         LinkHealth::Connected => "connected".to_owned(),
-        LinkHealth::Lost { since_s } => format!("lost for {since_s:.1} s"),
+        LinkHealth::Lost { since } => format!("lost for {:.1} s", since.as_secs_f64()),
         LinkHealth::Rejoining => "rejoining".to_owned(),
     };
     let frames = match status.frames {
@@ -149,9 +149,9 @@ fn lines(status: &NodeStatus, stale: bool) -> Vec<String> {
 
 fn banner(status: &NodeStatus, stale: bool) -> Option<Banner> {
     let (text, note) = match status.link {
-        LinkHealth::Lost { since_s } => (
+        LinkHealth::Lost { since } => (
             "LINK LOST".to_owned(),
-            format!("no word from the server for {} s", whole_seconds(since_s)),
+            format!("no word from the server for {} s", since.as_secs()),
         ),
         LinkHealth::Rejoining => (
             "REJOINING".to_owned(),
@@ -164,11 +164,6 @@ fn banner(status: &NodeStatus, stale: bool) -> Option<Banner> {
         LinkHealth::Connected => return None,
     };
     Some(Banner { text, note })
-}
-
-/// Rounded down, so that a text that is compared changes once a second; 0 for NaN.
-fn whole_seconds(seconds: f64) -> u64 {
-    seconds.max(0.0) as u64
 }
 
 /// The line height, over the height of the screen, at which every text fits; `wanted` if it does.
@@ -230,6 +225,7 @@ fn write(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn status(link: LinkHealth) -> NodeStatus {
         NodeStatus {
@@ -274,8 +270,14 @@ mod tests {
     #[test]
     fn banner_and_lines_do_not_lie_over_each_other() {
         for shape in [0.3, 1.0, 1.5, 4.0] {
-            let marks =
-                Overlay::of(&status(LinkHealth::Lost { since_s: 3.0 }), true, true).marks(shape);
+            let marks = Overlay::of(
+                &status(LinkHealth::Lost {
+                    since: Duration::from_secs(3),
+                }),
+                true,
+                true,
+            )
+            .marks(shape);
             let mut boxes = marks.iter().filter(|mark| mark.letter.is_none());
             let (lines, banner) = (
                 boxes.next().expect("lines"),
@@ -290,13 +292,15 @@ mod tests {
 
     #[test]
     fn a_lost_link_is_said_with_its_seconds_and_an_old_picture_too() {
-        let lost = |since_s| Overlay::of(&status(LinkHealth::Lost { since_s }), true, false).banner;
+        let lost = |seconds| {
+            let since = Duration::from_secs_f64(seconds);
+            Overlay::of(&status(LinkHealth::Lost { since }), true, false).banner
+        };
         let banner = lost(3.9).expect("a banner");
         assert_eq!(banner.text, "LINK LOST");
         assert!(banner.note.ends_with("for 3 s"), "{}", banner.note);
         assert_eq!(lost(3.1), lost(3.9), "the text changes once a second");
         assert_ne!(lost(4.0), lost(3.9));
-        assert!(lost(f64::NAN).is_some());
         let stale = Overlay::of(&status(LinkHealth::Connected), true, false);
         assert_eq!(stale.banner.expect("a banner").text, "OLD PICTURE");
         assert!(
@@ -309,7 +313,9 @@ mod tests {
     #[test]
     fn every_mark_lies_on_the_screen_whatever_its_shape_and_name() {
         for shape in [0.3, 1.0, 1.5, 4.0] {
-            let mut status = status(LinkHealth::Lost { since_s: 86_400.0 });
+            let mut status = status(LinkHealth::Lost {
+                since: Duration::from_secs(86_400),
+            });
             status.node = "a node whose name is far longer than a name should be".to_owned();
             let marks = Overlay::of(&status, true, true).marks(shape);
             assert!(marks.len() <= MAX_MARKS);

@@ -1,19 +1,7 @@
 //! What a node knows of itself: written by its session and its frame loop, shown by the HUD.
 
 /// How the node stands with its server.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum LinkHealth {
-    /// States or heartbeats arrive.
-    #[default]
-    Connected,
-    /// Nothing arrives. The last picture is held, and the screen says so.
-    Lost {
-        /// Time since the last sign of the server, in seconds.
-        since_s: f64,
-    },
-    /// The server answers again; scene and meshes are on their way.
-    Rejoining,
-}
+pub use taut_link::LinkHealth;
 
 /// How the node's frames keep pace with those of other nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

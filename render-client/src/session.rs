@@ -144,13 +144,7 @@ impl Session {
 
     /// How the link is, for the HUD.
     pub(crate) fn health(&self) -> LinkHealth {
-        match self.supervised.health() {
-            taut_link::LinkHealth::Connected => LinkHealth::Connected,
-            taut_link::LinkHealth::Lost { since } => LinkHealth::Lost {
-                since_s: since.as_secs_f64(),
-            },
-            taut_link::LinkHealth::Rejoining => LinkHealth::Rejoining,
-        }
+        self.supervised.health()
     }
 
     /// Sessions so far.

@@ -9,6 +9,7 @@ mod support;
 mod perceptual;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use image::{RgbImage, RgbaImage};
 use nalgebra::Isometry3;
@@ -104,7 +105,9 @@ fn pictures() -> Option<Vec<RgbImage>> {
     drawn.extend(over(&half_way_in(), hud, LinkHealth::Connected)?);
     let mut stale = half_way_in();
     stale.stale = true;
-    let lost = LinkHealth::Lost { since_s: 3.5 };
+    let lost = LinkHealth::Lost {
+        since: Duration::from_millis(3500),
+    };
     drawn.extend(over(&stale, Show::default(), lost)?);
     drawn.extend(over(&stale, Show::default(), LinkHealth::Connected)?);
     Some(drawn.iter().map(halved).collect())
@@ -235,7 +238,10 @@ fn a_missing_banner_is_seen() {
     let Some(old) = over(LinkHealth::Connected) else {
         return;
     };
-    let lost = over(LinkHealth::Lost { since_s: 3.5 }).expect("as before");
+    let lost = over(LinkHealth::Lost {
+        since: Duration::from_millis(3500),
+    })
+    .expect("as before");
     let found = difference(&old, &lost);
     assert!(!found.is_unseen(), "{found:?}");
 }

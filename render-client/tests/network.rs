@@ -14,7 +14,7 @@ use taut_link::{Content, ServerLink, ServerOptions, create_key_file, serve};
 use taut_proto::barrier::{MasterSettings, Swap};
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
-    BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+    BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription,
 };
 use taut_proto::state::ToolState;
 use taut_proto::{HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription};
@@ -78,11 +78,7 @@ fn content() -> Content {
         },
     };
     let description = SceneDescription {
-        name: "peg".to_owned(),
-        revision: 1,
-        god_object: body("peg", &meshes[0], support::ORANGE),
         obstacles: vec![body("box", &meshes[1], support::GREY_BLUE)],
-        reference_point: [0.0; 3],
         scene_origin: pose([0.0, -0.28, 0.22]),
         display_scale: 7.0,
         screens: vec![
@@ -108,11 +104,7 @@ fn content() -> Content {
         ],
         viewer: pose([0.12, -1.1, 0.85]),
         eye_separation: 0.065,
-        near: 0.05,
-        far: 10.0,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        show: ShowOptions::default(),
+        ..SceneDescription::of_body("peg", body("peg", &meshes[0], support::ORANGE))
     };
     Content {
         description,

@@ -21,7 +21,7 @@ use crate::clock::{SessionClock, nanoseconds};
 use crate::edge_sets::EdgeSets;
 use crate::head::Head;
 use crate::looking_on::Outlets;
-use crate::loops::shell::run_at_deadlines;
+use crate::loops::shell::{Beat, run_at_deadlines};
 use crate::loops::wiring::SharedView;
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::device_state::{DeviceState, RECENT_EVENTS};
@@ -58,7 +58,11 @@ pub fn run(
 ) {
     // A state that comes late is followed by the next one; nothing is owed to anybody.
     let late = AtomicU64::new(0);
-    run_at_deadlines(clock, period, shutdown, &late, |now| {
+    let beat = Beat {
+        period,
+        phase: Beat::BROADCAST,
+    };
+    run_at_deadlines(clock, beat, shutdown, &late, |now| {
         if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
             let fresh = wrenches.update();
             let command = wrenches.output_buffer();

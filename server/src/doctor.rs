@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 use taut_bridge::realtime::{
-    RealtimeGrant, monotonic_now, request_fifo, sharpen_timers, sleep_until,
+    AWAKE, RealtimeGrant, keep_cores_awake, may_lock_memory, monotonic_now, request_fifo,
+    sharpen_timers, sleep_until,
 };
 use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
 
@@ -83,13 +84,40 @@ impl fmt::Display for DoctorReport {
     }
 }
 
+/// Graphics drivers complain on standard error, once for each way in which they look for a screen, where nobody has set a directory for
+/// what a login session needs. Nothing is put there: this program begins anew, in the same process, with one. Returns only if
+/// there is no need, or with the reason why that failed.
+pub fn begin_anew_without_complaints() -> Option<std::io::Error> {
+    const DIRECTORY: &str = "XDG_RUNTIME_DIR";
+    let is_set = std::env::var_os(DIRECTORY).is_some_and(|directory| !directory.is_empty());
+    if is_set || !crate::rendering::BUILT_IN {
+        return None;
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt;
+
+        let program = match std::env::current_exe() {
+            Ok(program) => program,
+            Err(error) => return Some(error),
+        };
+        let mut again = std::process::Command::new(program);
+        again.args(std::env::args_os().skip(1));
+        again.env(DIRECTORY, std::env::temp_dir());
+        Some(again.exec())
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// Looks at this machine; takes a second and a little.
 pub fn examine() -> std::io::Result<DoctorReport> {
     let (grant, lateness) = measure_timers()?;
     let timer_realtime = grant.is_granted();
     let mut findings = vec![
         scheduling(&grant),
-        memory_lock(limit_of("Max locked memory")),
+        memory_lock(may_lock_memory(), limit_of("Max locked memory")),
+        idle_cores(&keep_cores_awake().0),
         timers(&lateness),
         kernel(
             std::fs::read_to_string("/sys/kernel/realtime")
@@ -162,10 +190,10 @@ fn scheduling(grant: &RealtimeGrant) -> Finding {
     }
 }
 
-fn memory_lock(limit: Option<String>) -> Finding {
+fn memory_lock(allowed: bool, limit: Option<String>) -> Finding {
     const WHAT: &str = "memory lock";
     match limit.as_deref() {
-        Some("unlimited") => Finding::good(WHAT, "any amount of memory may be locked"),
+        _ if allowed => Finding::good(WHAT, "any amount of memory may be locked"),
         Some(bytes) => Finding::lacking(
             WHAT,
             format!(
@@ -174,6 +202,20 @@ fn memory_lock(limit: Option<String>) -> Finding {
             "echo \"@realtime - memlock unlimited\" | sudo tee -a /etc/security/limits.d/99-taut.conf && sudo groupadd -f realtime && sudo usermod -aG realtime $USER  # then log in again",
         ),
         None => Finding::good(WHAT, "not known on this system"),
+    }
+}
+
+fn idle_cores(grant: &RealtimeGrant) -> Finding {
+    const WHAT: &str = "idle cores";
+    match grant {
+        RealtimeGrant::Granted { .. } => Finding::good(WHAT, "are kept awake while a session runs"),
+        RealtimeGrant::Waived { .. } => Finding::lacking(
+            WHAT,
+            format!(
+                "may sleep deeply between two ticks and wake late and cold: {AWAKE} cannot be written"
+            ),
+            "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee /etc/udev/rules.d/99-taut.rules && sudo groupadd -f realtime && sudo usermod -aG realtime $USER && sudo udevadm control --reload && sudo udevadm trigger --name-match=cpu_dma_latency  # then log in again",
+        ),
     }
 }
 
@@ -246,7 +288,7 @@ mod tests {
     #[test]
     fn whatever_is_lacking_comes_with_a_command() {
         let lacking = [
-            memory_lock(Some("65536".into())),
+            memory_lock(false, Some("65536".into())),
             timers(&Distribution {
                 p99: 900.0,
                 ..Distribution::default()
@@ -255,11 +297,15 @@ mod tests {
                 what: "SCHED_FIFO".into(),
                 why: "no".into(),
             }),
+            idle_cores(&RealtimeGrant::Waived {
+                what: "cores awake while idle".into(),
+                why: "no".into(),
+            }),
         ];
         for finding in lacking {
             assert!(!finding.good && finding.mend.is_some(), "{finding:?}");
         }
-        assert!(memory_lock(Some("unlimited".into())).good);
+        assert!(memory_lock(true, Some("65536".into())).good);
     }
 
     #[test]

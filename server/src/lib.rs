@@ -14,6 +14,7 @@
 //!
 //! `taut render` and `taut bridge` are the libraries `taut-render` and `taut-bridge`; `taut check` is `taut_scene::check`.
 
+pub mod admission;
 pub mod arm;
 pub mod broadcast;
 pub mod checker;

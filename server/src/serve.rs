@@ -6,6 +6,7 @@ use std::time::Duration;
 use taut_link::ClusterKey;
 use taut_scene::{FidelityPlan, Workbench};
 
+use crate::admission::AdmissionWatch;
 use crate::cli::ServeArgs;
 use crate::config::{Overrides, session_setup};
 use crate::failure::Failure;
@@ -40,7 +41,14 @@ pub fn run(
     let mut session = Session::start(setup)?;
     taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
-    watch(&mut session, &mut signal, args.duration, terminal, |_| {});
+    let mut admission = AdmissionWatch::new(&args.config);
+    watch(
+        &mut session,
+        &mut signal,
+        args.duration,
+        terminal,
+        |session| admission.follow(session, terminal),
+    );
     terminal.end_status();
     Ok(session.stop(terminal))
 }

@@ -158,6 +158,10 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     assert_eq!(number_after(&report, "sessions: "), 1.0, "{report}");
     let report = server.stop();
     assert_eq!(report["penetrations"], 0);
+    // All that in step: the barrier was on, and let the dead go as well.
+    let frames = &report["frames"];
+    assert!(frames["released"].as_u64() > Some(0), "{frames}");
+    assert_eq!(frames["mismatches"], 0, "{frames}");
 }
 
 /// A server whose device is behind a bridge, and that bridge, in whose hand the sphere goes round on the plane.

@@ -1,20 +1,24 @@
 //! Times the two computations of a string device's loop: `cargo run --release -p taut-spidar --example tension_timing`.
 //!
 //! A hand moves at 1 kHz in each shipped device and gets forces: a moderate wrench inside the feasible set, one that leaves it
-//! again and again, and unrelated poses and wrenches, where nothing of the last answer helps. Thread CPU time, each
-//! tick timed once, over all ticks; `reading the clock` is what an empty measurement shows.
+//! again and again, the same with the grip turned so far that for most of the time not even zero wrench can be rendered, and unrelated poses
+//! and wrenches, where nothing of the last answer helps. Thread CPU time, each
+//! tick timed once, over all ticks; `reading the clock` is what an empty measurement shows. What a session's own path costs is
+//! shown by the program's example `string_device_cost`.
 #![allow(
     clippy::disallowed_methods,
     reason = "a measurement needs a clock; the model itself has none"
 )]
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use rustix::time::{ClockId, clock_gettime};
 use taut_spidar::{
     ForwardKinematics, Geometry, Pose, StringMatrix, TensionSettings, TensionSolver, TensionStatus,
 };
 
 const TICKS: u32 = 100_000;
+/// A rotation at which the shipped devices mostly cannot hold all strings taut without a wrench, rad.
+const TURNED_FAR: f64 = 0.9;
 
 fn main() {
     let mut empty: Vec<f64> = (0..TICKS).map(|_| timed(|| ()).1).collect();
@@ -31,6 +35,13 @@ fn main() {
         let large = geometry.tension_max;
         distribution(&geometry, "in and out", TICKS, |tick| {
             (motion(&geometry, tick), wrench(&geometry, tick, large))
+        });
+        distribution(&geometry, "turned far", TICKS, |tick| {
+            let mut pose = motion(&geometry, tick);
+            pose.append_rotation_wrt_center_mut(&UnitQuaternion::from_scaled_axis(
+                TURNED_FAR * Vector3::new(0.6, 0.0, 0.8),
+            ));
+            (pose, wrench(&geometry, tick, small))
         });
         distribution(&geometry, "unrelated", TICKS, |tick| {
             let jump = tick.wrapping_mul(2_654_435_761) >> 8;
@@ -63,19 +74,21 @@ fn distribution(
 ) {
     let mut solver = TensionSolver::new(geometry, TensionSettings::default());
     let mut times = Vec::new();
-    let (mut rendered, mut factorisations, mut most) = (0_u32, 0, 0);
+    let (mut rendered, mut scaled, mut factorisations, mut most) = (0_u32, 0_u32, 0, 0);
     for tick in 0..ticks {
         let (pose, wrench) = at(tick);
         let strings = StringMatrix::at(geometry, &pose);
         let (answer, time) = timed(|| solver.distribute(&strings, &wrench));
         times.push(time);
         rendered += u32::from(answer.status == TensionStatus::Rendered);
+        scaled += u32::from(answer.status == TensionStatus::Scaled);
         factorisations += answer.factorisations;
         most = most.max(answer.factorisations);
     }
     let note = format!(
-        "{:.0} % rendered fully, {:.2} factorisations each, at most {most}",
+        "{:.0} % rendered fully, {:.0} % scaled, {:.2} factorisations each, at most {most}",
         100.0 * f64::from(rendered) / f64::from(ticks),
+        100.0 * f64::from(scaled) / f64::from(ticks),
         f64::from(factorisations) / f64::from(ticks)
     );
     report(

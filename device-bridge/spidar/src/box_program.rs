@@ -80,14 +80,26 @@ impl BoxProgram {
                 }
             }
         }
-        for (i, row) in gram.iter_mut().enumerate() {
-            row[i] += regularisation;
-        }
         Self {
             rows: *rows,
-            regularisation,
+            regularisation: 0.0,
             gram,
         }
+        .regularised(regularisation)
+    }
+
+    /// The same with another s.
+    pub(crate) fn regularised(mut self, regularisation: f64) -> Self {
+        for (i, row) in self.gram.iter_mut().enumerate() {
+            row[i] += regularisation - self.regularisation;
+        }
+        self.regularisation = regularisation;
+        self
+    }
+
+    /// A.
+    pub(crate) fn rows(&self) -> &[PerString; 6] {
+        &self.rows
     }
 
     /// `A x`.

@@ -28,6 +28,8 @@ mod geometry;
 mod geometry_file;
 mod hardware;
 pub mod kinematics;
+mod linear_program;
+mod null_space;
 mod picture;
 mod reach;
 mod residual;

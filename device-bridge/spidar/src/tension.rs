@@ -13,8 +13,8 @@
 //!    (s = 0.3, torque 6) let the tension term win a quarter of the force.
 //! 2. **A wrench outside Z is rendered in its direction**: `alpha f` with the largest alpha in [0, 1] for which it lies in Z.
 //!    Force and torque shrink together, so that the axis of the wrench (its screw) stays; a torque that cannot be
-//!    rendered thus costs force as well. alpha comes from cutting planes: the way to the nearest point of Z is the normal of a plane
-//!    that Z lies behind, and alpha falls to where the ray meets that plane, until it is in Z.
+//!    rendered thus costs force as well. Since eight strings have two degrees of freedom beyond the six of a wrench, alpha is the answer of a
+//!    linear program in three unknowns, solved exactly in a bounded number of operations.
 //! 3. **Where even no wrench at all cannot be rendered** (the grip is outside the workspace, or a motor is dead), no direction
 //!    can be kept, and the nearest wrench of Z is rendered. Between the two, within [`TensionSettings::margin`] of
 //!    that boundary, alpha goes continuously from one to the other, so that tensions never jump along a motion.
@@ -103,7 +103,9 @@ pub struct TensionAnswer {
 }
 
 /// Distributes wrenches over the strings. Keeps which tensions were at a limit, so that the next answer costs less.
-/// No allocation; at most 26 bounded problems of 60 factorisations each, and one of two or three as a rule.
+/// No allocation; at most three bounded problems of 60 factorisations each (one or two of one or two as a rule), one factorisation for the
+/// linear programs and two of those. Only at poses where the strings lack a direction of wrench altogether, which the forward
+/// kinematics refuse, there are up to 26 bounded problems.
 #[derive(Clone, Debug)]
 pub struct TensionSolver {
     arm: f64,
@@ -123,6 +125,8 @@ struct Memory {
     rest: Ray,
     /// Of the command's direction.
     direction: Ray,
+    /// The last command was outside Z, so that what its direction left is of a moment ago.
+    outside: bool,
 }
 
 impl TensionSolver {
@@ -143,6 +147,7 @@ impl TensionSolver {
                 command: [Side::Lower; STRINGS],
                 rest: Ray::UNKNOWN,
                 direction: Ray::UNKNOWN,
+                outside: false,
             },
         }
     }
@@ -178,7 +183,7 @@ impl TensionSolver {
             return None;
         }
         let mut ray = Ray::UNKNOWN;
-        let mut search = self.search(&rows, SEARCH_REGULARISATION);
+        let mut search = Search::new(BoxProgram::new(&rows, SEARCH_REGULARISATION), self.bounds());
         search.largest_scale(&target, &mut ray)
     }
 
@@ -189,13 +194,19 @@ impl TensionSolver {
         target: &[f64; 6],
     ) -> TensionAnswer {
         let mut memory = self.memory;
-        let mut search = self.search(rows, self.settings.regularisation);
+        let program = BoxProgram::new(rows, self.settings.regularisation);
+        let mut search = Search::new(program, self.bounds());
         let mut found = search.nearest(target, &mut memory.command);
         let (mut status, mut scale) = (TensionStatus::Rendered, 1.0);
         let gap = distance(&found.image, target);
-        if gap > nearness(target) {
+        let outside = gap > nearness(target);
+        if outside && !memory.outside {
+            memory.direction.sides = found.sides;
+        }
+        memory.outside = outside;
+        if outside {
             // How far inside the workspace: 1 is far enough to keep the direction.
-            let mut rays = self.search(rows, SEARCH_REGULARISATION);
+            let mut rays = Search::new(program.regularised(SEARCH_REGULARISATION), self.bounds());
             let inside = self.insideness(&mut rays, &mut memory.rest);
             let along = if inside > 0.0 {
                 rays.largest_scale(target, &mut memory.direction)
@@ -207,7 +218,7 @@ impl TensionSolver {
             let aim = target.map(|f| scale * f);
             let softest = inside * SOFTNESS.0 + (1.0 - inside) * SOFTNESS.1;
             let soft = self.settings.regularisation + softest * gap / (gap + 1.0);
-            let mut softer = self.search(rows, soft);
+            let mut softer = Search::new(program.regularised(soft), self.bounds());
             found = softer.nearest(&aim, &mut memory.direction.sides);
             search.factorisations += softer.factorisations;
             let off = distance(&found.image, target);
@@ -250,14 +261,6 @@ impl TensionSolver {
         let found = search.largest_scale(&direction, ray);
         search.bounds = all;
         found.unwrap_or(0.0)
-    }
-
-    fn search(&self, rows: &[PerString; 6], regularisation: f64) -> Search {
-        Search {
-            program: BoxProgram::new(rows, regularisation),
-            bounds: self.bounds(),
-            factorisations: 0,
-        }
     }
 
     fn scaled(&self, wrench: &Vector6<f64>) -> [f64; 6] {

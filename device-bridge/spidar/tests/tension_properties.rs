@@ -230,7 +230,8 @@ fn ten_thousand_random_wrenches_agree_with_an_interior_point() {
     );
     assert!(compared > 10_000 && rendered > 2000 && kept > 2000 && nearest > 100);
     assert!(worst_kkt < 1e-11);
-    assert!(most <= 150);
+    // Unrelated poses and wrenches: nothing of the last answer helps.
+    assert!(most <= 100);
 }
 
 #[test]

@@ -207,6 +207,12 @@ impl<H: StringHardware> SpidarDevice<H> {
         self.fault
     }
 
+    /// CPU time of the pose of the last read and of the tensions of the last write; zero without [`Self::with_clock`].
+    #[must_use]
+    pub fn computing_times(&self) -> (Duration, Duration) {
+        (self.spent.0, self.spent.1.saturating_sub(self.spent.0))
+    }
+
     /// The electronics.
     pub fn hardware_mut(&mut self) -> &mut H {
         &mut self.hardware

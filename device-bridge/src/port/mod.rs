@@ -12,7 +12,7 @@
 //!
 //! [`DevicePort`] (in [`device_port`]) owns the device, so nothing else can write to it. **What holds of every write,** whatever device, network
 //! and loops do: it is finite; its norms are within the limits; it differs from the last one by at most the slew rate
-//! times one period; and it is zero from 120 ms (hold and ramp-out) after the last good input on. A port that is not called can
+//! times one period; and it is zero from 120 ms (hold, ramp-out and a margin for a late loop) after the last good input on. A port that is not called can
 //! keep no promise: a device needs a watchdog of its own for that.
 //!
 //! Readings of the clock are arguments; a tick neither allocates nor waits.

@@ -54,6 +54,16 @@ impl SafetySettings {
     pub const FORCE_RATE: f64 = 500.0;
     /// 0.05 N m/ms: what 0.5 N/ms do at a lever of 0.1 m.
     pub const TORQUE_RATE: f64 = 50.0;
+    /// The promise to the hand: no force is felt that rests on a good input older than this.
+    pub const ZERO_AFTER: Duration = Duration::from_millis(120);
+    /// Age up to which the last force is held.
+    pub const HOLD: Duration = Duration::from_millis(20);
+    /// What is kept of the promise for a loop that ticks late and a device that is slow to take a wrench: five periods at 1 kHz.
+    pub const MARGIN: Duration = Duration::from_millis(5);
+    /// The rest: time from full force to none, 95 ms.
+    pub const RAMP_OUT: Duration = Self::ZERO_AFTER
+        .saturating_sub(Self::HOLD)
+        .saturating_sub(Self::MARGIN);
 
     /// The same with limits that are not above those of the device.
     #[must_use]
@@ -74,7 +84,7 @@ impl SafetySettings {
 }
 
 impl Default for SafetySettings {
-    /// 20 N, 0.5 N m; 0.5 N/ms, 0.05 N m/ms; hold 20 ms, out in 100 ms, in over 0.5 s; constraints of 100 ms; 1 kHz;
+    /// 20 N, 0.5 N m; 0.5 N/ms, 0.05 N m/ms; hold 20 ms, out in 95 ms, in over 0.5 s; constraints of 100 ms; 1 kHz;
     /// automatic, without buttons.
     fn default() -> Self {
         Self {
@@ -82,9 +92,9 @@ impl Default for SafetySettings {
             max_torque: 0.5,
             force_rate: Self::FORCE_RATE,
             torque_rate: Self::TORQUE_RATE,
-            hold: Duration::from_millis(20),
+            hold: Self::HOLD,
             max_constraint_age: Duration::from_millis(100),
-            ramp_out: Duration::from_millis(100),
+            ramp_out: Self::RAMP_OUT,
             ramp_in: Duration::from_millis(500),
             period: Duration::from_millis(1),
             rearm: Rearm::Automatic,

@@ -21,7 +21,7 @@ use taut_proto::{
     Header, HotState, InputSample, Kind, MeshBlob, MeshHash, PoseF64, SceneDescription,
     header::{HEADER_BYTES, TAG_BYTES},
     mesh_blob::Positions,
-    scene::{BodyDescription, ShowOptions},
+    scene::BodyDescription,
 };
 
 const SECONDS: u64 = 4;
@@ -249,29 +249,15 @@ fn content() -> Result<Content, Failure> {
         vec![[0, 1, 2]],
         None,
     )?;
-    let description = SceneDescription {
-        name: "flood".to_owned(),
-        revision: 1,
-        god_object: BodyDescription {
+    let description = SceneDescription::of_body(
+        "flood",
+        BodyDescription {
             name: "body".to_owned(),
             mesh: MeshHash::of(&mesh.encode()?),
             pose: PoseF64::IDENTITY,
             colour: [1.0; 4],
         },
-        obstacles: Vec::new(),
-        reference_point: [0.0; 3],
-        scene_origin: PoseF64::IDENTITY,
-        display_scale: 1.0,
-        screens: Vec::new(),
-        nodes: Vec::new(),
-        viewer: PoseF64::IDENTITY,
-        eye_separation: 0.064,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        near: 0.1,
-        far: 10.0,
-        show: ShowOptions::default(),
-    };
+    );
     Ok(Content {
         description,
         meshes: vec![mesh],

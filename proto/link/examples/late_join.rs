@@ -8,9 +8,8 @@ use taut_link::{
     ClientOptions, ClusterKey, Content, MeshCache, Role, ServerOptions, connect, serve,
 };
 use taut_proto::{
-    HotState, MeshBlob, MeshHash, PoseF64, SceneDescription,
-    mesh_blob::Positions,
-    scene::{BodyDescription, ShowOptions},
+    HotState, MeshBlob, MeshHash, PoseF64, SceneDescription, mesh_blob::Positions,
+    scene::BodyDescription,
 };
 
 /// Triangles of the scene's mesh: 10 MB.
@@ -33,24 +32,7 @@ fn content() -> Result<(Content, usize), Error> {
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],
     };
-    let description = SceneDescription {
-        name: "large".to_owned(),
-        revision: 1,
-        god_object: body,
-        obstacles: vec![],
-        reference_point: [0.0; 3],
-        scene_origin: PoseF64::IDENTITY,
-        display_scale: 1.0,
-        screens: vec![],
-        nodes: vec![],
-        viewer: PoseF64::IDENTITY,
-        eye_separation: 0.064,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        near: 0.05,
-        far: 10.0,
-        show: ShowOptions::default(),
-    };
+    let description = SceneDescription::of_body("large", body);
     let content = Content {
         description,
         meshes: vec![mesh],

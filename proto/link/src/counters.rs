@@ -109,7 +109,7 @@ counters! {
 counters! {
     /// Counts of a client since it joined.
     ClientCounters, ClientCounterCells {
-        /// Authentic datagrams received.
+        /// Authentic datagrams received, but for those of other members.
         packets_received,
         /// States received.
         states,
@@ -129,6 +129,8 @@ counters! {
         forged,
         /// Constraint sets that became whole.
         sets,
+        /// Datagrams of other members: no sign of the server.
+        from_members,
         /// Datagrams heard from the multicast group.
         multicast_heard,
         /// Times that the multicast group fell silent and states came by unicast again.

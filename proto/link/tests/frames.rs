@@ -1,6 +1,6 @@
 //! The barrier of frames over real sockets: two nodes in step, a bad network, a node that stops, nobody who leads.
 //!
-//! Nothing here measures: how sharp the swaps are is told by the example `swap_skew`.
+//! Nothing here measures: how sharp the swaps are is told by the report of `tests/network`.
 
 mod support;
 

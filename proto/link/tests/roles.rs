@@ -342,3 +342,38 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
     assert_eq!(flooding.is_closed(), None);
     assert_eq!(device.is_closed(), None);
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn who_is_revoked_while_he_is_in_goes_out_and_the_others_stay() {
+    let server = server().await;
+    let old = with(
+        &server,
+        Role::Render,
+        "left",
+        credential(Role::Render, "left", 1),
+    );
+    let left = join(old.clone()).await;
+    let web = join(with(
+        &server,
+        Role::Observer,
+        "web",
+        credential(Role::Observer, "web", 1),
+    ))
+    .await;
+    let policy = JoinPolicy {
+        revoked: vec!["left#1".parse().unwrap_or_else(|error| panic!("{error}"))],
+        ..JoinPolicy::default()
+    };
+    assert_eq!(server.set_policy(policy.clone()), 1);
+    assert_eq!(server.set_policy(policy), 0, "it is out");
+    wait_until("the end", || left.is_closed().is_some()).await;
+    let reason = left.is_closed().unwrap_or_default();
+    assert!(reason.contains("revoked"), "{reason}");
+    match error_of(old).await {
+        LinkError::Refused { code, .. } => assert_eq!(code, RefusalCode::Revoked),
+        other => panic!("{other}"),
+    }
+    assert!(web.is_closed().is_none());
+    let next = credential(Role::Render, "left", 2);
+    join(with(&server, Role::Render, "left", next)).await;
+}

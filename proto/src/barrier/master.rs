@@ -10,11 +10,12 @@
 //! who was in step, and slow nodes find together.
 
 use super::{
-    Arrive, FrameSkew, LEAD_NS, MAX_MEMBERS, MAX_MISSES, MemberStatus, NodeState, ReleaseHead,
-    SILENCE_NS,
+    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MAX_MISSES,
+    MemberStatus, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, TERMS_LEFT_OUT,
     member::Member,
     skew::{OpenFrame, Swaps},
 };
+use crate::group::SERVER_SENDER;
 use arrayvec::ArrayVec;
 
 /// Longest that a frame waits for a node that is behind, whatever the period is, ns.
@@ -92,6 +93,8 @@ pub struct Counts {
     pub evicted: u64,
     /// ARRIVEs that were refused.
     pub refused: u64,
+    /// Reigns of nodes that the server ended.
+    pub reclaimed: u64,
 }
 
 /// The master. All times are session time in ns and must not fall.
@@ -110,6 +113,10 @@ pub struct Master {
     last_deadline_ns: u64,
     /// When the last node arrived at the open frame.
     arrival_ns: u64,
+    /// Term and frame number that the next RELEASE goes on from: nodes led meanwhile.
+    reclaim: Option<(u32, u64)>,
+    /// When that was found last, ns.
+    reclaimed_ns: Option<u64>,
     /// Frame number and state of the newest frames that were begun.
     states: [(u64, Newest); REMEMBERED],
     swaps: Swaps,
@@ -135,6 +142,8 @@ impl Master {
             due_ns: 0,
             last_deadline_ns: 0,
             arrival_ns: 0,
+            reclaim: None,
+            reclaimed_ns: None,
             states: [(0, Newest::default()); REMEMBERED],
             swaps: Swaps::default(),
             skew_ns: 0,
@@ -172,6 +181,7 @@ impl Master {
         member.heard_ns = member.heard_ns.max(now_ns);
         member.period_us = arrive.period_us;
         if foreign {
+            self.reclaim(now_ns, arrive);
             // It knows no frame of this reign: the newest RELEASE tells it where we are.
             let answer = if begun {
                 Answer::Repeat
@@ -317,6 +327,19 @@ impl Master {
         }
     }
 
+    /// The server was silent, and a node led: from its next RELEASE on the server does again, in a reign above all.
+    fn reclaim(&mut self, now_ns: u64, arrive: &Arrive) {
+        let lately = self.reclaimed_ns.is_some_and(|at| now_ns < at + RECLAIM_NS);
+        if self.newest.master != SERVER_SENDER || arrive.term <= self.newest.term || lately {
+            return;
+        }
+        let ahead = arrive.frame.saturating_sub(self.newest.frame);
+        let frame = self.newest.frame + ahead.min(FARTHEST_AHEAD) + FRAMES_LEFT_OUT;
+        self.reclaim = Some((arrive.term.saturating_add(TERMS_LEFT_OUT), frame));
+        self.reclaimed_ns = Some(now_ns);
+        self.counts.reclaimed += 1;
+    }
+
     /// Compares what was drawn with what was released for that frame, while that is known.
     fn compare(&mut self, arrive: &Arrive) {
         let (frame, state) = self.states[(arrive.frame % REMEMBERED as u64) as usize];
@@ -327,6 +350,11 @@ impl Master {
     }
 
     fn release(&mut self, now_ns: u64, state: Newest) -> Option<FrameSkew> {
+        // What the nodes have drawn keeps its number, whoever leads from now on.
+        let drawn = self.newest.frame + 1;
+        if let Some((term, frame)) = self.reclaim.take() {
+            (self.newest.term, self.newest.frame) = (term, frame);
+        }
         let frame = self.newest.frame + 1;
         let ready_ns = self
             .arrival_ns
@@ -335,7 +363,7 @@ impl Master {
         let mut expected = ArrayVec::new();
         let mut late = ArrayVec::<u16, MAX_MEMBERS>::new();
         for member in &mut self.members {
-            if member.arrived == frame {
+            if member.arrived == drawn {
                 expected.push(member.session); // MAX_MEMBERS at most, as below
             } else {
                 late.push(member.session);
@@ -380,14 +408,14 @@ impl Master {
             ..self.newest
         };
         self.counts.released += 1;
-        let of_frame = self.states[(frame % REMEMBERED as u64) as usize];
+        let of_frame = self.states[(drawn % REMEMBERED as u64) as usize];
         self.states[((frame + 1) % REMEMBERED as u64) as usize] = (frame + 1, state);
         let state_time_ns = match of_frame {
-            (known, state) if known == frame => state.time_ns,
+            (known, state) if known == drawn => state.time_ns,
             _ => now_ns, // the very first frame has no state, and nobody draws it
         };
         self.swaps.follow(OpenFrame {
-            frame,
+            frame: drawn,
             expected,
             ready_ns,
             state_time_ns,

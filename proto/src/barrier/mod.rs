@@ -9,6 +9,9 @@
 //! sent again for every ARRIVE that comes after it. Nobody waits for ever: the master passes a late node over at the deadline, does not wait
 //! for it until it is back on time, and forgets one that is silent; a node that hears nothing draws on its own again.
 //!
+//! When the master is gone, the first of the nodes leads with the state that was held last ([`Succession`]), from node to node; when the server
+//! is there again, the nodes appeal to it ([`Node::appeal`]), and it takes the frames back in a reign above theirs.
+//!
 //! Pure state machines, times are arguments: [`Master`] (session time), [`Node`] and [`Succession`] (any monotonic clock of the node).
 //!
 //! Source: the barrier with one emitter and repeated messages of cluster displays; a distributed barrier with a central coordinator.
@@ -43,7 +46,18 @@ pub const MAX_MISSES: u32 = 10;
 pub const SILENCE_NS: u64 = 500_000_000;
 /// Time from the RELEASE to a planned swap, ns: two threads wake up meanwhile, and a lost copy comes again.
 pub const LEAD_NS: u64 = 300_000;
-/// Silence of the master after which a node may take its place, ns.
+/// Silence of the master after which a node may take its place, ns, where a node is given up after [`SILENCE_NS`].
 pub const SUCCESSION_NS: u64 = 150_000_000;
+/// Time between two signs of life of a node that leads, and of those that follow it, ns.
+pub const SIGN_NS: u64 = 50_000_000;
+/// Least time between two returns of the server to a reign that nodes began without it, ns: a node that claims such reigns costs the
+/// others a frame now and then, and no more.
+pub const RECLAIM_NS: u64 = 1_000_000_000;
+/// Frame numbers that a new reign leaves out: more than any RELEASE that it may have missed.
+pub const FRAMES_LEFT_OUT: u64 = 1024;
+/// Reigns that the server leaves out when it takes the frames back: more than nodes may have begun meanwhile, so that no two masters have one term.
+pub const TERMS_LEFT_OUT: u32 = 64;
+/// Farthest that a node may say the frames are ahead of those that are known: a year of 120 frames per second.
+pub const FARTHEST_AHEAD: u64 = 1 << 32;
 /// Silence of all masters after which a node draws on its own, ns.
 pub const FREE_NS: u64 = 500_000_000;

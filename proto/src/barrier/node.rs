@@ -9,6 +9,7 @@
 //! ```
 
 use super::{ARRIVE_PERIOD_NS, Arrive, FREE_NS, JOIN_PERIOD_NS, ReleaseHead};
+use crate::group::SERVER_SENDER;
 
 /// What a node is to do now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,7 @@ pub struct Node {
     /// Since when nothing new was released, or since when it waits.
     quiet_since_ns: u64,
     next_message_ns: u64,
+    next_appeal_ns: u64,
     arrive: Arrive,
     missed: u32,
 }
@@ -80,6 +82,7 @@ impl Node {
             newest: None,
             quiet_since_ns: 0,
             next_message_ns: 0,
+            next_appeal_ns: 0,
             arrive: Arrive::default(),
             missed: 0,
         }
@@ -177,6 +180,29 @@ impl Node {
         };
         self.next_message_ns = now_ns + period_ns;
         Some(message)
+    }
+
+    /// The message to the server that is due while another node leads: it names that reign, so that a server that is there again takes the
+    /// frames back.
+    pub fn appeal(&mut self, now_ns: u64) -> Option<Arrive> {
+        let newest = self.newest.as_ref()?;
+        if newest.master == SERVER_SENDER || now_ns < self.next_appeal_ns {
+            return None;
+        }
+        self.next_appeal_ns = now_ns + JOIN_PERIOD_NS;
+        Some(Arrive {
+            term: newest.term,
+            frame: newest.frame,
+            missed: self.missed,
+            period_us: self.period_us,
+            ..Arrive::default()
+        })
+    }
+
+    /// Session number of the master that this node follows: the server, before the first RELEASE.
+    pub fn master(&self) -> u16 {
+        let newest = self.newest.as_ref();
+        newest.map_or(SERVER_SENDER, |newest| newest.master)
     }
 
     /// The frame of the last [`Turn::Swap`] is shown: the swap was called at this session time, ns; 0 where it is not known.

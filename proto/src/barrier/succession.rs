@@ -1,18 +1,19 @@
 //! Who is master when the master is gone: the lowest session number that is alive.
 //!
 //! Nobody votes: the nodes know each other from the last RELEASE, and each waits its turn. The first in order stands after [`SUCCESSION_NS`] of
-//! silence, each further one [`TURN_NS`] later. A master that hears of one with a higher term, or with the same term and a lower number,
+//! silence, each further one a third of that later. A master that hears of one with a higher term, or with the same term and a lower number,
 //! resigns. So the cluster has one master again as soon as the living hear each other. Should two reign for a while, their frames have
 //! different ([`ReleaseHead::rank`], frame), and each node shows only ascending ones.
 //!
 //! Source: Garcia-Molina 1982 (bully election), with time-outs instead of messages.
 
-use super::{ReleaseHead, SUCCESSION_NS};
+use super::{FARTHEST_AHEAD, FRAMES_LEFT_OUT, ReleaseHead, SUCCESSION_NS};
+use crate::group::SERVER_SENDER;
 
-/// Time between the turns of two successors, ns: a RELEASE of the earlier one is there long before.
-const TURN_NS: u64 = 50_000_000;
-/// Frame numbers that a successor leaves out: more than any RELEASE that it may have missed.
-const FRAMES_LEFT_OUT: u64 = 1024;
+/// Turns that fit into the silence before the first: 50 ms from one to the next by default. A RELEASE of the earlier one is there long before.
+const TURNS_PER_SILENCE: u64 = 3;
+/// Most reigns that a member may say it is ahead: one datagram must not use the numbers up.
+const MOST_REIGNS_AHEAD: u32 = 1024;
 
 /// What a node is to do about the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,8 @@ pub enum Successor {
 #[derive(Clone, Debug)]
 pub struct Succession {
     session: u16,
+    /// Silence after which the first stands.
+    silence_ns: u64,
     heard_ns: u64,
     newest: Option<ReleaseHead>,
     reign: Option<u32>,
@@ -45,10 +48,38 @@ impl Succession {
     pub fn new(session: u16, now_ns: u64) -> Succession {
         Succession {
             session,
+            silence_ns: SUCCESSION_NS,
             heard_ns: now_ns,
             newest: None,
             reign: None,
         }
+    }
+
+    /// The same with another silence before the first stands, ns: for networks that pause longer.
+    #[must_use]
+    pub fn after_silence(mut self, silence_ns: u64) -> Succession {
+        self.silence_ns = silence_ns;
+        self
+    }
+
+    /// Whether a RELEASE that `sender` sent as a member may count: it names its sender as master, the numbers are near those that are known, and the
+    /// server has been silent for most of the time after which a node may stand. While the server is heard, no member releases anything.
+    pub fn may_follow(&self, now_ns: u64, sender: u16, head: &ReleaseHead) -> bool {
+        let Some(newest) = &self.newest else {
+            return false; // never part of anything
+        };
+        // Somebody else's silence began a moment before this node's.
+        let silent = now_ns.saturating_sub(self.heard_ns) >= self.silence_ns / 3 * 2;
+        head.master == sender
+            && sender != SERVER_SENDER
+            && head.term <= newest.term.saturating_add(MOST_REIGNS_AHEAD)
+            && head.frame <= newest.frame.saturating_add(FARTHEST_AHEAD)
+            && (newest.master != SERVER_SENDER || silent)
+    }
+
+    /// Whether this node leads.
+    pub fn reigns(&self) -> bool {
+        self.reign.is_some()
     }
 
     /// Any authentic datagram of the present master came.
@@ -89,7 +120,8 @@ impl Succession {
         let Some(place) = self.turn(newest) else {
             return Successor::No;
         };
-        if now_ns.saturating_sub(self.heard_ns) < SUCCESSION_NS + place * TURN_NS {
+        let turn_ns = self.silence_ns / TURNS_PER_SILENCE;
+        if now_ns.saturating_sub(self.heard_ns) < self.silence_ns + place * turn_ns {
             return Successor::No;
         }
         let term = newest.term.saturating_add(1);

@@ -26,6 +26,8 @@ pub struct World {
     /// Longest way, in steps.
     delay: u64,
     server_dies: Option<u64>,
+    /// Silent and deaf for a while from here on: start and length, ns.
+    server_pauses: Option<(u64, u64)>,
     seed: u64,
 }
 
@@ -72,6 +74,7 @@ pub fn any_world() -> impl Strategy<Value = World> {
                 doubled,
                 delay,
                 server_dies: None,
+                server_pauses: None,
                 seed,
             },
         )
@@ -91,6 +94,15 @@ pub fn any_world_without_server() -> impl Strategy<Value = World> {
         world.delay = world.delay.min(10);
         world.period_ns = world.period_ns.min(20 * MS);
         world.server_dies = Some(at * MS);
+        world
+    })
+}
+
+/// The same with a server that comes back: of the same epoch, with the numbers that it had.
+pub fn any_world_whose_server_pauses() -> impl Strategy<Value = World> {
+    (any_world_without_server(), 50_u64..900).prop_map(|(mut world, long)| {
+        let at = world.server_dies.take().unwrap_or_default();
+        world.server_pauses = Some((at, long * MS));
         world
     })
 }
@@ -204,7 +216,8 @@ impl World {
     }
 
     fn server_is_up(&self, now: u64) -> bool {
-        self.server_dies.is_none_or(|dies| now < dies)
+        let paused = |(at, long): (u64, u64)| (at..at + long).contains(&now);
+        self.server_dies.is_none_or(|dies| now < dies) && !self.server_pauses.is_some_and(paused)
     }
 
     pub fn run(&self) -> Seen {
@@ -308,7 +321,7 @@ impl World {
             let heard = screen.heard_server;
             screen.succession.hear(heard);
         }
-        if self.server_dies.is_some() {
+        if self.server_dies.is_some() || self.server_pauses.is_some() {
             match screen.succession.poll(now) {
                 Successor::No => {}
                 Successor::Resign => screen.reign = None,
@@ -371,8 +384,11 @@ impl World {
             }
             Turn::Swap { .. } => {}
         }
+        if let Some(appeal) = screen.node.appeal(now) {
+            network.send(now, &Packet::Arrive(screen.id, SERVER, appeal));
+        }
         if let Some(message) = screen.node.message(now) {
-            let master = screen.node.newest().map_or(SERVER, |newest| newest.master);
+            let master = screen.node.master();
             network.send(now, &Packet::Arrive(screen.id, master, message));
         }
     }
@@ -462,6 +478,23 @@ impl Seen {
                 id,
                 last
             );
+        }
+        Ok(())
+    }
+
+    /// At the end all the living that were in step when the server paused show frames of the server again.
+    pub fn assert_server_leads(&self, world: &World) -> Result<(), TestCaseError> {
+        let Some((paused, _)) = world.server_pauses else {
+            return Ok(());
+        };
+        for (id, plan) in (1_u16..).zip(&world.nodes) {
+            let shown = self.shown.get(&id).map_or(&[][..], Vec::as_slice);
+            let was_in = shown.iter().any(|(at, ..)| at + 100 * MS < paused);
+            if plan.dies.is_none() && was_in {
+                let last = shown.last().filter(|(at, ..)| at + 200 * MS > END);
+                let master = last.map(|(_, rank, _)| u16::MAX - rank.1);
+                prop_assert_eq!(master, Some(SERVER), "node {}: {:?}", id, shown.last());
+            }
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 //! A peg of 27,000 triangles in a hole of 27,000 triangles at three clearances, exact and with vertices perturbed by a micrometre, and a
 //! nut on its bolt where `TAUT_DATA` or `../shared/data` has them. The device inserts, pushes sideways, tilts, slides along and turns at 1 kHz.
 //! Forces are those for the device pose one millisecond after the set; every few steps they are held against the projection
-//! on every facing pair within reach. Times are CPU time of the thread.
+//! on every facing pair within reach. Times are CPU time of the thread; the nominal work says the same on every machine, busy or not.
 #![allow(
     clippy::disallowed_methods,
     reason = "a measurement reads files and arguments; the method does not"
@@ -243,6 +243,7 @@ fn measure(
         GodObject::new(Arc::clone(&world), settings, path[0]).expect("a free start");
     let mut every = Every::new(settings);
     let (mut update, mut force, mut rows, mut lengths) = (vec![], vec![], vec![], vec![]);
+    let mut nominal = vec![];
     let (mut errors, mut relative, mut torques, mut reference_rows) =
         (vec![], vec![], vec![], vec![]);
     let (mut substeps, mut unfinished, mut arrivals, mut truncated) = (0, 0, 0, 0);
@@ -253,6 +254,7 @@ fn measure(
         let report = god_object.step(&pair[0], None);
         update.push(cpu_us() - clock);
         work += report.work;
+        nominal.push(report.work.nominal_us() as f64);
         substeps += report.substeps;
         unfinished += u32::from(report.unfinished);
         let set = god_object.constraint_set();
@@ -281,6 +283,7 @@ fn measure(
         }
     }
     percentiles("update, us", &mut update);
+    percentiles("work, nominal us", &mut nominal);
     percentiles("force, us", &mut force);
     percentiles("rows", &mut rows);
     percentiles("rows within reach", &mut reference_rows);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use taut_observers::{
     Hello, StreamServer, StreamSettings, VrpnFrame, VrpnServer, VrpnSettings, state_channel,
 };
-use taut_proto::scene::{BodyDescription, ShowOptions};
+use taut_proto::scene::BodyDescription;
 use taut_proto::state::{RunState, ToolState};
 use taut_proto::{HotState, MeshHash, PoseF64, SceneDescription};
 
@@ -89,21 +89,7 @@ fn scene() -> SceneDescription {
         colour: [1.0; 4],
     };
     SceneDescription {
-        name: "circle".to_owned(),
-        revision: 1,
-        god_object: body("ball"),
         obstacles: vec![body("plane")],
-        reference_point: [0.0; 3],
-        scene_origin: PoseF64::IDENTITY,
-        display_scale: 1.0,
-        screens: Vec::new(),
-        nodes: Vec::new(),
-        viewer: PoseF64::IDENTITY,
-        eye_separation: 0.064,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        near: 0.1,
-        far: 10.0,
-        show: ShowOptions::default(),
+        ..SceneDescription::of_body("circle", body("ball"))
     }
 }

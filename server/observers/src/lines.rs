@@ -365,22 +365,8 @@ mod tests {
             colour: [1.0; 4],
         };
         SceneDescription {
-            name: String::new(),
-            revision: 1,
-            god_object: body.clone(),
-            obstacles: vec![body],
-            reference_point: [0.0; 3],
-            scene_origin: PoseF64::IDENTITY,
-            display_scale: 1.0,
-            screens: Vec::new(),
-            nodes: Vec::new(),
-            viewer: PoseF64::IDENTITY,
-            eye_separation: 0.064,
-            separation_scale: 1.0,
-            nearest_disparity: 0.0,
-            near: 0.1,
-            far: 10.0,
-            show: taut_proto::scene::ShowOptions::default(),
+            obstacles: vec![body.clone()],
+            ..SceneDescription::of_body("", body)
         }
     }
 

@@ -10,7 +10,7 @@ use futures_util::StreamExt;
 use serde_json::Value;
 use support::{PATIENCE, Workbench, wait_for};
 use taut_observers::{Hello, StreamServer, StreamSettings};
-use taut_proto::scene::{BodyDescription, ShowOptions};
+use taut_proto::scene::BodyDescription;
 use taut_proto::{MeshHash, PoseF64, SceneDescription};
 use tokio_tungstenite::tungstenite::Message;
 
@@ -26,22 +26,8 @@ fn hello() -> Hello {
         program: "taut test".to_owned(),
         rate: 60.0,
         scene: SceneDescription {
-            name: "ball-on-ball".to_owned(),
-            revision: 1,
-            god_object: body.clone(),
-            obstacles: vec![body],
-            reference_point: [0.0; 3],
-            scene_origin: PoseF64::IDENTITY,
-            display_scale: 1.0,
-            screens: Vec::new(),
-            nodes: Vec::new(),
-            viewer: PoseF64::IDENTITY,
-            eye_separation: 0.064,
-            separation_scale: 1.0,
-            nearest_disparity: 0.0,
-            near: 0.1,
-            far: 10.0,
-            show: ShowOptions::default(),
+            obstacles: vec![body.clone()],
+            ..SceneDescription::of_body("ball-on-ball", body)
         },
     }
 }

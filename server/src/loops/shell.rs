@@ -50,19 +50,57 @@ pub fn spawn(
     })
 }
 
-/// Calls `tick` at every deadline, `period` apart, until the end is asked for. Missed deadlines are added to `misses`.
+/// When a loop ticks: at the session times `phase + k period`.
+///
+/// The session's loops have phases of their own: loops of one period that began at a chance would keep the distance that they began with,
+/// and where that is none, the timer of one interrupts the other within its tick, every time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Beat {
+    /// Time between two ticks.
+    pub period: Duration,
+    /// Less than a period, or any other time: only its place in the period counts.
+    pub phase: Duration,
+}
+
+impl Beat {
+    /// Phase of the haptics loop. The coupling follows it at once.
+    pub const HAPTICS: Duration = Duration::ZERO;
+    /// Phase of the god-object loop at the rate of the haptics loop: when the coupling has answered the sample.
+    pub const GOD_OBJECT: Duration = Duration::from_micros(200);
+    /// Phase of the broadcaster: when most updates of the god-object are done.
+    pub const BROADCAST: Duration = Duration::from_micros(500);
+
+    /// The first deadline that is at least one period after `now`.
+    fn first_after(&self, now: Duration) -> Duration {
+        let earliest = now + self.period;
+        let beyond = earliest
+            .saturating_sub(self.phase)
+            .as_nanos()
+            .checked_rem(self.period.as_nanos())
+            .unwrap_or(0);
+        // Less than a period, which is far less than 2^64 ns.
+        let beyond = Duration::from_nanos(beyond as u64);
+        if beyond.is_zero() {
+            earliest
+        } else {
+            earliest + (self.period - beyond)
+        }
+    }
+}
+
+/// Calls `tick` at every deadline of `beat` until the end is asked for. Missed deadlines are added to `misses`.
 pub fn run_at_deadlines(
     clock: SessionClock,
-    period: Duration,
+    beat: Beat,
     shutdown: &Shutdown,
     misses: &AtomicU64,
     mut tick: impl FnMut(Duration),
 ) {
-    let mut deadline = clock.now() + period;
+    let mut deadline = beat.first_after(clock.now());
     while !shutdown.is_asked() {
         sleep_until(clock.monotonic(deadline));
         tick(clock.now());
-        let (next, missed) = next_deadline(deadline, clock.now(), period);
+        let (next, missed) = next_deadline(deadline, clock.now(), beat.period);
         deadline = next;
         if missed > 0 {
             misses.store(misses.load(Ordering::Relaxed) + missed, Ordering::Relaxed);
@@ -95,6 +133,29 @@ mod tests {
         assert_eq!(next_deadline(10 * MS, 11 * MS - MS / 10, MS), (11 * MS, 0));
         assert_eq!(next_deadline(10 * MS, 11 * MS + MS / 10, MS), (11 * MS, 1));
         assert_eq!(next_deadline(10 * MS, 15 * MS + MS / 2, MS), (15 * MS, 5));
+    }
+
+    #[test]
+    fn a_loop_begins_on_its_beat_and_not_before_a_period_has_passed() {
+        let beat = Beat {
+            period: MS,
+            phase: MS / 5,
+        };
+        for now_us in [0, 199, 200, 201, 999, 1000, 12_345] {
+            let now = Duration::from_micros(now_us);
+            let first = beat.first_after(now);
+            assert!(
+                first >= now + MS && first < now + 2 * MS,
+                "{now:?} {first:?}"
+            );
+            assert_eq!((first - MS / 5).as_nanos() % MS.as_nanos(), 0, "{first:?}");
+        }
+        // Nothing to divide by: at once.
+        let none = Beat {
+            period: Duration::ZERO,
+            phase: Duration::ZERO,
+        };
+        assert_eq!(none.first_after(MS), MS);
     }
 
     #[test]
@@ -134,7 +195,11 @@ mod tests {
         let misses = AtomicU64::new(0);
         let mut times = Vec::new();
         let asked = shutdown.clone();
-        run_at_deadlines(SessionClock::start(), MS, &shutdown, &misses, |now| {
+        let beat = Beat {
+            period: MS,
+            phase: Beat::HAPTICS,
+        };
+        run_at_deadlines(SessionClock::start(), beat, &shutdown, &misses, |now| {
             times.push(now);
             if times.len() == 5 {
                 asked.ask();

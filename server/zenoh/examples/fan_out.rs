@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use taut_observers::{Hello, StateOutlet, state_channel};
-use taut_proto::scene::{BodyDescription, ShowOptions};
+use taut_proto::scene::BodyDescription;
 use taut_proto::state::{ContactState, RunState, ToolState};
 use taut_proto::{HotState, MeshHash, PoseF64, SceneDescription};
 use taut_zenoh::zenoh::{Config, Session, Wait, open};
@@ -230,22 +230,8 @@ fn hello(rate: f64) -> Hello {
         program: "taut-zenoh example".to_owned(),
         rate,
         scene: SceneDescription {
-            name: "none".to_owned(),
-            revision: 1,
-            god_object: body("ball"),
             obstacles: vec![body("plane")],
-            reference_point: [0.0; 3],
-            scene_origin: PoseF64::IDENTITY,
-            display_scale: 1.0,
-            screens: Vec::new(),
-            nodes: Vec::new(),
-            viewer: PoseF64::IDENTITY,
-            eye_separation: 0.064,
-            separation_scale: 1.0,
-            nearest_disparity: 0.0,
-            near: 0.1,
-            far: 10.0,
-            show: ShowOptions::default(),
+            ..SceneDescription::of_body("none", body("ball"))
         },
     }
 }

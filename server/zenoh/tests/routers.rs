@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use taut_observers::{Hello, StateFeed, state_channel};
 use taut_proto::codec::decode;
-use taut_proto::scene::{BodyDescription, ShowOptions};
+use taut_proto::scene::BodyDescription;
 use taut_proto::state::{EventRecord, RunState, ToolState, event_code};
 use taut_proto::{HotState, MeshHash, PoseF64, SceneDescription};
 use taut_zenoh::{ZenohPublisher, ZenohSettings};
@@ -60,22 +60,8 @@ fn hello() -> Hello {
         program: "taut test".to_owned(),
         rate: 100.0,
         scene: SceneDescription {
-            name: "ball-on-ball".to_owned(),
-            revision: 1,
-            god_object: body.clone(),
-            obstacles: vec![body],
-            reference_point: [0.0; 3],
-            scene_origin: PoseF64::IDENTITY,
-            display_scale: 1.0,
-            screens: Vec::new(),
-            nodes: Vec::new(),
-            viewer: PoseF64::IDENTITY,
-            eye_separation: 0.064,
-            separation_scale: 1.0,
-            nearest_disparity: 0.0,
-            near: 0.1,
-            far: 10.0,
-            show: ShowOptions::default(),
+            obstacles: vec![body.clone()],
+            ..SceneDescription::of_body("ball-on-ball", body)
         },
     }
 }

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use taut_link::Transport;
-use taut_network_tests::bench::{isolation, node};
+use taut_network_tests::bench::{failover, isolation, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
 
 struct Arguments {
@@ -29,6 +29,16 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             return Err("--client takes SERVER NODE TRANSPORT KEY".into());
         };
         isolation::client(server, node, transport, key.as_ref())?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    // The server of the fail-over run, which is killed.
+    if arguments.next_if(|first| first == "--lead").is_some() {
+        let words: Vec<String> = arguments.collect();
+        let [quic, udp, key, timeout_ms] = &words[..] else {
+            return Err("--lead takes QUIC UDP KEY MILLISECONDS".into());
+        };
+        let node_timeout = Duration::from_millis(timeout_ms.parse()?);
+        failover::lead(quic, udp, key.as_ref(), node_timeout)?;
         return Ok(ExitCode::SUCCESS);
     }
     // One node of a network of namespaces or machines.

@@ -59,3 +59,28 @@ fn soak() {
 fn what_is_not_measured_here_is_said() {
     check("elsewhere");
 }
+
+#[test]
+fn skew() {
+    check("skew");
+}
+
+#[test]
+fn events() {
+    check("events");
+}
+
+#[test]
+fn failover() {
+    check("failover");
+}
+
+#[test]
+fn drawing_nodes_say_what_is_missing() {
+    check("screens");
+}
+
+#[test]
+fn a_server_that_dies_says_what_is_missing() {
+    check("server");
+}

@@ -1,13 +1,13 @@
 //! What a render node's drawing thread does with the barrier: take a frame, draw it, say so, wait, show it.
 
-use super::hot::Hot;
+use super::{frames::Part, hot::Hot};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
 use taut_proto::{
-    HotState, Payload,
-    barrier::{Arrive, Drawn, Node, ReleaseHead, Turn},
+    HotState,
+    barrier::{Arrive, Drawn, ReleaseHead, SILENCE_NS, SUCCESSION_NS, Turn},
 };
 
 /// The last of the way to a planned swap is waited for without sleep, because no timer is that sharp.
@@ -17,7 +17,8 @@ const FARTHEST_SWAP: Duration = Duration::from_millis(100);
 
 /// One node's way through the barrier, for the thread that draws. A node with several screens goes through it once per frame, with all of them.
 ///
-/// Dropped, the node takes no part any more.
+/// When the server falls silent, the nodes go on together with the state that they hold, led by one of them; also when the link has given its
+/// session up, until it is dropped. Dropped, the node takes no part any more.
 pub struct FrameGate {
     hot: Arc<Hot>,
     drawing: Option<Drawing>,
@@ -75,10 +76,20 @@ pub struct FrameStatus {
 }
 
 impl FrameGate {
-    /// `period`: shortest time between two frames that this node is made for.
-    pub(crate) fn new(hot: Arc<Hot>, session: u16, period: Duration) -> FrameGate {
+    /// `period`: shortest time between two frames that this node is made for. `node_timeout`: silence after which the session gives a node up; a
+    /// node may lead after three tenths of it.
+    pub(crate) fn new(
+        hot: Arc<Hot>,
+        session: u16,
+        period: Duration,
+        node_timeout: Duration,
+    ) -> FrameGate {
         let period_us = u32::try_from(period.as_micros()).unwrap_or(u32::MAX);
-        hot.inbound.frames.take_part(Node::new(session, period_us));
+        let share = SUCCESSION_NS as f64 / SILENCE_NS as f64;
+        let silence_ns = node_timeout.mul_f64(share).as_nanos() as u64; // a minute at most
+        let now_ns = hot.inbound.local_ns(Instant::now());
+        let part = Part::new(session, period_us, silence_ns, now_ns);
+        hot.inbound.frames.take_part(part);
         FrameGate { hot, drawing: None }
     }
 
@@ -212,7 +223,7 @@ impl FrameGate {
 
     fn send(&self, message: Option<Arrive>) {
         if let Some(message) = message {
-            self.hot.send(&Payload::Arrive(message));
+            self.hot.send_arrive(&message);
         }
     }
 

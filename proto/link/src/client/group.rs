@@ -7,7 +7,7 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    Group, GroupMember, GroupOpener, GroupSealer, Payload,
+    Group, GroupMember, GroupOpener, GroupSealer, Payload, Role,
     group::GroupKeys,
     seal::{DatagramBuffer, OpenError, Opened},
 };
@@ -67,6 +67,20 @@ impl GroupEnd {
 
     pub(crate) fn roster(&self) -> Option<Arc<Roster>> {
         lock(&self.roster).clone()
+    }
+
+    /// Number of this member.
+    pub(crate) fn own(&self) -> u16 {
+        self.own
+    }
+
+    /// Whether the roster names this member with this role.
+    pub(crate) fn has_role(&self, member: u16, role: Role) -> bool {
+        let roster = self.roster();
+        roster.is_some_and(|roster| {
+            let mut members = roster.members.iter();
+            members.any(|other| other.sender == member && other.role == role)
+        })
     }
 
     /// Address of a member, if it is known.

@@ -2,8 +2,8 @@
 //! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
 use super::{group::GroupEnd, inbound::Inbound, multicast};
-use crate::LinkError;
-use quinn::Connection;
+use crate::{LinkError, framing::CLOSE_STOPPING};
+use quinn::{Connection, ConnectionError};
 use std::{
     io,
     net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket},
@@ -31,6 +31,8 @@ const QUICK_REQUESTS: u32 = 16;
 const QUICK_PERIOD: Duration = Duration::from_millis(5);
 /// Distance between later ones: also the sign of life that the server expects, ten of which may be lost in a row.
 const PERIOD: Duration = Duration::from_millis(50);
+/// Distance between two looks at who leads the frames, while this node takes part in them.
+const LOOK_PERIOD: Duration = Duration::from_millis(10);
 /// Longest that a send may take: the kernel's buffer is full then, and the datagram is given up.
 const SEND_TIMEOUT: Duration = Duration::from_millis(1);
 /// Shortest receive timeout: zero would mean "for ever".
@@ -163,10 +165,14 @@ impl Hot {
             Ok(opened) => opened,
             Err(error) => return self.inbound.count_refused(&error),
         };
-        self.inbound.counters.packets_received.one();
+        let counters = &self.inbound.counters;
         match (opened.header.sender, &opened.payload) {
             (SERVER_SENDER, Payload::Hot(_)) => {}
-            (sender, payload) => self.group.hand_over(sender, payload, received),
+            (sender, payload) => {
+                counters.from_members.one();
+                self.take_from_member(&opened, received);
+                self.group.hand_over(sender, payload, received);
+            }
         }
     }
 
@@ -211,7 +217,7 @@ impl Hot {
         from_server
     }
 
-    /// Starts receiving; ends by itself with the connection.
+    /// Starts receiving; ends by itself with the session.
     pub(crate) fn start(self: Arc<Hot>) -> Result<(), LinkError> {
         match self.path {
             Path::Udp { .. } => {
@@ -235,30 +241,64 @@ impl Hot {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the session is at its end.
+    /// Whether the session is at its end. One whose server fell silent or stopped is not while this node draws in step with others: it goes on
+    /// with them from node to node.
     pub(crate) fn is_over(&self) -> bool {
-        self.stop.load(Ordering::Relaxed) || self.connection.close_reason().is_some()
+        self.stop.load(Ordering::Relaxed)
+            || self
+                .connection
+                .close_reason()
+                .is_some_and(|reason| !self.outlives(&reason))
+    }
+
+    /// Whether the server's own planes are closed.
+    pub(crate) fn is_orphaned(&self) -> bool {
+        self.connection.close_reason().is_some()
+    }
+
+    /// Whether the frames go on after an end of the connection like this.
+    fn outlives(&self, reason: &ConnectionError) -> bool {
+        // Whom the server sends away, because it was silent or broke the rules, has no part in the frames of those that stay.
+        let dismissed = matches!(
+            reason,
+            ConnectionError::ApplicationClosed(close) if close.error_code != CLOSE_STOPPING
+        );
+        let by_udp = matches!(self.path, Path::Udp { .. });
+        by_udp && !dismissed && self.inbound.frames.has_company()
     }
 
     fn request_time(&self) {
         let client_sent = self.inbound.local_ns(Instant::now());
+        self.sealer.roll_by_time(client_sent);
         self.send(&Payload::TimeRequest(TimeRequest { client_sent }));
     }
 
-    fn run_udp(&self) {
+    fn run_udp(self: &Arc<Hot>) {
         let Path::Udp { socket, .. } = &self.path else {
             return;
         };
         let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
         let mut rhythm = Rhythm::start(Instant::now());
         let mut wait = None;
+        let mut look = Instant::now();
         while !self.is_over() {
             let now = Instant::now();
             if rhythm.is_due(now) {
-                self.request_time();
+                if !self.is_orphaned() {
+                    self.request_time();
+                }
+                self.give_signs(now);
+            }
+            let mut longest = rhythm.period();
+            if now >= look {
+                look = now + LOOK_PERIOD;
+                self.look_for_master(now);
+            }
+            if self.inbound.frames.takes_part() {
+                longest = longest.min(LOOK_PERIOD);
             }
             // The timeout is a system call: only when the rhythm changes. A stream of states keeps the loop going anyway.
-            let longest = rhythm.period().max(SHORTEST_WAIT);
+            let longest = longest.max(SHORTEST_WAIT);
             if wait != Some(longest) {
                 if socket.set_read_timeout(Some(longest)).is_err() {
                     self.inbound.counters.send_errors.one();

@@ -96,6 +96,9 @@ impl Inbound {
             drop(inner);
             return self.frames.release(release, opened.state_hash, local_ns);
         }
+        if let Payload::Hot(_) = opened.payload {
+            self.frames.witness(opened.state_hash);
+        }
         inner.take(opened, received, local_ns, counters);
     }
 

@@ -122,7 +122,7 @@ impl ClientLink {
     /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {
-        FrameGate::new(self.hot.clone(), self.session, period)
+        FrameGate::new(self.hot.clone(), self.session, period, self.node_timeout)
     }
 
     /// Moves the discrete events since the last call to the end of `out`: each since the join exactly once, in order, whatever the network loses. At most
@@ -264,6 +264,15 @@ impl ClientLink {
     pub fn abandon(&self) {
         self.hot.stop();
         self.hot.connection.close(CLOSE_BYE, b"the node left");
+    }
+
+    /// The server is gone: closes what belongs to it. A node that draws in step with others goes on with them, led by one of them, until the link is
+    /// dropped or abandoned; any other is left at once.
+    pub fn outlive(&self) {
+        self.hot.connection.close(CLOSE_BYE, b"the node left");
+        if self.hot.is_over() {
+            self.hot.stop();
+        }
     }
 
     /// Waits until the link is closed and returns why.

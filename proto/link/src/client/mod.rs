@@ -11,6 +11,7 @@ mod mesh_cache;
 mod meshes;
 mod multicast;
 mod options;
+mod reign;
 mod rejoiner;
 mod supervised;
 mod told;

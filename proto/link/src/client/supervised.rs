@@ -129,16 +129,21 @@ async fn supervise<T, P, F, E>(
 {
     loop {
         let end = watch(&link, rejoiner.policy().dead_after, &slot).await;
-        link.abandon();
         if end == SessionEnd::ServerStopped && !rejoiner.policy().stay {
+            link.abandon();
             lock(&slot).renewal = Some(Renewal::Ended(end));
             return;
         }
+        // Frames that are drawn in step with other nodes go on meanwhile, led by one of them.
+        link.outlive();
         match &end {
             SessionEnd::ServerStopped => tracing::info!("the server stopped; waiting for it"),
             SessionEnd::Lost(reason) => tracing::warn!("link lost: {reason}"),
         }
-        let Some((next, prepared)) = come_back(&mut rejoiner, &mut prepare, &slot).await else {
+        let back = come_back(&mut rejoiner, &mut prepare, &slot).await;
+        // Sockets and keys of the group before are of no use in the next session, and must not serve anybody.
+        link.abandon();
+        let Some((next, prepared)) = back else {
             lock(&slot).renewal = Some(Renewal::Ended(end));
             return;
         };

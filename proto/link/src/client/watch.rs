@@ -10,11 +10,12 @@ use taut_proto::membership::{Liveness, PeerWatch, SilenceLimits};
 const NEVER_HEARD: Duration = Duration::from_secs(1);
 
 /// A link as people see it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LinkHealth {
-    /// States come.
+    /// States or signs of life come.
+    #[default]
     Connected,
-    /// The server is silent, or gone.
+    /// The server is silent, or gone. The last state is held, and screens say so.
     Lost {
         /// For how long it has been.
         since: Duration,

@@ -157,7 +157,8 @@ fn admit(
         let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
         return Err((RefusalCode::WrongKey, text.to_owned()));
     }
-    shared.policy.check(claim).map_err(|shut_out| {
+    let policy = lock(&shared.policy);
+    policy.check(claim).map_err(|shut_out| {
         shared.counters.shut_out.one();
         let code = match shut_out {
             ShutOut::Role(_) => RefusalCode::RoleClosed,
@@ -192,6 +193,7 @@ fn admit(
                     number,
                     node: hello.node.clone(),
                     role: hello.role,
+                    grant: hello.grant,
                     transport: hello.transport,
                     rate_hz: hello.rate_hz,
                     joined_ns: now_ns,

@@ -15,8 +15,10 @@ use super::{
     shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
-    Counters, LinkError, STOP_REASON, SessionClock, counters::CounterCells,
-    framing::CLOSE_STOPPING, transport,
+    Counters, LinkError, STOP_REASON, SessionClock,
+    counters::CounterCells,
+    framing::{CLOSE_REFUSED, CLOSE_STOPPING},
+    transport,
 };
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
@@ -30,8 +32,8 @@ use std::{
     thread::JoinHandle,
     time::Duration,
 };
-use taut_proto::ServerPin;
 use taut_proto::membership::{Pace, SilenceLimits};
+use taut_proto::{JoinPolicy, ServerPin};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -86,7 +88,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
-        policy: options.policy,
+        policy: Mutex::new(options.policy),
         joins: Mutex::new(options.limits.guard()),
         unknown: Mutex::new(options.limits.unknown()),
         heads,
@@ -191,6 +193,32 @@ impl ServerLink {
             .iter()
             .map(|session| session.status(now_ns))
             .collect()
+    }
+
+    /// Lets in by another policy from now on, and ends the sessions of those whom it shuts out; how many.
+    pub fn set_policy(&self, policy: JoinPolicy) -> usize {
+        let shared = &self.shared;
+        let mut present = lock(&shared.policy);
+        *present = policy;
+        let mut ended = 0;
+        for session in shared.sessions.all().iter() {
+            let Err(shut_out) = present.check(session.claim()) else {
+                continue;
+            };
+            // One that left by itself just now is gone already, and told.
+            if shared.sessions.remove(session.number) {
+                let reason = shut_out.to_string();
+                tracing::info!(node = session.node, "shut out: {reason}");
+                session.connection.close(CLOSE_REFUSED, reason.as_bytes());
+                shared.counters.shut_out.one();
+                shared.tell(LinkEvent::Left {
+                    status: session.status(shared.clock.now_ns()),
+                    reason,
+                });
+                ended += 1;
+            }
+        }
+        ended
     }
 
     /// Next event, if there is one.

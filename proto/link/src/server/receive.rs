@@ -89,6 +89,7 @@ pub(crate) fn receive(
     }
     match opened.payload {
         Payload::TimeRequest(request) => {
+            session.roll_keys(now_ns); // twenty times a second are often enough
             session.send(
                 &Payload::TimeResponse(TimeResponse {
                     client_sent: request.client_sent,

@@ -15,6 +15,7 @@ use taut_proto::{
     events::is_newer,
     group::is_member,
     pace::Pace,
+    proof::{Claim, Grant},
     seal::{DatagramBuffer, OpenError, Opened, Opener, Sealer},
 };
 
@@ -22,6 +23,7 @@ pub(crate) struct Session {
     pub(crate) number: u16,
     pub(crate) node: String,
     pub(crate) role: Role,
+    grant: Grant,
     pub(crate) transport: Transport,
     pub(crate) rate_hz: u32,
     pub(crate) connection: quinn::Connection,
@@ -62,6 +64,7 @@ pub(crate) struct Admitted {
     pub(crate) number: u16,
     pub(crate) node: String,
     pub(crate) role: Role,
+    pub(crate) grant: Grant,
     pub(crate) transport: Transport,
     pub(crate) rate_hz: u32,
     pub(crate) joined_ns: u64,
@@ -78,6 +81,7 @@ impl Session {
             number: admitted.number,
             node: admitted.node,
             role: admitted.role,
+            grant: admitted.grant,
             transport: admitted.transport,
             rate_hz: admitted.rate_hz,
             connection,
@@ -98,6 +102,15 @@ impl Session {
             stats: Mutex::new(None),
             matches: Cell::default(),
             mismatches: Cell::default(),
+        }
+    }
+
+    /// What it has proven when it joined.
+    pub(crate) fn claim(&self) -> Claim<'_> {
+        Claim {
+            role: self.role,
+            node: &self.node,
+            grant: self.grant,
         }
     }
 
@@ -220,6 +233,11 @@ impl Session {
                 Sent::Failed
             }
         }
+    }
+
+    /// Changes the key of what is sent to it, if that is due by time.
+    pub(crate) fn roll_keys(&self, now_ns: u64) {
+        self.sealer.roll_by_time(now_ns);
     }
 
     /// Opens a datagram; if authentic, notes the sign of life and where it came from.

@@ -30,7 +30,8 @@ use taut_proto::{
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
-    pub(crate) policy: JoinPolicy,
+    /// Who may be in. Held while a client is admitted, so that none slips in by the one before.
+    pub(crate) policy: Mutex<JoinPolicy>,
     pub(crate) joins: Mutex<JoinGuard>,
     pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,

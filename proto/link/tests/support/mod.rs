@@ -15,9 +15,7 @@ use taut_link::{
 use taut_proto::{
     HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
     mesh_blob::Positions,
-    scene::{
-        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
-    },
+    scene::{BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription},
     state::{RunState, ToolState},
 };
 
@@ -57,13 +55,9 @@ pub fn content() -> Content {
         colour: [1.0, 0.5, 0.1, 1.0],
     };
     let description = SceneDescription {
-        name: "test".to_owned(),
         revision: 7,
-        god_object: body("peg", &meshes[0]),
         obstacles: vec![body("box", &meshes[1])],
         reference_point: [0.0, 0.0, 0.01],
-        scene_origin: PoseF64::IDENTITY,
-        display_scale: 1.0,
         screens: vec![ScreenDescription {
             name: "front".to_owned(),
             lower_left: [-0.5, 0.5, 0.0],
@@ -81,13 +75,7 @@ pub fn content() -> Content {
             },
             monitors: vec![],
         }],
-        viewer: PoseF64::IDENTITY,
-        eye_separation: 0.064,
-        near: 0.05,
-        far: 10.0,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        show: ShowOptions::default(),
+        ..SceneDescription::of_body("test", body("peg", &meshes[0]))
     };
     Content {
         description,

@@ -9,7 +9,9 @@
 //! A search that is given up has then looked at every pair of triangles nearer than the lower edge of its band. What lies below a
 //! volume is no nearer than the volume: it goes into its band or a later one.
 
-use super::facing_volumes::{FacingVolumes, open_pair_with};
+use super::descent::open_pair;
+use super::facing_volumes::FacingVolumes;
+use super::turned::TurnedNodes;
 use super::work::Work;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
@@ -108,7 +110,7 @@ fn band_of(share: f32) -> usize {
 pub(crate) fn for_nearest_triangle_pairs(
     trees: (&WideTree, &WideTree),
     (volumes, margin): (&FacingVolumes, f64),
-    bands: &mut Bands,
+    (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
     mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
@@ -131,7 +133,7 @@ pub(crate) fn for_nearest_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair_with::<false>(trees, volumes, (a, b), |(a, b), beyond| {
+        open_pair::<false>(trees, volumes, turned, (a, b), |(a, b), beyond| {
             if wanted(body.owned(a), obstacle.owned(b)) {
                 let own = band_of(1.0 + beyond * scale);
                 room &= bands.push(own.clamp(band, BANDS - 1), (a, b));

@@ -32,76 +32,58 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
-use super::work::Work;
-use crate::geometry::lanes::{LANES, Lanes};
-use crate::geometry::volume::Volume;
-use crate::geometry::wide_tree::{Below, Child, ROOT, WideNode, WideTree};
+use super::single::{apply, norm, product, sum};
+use super::turned::TurnedNodes;
+use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
 const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
 /// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
 const LENGTH_ROUNDING: f64 = 128.0 * HALF_UNIT;
-const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
-const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
+pub(super) const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
+pub(super) const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
 /// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
 const CONE_WIDENING: f64 = 1e-6;
-/// Feet may lie outside their faces by this share of the gap, twice the tolerance of the collection, and sines come with rounding.
-const FOOT_SHARE: f32 = 2e-4;
-/// Pairs that a descent holds: each level of either tree adds seven, and there are fewer levels than in the binary trees.
-pub(crate) const WIDE_STACK_CAPACITY: usize = 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
+
+/// Whose volumes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Those of the body.
+    Body = 0,
+    /// Those of the obstacle.
+    Obstacle = 1,
+}
 
 /// Tests volumes of a body against volumes of an obstacle over an interval of a motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FacingVolumes {
-    /// Obstacle from body axes at the middle of the interval.
-    rotation: [[f32; 3]; 3],
-    rotation_abs: [[f32; 3]; 3],
-    /// Origin of the body's tree, from that of the obstacle's, obstacle axes, m.
-    offset: [f32; 3],
-    /// Origin of the obstacle's tree, from that of the body's, body axes, m.
-    offset_back: [f32; 3],
-    /// Half the path of the origin of the body's tree, and half the rotation: obstacle axes, body axes.
-    half_path: [[f32; 3]; 2],
-    half_turn: [[f32; 3]; 2],
-    angle: f32,
+    /// Tells these volumes from others.
+    pub(super) serial: u32,
+    frames: [Frame; 2],
     /// Bound on half the path of any point of the body, m.
     longest_half_sweep: f32,
     /// What volumes stray by, all over the body, and rounding, m: without the margin and with it.
-    bare_stray: f32,
-    stray: f32,
-    margin: f32,
+    pub(super) bare_stray: f32,
+    pub(super) stray: f32,
+    pub(super) margin: f32,
     /// Cosine and sine of what cones are widened by.
-    turn: [f32; 2],
+    pub(super) turn: [f32; 2],
 }
 
-/// One volume, ready to be tested against eight of the other tree, in that tree's frame.
+/// How the volumes of one tree get into the other tree's frame.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Against {
-    center: [f32; 3],
-    half: [f32; 3],
-    axis: [f32; 3],
-    /// Of the volume's box: tangent and its product with the axis, and half the sides.
-    tangents: [[f32; 3]; 2],
-    sides: [f32; 2],
-    middle: f32,
-    slab: f32,
-    cosine: f32,
-    sine: f32,
-    sweep: [f32; 3],
-    spin: [f32; 3],
-    bare_stray: f32,
-    stray: f32,
-    /// Margin along the tangents of this volume, m: what faces its features is no farther aside.
-    margin_aside: f32,
-    margin: f32,
-    /// Cosine and sine of what cones are widened by.
-    turn: [f32; 2],
-    /// Along sides of boxes: what the volume's points stray by more.
-    stray_along_sides: f32,
-    stray_along_axis: f32,
-    /// Path of the volume's farthest point about its centre, and that of the eight, per radius.
-    turning: f32,
-    turning_per_radius: f32,
+pub(super) struct Frame {
+    pub(super) rotation: [[f32; 3]; 3],
+    pub(super) rotation_abs: [[f32; 3]; 3],
+    /// Origin of this tree from that of the other, other axes, m.
+    pub(super) offset: [f32; 3],
+    /// Half the path of the origin of the body's tree, m, half the rotation and its angle: other axes; zero for the obstacle, which rests.
+    pub(super) half_path: [f32; 3],
+    pub(super) half_turn: [f32; 3],
+    pub(super) angle: f32,
+    /// The same in the body's own axes.
+    own_half_path: [f32; 3],
+    pub(super) own_half_turn: [f32; 3],
 }
 
 impl FacingVolumes {
@@ -111,6 +93,7 @@ impl FacingVolumes {
         motion: &RelativeMotion,
         [from, to]: [f64; 2],
         margin: f64,
+        turned: &mut TurnedNodes,
     ) -> Self {
         let half = 0.5 * (to - from);
         let placement = motion.at(0.5 * (from + to));
@@ -120,6 +103,7 @@ impl FacingVolumes {
             [motion.velocity * half, motion.spin * half],
             margin,
             CONE_WIDENING,
+            turned,
         )
     }
 
@@ -129,6 +113,7 @@ impl FacingVolumes {
         placement: &Placement,
         margin: f64,
         tilt: f64,
+        turned: &mut TurnedNodes,
     ) -> Self {
         Self::new(
             trees,
@@ -136,6 +121,7 @@ impl FacingVolumes {
             [Vector3::zeros(); 2],
             margin,
             tilt + CONE_WIDENING,
+            turned,
         )
     }
 
@@ -145,6 +131,7 @@ impl FacingVolumes {
         [half_path, half_turn]: [Vector3<f64>; 2],
         margin: f64,
         widening: f64,
+        turned: &mut TurnedNodes,
     ) -> Self {
         let rotation = &placement.rotation;
         let origin = placement.point(&body.origin).coords;
@@ -155,15 +142,30 @@ impl FacingVolumes {
         let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
         let bare_stray = 0.5 * angle * angle * arm + LENGTH_ROUNDING * reach;
         let turn = (angle + widening).min(std::f64::consts::PI);
-        let to_body = |v: &Vector3<f64>| rotation.tr_mul(v);
-        Self {
+        let to_body = |v: &Vector3<f64>| vector(&rotation.tr_mul(v));
+        let of_body = Frame {
             rotation: single(rotation),
             rotation_abs: single(&rotation.abs()),
             offset: vector(&offset),
-            offset_back: vector(&-to_body(&offset)),
-            half_path: [vector(&path), vector(&to_body(&path))],
-            half_turn: [vector(&half_turn), vector(&to_body(&half_turn))],
+            half_path: vector(&path),
+            half_turn: vector(&half_turn),
             angle: angle as f32,
+            own_half_path: to_body(&path),
+            own_half_turn: to_body(&half_turn),
+        };
+        let of_obstacle = Frame {
+            rotation: single(&rotation.transpose()),
+            rotation_abs: single(&rotation.abs().transpose()),
+            offset: to_body(&-offset),
+            half_path: [0.0; 3],
+            half_turn: [0.0; 3],
+            angle: 0.0,
+            own_half_path: [0.0; 3],
+            own_half_turn: [0.0; 3],
+        };
+        Self {
+            serial: turned.next_serial(),
+            frames: [of_body, of_obstacle],
             longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
             bare_stray: bare_stray as f32,
             stray: (bare_stray + margin) as f32,
@@ -172,298 +174,39 @@ impl FacingVolumes {
         }
     }
 
+    #[inline(always)]
+    pub(super) fn frame(&self, side: Side) -> &Frame {
+        &self.frames[side as usize]
+    }
+
+    /// Half the path of the origin of the body's tree, m, half the rotation and its angle, in the body's axes.
+    #[inline(always)]
+    pub(super) fn path_in_body_axes(&self) -> (&[f32; 3], &[f32; 3], f32) {
+        let body = &self.frames[Side::Body as usize];
+        (&body.own_half_path, &body.own_half_turn, body.angle)
+    }
+
     /// Whether a volume of the body moves by more than `length` (m) in half the interval, to first order.
     #[inline]
     pub(crate) fn sweeps_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
         self.longest_half_sweep > length && {
-            let body = tree.volume(child);
-            let arm = apply(&self.rotation, &body.center);
-            let sweep = sum(&self.half_path[0], &product(&self.half_turn[0], &arm));
-            norm(&sweep) + self.angle * body.radius > length
-        }
-    }
-
-    /// A volume of the body, to be tested against volumes of the obstacle.
-    #[inline]
-    pub(crate) fn of_body(&self, v: &Volume) -> Against {
-        let arm = apply(&self.rotation, &v.center);
-        let turned = |d: &[f32; 3]| apply(&self.rotation, d);
-        let sweep = sum(&self.half_path[0], &product(&self.half_turn[0], &arm));
-        let half = apply(&self.rotation_abs, &v.half);
-        Against {
-            center: sum(&arm, &self.offset),
-            sweep,
-            stray_along_sides: self.angle * v.radius,
-            stray_along_axis: stray_along_axis(v, &self.half_turn[1]),
-            turning: self.angle * v.radius,
-            ..self.against(v, turned, half)
-        }
-    }
-
-    /// A volume of the obstacle, to be tested against volumes of the body.
-    #[inline]
-    pub(crate) fn of_obstacle(&self, v: &Volume) -> Against {
-        let turned = |d: &[f32; 3]| apply_transposed(&self.rotation, d);
-        let half = apply_transposed(&self.rotation_abs, &v.half);
-        Against {
-            center: sum(&turned(&v.center), &self.offset_back),
-            sweep: self.half_path[1],
-            spin: self.half_turn[1],
-            turning_per_radius: self.angle,
-            ..self.against(v, turned, half)
-        }
-    }
-
-    /// What is the same for both, at rest.
-    #[inline(always)]
-    fn against(
-        &self,
-        v: &Volume,
-        turned: impl Fn(&[f32; 3]) -> [f32; 3],
-        half: [f32; 3],
-    ) -> Against {
-        let (axis, tangent) = (turned(&v.axis), turned(&v.tangent));
-        let tangents = [tangent, product(&axis, &tangent)];
-        let sides = [
-            scaled(&tangents[0], v.along),
-            scaled(&tangents[1], v.across),
-        ];
-        // The box about the axis is the narrower one where the surface runs aslant.
-        let thickness = v.middle.abs() + v.slab;
-        let aslant = |i: usize| axis[i].abs() * thickness + sides[0][i].abs() + sides[1][i].abs();
-        let (cosine, sine) = self.widened(v);
-        Against {
-            center: [0.0; 3],
-            half: [0, 1, 2].map(|i| half[i].min(aslant(i))),
-            axis: [-axis[0], -axis[1], -axis[2]],
-            tangents,
-            sides: [v.along, v.across],
-            middle: -v.middle,
-            slab: v.slab,
-            cosine,
-            sine,
-            sweep: [0.0; 3],
-            spin: [0.0; 3],
-            bare_stray: self.bare_stray,
-            stray: self.stray,
-            margin_aside: self.margin * if cosine > 0.0 { aside(sine) } else { 1.0 },
-            margin: self.margin,
-            turn: self.turn,
-            stray_along_sides: 0.0,
-            stray_along_axis: 0.0,
-            turning: 0.0,
-            turning_per_radius: 0.0,
+            let frame = self.frame(Side::Body);
+            let arm = apply(&frame.rotation, tree.center(child));
+            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
+            norm(&sweep) + frame.angle * tree.radius(child) > length
         }
     }
 
     /// Cosine and sine of a cone that is widened by the rotation; a cone of all directions stays one.
-    #[inline]
-    fn widened(&self, v: &Volume) -> (f32, f32) {
-        let [cosine, sine] = self.turn;
-        let wide = v.sine * cosine + v.cosine * sine;
+    #[inline(always)]
+    pub(super) fn widened(&self, cosine: f32, sine: f32) -> (f32, f32) {
+        let [cos, sin] = self.turn;
+        let wide = sine.mul_add(cos, cosine * sin);
         if wide > 0.0 {
-            (v.cosine * cosine - v.sine * sine, wide)
+            (cosine.mul_add(cos, -(sine * sin)), wide)
         } else {
             (-1.0, 0.0)
         }
-    }
-}
-
-impl Against {
-    /// By how much more than the margin each of the eight is apart from this volume at least, m: infinite where they do not face, not above
-    /// zero where they may come near. NaN is passed over: what has no other bound is near.
-    ///
-    /// One loop over the lanes, without branches: the compiler makes vectors of it.
-    #[inline]
-    fn beyond<const MOVES: bool>(&self, node: &WideNode) -> Lanes {
-        let (n, q) = (node, self);
-        let mut beyond = Lanes::splat(0.0);
-        for k in 0..LANES {
-            let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
-            let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
-            let t = [n.tangent[0].0[k], n.tangent[1].0[k], n.tangent[2].0[k]];
-            let b = product(&a, &t);
-            let (slab, middle) = (n.slab.0[k], n.middle.0[k]);
-            let (along, across) = (n.along.0[k], n.across.0[k]);
-            let d = [q.center[0] - c[0], q.center[1] - c[1], q.center[2] - c[2]];
-            let cosine = dot(&a, &q.axis);
-            let (mut s, mut stray_x, mut stray_a) = ([0.0; 3], q.stray, q.stray);
-            if MOVES {
-                s = sum(&q.sweep, &product(&q.spin, &c));
-                let turning = q.turning_per_radius * n.radius.0[k];
-                stray_x += q.stray_along_sides + turning;
-                // Seen along an axis, points stray by what the axes' own turn lets them; the axes differ by a chord.
-                let chord = ((2.0 - 2.0 * cosine).max(0.0) + CHORD_ROUNDING).sqrt();
-                stray_a += q.stray_along_axis
-                    + dot(&q.spin, &b).abs() * along
-                    + dot(&q.spin, &t).abs() * across
-                    + chord * (q.turning + turning);
-            }
-            // Along the sides of the boxes.
-            let off_x = d[0].abs() - (n.half[0].0[k] + q.half[0] + s[0].abs() + stray_x);
-            let off_y = d[1].abs() - (n.half[1].0[k] + q.half[1] + s[1].abs() + stray_x);
-            let off_z = d[2].abs() - (n.half[2].0[k] + q.half[2] + s[2].abs() + stray_x);
-            // Along the axes of the eight, and along that of the one.
-            let slant = cosine.abs();
-            let height = dot(&a, &d) + cosine * q.middle - middle;
-            let [u, v] = &q.tangents;
-            let (on_u, on_v) = (dot(&a, u).abs(), dot(&a, v).abs());
-            let sides = on_u * q.sides[0] + on_v * q.sides[1];
-            let extent = slab + slant * q.slab + sides + dot(&a, &s).abs();
-            let off_a = height.abs() - extent - stray_a;
-            let behind_a = -height - extent - q.bare_stray;
-            let height = dot(&q.axis, &d) + q.middle - cosine * middle;
-            let (up_t, up_b) = (dot(&q.axis, &t), dot(&q.axis, &b));
-            let sides = up_t.abs() * along + up_b.abs() * across;
-            let extent = q.slab + slant * slab + sides + dot(&q.axis, &s).abs();
-            let off_b = height.abs() - extent - stray_a;
-            let behind_b = -height - extent - q.bare_stray;
-            // Cones: the sum of two angles is above pi where its sine is not above zero.
-            let [cos, sin] = [n.cosine.0[k], n.sine.0[k]];
-            let narrow = sin * q.cosine + cos * q.sine > 0.0;
-            let away = cosine < cos * q.cosine - sin * q.sine - COSINE_ROUNDING;
-            let mut off = larger(larger(off_x, off_y), larger(off_z, larger(off_a, off_b)));
-            let mut apart = narrow & away;
-            if !MOVES {
-                // What faces lies along a normal: in front, and as little aside as the cone is narrow.
-                let [cos_w, sin_w] = q.turn;
-                let (cos, sin) = (cos * cos_w - sin * sin_w, sin * cos_w + cos * sin_w);
-                let narrow_a = (cos > 0.0) & (sin >= 0.0);
-                let narrow_b = q.cosine > 0.0;
-                apart |= (narrow_a & (behind_a > 0.0)) | (narrow_b & (behind_b > 0.0));
-                let margin_a = q.margin * if narrow_a { aside(sin) } else { 1.0 };
-                let (tu, tv, bu, bv) = (
-                    dot(&t, u).abs(),
-                    dot(&t, v).abs(),
-                    dot(&b, u).abs(),
-                    dot(&b, v).abs(),
-                );
-                let lateral_t = (dot(&t, &d) + up_t * q.middle).abs()
-                    - (along + up_t.abs() * q.slab + tu * q.sides[0] + tv * q.sides[1])
-                    - q.bare_stray;
-                let lateral_b = (dot(&b, &d) + up_b * q.middle).abs()
-                    - (across + up_b.abs() * q.slab + bu * q.sides[0] + bv * q.sides[1])
-                    - q.bare_stray;
-                let lateral_u = (dot(u, &d) - dot(&a, u) * middle).abs()
-                    - (q.sides[0] + on_u * slab + tu * along + bu * across)
-                    - q.bare_stray;
-                let lateral_v = (dot(v, &d) - dot(&a, v) * middle).abs()
-                    - (q.sides[1] + on_v * slab + tv * along + bv * across)
-                    - q.bare_stray;
-                let of_a = larger(lateral_t, lateral_b);
-                let of_b = larger(lateral_u, lateral_v);
-                apart |= (of_a > margin_a) | (of_b > q.margin_aside);
-                off = larger(off, larger(of_a, of_b) - q.margin);
-            }
-            beyond.0[k] = if apart { f32::INFINITY } else { off };
-        }
-        beyond
-    }
-}
-
-/// The share of a distance that may lie across the axis of a cone whose sine this is.
-#[inline(always)]
-fn aside(sine: f32) -> f32 {
-    let share = sine + FOOT_SHARE;
-    if share < 1.0 { share } else { 1.0 }
-}
-
-/// Which lanes are not beyond the margin: a bit each.
-#[inline(always)]
-fn near(beyond: &Lanes) -> u32 {
-    let mut mask = 0;
-    for (k, lane) in beyond.0.iter().enumerate() {
-        let off = *lane > 0.0; // false for NaN
-        mask |= u32::from(!off) << k;
-    }
-    mask
-}
-
-/// The larger of two; the second if the first is NaN.
-#[inline(always)]
-fn larger(x: f32, y: f32) -> f32 {
-    if x > y { x } else { y }
-}
-
-/// What the points of a volume stray by from its centre along its axis while they turn, the turn in the mesh's axes.
-#[inline(always)]
-fn stray_along_axis(v: &Volume, turn: &[f32; 3]) -> f32 {
-    let across = product(&v.axis, &v.tangent);
-    dot(turn, &across).abs() * v.along + dot(turn, &v.tangent).abs() * v.across
-}
-
-/// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
-/// down; stops when it returns false. Pairs of volumes that own features `wanted` refuses, (body, obstacle), are not opened.
-pub(crate) fn for_facing_triangle_pairs(
-    (body, obstacle): (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
-    stack: &mut Vec<(Child, Child)>,
-    work: &mut Work,
-    wanted: impl Fn(u8, u8) -> bool,
-    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
-) {
-    stack.clear();
-    stack.push((ROOT, ROOT));
-    while let Some((a, b)) = stack.pop() {
-        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-            work.triangle_pairs += 1;
-            if !visit(t, s, work) {
-                return;
-            }
-            continue;
-        }
-        work.node_pairs += 1;
-        open_pair::<false>((body, obstacle), volumes, (a, b), |(a, b)| {
-            if wanted(body.owned(a), obstacle.owned(b)) {
-                stack.push((a, b));
-            }
-        });
-    }
-}
-
-/// Opens the thicker of two volumes that are not both triangles, and hands on its children that face the other.
-#[inline]
-pub(crate) fn open_pair<const MOVES: bool>(
-    trees: (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
-    pair: (Child, Child),
-    mut found: impl FnMut((Child, Child)),
-) {
-    open_pair_with::<MOVES>(trees, volumes, pair, |pair, _| found(pair));
-}
-
-/// The same; each child comes with how much farther than the margin it is apart at least, m: not above zero.
-#[inline]
-pub(super) fn open_pair_with<const MOVES: bool>(
-    (body, obstacle): (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
-    (a, b): (Child, Child),
-    mut found: impl FnMut((Child, Child), f32),
-) {
-    match (body.below(a), obstacle.below(b)) {
-        (Below::Node(node), below)
-            if matches!(below, Below::Triangle(_)) || body.thickness(a) > obstacle.thickness(b) =>
-        {
-            let against = volumes.of_obstacle(obstacle.volume(b));
-            let beyond = against.beyond::<MOVES>(body.node(node));
-            for_each_child(node, &beyond, |child, beyond| found((child, b), beyond));
-        }
-        (_, Below::Node(node)) => {
-            let against = volumes.of_body(body.volume(a));
-            let beyond = against.beyond::<MOVES>(obstacle.node(node));
-            for_each_child(node, &beyond, |child, beyond| found((a, child), beyond));
-        }
-        (_, Below::Triangle(_)) => found((a, b), 0.0),
-    }
-}
-
-#[inline(always)]
-fn for_each_child(node: u32, beyond: &Lanes, mut each: impl FnMut(Child, f32)) {
-    let mut mask = near(beyond);
-    while mask != 0 {
-        let lane = mask.trailing_zeros();
-        each(node * LANES as u32 + lane, beyond.0[lane as usize]);
-        mask &= mask - 1;
     }
 }
 
@@ -473,47 +216,4 @@ fn single(m: &Matrix3<f64>) -> [[f32; 3]; 3] {
 
 fn vector(v: &Vector3<f64>) -> [f32; 3] {
     [v.x as f32, v.y as f32, v.z as f32]
-}
-
-#[inline(always)]
-fn apply(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
-    [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
-}
-
-#[inline(always)]
-fn apply_transposed(m: &[[f32; 3]; 3], v: &[f32; 3]) -> [f32; 3] {
-    [
-        m[0][0] * v[0] + m[1][0] * v[1] + m[2][0] * v[2],
-        m[0][1] * v[0] + m[1][1] * v[1] + m[2][1] * v[2],
-        m[0][2] * v[0] + m[1][2] * v[1] + m[2][2] * v[2],
-    ]
-}
-
-#[inline(always)]
-fn scaled(v: &[f32; 3], length: f32) -> [f32; 3] {
-    [v[0] * length, v[1] * length, v[2] * length]
-}
-
-#[inline(always)]
-fn sum(v: &[f32; 3], w: &[f32; 3]) -> [f32; 3] {
-    [v[0] + w[0], v[1] + w[1], v[2] + w[2]]
-}
-
-#[inline(always)]
-fn product(v: &[f32; 3], w: &[f32; 3]) -> [f32; 3] {
-    [
-        v[1] * w[2] - v[2] * w[1],
-        v[2] * w[0] - v[0] * w[2],
-        v[0] * w[1] - v[1] * w[0],
-    ]
-}
-
-#[inline(always)]
-fn dot(v: &[f32; 3], w: &[f32; 3]) -> f32 {
-    v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
-}
-
-#[inline(always)]
-fn norm(v: &[f32; 3]) -> f32 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }

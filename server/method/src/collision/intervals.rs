@@ -2,6 +2,7 @@
 
 use super::facing_volumes::FacingVolumes;
 use super::motion::{Placement, RelativeMotion};
+use super::turned::TurnedNodes;
 use crate::geometry::wide_tree::WideTree;
 
 /// Most halvings of a motion.
@@ -61,13 +62,14 @@ impl Intervals {
         number: u32,
         motion: &RelativeMotion,
         trees: (&WideTree, &WideTree),
+        turned: &mut TurnedNodes,
     ) -> &Interval {
         let place = &mut self.made[number as usize];
         if place.is_none() {
             self.numbers.push(number);
         }
         let (end, margin) = (self.end, self.margin);
-        place.get_or_insert_with(|| make(number, end, margin, motion, trees))
+        place.get_or_insert_with(|| make(number, end, margin, motion, trees, turned))
     }
 }
 
@@ -78,13 +80,14 @@ fn make(
     margin: f64,
     motion: &RelativeMotion,
     trees: (&WideTree, &WideTree),
+    turned: &mut TurnedNodes,
 ) -> Interval {
     let [from, to] = ends(number, end);
     Interval {
         from,
         to,
         start: motion.at(from),
-        volumes: FacingVolumes::over(trees, motion, [from, to], margin),
+        volumes: FacingVolumes::over(trees, motion, [from, to], margin, turned),
     }
 }
 

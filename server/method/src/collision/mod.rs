@@ -2,6 +2,8 @@
 
 mod advancement;
 mod bands;
+mod beyond;
+mod descent;
 mod distance;
 mod facing_volumes;
 mod gaps;
@@ -10,8 +12,11 @@ mod intervals;
 mod known_apart;
 mod linear;
 mod motion;
+mod passed;
+mod single;
 mod still_box;
 mod time_of_impact;
+mod turned;
 mod work;
 mod workspace;
 
@@ -24,6 +29,8 @@ pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
 pub(crate) use bands::for_nearest_triangle_pairs;
-pub(crate) use facing_volumes::{FacingVolumes, for_facing_triangle_pairs};
+pub(crate) use descent::for_facing_triangle_pairs;
+pub(crate) use facing_volumes::FacingVolumes;
 pub(crate) use motion::{Placement, RelativeMotion};
+pub(crate) use passed::PassedPair;
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

@@ -22,7 +22,8 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
-use super::facing_volumes::{FacingVolumes, for_facing_triangle_pairs, open_pair};
+use super::descent::{for_facing_triangle_pairs, open_pair};
+use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
 use super::motion::{Motion, RelativeMotion};
@@ -181,13 +182,19 @@ impl Problem<'_> {
             return false;
         }
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
-        let volumes = FacingVolumes::still(trees, &start, 0.0, std::f64::consts::PI);
+        let volumes = FacingVolumes::still(
+            trees,
+            &start,
+            0.0,
+            std::f64::consts::PI,
+            &mut workspace.turned,
+        );
         let mut crosses = false;
         let any = |_, _| true;
         for_facing_triangle_pairs(
             trees,
             &volumes,
-            &mut workspace.pairs,
+            (&mut workspace.pairs, &mut workspace.turned),
             work,
             any,
             |a, b, _| {
@@ -253,11 +260,14 @@ impl Problem<'_> {
             stack,
             hints,
             intervals,
+            passed,
+            turned,
             ..
         } = workspace;
         intervals.restart(first.time, search.gaps.stop);
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
+        passed.restart();
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
         while let Some((a, b, mut index)) = stack.pop() {
@@ -265,7 +275,7 @@ impl Problem<'_> {
             while index.ilog2() < cuts && intervals.middle(index) >= first.time {
                 index *= 2;
             }
-            let interval = intervals.get(index, self.relative, trees);
+            let interval = intervals.get(index, self.relative, trees, turned);
             let [from, to] = [interval.from, interval.to.min(first.time)];
             let later = from >= first.time || (first.is_near() && from > 0.0);
             if (later && from > 0.0) || first.overlapping {
@@ -273,6 +283,7 @@ impl Problem<'_> {
             }
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
+                passed.push((t, s));
                 let pair = self.pair(t, s);
                 if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
                     && !hints.contains(&(t, s))
@@ -295,7 +306,7 @@ impl Problem<'_> {
                 stack.push((a, b, 2 * index));
                 continue;
             }
-            open_pair::<true>(trees, &interval.volumes, (a, b), |(a, b)| {
+            open_pair::<true>(trees, &interval.volumes, turned, (a, b), |(a, b), _| {
                 stack.push((a, b, index));
             });
         }

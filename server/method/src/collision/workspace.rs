@@ -3,10 +3,12 @@
 use arrayvec::ArrayVec;
 
 use super::bands::Bands;
-use super::facing_volumes::WIDE_STACK_CAPACITY;
+use super::descent::WIDE_STACK_CAPACITY;
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
+use super::passed::PassedPairs;
 use super::still_box::STACK_CAPACITY;
+use super::turned::TurnedNodes;
 use crate::constraint::Contact;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
@@ -26,6 +28,8 @@ pub struct CollisionWorkspace {
     pub(super) stack: Vec<(u32, u32, u32)>,
     pub(super) intervals: Intervals,
     pub(super) apart: KnownApart,
+    pub(crate) passed: PassedPairs,
+    pub(crate) turned: TurnedNodes,
     pub(crate) candidates: Vec<Contact>,
     pub(crate) candidate_limit: usize,
     pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
@@ -45,6 +49,8 @@ impl CollisionWorkspace {
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),
+            passed: PassedPairs::new(),
+            turned: TurnedNodes::new(),
             candidates: Vec::with_capacity(candidates),
             candidate_limit: candidates,
             hints: ArrayVec::new(),

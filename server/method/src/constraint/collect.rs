@@ -12,6 +12,9 @@ use crate::collision::{
 use crate::geometry::Mesh;
 use crate::spatial::Pose;
 
+/// The bits of owned features that stand for corners; those of sides follow.
+const CORNERS: u8 = 7;
+
 /// Appends every contact within `activation_distance` (m) to `out`, nearest first, as many as its capacity has room for.
 ///
 /// A contact is a pair of features that face each other ([`Contact`]); faces that lie on faces, and parallel edges, are represented by their
@@ -61,7 +64,13 @@ pub(crate) fn collect_bounded(
 ) -> Collected {
     let placement = Placement::of(body_pose, obstacle_pose);
     let trees = (body.wide_tree(), obstacle.wide_tree());
-    let volumes = FacingVolumes::still(trees, &placement, activation_distance, LOOK_AHEAD_TILT);
+    let volumes = FacingVolumes::still(
+        trees,
+        &placement,
+        activation_distance,
+        LOOK_AHEAD_TILT,
+        &mut workspace.turned,
+    );
     let facing = Facing {
         body,
         obstacle,
@@ -89,10 +98,10 @@ pub(crate) fn collect_bounded(
     };
     let mut complete_within = activation_distance;
     if pairs == u64::MAX {
-        let stack = &mut workspace.pairs;
+        let stack = (&mut workspace.pairs, &mut workspace.turned);
         for_facing_triangle_pairs(trees, &volumes, stack, work, can_touch, look);
     } else {
-        let bands = &mut workspace.bands;
+        let bands = (&mut workspace.bands, &mut workspace.turned);
         let volumes = (&volumes, activation_distance);
         let within = for_nearest_triangle_pairs(trees, volumes, bands, work, can_touch, &mut look);
         complete_within = complete_within.min(within);
@@ -123,7 +132,6 @@ pub(crate) fn collect_bounded(
 /// meets the other's face, sides meet sides.
 #[inline]
 fn can_touch(on_a: u8, on_b: u8) -> bool {
-    const CORNERS: u8 = 7;
     (on_a | on_b) & CORNERS != 0 || (on_a != 0 && on_b != 0)
 }
 
@@ -138,36 +146,49 @@ pub(super) fn for_contacts(
         facing.body.owned_features(pair.a),
         facing.obstacle.owned_features(pair.b),
     );
-    let corner = |owned: u8, k: usize| owned & (1 << k) != 0;
-    let side = |owned: u8, k: usize| owned & (8 << k) != 0;
-    for k in 0..3 {
-        if corner(on_a, k) {
-            work.feature_pairs += 1;
-            facing.vertex_face(pair, k).map(&mut found);
-        }
-        if corner(on_b, k) {
-            work.feature_pairs += 1;
-            facing.face_vertex(pair, k).map(&mut found);
-        }
-    }
-    if on_a == 0 || on_b == 0 {
-        return;
-    }
+    let (corners_a, corners_b) = (on_a & CORNERS, on_b & CORNERS);
+    let (sides_a, sides_b) = (on_a >> 3, on_b >> 3);
+    for_bits(corners_a, |k| {
+        work.feature_pairs += 1;
+        facing.vertex_face(pair, k).map(&mut found);
+    });
+    for_bits(corners_b, |k| {
+        work.feature_pairs += 1;
+        facing.face_vertex(pair, k).map(&mut found);
+    });
     work.feature_pairs += u64::from(on_a.count_ones() * on_b.count_ones());
-    for i in 0..3 {
-        for j in 0..3 {
-            if side(on_a, i) && side(on_b, j) {
-                facing.edge_edge(pair, i, j).map(&mut found);
-            }
-            if corner(on_a, i) && side(on_b, j) {
-                facing.vertex_edge(pair, i, j).map(&mut found);
-            }
-            if side(on_a, i) && corner(on_b, j) {
-                facing.edge_vertex(pair, i, j).map(&mut found);
-            }
-            if corner(on_a, i) && corner(on_b, j) {
-                facing.vertex_vertex(pair, i, j).map(&mut found);
-            }
+    if sides_a != 0 && sides_b != 0 {
+        let of_body = facing.arcs_of_body(pair, sides_a);
+        for_bits(sides_b, |j| {
+            let on_obstacle = facing.arc_of_obstacle(pair, j);
+            for_bits(sides_a, |i| {
+                if of_body[i].may_cross(&on_obstacle) {
+                    facing.edge_edge(pair, i, j).map(&mut found);
+                }
+            });
+        });
+    }
+    for_bits(corners_a, |i| {
+        for_bits(sides_b, |j| {
+            facing.vertex_edge(pair, i, j).map(&mut found);
+        });
+        for_bits(corners_b, |j| {
+            facing.vertex_vertex(pair, i, j).map(&mut found);
+        });
+    });
+    for_bits(corners_b, |j| {
+        for_bits(sides_a, |i| {
+            facing.edge_vertex(pair, i, j).map(&mut found);
+        });
+    });
+}
+
+/// Calls `each` with the places of the bits that are set, lowest first; those of three.
+#[inline(always)]
+pub(super) fn for_bits(mask: u8, mut each: impl FnMut(usize)) {
+    for k in 0..3 {
+        if mask & (1 << k) != 0 {
+            each(k);
         }
     }
 }

@@ -255,8 +255,8 @@ impl Facing<'_> {
         }
     }
 
-    /// Whether features of the two triangles can face each other along some line between the triangles: each line is within a
-    /// cone about that of the middles, each normal within the cones of the triangles. To tolerance; true for NaN.
+    /// Whether features of the two triangles can face each other within the activation distance along some line between the triangles: each
+    /// line is within a cone about that of the middles, each normal within the cones of the triangles. To tolerance; true for NaN.
     pub(super) fn may_face(&self, pair: &Pair) -> bool {
         let third = 1.0 / 3.0;
         let middle = |t: &[Point3<f64>; 3]| (t[0].coords + t[1].coords + t[2].coords) * third;
@@ -269,12 +269,18 @@ impl Facing<'_> {
         let line = x - y;
         // (a + b)^2 <= 2 a^2 + 2 b^2: no root.
         let spread = 2.0 * (radius(&pair.x, &x) + radius(&pair.y, &y));
-        let squared = line.norm_squared() - spread;
+        let (square, spread) = (line.norm_squared(), spread.sqrt());
+        let within = spread + self.activation_distance * (1.0 + FOOT_TOLERANCE_PER_GAP);
+        let far = square > within * within; // false for NaN
+        if far {
+            return false;
+        }
+        let squared = square - spread * spread;
         let apart = squared > 0.0; // false for NaN
         if !apart {
             return true;
         }
-        let (along, spread) = (squared.sqrt(), spread.sqrt());
+        let along = squared.sqrt();
         let tilt = LOOK_AHEAD_TILT * (line.x.abs() + line.y.abs() + line.z.abs());
         let off_line = |cosine: f64, cone: &NormalCone| {
             // cos(sum + tilt) >= cos(sum) - tilt, for cones narrower than a right angle.

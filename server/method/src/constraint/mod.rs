@@ -1,5 +1,6 @@
 //! Contacts between features, and the constraint set made of them.
 
+mod arc;
 mod collect;
 mod contact;
 mod facing;

@@ -10,7 +10,7 @@ pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 
 impl Lanes {
     /// The same number eight times.
-    pub(crate) fn splat(x: f32) -> Self {
+    pub(crate) const fn splat(x: f32) -> Self {
         Self([x; LANES])
     }
 }

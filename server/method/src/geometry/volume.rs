@@ -35,8 +35,7 @@ const STRIP_SHARE: f64 = 0.1;
 const LEAST_TANGENT: f64 = 0.5;
 
 /// What a child of a node of the wide tree holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(align(32))]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Volume {
     pub(crate) center: [f32; 3],
     pub(crate) half: [f32; 3],
@@ -49,10 +48,8 @@ pub(crate) struct Volume {
     pub(crate) radius: f32,
     pub(crate) cosine: f32,
     pub(crate) sine: f32,
-    /// What is below, as the wide tree has it.
-    pub(super) below: u32,
     /// Which kinds of features the triangles inside own, as the bits of [`Mesh::owned_features`](crate::Mesh::owned_features).
-    pub(super) owned: u32,
+    pub(super) owned: u8,
 }
 
 /// What the build of a wide tree reads.
@@ -120,10 +117,9 @@ impl Source<'_> {
             radius: outward(radius.sqrt()),
             cosine: angle.cos() as f32,
             sine: angle.sin() as f32,
-            below: 0,
             owned: inside
                 .iter()
-                .fold(0, |kinds, t| kinds | u32::from(self.owned[*t as usize])),
+                .fold(0, |kinds, t| kinds | self.owned[*t as usize]),
         }
     }
 

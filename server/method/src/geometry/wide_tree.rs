@@ -36,6 +36,17 @@ pub(crate) struct WideNode {
     pub(crate) sine: Lanes,
 }
 
+/// What a descent asks of a child before it opens it: half a cache line.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+struct Entry {
+    center: [f32; 3],
+    radius: f32,
+    thickness: f32,
+    below: u32,
+    owned: u8,
+}
+
 /// What lies below a child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Below {
@@ -49,8 +60,8 @@ pub(crate) enum Below {
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree {
     nodes: Vec<WideNode>,
-    /// The children of all nodes, by number.
-    volumes: Vec<Volume>,
+    /// What a descent asks of the children of all nodes, by number.
+    entries: Vec<Entry>,
     /// Point of the mesh's frame from which all coordinates are taken, m.
     pub(crate) origin: Point3<f64>,
     /// Largest distance of a vertex from `origin`, m.
@@ -102,7 +113,7 @@ impl WideTree {
             .sqrt();
         let mut tree = Self {
             nodes: Vec::new(),
-            volumes: Vec::new(),
+            entries: Vec::new(),
             origin: source.origin,
             reach,
         };
@@ -110,7 +121,7 @@ impl WideTree {
         let whole = source.volume(0, None);
         tree.set(ROOT, whole);
         let below = source.grow(0, &whole.tangent, &mut tree);
-        tree.volumes[ROOT as usize].below = below;
+        tree.entries[ROOT as usize].below = below;
         tree
     }
 
@@ -118,14 +129,20 @@ impl WideTree {
     fn add_node(&mut self) -> u32 {
         let index = self.nodes.len() as u32;
         self.nodes.push(WideNode::empty());
-        self.volumes
-            .resize(self.nodes.len() * LANES, Volume::default());
+        self.entries
+            .resize(self.nodes.len() * LANES, Entry::default());
         index
     }
 
     fn set(&mut self, child: Child, volume: Volume) {
         self.nodes[child as usize / LANES].set(child as usize % LANES, &volume);
-        self.volumes[child as usize] = volume;
+        self.entries[child as usize] = Entry {
+            center: volume.center,
+            radius: volume.radius,
+            thickness: volume.slab + THICKNESS_PER_RADIUS * volume.radius,
+            below: 0,
+            owned: volume.owned,
+        };
     }
 
     /// Node `index`.
@@ -134,35 +151,34 @@ impl WideTree {
         &self.nodes[index as usize]
     }
 
-    /// What a child holds.
+    /// Centre of a child's ball, from the tree's `origin`, m.
     #[inline]
-    pub(crate) fn volume(&self, child: Child) -> &Volume {
-        &self.volumes[child as usize]
+    pub(crate) fn center(&self, child: Child) -> &[f32; 3] {
+        &self.entries[child as usize].center
     }
 
     /// Radius of a child's ball, m.
     #[inline]
     pub(crate) fn radius(&self, child: Child) -> f32 {
-        self.volumes[child as usize].radius
+        self.entries[child as usize].radius
     }
 
     /// What tells which of two volumes is to be opened: the thicker one, m; of flat ones, the larger.
     #[inline]
     pub(crate) fn thickness(&self, child: Child) -> f32 {
-        let volume = &self.volumes[child as usize];
-        volume.slab + THICKNESS_PER_RADIUS * volume.radius
+        self.entries[child as usize].thickness
     }
 
     /// Which kinds of features the triangles below a child own.
     #[inline]
     pub(crate) fn owned(&self, child: Child) -> u8 {
-        self.volumes[child as usize].owned as u8
+        self.entries[child as usize].owned
     }
 
     /// What lies below a child.
     #[inline]
     pub(crate) fn below(&self, child: Child) -> Below {
-        let below = self.volumes[child as usize].below;
+        let below = self.entries[child as usize].below;
         if below & TRIANGLE != 0 {
             Below::Triangle(below & !TRIANGLE)
         } else {
@@ -186,6 +202,26 @@ impl WideNode {
             radius: zero,
             cosine: zero,
             sine: zero,
+        }
+    }
+
+    /// The volume of lane `k`, without what lies below.
+    #[cfg(test)]
+    fn child(&self, k: usize) -> Volume {
+        let three = |v: &[Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
+        Volume {
+            center: three(&self.center),
+            half: three(&self.half),
+            axis: three(&self.axis),
+            tangent: three(&self.tangent),
+            middle: self.middle.0[k],
+            slab: self.slab.0[k],
+            along: self.along.0[k],
+            across: self.across.0[k],
+            radius: self.radius.0[k],
+            cosine: self.cosine.0[k],
+            sine: self.sine.0[k],
+            owned: 0,
         }
     }
 
@@ -218,7 +254,7 @@ impl Source<'_> {
         for (child, opened) in (index * LANES as u32..).zip(&below[..count]) {
             let volume = self.volume(*opened, Some(tangent));
             tree.set(child, volume);
-            tree.volumes[child as usize].below = self.grow(*opened, &volume.tangent, tree);
+            tree.entries[child as usize].below = self.grow(*opened, &volume.tangent, tree);
         }
         index
     }
@@ -268,7 +304,9 @@ mod tests {
                 .flat_map(|c| below(mesh, c))
                 .collect(),
         };
-        let v = tree.volume(child);
+        let v = tree
+            .node(child / LANES as u32)
+            .child(child as usize % LANES);
         let wide = |x: [f32; 3]| Vector3::from(x.map(f64::from));
         let (center, axis) = (tree.origin + wide(v.center), wide(v.axis));
         let cone = f64::from(v.sine).atan2(f64::from(v.cosine));

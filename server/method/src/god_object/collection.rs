@@ -9,9 +9,20 @@ impl GodObject {
     /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
     pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
         self.collected_within = distance;
-        if self.refresh(distance, work) {
-            return;
+        if !self.refresh(distance, false, work) {
+            self.collect_all(distance, work);
         }
+    }
+
+    /// The same for the next sub-step, after a motion: where rows are found as motions need them, what the motion passed will do.
+    pub(super) fn collect_after_motion(&mut self, distance: f64, work: &mut Work) {
+        self.collected_within = distance;
+        if !self.refresh(distance, true, work) {
+            self.collect_all(distance, work);
+        }
+    }
+
+    fn collect_all(&mut self, distance: f64, work: &mut Work) {
         let pairs_before = work.triangle_pairs + work.feature_pairs;
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;

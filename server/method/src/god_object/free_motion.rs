@@ -9,7 +9,11 @@ impl GodObject {
     pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
         let settings = self.advancement();
         let mut free = 1.0;
-        for (obstacle, placed) in self.world.obstacles.iter().zip(&self.obstacles) {
+        self.collision.passed.clear();
+        let placed = self.world.obstacles.iter().zip(&self.obstacles);
+        for (index, (obstacle, placed)) in placed.enumerate() {
+            let index = u16::try_from(index).unwrap_or(u16::MAX);
+            self.collision.passed.begin(index);
             let found = shape::time_of_impact(
                 &self.world.body,
                 &motion,

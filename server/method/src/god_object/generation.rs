@@ -17,6 +17,9 @@ use crate::world::World;
 const TOLERANCE_PER_REST_DISTANCE: f64 = 0.01;
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
+/// Candidates of a collection that was given up are carried so many rest distances: features are larger, and to collect again would find some others
+/// of too many.
+const CARRIED_REST_DISTANCES: f64 = 4.0;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
@@ -31,25 +34,56 @@ impl GodObject {
             .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
     }
 
-    /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
-    /// collected last do not reach as far. False where every pair becomes a row.
-    pub(super) fn refresh(&mut self, distance: f64, work: &mut Work) -> bool {
+    /// The known rows at the present pose; and the facing pairs within `distance` (m) to choose from, where those that were
+    /// collected last do not reach as far: every one, or after a motion those that it passed. False where every pair becomes a row.
+    pub(super) fn refresh(&mut self, distance: f64, after_motion: bool, work: &mut Work) -> bool {
         let Some(mut reduction) = self.reduction.take() else {
             return false;
         };
         if let Some(at) = self.place() {
-            reduction.move_to(&at, &self.collision.hints, work);
+            reduction.move_to(&at, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
-            // Where the work allows no more, a longer way is gone before the next collection.
-            let reaches = moved + distance.min(LONGER_WAY * within) <= within;
-            self.set.gap_min = reduction.gap_min();
-            if !reaches || reduction.is_outdated() {
+            // Where the work allows no more, a longer way is gone before the next collection. What lies on that way was no candidate where it
+            // began, either.
+            let carried = CARRIED_REST_DISTANCES * at.rest_distance;
+            let reaches = moved + distance.min(LONGER_WAY * within) <= within
+                || (reduction.was_given_up() && moved <= carried);
+            if reaches && !reduction.is_outdated() {
+                reduction.take_hints(&at, &self.collision.hints, work);
+                self.set.gap_min = reduction.gap_min();
+            } else if after_motion {
+                self.collect_passed(&mut reduction, &at, distance, work);
+            } else {
                 self.collect_candidates(&mut reduction, &at, distance, work);
             }
         }
         self.reduction = Some(reduction);
         self.write_set();
         true
+    }
+
+    /// The facing pairs within `distance`, m, of those that the last motion's searches came across: what the next sub-step may press
+    /// against. Where there were too many, every facing pair.
+    ///
+    /// A row that this misses stops the next motion and is found there. A set that is published is collected as a whole.
+    fn collect_passed(
+        &mut self,
+        reduction: &mut RowReduction,
+        at: &At,
+        distance: f64,
+        work: &mut Work,
+    ) {
+        match self.collision.passed.all() {
+            Some(passed) => {
+                reduction.begin(at, 0.0);
+                reduction.offer_passed(at, passed, distance, work);
+                self.set.gap_min = reduction.gap_min();
+            }
+            None => {
+                reduction.take_hints(at, &self.collision.hints, work);
+                self.collect_candidates(reduction, at, distance, work);
+            }
+        }
     }
 
     /// The facing pairs within `distance`, m, nearest first, as far as the work allows: every obstacle has its share of it.
@@ -81,6 +115,8 @@ impl GodObject {
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, &self.contacts, &collected);
         }
+        let looked_at = self.settings.look_ahead_pairs - pairs;
+        self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));
         // Known rows may be nearer than what a collection that was given up has found.
         self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
     }
@@ -95,13 +131,13 @@ impl GodObject {
         }
     }
 
-    /// The candidates of the present pose, within the distance of the last collection.
+    /// The candidates of the present pose, within the distance of the last collection, after a motion that left some behind.
     fn collect_again(&mut self, work: &mut Work) {
         let Some(mut reduction) = self.reduction.take() else {
             return;
         };
         if let Some(at) = self.place() {
-            self.collect_candidates(&mut reduction, &at, self.collected_within, work);
+            self.collect_passed(&mut reduction, &at, self.collected_within, work);
         }
         self.reduction = Some(reduction);
     }

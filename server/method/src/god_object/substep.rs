@@ -15,7 +15,7 @@ use crate::spatial::{
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
 /// A motion that is a smaller share of the way that the update has made is not worth a search.
-const WORTH_SHARE: f64 = 0.05;
+const WORTH_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
 const TIGHT_GAP_SHARE: f64 = 0.5;
 /// Motions that turn back on each other more often than this go to and fro about where they end: the next update is nearer.
@@ -99,7 +99,7 @@ impl GodObject {
                 .activation_distance
                 .min(2.0 * self.settings.rest_distance + covered)
         };
-        self.collect(distance, &mut report.work);
+        self.collect_after_motion(distance, &mut report.work);
 
         // The linear rows foretell no gap below the rest distance that was not there before.
         let lost = gap_before - self.set.gap_min;

@@ -3,7 +3,7 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 
-use super::parse::{Files, bind, port};
+use super::parts::{Files, bind, port};
 use crate::document::{Range, Section};
 
 /// Fastest stream to those who look on, 1/s.

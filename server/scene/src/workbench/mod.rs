@@ -1,14 +1,21 @@
 //! The workbench: screens, nodes, viewer, device, network, frames, monitoring, real time.
 
 mod admission;
+mod device;
+mod displays;
 mod dynamics;
 mod frames;
 mod load;
 mod looking_on;
+mod monitoring;
+mod network;
 mod parse;
+mod parts;
+mod realtime;
 mod safety;
 mod spec;
 mod tracker;
+mod viewer;
 
 pub use dynamics::DeviceDynamics;
 pub use frames::{FrameSwap, Frames};

@@ -317,7 +317,7 @@ pub struct Safety {
 
 impl Safety {
     /// Time in which a force fades once its inputs are lost, ms: fixed, because what is promised of faults rests on it.
-    pub const FADE_MS: f64 = 100.0;
+    pub const FADE_MS: f64 = 95.0;
 }
 
 impl Default for Safety {

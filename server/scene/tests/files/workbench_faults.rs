@@ -165,7 +165,7 @@ fn every_fault_names_file_line_and_key() {
             "# max_force = 20.0 ",
             "max_force = 60.0 #",
             "max_force = 60",
-            "`max_force` in [safety] is 60 N, which cannot fade in 100 ms at `force_slew` = 0.5 N/ms; use at most 50 N, or a larger `force_slew`",
+            "`max_force` in [safety] is 60 N, which cannot fade in 95 ms at `force_slew` = 0.5 N/ms; use at most 47.5 N, or a larger `force_slew`",
         ),
         (
             "# rearm = \"manual\" ",

@@ -6,21 +6,19 @@
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, ClusterKey, Role, Transport, connect, create_key_file};
+use taut_link::{ClientOptions, ClusterKey, Role, Transport, connect};
 use taut_proto::{InputSample, PoseF64, version::MAGIC};
-use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
+use super::program::{Served, Workbench, set};
 use super::{BenchError, request_fifo};
 
-/// The workbench file that is shipped.
-const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
 /// Longest wait for the program to serve or to end.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
@@ -105,112 +103,6 @@ pub fn measure(
     Ok(result)
 }
 
-/// `taut serve` in a directory of its own.
-struct Served {
-    child: Child,
-    lines: BufReader<std::process::ChildStderr>,
-    directory: TempDir,
-    quic: String,
-    udp: String,
-}
-
-impl Served {
-    fn start(program: &Path) -> Result<Served, BenchError> {
-        let directory = tempfile::tempdir()?;
-        let (config, key) = write_workbench(directory.path())?;
-        let mut child = Command::new(program)
-            .args(["serve", "--json", "--no-monitor", "--config"])
-            .arg(config)
-            .arg("--key")
-            .arg(key)
-            .current_dir(directory.path())
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()?;
-        let Some(errors) = child.stderr.take() else {
-            return Err(BenchError::Missing(
-                "the program has no standard error".to_owned(),
-            ));
-        };
-        let mut served = Served {
-            child,
-            lines: BufReader::new(errors),
-            directory,
-            quic: String::new(),
-            udp: String::new(),
-        };
-        (served.quic, served.udp) = served.addresses()?;
-        Ok(served)
-    }
-
-    /// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
-    fn addresses(&mut self) -> Result<(String, String), BenchError> {
-        let (mut line, mut all) = (String::new(), String::new());
-        while self.lines.read_line(&mut line)? > 0 {
-            let found = line.trim_end().strip_prefix("serving on ");
-            let both =
-                found.and_then(|text| text.strip_suffix(" (poses)")?.split_once(" (control) and "));
-            if let Some((quic, udp)) = both {
-                return Ok((quic.to_owned(), udp.to_owned()));
-            }
-            all.push_str(&line);
-            line.clear();
-        }
-        Err(BenchError::Missing(format!(
-            "the program does not serve: {}",
-            all.trim()
-        )))
-    }
-
-    fn key(&self) -> PathBuf {
-        self.directory.path().join("cluster.key")
-    }
-
-    /// Ends it as Ctrl-C does; its report.
-    fn stop(mut self) -> Result<serde_json::Value, BenchError> {
-        let id = rustix::process::Pid::from_child(&self.child);
-        rustix::process::kill_process(id, rustix::process::Signal::INT)
-            .map_err(std::io::Error::from)?;
-        let mut text = String::new();
-        if let Some(mut out) = self.child.stdout.take() {
-            out.read_to_string(&mut text)?;
-        }
-        self.child.wait()?;
-        serde_json::from_str(&text).map_err(|error| {
-            BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))
-        })
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        let _ = self.child.kill(); // it has ended where all went well
-        let _ = self.child.wait();
-    }
-}
-
-/// The shipped workbench on free ports, and a key; their paths.
-fn write_workbench(directory: &Path) -> Result<(PathBuf, PathBuf), BenchError> {
-    let broken = || BenchError::Missing("the shipped workbench file is no TOML".to_owned());
-    let mut file: toml::Table = SHIPPED_WORKBENCH.parse().map_err(|_| broken())?;
-    file.insert("scene".to_owned(), "sphere-on-plane".into());
-    let network = file.get_mut("network").and_then(toml::Value::as_table_mut);
-    let network = network.ok_or_else(broken)?;
-    for port in ["quic_port", "udp_port"] {
-        network.insert(port.to_owned(), 0.into());
-    }
-    // A stalled client is to stay: what it does to the loop is the question.
-    network.insert("node_timeout".to_owned(), NODE_TIMEOUT_S.into());
-    let (config, key) = (
-        directory.join("workbench.toml"),
-        directory.join("cluster.key"),
-    );
-    std::fs::write(&config, file.to_string())?;
-    create_key_file(&key)?;
-    Ok((config, key))
-}
-
 fn run(
     program: &Path,
     this: &Path,
@@ -218,8 +110,14 @@ fn run(
     crowded: bool,
     result: &mut Isolation,
 ) -> Result<(), BenchError> {
-    let served = Served::start(program)?;
-    let crowd = crowded.then(|| awake(&served, this)).transpose()?;
+    // A stalled client is to stay: what it does to the loop is the question.
+    let workbench = Workbench::new(program, |file| {
+        set(file, "network.node_timeout", NODE_TIMEOUT_S)
+    })?;
+    let served = workbench.serve(None)?;
+    let crowd = crowded
+        .then(|| awake(&workbench, &served, this))
+        .transpose()?;
     std::thread::sleep(duration);
     let flooded = crowd.map_or(Ok(0), Crowd::leave)?;
     let report = served.stop()?;
@@ -247,14 +145,14 @@ fn run(
 
 /// The eight, with threads of the lowest real-time priority where the system grants it: on a loaded machine they would be thrown out for their
 /// silence. The program, started before, does not inherit it.
-fn awake(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+fn awake(workbench: &Workbench, served: &Served, this: &Path) -> Result<Crowd, BenchError> {
     const PRIORITY: u8 = 1;
     std::thread::scope(|scope| {
         let joined = std::thread::Builder::new()
             .name("crowd".to_owned())
             .spawn_scoped(scope, || {
                 let _ = request_fifo(PRIORITY);
-                Crowd::join(served, this)
+                Crowd::join(workbench, served, this)
             })?;
         joined
             .join()
@@ -273,9 +171,9 @@ struct Crowd {
 }
 
 impl Crowd {
-    fn join(served: &Served, this: &Path) -> Result<Crowd, BenchError> {
+    fn join(workbench: &Workbench, served: &Served, this: &Path) -> Result<Crowd, BenchError> {
         let runtime = Runtime::new()?;
-        let key = taut_link::read_key_file(&served.key())?;
+        let key = workbench.key()?;
         let mut readers = Vec::new();
         for (node, transport) in [
             ("udp-1", Transport::Udp),
@@ -290,7 +188,7 @@ impl Crowd {
             stalled.push(Stalled::start(
                 this,
                 &served.quic,
-                &served.key(),
+                &workbench.key_path(),
                 node,
                 transport,
             )?);

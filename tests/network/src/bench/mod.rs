@@ -2,14 +2,21 @@
 
 pub mod age;
 pub mod death;
+pub mod events;
+pub mod failover;
 pub mod isolation;
 pub mod join;
 pub mod latency;
 mod memory;
 pub mod node;
+mod program;
 mod quantiles;
 mod realtime;
+pub mod screen;
+pub mod screen_death;
+pub mod server_kill;
 mod session;
+pub mod skew;
 pub mod soak;
 
 pub use memory::resident_bytes;

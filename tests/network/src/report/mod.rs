@@ -3,6 +3,8 @@
 //! A row says what is asked, what was measured on this machine now, and whether it is met. What this program does not measure has a row, too,
 //! which says where it is looked at.
 
+mod frames;
+mod processes;
 mod row;
 mod sections;
 

@@ -28,7 +28,7 @@ use nalgebra::Point3;
 use super::collect::{for_contacts, in_world};
 use super::facing::Facing;
 use super::{Collected, Contact, FeaturePair, contact_jacobian};
-use crate::collision::{Placement, Work};
+use crate::collision::{PassedPair, Placement, Work};
 use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
 use crate::spatial::{Pose, Vector6, angular, linear};
@@ -140,9 +140,7 @@ impl RowReduction {
     }
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
-    ///
-    /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
-    pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
+    pub(crate) fn move_to(&mut self, at: &At, work: &mut Work) {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
@@ -158,6 +156,10 @@ impl RowReduction {
             contact.is_some()
         });
         self.candidates.move_to(&at.reference);
+    }
+
+    /// What faces between triangle pairs that stopped the last motions becomes a row.
+    pub(crate) fn take_hints(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
         for &hint in hints.iter().take(HINTS_TAKEN) {
             self.take_hint(at, hint, work);
         }
@@ -223,6 +225,44 @@ impl RowReduction {
         let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
+    }
+
+    /// Adds the contacts of these pairs of triangles within `distance` (m) to choose from. What lies between other pairs is not known.
+    pub(crate) fn offer_passed(
+        &mut self,
+        at: &At,
+        passed: &[PassedPair],
+        distance: f64,
+        work: &mut Work,
+    ) {
+        let center = at.center();
+        let candidates = &mut self.candidates;
+        candidates.complete_within = 0.0;
+        for of_obstacle in passed.chunk_by(|p, q| p.obstacle == q.obstacle) {
+            let index = of_obstacle[0].obstacle;
+            let obstacle = &at.world.obstacles[usize::from(index)];
+            let placement = Placement::of(&at.pose, &obstacle.pose);
+            let facing = Facing {
+                body: &at.world.body.mesh,
+                obstacle: &obstacle.mesh,
+                placement: &placement,
+                obstacle_index: index,
+                activation_distance: distance,
+                past_hollows: false,
+            };
+            for passed in of_obstacle {
+                let pair = facing.pair(passed.triangles.0, passed.triangles.1);
+                if !facing.may_face(&pair) {
+                    continue;
+                }
+                for_contacts(&facing, &pair, work, |contact| {
+                    if candidates.room() > 0 {
+                        let contact = in_world(&contact, &obstacle.pose);
+                        candidates.push(&contact, &jacobian(&contact, &center));
+                    }
+                });
+            }
+        }
     }
 
     /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.

@@ -1,0 +1,130 @@
+//! Why a bridge did not run, or did not run to its end.
+
+use std::path::PathBuf;
+
+use taut_link::LinkError;
+
+use crate::choice::InputError;
+use crate::devices::{PathError, TraceError};
+use crate::edge::OfferError;
+use crate::report::BridgeReport;
+use crate::simulated_strings::StringsError;
+use crate::trace_file::TraceFileError;
+
+/// Why a bridge did not run, or did not run to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum BridgeError {
+    /// No key file was named.
+    #[error(
+        "no credential is named: give the device's, which `taut keys` made on the haptic PC, by --key FILE or TAUT_KEY_FILE"
+    )]
+    NoKey,
+    /// A number on the command line is out of range.
+    #[error("{option} is {value}, which is out of range; use {range}")]
+    OutOfRange {
+        /// The option.
+        option: &'static str,
+        /// What was given.
+        value: f64,
+        /// What may be given.
+        range: &'static str,
+    },
+    /// A trace or path file is wrong.
+    #[error(transparent)]
+    File(#[from] TraceFileError),
+    /// A path cannot be followed.
+    #[error("{}: {cause}", path.display())]
+    Path {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: PathError,
+    },
+    /// A trace cannot be replayed.
+    #[error("{}: {cause}", path.display())]
+    Trace {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        cause: TraceError,
+    },
+    /// An input device cannot be read.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// A simulated string-driven device cannot be made.
+    #[error(transparent)]
+    Strings(#[from] StringsError),
+    /// The mouse is none of a bridge's.
+    #[error("the mouse belongs to a render window: use `taut render --hold` instead of a bridge")]
+    Mouse,
+    /// The server cannot be joined.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The server's scene has no valid start pose.
+    #[error(
+        "the server's scene has a start pose that is no pose; check the scene with `taut check`"
+    )]
+    NoStartPose,
+    /// The server does not let the bridge couple.
+    #[error(
+        "the server couples by itself ({reason}): leave out `--coupling edge`, and keep the network short"
+    )]
+    NoEdge {
+        /// What it says.
+        reason: String,
+    },
+    /// The server's offer makes no coupling.
+    #[error(transparent)]
+    Offer(#[from] OfferError),
+    /// A thread cannot be started.
+    #[error("cannot start a thread for {what}: {cause}; end other programs or raise the limit")]
+    Thread {
+        /// What for.
+        what: &'static str,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+    /// The end was asked for before there was a server.
+    #[error("no server was there at {server} until the end")]
+    NeverJoined {
+        /// As given.
+        server: String,
+    },
+    /// The server came back with a scene in which the device stands elsewhere.
+    #[error(
+        "the server {server} came back with another scene ({scene}): the force is zero; start this bridge again, so that the device finds its place in it"
+    )]
+    OtherScene {
+        /// As given.
+        server: String,
+        /// Name of the scene.
+        scene: String,
+    },
+    /// The device loop panicked.
+    #[error("the device loop broke down; report this, with the lines above")]
+    LoopBroke,
+    /// The server went away while the bridge ran.
+    #[error(
+        "the server {server} was lost ({reason}): the force is zero; start it again, or let this bridge wait longer (--give-up)"
+    )]
+    ServerLost {
+        /// As given.
+        server: String,
+        /// Why.
+        reason: String,
+        /// What was seen until then.
+        report: Box<BridgeReport>,
+    },
+}
+
+impl BridgeError {
+    /// Exit code of the process: 1 failed, 2 bad input.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Thread { .. } | Self::LoopBroke | Self::NeverJoined { .. } => 1,
+            Self::ServerLost { .. } | Self::OtherScene { .. } => 1,
+            _ => 2,
+        }
+    }
+}

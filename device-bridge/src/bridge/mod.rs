@@ -1,0 +1,133 @@
+//! `taut bridge`: the device side in a process of its own, at the other end of the network from the loops.
+//!
+//! | thread | does |
+//! |--------|------|
+//! | caller's | watches: link, signals, duration; tells what happens |
+//! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines |
+//! | `taut-bridge-net` | the link's sockets (tokio) |
+//! | `console` | what is typed, where standard input is a terminal: `arm`, `off` |
+//!
+//! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
+//! has the force at zero 120 ms later, whatever else goes on.
+
+mod error;
+mod over;
+mod sessions;
+mod setup;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use taut_link::proto::SceneDescription;
+use taut_link::{ClientOptions, RejoinPolicy, Rejoiner};
+
+pub use error::BridgeError;
+use over::{Over, stop_on_signal};
+use sessions::Run;
+use setup::{behind_port, build_loop, client_options, prepare};
+
+use crate::arm_switch::{self, ArmSwitch};
+use crate::bridge_loop::BridgeLoop;
+use crate::cli::BridgeArgs;
+use crate::device::Device;
+use crate::device_loop::Totals;
+use crate::placement::Placement;
+use crate::realtime::monotonic_now;
+use crate::report::BridgeReport;
+
+/// How often the watching thread looks.
+const WATCH_PERIOD: Duration = Duration::from_millis(20);
+
+/// Runs a bridge until `--duration`, a signal, the end of its trace, or until the server says that it stops. A server that is lost ends it
+/// only with `--give-up`: until then the force is zero and it tries to join again.
+///
+/// # Errors
+/// [`BridgeError`]: bad input is found before anything is started.
+pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
+    let (options, motion) = prepare(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let wishes = Arc::default();
+    arm_switch::listen_at_console(&wishes);
+    run_loop(args, options, stop, wishes, |scene| {
+        build_loop(args, &motion, scene)
+    })
+}
+
+/// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
+/// `--device`, `--hand` and `--path` of `args` are not looked at.
+///
+/// # Errors
+/// [`BridgeError`].
+pub fn run_device(
+    args: &BridgeArgs,
+    stop: Arc<AtomicBool>,
+    make: impl FnOnce(Placement) -> Box<dyn Device>,
+) -> Result<BridgeReport, BridgeError> {
+    let options = client_options(args)?;
+    // The console is the caller's.
+    run_loop(args, options, stop, Arc::default(), |scene| {
+        let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
+        let device = make(placement);
+        Ok(behind_port(
+            args,
+            device,
+            placement.reference_point,
+            &placement.start,
+        ))
+    })
+}
+
+fn run_loop(
+    args: &BridgeArgs,
+    options: ClientOptions,
+    stop: Arc<AtomicBool>,
+    wishes: Arc<ArmSwitch>,
+    build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
+) -> Result<BridgeReport, BridgeError> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("taut-bridge-net")
+        .enable_all()
+        .build()
+        .map_err(|cause| BridgeError::Thread {
+            what: "the network",
+            cause,
+        })?;
+    runtime.spawn(stop_on_signal(Arc::clone(&stop)));
+
+    let deadline = args
+        .duration
+        .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds));
+    let over = Over { stop, deadline };
+    let mut rejoiner = Rejoiner::new(options, policy(args));
+    let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
+        return Err(BridgeError::NeverJoined {
+            server: args.server.clone(),
+        });
+    };
+    let first = first?;
+    let bridge = build(first.description())?;
+    let mut run = Run {
+        safety: *bridge.port().settings(),
+        wishes,
+        args,
+        scene: first.description().clone(),
+        rejoiner,
+        runtime,
+        over,
+        totals: Totals::new(),
+    };
+    run.sessions(first, bridge)
+}
+
+/// What the bridge does without a server.
+fn policy(args: &BridgeArgs) -> RejoinPolicy {
+    RejoinPolicy {
+        stay: args.stay,
+        give_up: args
+            .give_up
+            .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
+        ..RejoinPolicy::default()
+    }
+}

@@ -1,0 +1,283 @@
+//! A bridge at work: one session after another, with one device loop that goes from each to the next.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use taut_link::proto::control::LogLevel;
+use taut_link::proto::membership::Liveness;
+use taut_link::proto::{CouplingOffer, SceneDescription};
+use taut_link::{ClientLink, LinkWatch, Rejoiner};
+
+use super::over::Over;
+use super::{BridgeError, WATCH_PERIOD};
+use crate::arm_switch::ArmSwitch;
+use crate::bridge_loop::BridgeLoop;
+use crate::cli::{BridgeArgs, CouplingChoice};
+use crate::device::DeviceFault;
+use crate::device_loop::{DeviceLoop, Totals};
+use crate::edge::EdgeCoupler;
+use crate::port::{SafetyEvent, SafetySettings};
+use crate::report::BridgeReport;
+
+/// Notices that may wait to be told; more are dropped, the counts in the report are complete.
+const NOTICES: usize = 64;
+
+/// Why a session ended.
+enum SessionEnd {
+    Duration,
+    Signal,
+    TraceEnded,
+    /// The server told its clients that it stops.
+    ServerStopped,
+    /// It is gone for another reason.
+    ServerLost(String),
+}
+
+/// A bridge at work.
+pub(super) struct Run<'a> {
+    pub(super) args: &'a BridgeArgs,
+    /// Of the first session: the device was placed in it.
+    pub(super) scene: SceneDescription,
+    pub(super) rejoiner: Rejoiner,
+    pub(super) runtime: tokio::runtime::Runtime,
+    pub(super) over: Over,
+    pub(super) safety: SafetySettings,
+    pub(super) wishes: Arc<ArmSwitch>,
+    pub(super) totals: Totals,
+}
+
+impl Run<'_> {
+    pub(super) fn sessions(
+        &mut self,
+        first: ClientLink,
+        mut bridge: BridgeLoop,
+    ) -> Result<BridgeReport, BridgeError> {
+        let mut link = Some(first);
+        loop {
+            let Some(session) = link.take() else {
+                return Ok(self.report(&bridge, "done while the server was away"));
+            };
+            self.totals.sessions += 1;
+            let end;
+            (bridge, end) = self.session(session, bridge)?;
+            match end {
+                SessionEnd::Duration => return Ok(self.report(&bridge, "done")),
+                SessionEnd::Signal => return Ok(self.report(&bridge, "stopped by a signal")),
+                SessionEnd::TraceEnded => return Ok(self.report(&bridge, "the trace ended")),
+                SessionEnd::ServerStopped if self.args.stay => {
+                    tracing::info!("the server stopped: the force is zero; waiting for it");
+                    link = self.join_again("it stopped", &bridge)?;
+                }
+                SessionEnd::ServerStopped => {
+                    tracing::info!("the server stopped: the force is zero");
+                    return Ok(self.report(&bridge, "the server stopped"));
+                }
+                SessionEnd::ServerLost(reason) => {
+                    tracing::warn!(
+                        "the server was lost ({reason}): the force is zero; trying again"
+                    );
+                    link = self.join_again(&reason, &bridge)?;
+                }
+            }
+        }
+    }
+
+    /// Joins again; `None` if the end comes first.
+    fn join_again(
+        &mut self,
+        reason: &str,
+        bridge: &BridgeLoop,
+    ) -> Result<Option<ClientLink>, BridgeError> {
+        let joined = self.runtime.block_on(self.over.or(self.rejoiner.rejoin()));
+        match joined {
+            None => Ok(None),
+            Some(Err(_gave_up)) => {
+                let report = self.report(bridge, &format!("the server was lost: {reason}"));
+                Err(BridgeError::ServerLost {
+                    server: self.args.server.clone(),
+                    reason: reason.to_owned(),
+                    report: Box::new(report),
+                })
+            }
+            Some(Ok(link)) if same_place(&self.scene, link.description()) => {
+                tracing::info!("joined again: the force comes back as after any silence");
+                Ok(Some(link))
+            }
+            Some(Ok(link)) => Err(BridgeError::OtherScene {
+                server: self.args.server.clone(),
+                scene: link.description().name.clone(),
+            }),
+        }
+    }
+
+    /// Runs the device loop on `link` until something ends it; gives the loop back.
+    fn session(
+        &mut self,
+        link: ClientLink,
+        mut bridge: BridgeLoop,
+    ) -> Result<(BridgeLoop, SessionEnd), BridgeError> {
+        let link = Arc::new(link);
+        let end_loop = Arc::new(AtomicBool::new(false));
+        let (sender, notices) = sync_channel(NOTICES);
+        let mut device_loop = DeviceLoop {
+            link: Arc::clone(&link),
+            end: Arc::clone(&end_loop),
+            wishes: Arc::clone(&self.wishes),
+            notices: sender,
+            period: Duration::from_secs_f64(1.0 / self.args.rate),
+            priority: self.args.priority,
+            core: self.args.core,
+            totals: std::mem::replace(&mut self.totals, Totals::new()),
+        };
+        bridge.begin_session(edge_coupler(self.args.coupling, link.coupling())?);
+        let thread = thread::Builder::new()
+            .name("taut-bridge-dev".to_owned())
+            .spawn(move || {
+                device_loop.run(&mut bridge);
+                (bridge, device_loop.totals)
+            })
+            .map_err(|cause| BridgeError::Thread {
+                what: "the device loop",
+                cause,
+            })?;
+
+        let dead_after = self.rejoiner.policy().dead_after;
+        let mut watch = LinkWatch::new(Instant::now(), dead_after.unwrap_or(link.node_timeout()));
+        let mut end = None;
+        while end.is_none() && !thread.is_finished() {
+            thread::sleep(WATCH_PERIOD);
+            end = self.session_end(&link, &mut watch, &notices);
+        }
+        if matches!(
+            end,
+            Some(SessionEnd::ServerStopped | SessionEnd::ServerLost(_))
+        ) {
+            // Let the force fade as on any silence, rather than cut it.
+            let settings = self.safety;
+            thread::sleep(settings.hold + settings.ramp_out);
+        }
+        end_loop.store(true, Ordering::Relaxed);
+        let (bridge, totals) = thread.join().map_err(|_| BridgeError::LoopBroke)?;
+        self.totals = totals;
+        tell(&link, &notices);
+
+        let seen = link.counters();
+        self.totals.packets.packets_sent += seen.packets_sent;
+        self.totals.packets.packets_received += seen.packets_received;
+        self.totals.packets.lost += seen.lost;
+        if link.is_closed().is_none() {
+            self.runtime.block_on(link.leave());
+        }
+        let end = end.unwrap_or(match bridge.fault() {
+            Some(DeviceFault::Ended) => SessionEnd::TraceEnded,
+            _ => SessionEnd::Signal,
+        });
+        Ok((bridge, end))
+    }
+
+    fn session_end(
+        &self,
+        link: &ClientLink,
+        watch: &mut LinkWatch,
+        notices: &Receiver<SafetyEvent>,
+    ) -> Option<SessionEnd> {
+        tell(link, notices);
+        let silent = watch.look(link, Instant::now()) == Liveness::Dead;
+        if self.over.is_asked() {
+            return Some(SessionEnd::Signal);
+        }
+        if self.over.is_now() {
+            return Some(SessionEnd::Duration);
+        }
+        match link.ended() {
+            Some(taut_link::SessionEnd::ServerStopped) => Some(SessionEnd::ServerStopped),
+            Some(taut_link::SessionEnd::Lost(reason)) => Some(SessionEnd::ServerLost(reason)),
+            None if silent => {
+                link.abandon();
+                Some(SessionEnd::ServerLost("it fell silent".to_owned()))
+            }
+            None => None,
+        }
+    }
+
+    fn report(&self, bridge: &BridgeLoop, ended: &str) -> BridgeReport {
+        let (totals, stats) = (&self.totals, bridge.stats());
+        let start = totals.first_tick.unwrap_or(totals.last_tick);
+        BridgeReport {
+            device: bridge.port().info().name.clone(),
+            server: self.args.server.clone(),
+            ended: ended.to_owned(),
+            duration_s: totals.last_tick.saturating_sub(start).as_secs_f64(),
+            ticks: stats.ticks,
+            missed_periods: totals.missed,
+            period_us: totals.period.summary(),
+            coupling: if bridge.couples() { "edge" } else { "server" }.to_owned(),
+            sets: stats.sets,
+            broken_sets: stats.broken_sets,
+            set_age_us: stats.set_age.summary(),
+            wrenches: stats.wrenches,
+            wrench_age_us: stats.wrench_age.summary(),
+            round_trip_us: stats.round_trip.summary(),
+            packets_sent: totals.packets.packets_sent,
+            packets_received: totals.packets.packets_received,
+            packets_lost: totals.packets.lost,
+            energy_injected_j: bridge.port().energy().injected(),
+            energy_delivered_j: bridge.port().energy().delivered(),
+            max_force_age_ms: stats.max_force_age.as_secs_f64() * 1e3,
+            max_force_n: stats.max_force,
+            max_torque_n_m: stats.max_torque,
+            safety_events: stats.safety_events,
+            faulty_ticks: stats.faulty_ticks,
+            sessions: totals.sessions,
+            realtime: totals.realtime.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+/// Whether the device stands in both scenes alike.
+fn same_place(before: &SceneDescription, now: &SceneDescription) -> bool {
+    before.reference_point == now.reference_point
+        && before.scene_origin == now.scene_origin
+        && before.display_scale == now.display_scale
+        && before.god_object.pose == now.god_object.pose
+}
+
+/// Logs what the device loop noticed, here and at the server.
+fn tell(link: &ClientLink, notices: &Receiver<SafetyEvent>) {
+    for event in notices.try_iter() {
+        let level = if event.kind.is_good_news() {
+            tracing::info!("{event}");
+            LogLevel::Info
+        } else {
+            tracing::warn!("{event}");
+            LogLevel::Warning
+        };
+        link.post_log(level, event.to_string());
+    }
+}
+
+/// The coupling of a session, if it is to be here.
+fn edge_coupler(
+    choice: Option<CouplingChoice>,
+    offer: Option<&CouplingOffer>,
+) -> Result<Option<EdgeCoupler>, BridgeError> {
+    match (choice, offer) {
+        (Some(CouplingChoice::Server), _) | (None, None) => Ok(None),
+        (_, Some(CouplingOffer::AtEdge(offer))) => Ok(Some(EdgeCoupler::new(offer)?)),
+        (None, Some(CouplingOffer::AtServer { reason })) => {
+            tracing::info!("the server computes the force: {reason}");
+            Ok(None)
+        }
+        (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
+            Err(BridgeError::NoEdge {
+                reason: reason.clone(),
+            })
+        }
+        (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {
+            reason: "it says nothing of another way".to_owned(),
+        }),
+    }
+}

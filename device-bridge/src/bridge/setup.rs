@@ -1,0 +1,192 @@
+//! What the command line asks for, checked before anything is started: motion, credential, and the device behind its port.
+
+use std::path::PathBuf;
+
+use nalgebra::Point3;
+use taut_link::proto::SceneDescription;
+use taut_link::{ClientOptions, Role, read_join_key};
+use taut_spidar::Geometry;
+
+use super::BridgeError;
+use crate::bridge_loop::BridgeLoop;
+use crate::choice::{DeviceChoice, InputChoice};
+use crate::cli::BridgeArgs;
+use crate::device::{Device, Pose};
+use crate::devices::{AtEnd, Grip, MinJerkPath, RecordedDevice, SimulatedDevice, Trace, Tremor};
+use crate::placement::Placement;
+use crate::port::DevicePort;
+use crate::simulated_strings::{simulated_spidar, string_geometry};
+use crate::trace_file::{read_trace, via_points};
+
+/// States per second for a client that draws nothing: the fewest.
+const STATE_RATE_HZ: u32 = 1;
+
+/// Sway of a hand that was given no path: 20 mm to either side, a cycle in 8 s.
+const SWAY: (f64, f64) = (0.02, 8.0);
+
+/// Rates that a device loop can hold, in Hz.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=10_000.0;
+
+/// What moves the device: read and checked before anything is started.
+pub(super) enum Motion {
+    /// A simulated hand; without a path it sways.
+    Held {
+        path: Option<MinJerkPath>,
+        strings: Option<Box<Geometry>>,
+    },
+    Trace(PathBuf, Trace),
+    Input(InputChoice),
+}
+
+pub(super) fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), BridgeError> {
+    let in_range = |option, value: f64, valid: bool, range| {
+        if valid {
+            Ok(())
+        } else {
+            Err(BridgeError::OutOfRange {
+                option,
+                value,
+                range,
+            })
+        }
+    };
+    in_range(
+        "--rate",
+        args.rate,
+        RATES_HZ.contains(&args.rate),
+        "1 to 10000 Hz",
+    )?;
+    for (option, value) in [
+        ("--max-force", args.safety.max_force),
+        ("--max-torque", args.safety.max_torque),
+        ("--force-slew", args.safety.force_slew),
+        ("--torque-slew", args.safety.torque_slew),
+    ] {
+        in_range(
+            option,
+            value,
+            value > 0.0 && value <= 1e3,
+            "a number above 0, at most 1000",
+        )?;
+    }
+    if let Some(seconds) = args.duration {
+        let valid = (0.0..=1e9).contains(&seconds);
+        in_range("--duration", seconds, valid, "0 to 1e9 s")?;
+    }
+    if let Some(seconds) = args.give_up {
+        let valid = (0.0..=1e9).contains(&seconds);
+        in_range("--give-up", seconds, valid, "0 to 1e9 s")?;
+    }
+
+    let motion = match (&args.device, &args.path) {
+        (DeviceChoice::Mouse, _) => return Err(BridgeError::Mouse),
+        (DeviceChoice::Input(input), _) => Motion::Input(input.clone()),
+        (DeviceChoice::Trace(file), _) => Motion::Trace(file.clone(), read_trace(file)?),
+        (DeviceChoice::Simulated { strings }, file) => {
+            let path = file.as_ref().map(|file| {
+                let path = MinJerkPath::new(via_points(&read_trace(file)?), args.looping);
+                path.map_err(|cause| BridgeError::Path {
+                    path: file.clone(),
+                    cause,
+                })
+            });
+            Motion::Held {
+                path: path.transpose()?,
+                strings: strings
+                    .as_deref()
+                    .map(string_geometry)
+                    .transpose()?
+                    .map(Box::new),
+            }
+        }
+    };
+
+    Ok((client_options(args)?, motion))
+}
+
+pub(super) fn client_options(args: &BridgeArgs) -> Result<ClientOptions, BridgeError> {
+    let key_file = args
+        .key
+        .clone()
+        .or_else(|| std::env::var_os("TAUT_KEY_FILE").map(PathBuf::from))
+        .ok_or(BridgeError::NoKey)?;
+    let key = read_join_key(&key_file)?;
+    let mut options = ClientOptions::new(&args.server, key, Role::Device, &args.node);
+    options.transport = args.transport;
+    options.rate_hz = STATE_RATE_HZ;
+    Ok(options)
+}
+
+pub(super) fn build_loop(
+    args: &BridgeArgs,
+    motion: &Motion,
+    scene: &SceneDescription,
+) -> Result<BridgeLoop, BridgeError> {
+    let start = scene
+        .god_object
+        .pose
+        .to_isometry()
+        .ok_or(BridgeError::NoStartPose)?;
+    let reference_point = Point3::from(scene.reference_point);
+    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.seed);
+    let device: Box<dyn Device> = match motion {
+        Motion::Held { path, strings } => {
+            let path = match path {
+                Some(path) => path.clone(),
+                None => MinJerkPath::sway(start, SWAY.0, SWAY.1),
+            };
+            let hand = args.hand.into();
+            match strings {
+                None => Box::new(
+                    SimulatedDevice::new(Grip::workbench(), hand, path, reference_point)
+                        .with_tremor(tremor),
+                ),
+                Some(geometry) => {
+                    let origin = scene.scene_origin.to_isometry();
+                    let turned = origin.ok_or(BridgeError::NoStartPose)?.rotation.inverse();
+                    let made = simulated_spidar(
+                        Geometry::clone(geometry),
+                        turned,
+                        reference_point,
+                        hand,
+                        path,
+                        Some(tremor),
+                    )?;
+                    if let Some(warning) = made.warning {
+                        tracing::warn!("{warning}");
+                    }
+                    Box::new(made.device)
+                }
+            }
+        }
+        Motion::Input(input) => {
+            input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
+        }
+        Motion::Trace(path, trace) => {
+            let at_end = if args.looping {
+                AtEnd::Loop
+            } else {
+                AtEnd::Fault
+            };
+            let device = RecordedDevice::new(trace.clone(), at_end, reference_point);
+            Box::new(device.map_err(|cause| BridgeError::Trace {
+                path: path.clone(),
+                cause,
+            })?)
+        }
+    };
+    Ok(behind_port(args, device, reference_point, &start))
+}
+
+/// The device behind the port that makes every force safe. What has no motors, or no hand at them, arms by itself.
+pub(super) fn behind_port(
+    args: &BridgeArgs,
+    device: Box<dyn Device>,
+    reference_point: Point3<f64>,
+    start: &Pose,
+) -> BridgeLoop {
+    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated { .. })
+        || device.info().actuated_degrees_of_freedom == 0;
+    let safety = args.safety.settings(args.rate, nobody_is_hurt);
+    BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
+}

@@ -1,0 +1,122 @@
+//! What this machine adds to a computation that is always the same: a control for the times in a session's report.
+//!
+//! `cargo run --release -p taut --no-default-features --example control_loop [seconds] [--awake]`
+//!
+//! Beside a running session, or alone, a thread of the haptics loop's class wakes at 1 kHz and computes one pose and one set of tensions from
+//! the same lengths and the same wrench every time: the same instructions on the same data. What then differs between two ticks
+//! is the machine's: cold caches after the sleep, interrupts within the measured span (their time counts as the thread's where the kernel does
+//! not account for it apart), a host that took the core away. A second span computes the same again at once, with warm caches. With `--awake`
+//! idle cores are kept awake, as a session does.
+
+use std::time::Duration;
+
+use god_object::Vector6;
+use god_object::nalgebra::Vector3;
+use taut::realtime::thread_cpu_time;
+use taut::timing::{Distribution, Histogram};
+use taut_bridge::realtime::{
+    keep_cores_awake, lock_memory, monotonic_now, request_fifo, sleep_until,
+};
+use taut_spidar::{
+    ForwardKinematics, Geometry, Pose, StringMatrix, TensionSettings, TensionSolver,
+};
+
+/// Of the haptics loop.
+const PRIORITY: u8 = 80;
+const PERIOD: Duration = Duration::from_millis(1);
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut seconds = 60;
+    let mut awake = None;
+    for argument in std::env::args().skip(1) {
+        if argument == "--awake" {
+            let (grant, held) = keep_cores_awake();
+            println!("{grant}");
+            awake = held;
+        } else {
+            seconds = argument.parse()?;
+        }
+    }
+    println!("{}", lock_memory());
+    println!("{}", request_fifo(PRIORITY));
+    println!("load of the machine: {}", first_line("/proc/loadavg"));
+
+    let geometry = Geometry::shipped("wb").ok_or("wb is shipped")?;
+    // Turned so far that zero wrench cannot be rendered: the dear case.
+    let pose = Pose::new(
+        Vector3::new(0.05, -0.03, 0.02),
+        Vector3::new(0.5, 0.3, -0.4),
+    );
+    let lengths = geometry.lengths(&pose);
+    let wrench = Vector6::new(1.0, -2.0, 0.5, 0.02, 0.01, -0.03);
+    let mut kinematics = ForwardKinematics::new(&geometry);
+    let mut solver = TensionSolver::new(&geometry, TensionSettings::default());
+    // Where it was a millisecond ago, at 0.1 m/s: as many steps as in a session.
+    let before = Pose::from_parts(
+        (pose.translation.vector - Vector3::new(1e-4, 0.0, 0.0)).into(),
+        pose.rotation,
+    );
+    let mut compute = || {
+        kinematics.start_at(before);
+        let strings = kinematics.solve(&lengths).map_or_else(
+            |_| StringMatrix::at(&geometry, &pose),
+            |answer| answer.strings,
+        );
+        solver.distribute(&strings, &wrench)
+    };
+    println!(
+        "each tick: {:?}, {} factorisations",
+        compute().status,
+        compute().factorisations
+    );
+
+    let (cold, warm) = (Histogram::default(), Histogram::default());
+    let (wall, late) = (Histogram::default(), Histogram::default());
+    let mut misses = 0_u32;
+    let mut deadline = monotonic_now();
+    for _ in 0..1000 * seconds {
+        deadline += PERIOD;
+        sleep_until(deadline);
+        let woken = monotonic_now();
+        let before = thread_cpu_time();
+        let first = std::hint::black_box(compute());
+        let between = thread_cpu_time();
+        let done = monotonic_now();
+        let second = std::hint::black_box(compute());
+        let after = thread_cpu_time();
+        assert_eq!(first.tensions, second.tensions);
+        cold.record_time(between.saturating_sub(before));
+        warm.record_time(after.saturating_sub(between));
+        wall.record_time(done.saturating_sub(woken));
+        late.record_time(woken.saturating_sub(deadline));
+        if done > deadline + PERIOD {
+            misses += 1;
+            deadline = done;
+        }
+    }
+    drop(awake);
+    show("CPU, after the sleep", &cold.distribution_us());
+    show("CPU, again at once", &warm.distribution_us());
+    show("elapsed, after the sleep", &wall.distribution_us());
+    show("woken late by", &late.distribution_us());
+    println!("deadlines missed: {misses}");
+    println!("load of the machine: {}", first_line("/proc/loadavg"));
+    for line in std::fs::read_to_string("/proc/thread-self/status")?.lines() {
+        if line.contains("ctxt_switches") {
+            println!("{line}");
+        }
+    }
+    Ok(())
+}
+
+fn first_line(path: &str) -> String {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    text.lines().next().unwrap_or("not known").to_owned()
+}
+
+fn show(what: &str, seen: &Distribution) {
+    println!(
+        "{what:26} p50 {:6.2}  p99 {:6.2}  p99.9 {:7.2}  max {:8.2} us",
+        seen.p50, seen.p99, seen.p999, seen.max
+    );
+}

@@ -1,0 +1,162 @@
+//! Eight volumes of one tree as the other tree sees them: in its frame, with what their motion adds.
+//!
+//! A descent meets the same volumes again and again, each time against other ones. So a node is turned once for all its eight, and kept until
+//! another takes its place.
+
+use super::facing_volumes::{FacingVolumes, Side};
+use super::single::{apply, dot, product, sum};
+use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::wide_tree::{Child, WideNode, WideTree};
+
+/// Nodes of each tree that are kept turned: a quarter more of them would not fit the first cache, half as many are turned more often.
+const KEPT: usize = 32;
+/// Feet may lie outside their faces by this share of the gap, twice the tolerance of the collection, and sines come with rounding.
+const FOOT_SHARE: f32 = 2e-4;
+
+/// Eight volumes in the frame of the other tree. The axes point the other way: the product with an axis that they face is 1.
+#[derive(Clone, Debug)]
+pub(super) struct Turned {
+    pub(super) center: [Lanes; 3],
+    /// Half of the sides of the boxes along the frame's axes, and what points stray by along them, m.
+    pub(super) reach: [Lanes; 3],
+    pub(super) axis: [Lanes; 3],
+    /// Of the box about the axis: tangent and its product with the axis, and half the sides.
+    pub(super) tangents: [[Lanes; 3]; 2],
+    pub(super) sides: [Lanes; 2],
+    pub(super) middle: Lanes,
+    pub(super) slab: Lanes,
+    pub(super) cosine: Lanes,
+    pub(super) sine: Lanes,
+    /// Margin along the tangents, m: what faces these features is no farther aside.
+    pub(super) margin_aside: Lanes,
+    /// Of volumes that move: the path, what their points stray by along the axis, and the path of the farthest about the centre.
+    pub(super) sweep: [Lanes; 3],
+    pub(super) stray_along_axis: Lanes,
+    pub(super) turning: Lanes,
+}
+
+/// The nodes turned last, each in the place that its number gives it.
+#[derive(Clone, Debug)]
+pub(crate) struct TurnedNodes {
+    kept: Box<[Turned; 2 * KEPT]>,
+    /// Which volumes turned it, above which node it is.
+    keys: Box<[u64; 2 * KEPT]>,
+    serial: u32,
+}
+
+impl TurnedNodes {
+    /// Allocates everything that it will ever need.
+    pub(super) fn new() -> Self {
+        Self {
+            kept: Box::new([const { Turned::zero() }; 2 * KEPT]),
+            keys: Box::new([0; 2 * KEPT]),
+            serial: 0,
+        }
+    }
+
+    /// A number that no volumes had whose nodes are still kept.
+    pub(crate) fn next_serial(&mut self) -> u32 {
+        self.serial = self.serial.wrapping_add(1);
+        if self.serial == 0 {
+            self.keys.fill(0);
+            self.serial = 1;
+        }
+        self.serial
+    }
+
+    /// The node that holds `child`, a child of the tree on `side`, turned.
+    #[inline(always)]
+    pub(super) fn of(
+        &mut self,
+        volumes: &FacingVolumes,
+        side: Side,
+        tree: &WideTree,
+        child: Child,
+    ) -> &Turned {
+        let node = child / LANES as u32;
+        let place = side as usize * KEPT + node as usize % KEPT;
+        let key = u64::from(volumes.serial) << 32 | u64::from(node);
+        if self.keys[place] != key {
+            self.keys[place] = key;
+            self.kept[place].turn(volumes, side, tree.node(node));
+        }
+        &self.kept[place]
+    }
+}
+
+impl Turned {
+    const fn zero() -> Self {
+        let zero = Lanes::splat(0.0);
+        Self {
+            center: [zero; 3],
+            reach: [zero; 3],
+            axis: [zero; 3],
+            tangents: [[zero; 3]; 2],
+            sides: [zero; 2],
+            middle: zero,
+            slab: zero,
+            cosine: zero,
+            sine: zero,
+            margin_aside: zero,
+            sweep: [zero; 3],
+            stray_along_axis: zero,
+            turning: zero,
+        }
+    }
+
+    /// One loop over the lanes, without branches: the compiler makes vectors of it.
+    #[inline(never)]
+    fn turn(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
+        let frame = volumes.frame(side);
+        let (n, rotation) = (node, &frame.rotation);
+        for k in 0..LANES {
+            let lane = |v: &[Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
+            let (own_axis, own_tangent) = (lane(&n.axis), lane(&n.tangent));
+            let arm = apply(rotation, &lane(&n.center));
+            let (axis, tangent) = (apply(rotation, &own_axis), apply(rotation, &own_tangent));
+            let bitangent = product(&axis, &tangent);
+            let (along, across) = (n.along.0[k], n.across.0[k]);
+            let (middle, slab, radius) = (n.middle.0[k], n.slab.0[k], n.radius.0[k]);
+            let turning = frame.angle * radius;
+            let half = apply(&frame.rotation_abs, &lane(&n.half));
+            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
+            // The box about the axis is the narrower one where the surface runs aslant.
+            let thickness = middle.abs() + slab;
+            for i in 0..3 {
+                let aslant = axis[i].abs().mul_add(
+                    thickness,
+                    tangent[i].abs().mul_add(along, bitangent[i].abs() * across),
+                );
+                let half = if half[i] < aslant { half[i] } else { aslant };
+                self.center[i].0[k] = arm[i] + frame.offset[i];
+                self.reach[i].0[k] = half + volumes.stray + turning;
+                self.axis[i].0[k] = -axis[i];
+                self.tangents[0][i].0[k] = tangent[i];
+                self.tangents[1][i].0[k] = bitangent[i];
+                self.sweep[i].0[k] = sweep[i];
+            }
+            let (cosine, sine) = volumes.widened(n.cosine.0[k], n.sine.0[k]);
+            self.sides[0].0[k] = along;
+            self.sides[1].0[k] = across;
+            self.middle.0[k] = -middle;
+            self.slab.0[k] = slab;
+            self.cosine.0[k] = cosine;
+            self.sine.0[k] = sine;
+            self.margin_aside.0[k] = volumes.margin * if cosine > 0.0 { aside(sine) } else { 1.0 };
+            // What points stray by along the axis while they turn.
+            let own_across = product(&own_axis, &own_tangent);
+            let turn = &frame.own_half_turn;
+            self.stray_along_axis.0[k] = dot(turn, &own_across)
+                .abs()
+                .mul_add(along, dot(turn, &own_tangent).abs() * across);
+            self.turning.0[k] = turning;
+        }
+    }
+}
+
+/// The share of a distance that may lie across the axis of a cone whose sine this is.
+#[inline(always)]
+pub(super) fn aside(sine: f32) -> f32 {
+    let share = sine + FOOT_SHARE;
+    if share < 1.0 { share } else { 1.0 }
+}

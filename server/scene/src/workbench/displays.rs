@@ -1,0 +1,144 @@
+//! The screens, and the nodes that draw them.
+
+use nalgebra::Point3;
+
+use super::parts::table;
+use super::spec::{Node, Screen, Stereo, Window};
+use crate::document::{Range, Section};
+
+/// Shortest edge of a screen, m. Shorter is a slip of the unit.
+const MIN_SCREEN_EDGE: f64 = 0.01;
+/// Largest cosine between the edges of a screen: half a degree from square, more than a careful tape measure errs by.
+const SQUARENESS: f64 = 8.7e-3;
+/// Largest window side, pixels.
+const MAX_PIXELS: i64 = 16_384;
+
+pub(super) fn screens(root: &Section<'_>) -> Vec<Screen> {
+    let mut screens: Vec<Screen> = Vec::new();
+    for section in root.sections("screen") {
+        let name = unique_name(&section, "screen", screens.iter().map(|s| s.name.as_str()));
+        let corner = |key: &'static str| {
+            if !section.has(key) {
+                section.complain_missing(key, &format!("{key} = [x, y, z] (m)"));
+            }
+            section.numbers::<3>(key, Range::Finite).map(Point3::from)
+        };
+        let corners = (
+            corner("lower_left"),
+            corner("lower_right"),
+            corner("upper_left"),
+        );
+        if let (Some(name), (Some(lower_left), Some(lower_right), Some(upper_left))) =
+            (name, corners)
+        {
+            let (right, up) = (lower_right - lower_left, upper_left - lower_left);
+            let square = right.dot(&up).abs() <= SQUARENESS * right.norm() * up.norm();
+            if right.norm() < MIN_SCREEN_EDGE || up.norm() < MIN_SCREEN_EDGE || !square {
+                let text = format!(
+                    "the corners of screen \"{name}\" are no rectangle; give lower left, lower right and upper left in metres"
+                );
+                section.complain(section.at(), text);
+            }
+            screens.push(Screen {
+                name,
+                lower_left,
+                lower_right,
+                upper_left,
+            });
+        }
+        section.finish();
+    }
+    if screens.is_empty() && !root.has("screen") {
+        root.complain_missing("screen", "at least one [[screen]] with three corners");
+    }
+    screens
+}
+
+pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
+    let mut nodes: Vec<Node> = Vec::new();
+    for section in root.sections("node") {
+        let name = unique_name(&section, "node", nodes.iter().map(|n| n.name.as_str()));
+        if !section.has("screens") {
+            section.complain_missing("screens", "screens = [\"front\"]");
+        }
+        let mut drawn = Vec::new();
+        for (screen, at) in section.texts("screens").unwrap_or_default() {
+            if !screens.iter().any(|known| known.name == screen) {
+                let known: Vec<&str> = screens.iter().map(|s| s.name.as_str()).collect();
+                let text = format!(
+                    "{} draws the screen \"{screen}\", which does not exist; known screens: {}",
+                    section.name(),
+                    known.join(", ")
+                );
+                section.complain(at, text);
+            } else if drawn.iter().any(|other| other == screen) {
+                section.complain(
+                    at,
+                    format!(
+                        "{} draws the screen \"{screen}\" twice; remove one",
+                        section.name()
+                    ),
+                );
+            }
+            drawn.push(screen.to_owned());
+        }
+        if let Some(list) = section.get("screens").filter(|_| drawn.is_empty()) {
+            section.complain(
+                &list.at,
+                format!(
+                    "{} draws no screen; name at least one in `screens`",
+                    section.name()
+                ),
+            );
+        }
+        let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
+        let window = table(&section, "window", |window| {
+            let pixels = |key, default| {
+                window
+                    .integer(key, 16, MAX_PIXELS)
+                    .map_or(default, |n| n as u32)
+            };
+            Window {
+                width: pixels("width", 1280),
+                height: pixels("height", 800),
+                fullscreen: window.boolean("fullscreen").unwrap_or(false),
+                monitors: window.names_or_numbers("monitor").unwrap_or_default(),
+            }
+        });
+        let window = window.unwrap_or(Window {
+            width: 1280,
+            height: 800,
+            fullscreen: false,
+            monitors: Vec::new(),
+        });
+        section.finish();
+        if let Some(name) = name {
+            nodes.push(Node {
+                name,
+                screens: drawn,
+                stereo,
+                window,
+            });
+        }
+    }
+    if nodes.is_empty() && !root.has("node") {
+        root.complain_missing("node", "at least one [[node]] with name and screens");
+    }
+    nodes
+}
+
+fn unique_name<'n>(
+    section: &Section<'_>,
+    kind: &str,
+    mut others: impl Iterator<Item = &'n str>,
+) -> Option<String> {
+    let name = section.required_text("name", &format!("name = \"{kind}-1\""))?;
+    if others.any(|other| other == name) {
+        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!("there are two {kind}s of the name \"{name}\"; rename one"),
+        );
+    }
+    Some(name.to_owned())
+}

@@ -1,0 +1,135 @@
+//! Addresses, transport and admission of the network.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddrV4};
+
+use taut_proto::JoinPolicy;
+
+use super::admission::admission;
+use super::parts::{Files, MAX_RATE, bind, port};
+use super::spec::{Network, TransportKind};
+use crate::document::{Range, Section};
+
+/// Group of states where the file names none: of this site (RFC 2365).
+const DEFAULT_GROUP: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(239, 255, 72, 87), 4859);
+/// Most clients.
+const MAX_CLIENTS: i64 = 256;
+/// Silence after which a node counts as gone, s: ten of its signs of life.
+const NODE_TIMEOUT: f64 = 0.5;
+/// Longest that may be asked for, s.
+const MAX_NODE_TIMEOUT: f64 = 60.0;
+
+/// Group and interface of multicast; the interface must be known where multicast is asked for.
+fn multicast(
+    section: &Section<'_>,
+    transport: TransportKind,
+    bind: IpAddr,
+) -> (SocketAddrV4, Ipv4Addr) {
+    let complain = |key: &'static str, text: String| {
+        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        section.complain(at, text);
+    };
+    let group = match section.text("multicast_group") {
+        None => DEFAULT_GROUP,
+        Some(text) => match text.parse::<SocketAddrV4>() {
+            Ok(group) if group.ip().is_multicast() && group.port() != 0 => group,
+            _ => {
+                complain(
+                    "multicast_group",
+                    format!(
+                        "`multicast_group` in {} is \"{text}\", which is no multicast address with a port; write one such as \"{DEFAULT_GROUP}\"",
+                        section.name()
+                    ),
+                );
+                DEFAULT_GROUP
+            }
+        },
+    };
+    let interface = match (section.text("multicast_interface"), bind) {
+        (Some(text), _) => text
+            .parse::<Ipv4Addr>()
+            .ok()
+            .filter(|ip| !ip.is_unspecified()),
+        (None, IpAddr::V4(bind)) if !bind.is_unspecified() => Some(bind),
+        (None, _) if transport != TransportKind::Multicast => Some(Ipv4Addr::LOCALHOST),
+        (None, _) => None,
+    };
+    if interface.is_none() {
+        complain(
+            "multicast_interface",
+            format!(
+                "{} does not say from which interface multicast leaves; write its address, such as multicast_interface = \"192.168.1.5\"",
+                section.name()
+            ),
+        );
+    }
+    (group, interface.unwrap_or(Ipv4Addr::LOCALHOST))
+}
+
+pub(super) fn network(
+    section: Option<Section<'_>>,
+    root: &Section<'_>,
+    files: &Files<'_>,
+) -> Option<Network> {
+    let loopback = IpAddr::V4(Ipv4Addr::LOCALHOST);
+    let Some(section) = section else {
+        return (!root.has("network")).then_some(Network {
+            bind: loopback,
+            quic_port: 4857,
+            udp_port: 4858,
+            transport: TransportKind::Udp,
+            multicast_group: DEFAULT_GROUP,
+            multicast_interface: Ipv4Addr::LOCALHOST,
+            key_file: None,
+            broadcast_rate: 1000.0,
+            max_clients: 16,
+            admission: JoinPolicy::default(),
+            node_timeout: NODE_TIMEOUT,
+        });
+    };
+    let transports = [
+        ("udp", TransportKind::Udp),
+        ("quic", TransportKind::QuicDatagram),
+        ("multicast", TransportKind::Multicast),
+    ];
+    let address = bind(&section, loopback);
+    let (quic_port, udp_port) = (
+        port(&section, "quic_port", 4857),
+        port(&section, "udp_port", 4858),
+    );
+    if quic_port == udp_port && quic_port != 0 {
+        let at = section
+            .get("udp_port")
+            .map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!(
+                "`quic_port` and `udp_port` in {} are both {udp_port}; choose another for one",
+                section.name()
+            ),
+        );
+    }
+    let transport = section.choice("transport", &transports).unwrap_or_default();
+    let (multicast_group, multicast_interface) =
+        multicast(&section, transport, address.unwrap_or(loopback));
+    let network = Network {
+        bind: address.unwrap_or(loopback),
+        quic_port,
+        udp_port,
+        transport,
+        multicast_group,
+        multicast_interface,
+        key_file: files.path(&section, "key_file"),
+        broadcast_rate: section.number_or("broadcast_rate", Range::PositiveUpTo(MAX_RATE), 1000.0),
+        max_clients: section
+            .integer("max_clients", 1, MAX_CLIENTS)
+            .map_or(16, |n| n as usize),
+        admission: admission(&section),
+        node_timeout: section.number_or(
+            "node_timeout",
+            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            NODE_TIMEOUT,
+        ),
+    };
+    section.finish();
+    Some(network)
+}

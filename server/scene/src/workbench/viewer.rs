@@ -1,0 +1,76 @@
+//! Who looks: eyes, head, its tracking, comfort; and what is drawn beside the scene.
+
+use super::parts::table;
+use super::spec::{HeadTracking, Show, Viewer};
+use super::tracker::vrpn_sensor;
+use crate::document::{Range, Section};
+use crate::scene::pose_of;
+
+/// Largest limit on what stands out from a screen, degrees: nobody fuses more.
+const MAX_DISPARITY_DEG: f64 = 30.0;
+
+pub(super) fn viewer(section: &Section<'_>) -> Option<Viewer> {
+    let eye_separation = section.number_or("eye_separation", Range::UpTo(0.2), 0.064);
+    let head = table(section, "head", pose_of);
+    if head.is_none() && !section.has("head") {
+        section.complain_missing(
+            "head",
+            "head = { position = [0.0, -1.3, 0.9], rotation = [0.7071, 0.7071, 0.0, 0.0] }",
+        );
+    }
+    let sway = table(section, "sway", |sway| HeadTracking::Sway {
+        amplitude: sway.number_or("amplitude", Range::UpTo(1.0), 0.05),
+        period: sway.number_or("period", Range::Positive, 6.0),
+    });
+    let near = section.number_or("near", Range::Positive, 0.05);
+    let far = section.number_or("far", Range::Positive, 20.0);
+    let separation_scale = section.number_or("separation_scale", Range::UpTo(1.0), 1.0);
+    let nearest_disparity = section
+        .number_or("nearest_disparity_deg", Range::UpTo(MAX_DISPARITY_DEG), 0.0)
+        .to_radians();
+    if near >= far {
+        section.complain(
+            section.at(),
+            format!(
+                "`near` ({near}) in {} must be smaller than `far` ({far})",
+                section.name()
+            ),
+        );
+    }
+    let tracker = table(section, "tracker", vrpn_sensor);
+    if let (Some(_), Some(_), Some(node)) = (&sway, &tracker, section.get("tracker")) {
+        let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
+        section.complain(&node.at, text);
+    }
+    let remote = section.boolean("remote_tracker").unwrap_or(false);
+    if let (true, Some(node)) = (remote, section.get("remote_tracker"))
+        && (tracker.is_some() || sway.is_some())
+    {
+        let text = "`remote_tracker` in [viewer] excludes `tracker` and `sway`; leave one out";
+        section.complain(&node.at, text);
+    }
+    let tracking = match tracker {
+        None if remote => HeadTracking::Remote,
+        Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
+        None => sway.unwrap_or(HeadTracking::Fixed),
+    };
+    Some(Viewer {
+        eye_separation,
+        head: head.flatten()?,
+        tracking,
+        near,
+        far,
+        separation_scale,
+        nearest_disparity,
+    })
+}
+
+pub(super) fn show(section: &Section<'_>) -> Show {
+    let wanted = |key| section.boolean(key).unwrap_or(false);
+    Show {
+        ghost: wanted("ghost"),
+        contacts: wanted("contacts"),
+        force: wanted("force"),
+        hud: wanted("hud"),
+    }
+}

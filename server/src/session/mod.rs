@@ -1,0 +1,123 @@
+//! One session of the server: Figure 3 in code, and what stands around it.
+//!
+//! Started in this order, so that each thing finds what it reads: network, loops and shared data (not yet running), monitor,
+//! then the threads: coupling, god-object, checker, broadcast, and haptics last, which sets everything moving. Stopped the other way
+//! round. A start that fails on the way leaves nothing running.
+
+mod end;
+mod news;
+mod start;
+mod threads;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use taut_bridge::ArmSwitch;
+use taut_bridge::realtime::Awake;
+use taut_link::{JoinPolicy, ServerLink, ServerPin};
+use taut_recording::Recorder;
+use taut_scene::FidelityPlan;
+use tokio::runtime::Runtime;
+
+use crate::clients::ClientLedger;
+use crate::clock::SessionClock;
+use crate::fidelity::FidelityWatch;
+use crate::looking_on::LookingOn;
+use crate::loops::incidents::IncidentNews;
+use crate::monitor::{MonitorFeed, NetworkCounts};
+use crate::realtime::RealtimeLedger;
+use crate::report::RealtimeReport;
+use crate::shared::fanout::Subscriber;
+use crate::shared::wrench_command::WrenchCommand;
+use crate::shutdown::Shutdown;
+use crate::statistics::Statistics;
+
+/// The scene's choice of its fidelity, and the watch over it.
+struct Fidelity {
+    plan: FidelityPlan,
+    watch: Arc<FidelityWatch>,
+    told: [bool; 2],
+}
+
+/// A running session. Dropped, it ends.
+pub struct Session {
+    clock: SessionClock,
+    started: Duration,
+    shutdown: Shutdown,
+    ledger: RealtimeLedger,
+    statistics: Statistics,
+    wrench: Subscriber<WrenchCommand>,
+    arm_switch: Arc<ArmSwitch>,
+    incidents: IncidentNews,
+    fidelity: Option<Fidelity>,
+    network: Arc<NetworkCounts>,
+    clients: ClientLedger,
+    /// In the order of their start.
+    threads: Vec<JoinHandle<()>>,
+    monitor: Option<MonitorFeed>,
+    recorder: Option<Recorder>,
+    looking_on: LookingOn,
+    link: Option<ServerLink>,
+    runtime: Runtime,
+    /// While it is held, idle cores wait at work.
+    _awake: Option<Awake>,
+}
+
+impl Session {
+    /// Address of the control plane, with the port that it got.
+    pub fn quic_address(&self) -> Option<SocketAddr> {
+        self.link.as_ref().map(ServerLink::quic_addr)
+    }
+
+    /// What clients know this server by.
+    pub fn fingerprint(&self) -> Option<ServerPin> {
+        self.link.as_ref().map(ServerLink::pin)
+    }
+
+    /// Address of the state plane, with the port that it got.
+    pub fn udp_address(&self) -> Option<SocketAddr> {
+        self.link.as_ref().map(ServerLink::udp_addr)
+    }
+
+    /// Lets in by another policy from now on; how many clients that shut out.
+    pub fn set_admission(&self, policy: JoinPolicy) -> usize {
+        self.link.as_ref().map_or(0, |link| link.set_policy(policy))
+    }
+
+    /// Those who look on without taut's own client.
+    pub fn looking_on(&self) -> &LookingOn {
+        &self.looking_on
+    }
+
+    /// The running monitor.
+    pub fn monitor(&self) -> Option<&MonitorFeed> {
+        self.monitor.as_ref()
+    }
+
+    /// What the system granted and refused.
+    pub fn realtime(&self) -> RealtimeReport {
+        self.ledger.report()
+    }
+
+    /// What fidelity the scene chose for itself, if it does.
+    pub fn fidelity(&self) -> Option<&FidelityPlan> {
+        self.fidelity.as_ref().map(|fidelity| &fidelity.plan)
+    }
+
+    /// Asks for force at the device, or for none.
+    pub fn arm_switch(&self) -> &Arc<ArmSwitch> {
+        &self.arm_switch
+    }
+
+    /// How long the loops have run.
+    pub fn age(&self) -> Duration {
+        self.clock.now().saturating_sub(self.started)
+    }
+
+    /// Whether the session asked for its own end, because something broke.
+    pub fn is_ending(&self) -> bool {
+        self.shutdown.is_asked()
+    }
+}

@@ -1,0 +1,131 @@
+//! What goes on: network, safety events and fidelity, told to the log, the recording and the monitor.
+
+use std::sync::atomic::Ordering;
+
+use god_object::spatial::linear;
+use taut_bridge::ArmWish;
+use taut_link::{LinkEvent, proto};
+use taut_recording::EventRecord;
+
+use crate::loops::incidents::{self};
+use crate::monitor::Severity;
+use crate::terminal::Terminal;
+
+use super::Session;
+
+impl Session {
+    /// Tells what happened on the network since the last time: errors here, everything to monitor and log. Call it a few times a
+    /// second.
+    pub fn follow_network(&mut self, terminal: &Terminal) {
+        self.tell_incidents();
+        if let Some(fidelity) = &mut self.fidelity {
+            for line in fidelity.watch.notices(&mut fidelity.told) {
+                terminal.say(&line);
+                tracing::info!("{line}");
+            }
+        }
+        let Some(link) = &self.link else {
+            return;
+        };
+        let mut lines = Vec::new();
+        while let Some(event) = link.try_event() {
+            if let LinkEvent::Arm { arm, .. } = event {
+                self.arm_switch
+                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            }
+            lines.extend(
+                self.clients
+                    .follow(&event)
+                    .map(|line| (severity(&event), line)),
+            );
+        }
+        for (severity, line) in lines {
+            if severity == Severity::Error {
+                terminal.say(&format!("taut: {line}"));
+            }
+            tracing::info!("{line}");
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: self.clock.now(),
+                    kind: "network".to_owned(),
+                    text: line.clone(),
+                });
+            }
+            if let Some(monitor) = &self.monitor {
+                monitor.log(severity, &line);
+            }
+        }
+        let clients = link.clients();
+        self.clients.look_at(&clients);
+        let counters = link.counters();
+        self.network
+            .packets_sent
+            .store(counters.packets_sent, Ordering::Relaxed);
+        self.network
+            .packets_received
+            .store(counters.packets_received, Ordering::Relaxed);
+        self.network.clients.store(
+            u32::try_from(clients.len()).unwrap_or(u32::MAX),
+            Ordering::Relaxed,
+        );
+    }
+
+    /// Tells of the device port's events, to the log and the recording; the monitor looks by itself.
+    pub(super) fn tell_incidents(&mut self) {
+        let counts = &self.statistics.haptics.incidents;
+        for (event, times) in self.incidents.since_last(counts) {
+            let text = incidents::line(&event, times);
+            if event.kind.is_good_news() {
+                tracing::info!("{text}");
+            } else {
+                tracing::warn!("{text}");
+            }
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: event.time,
+                    kind: "safety".to_owned(),
+                    text,
+                });
+            }
+        }
+    }
+
+    /// One line of what goes on.
+    pub fn status_line(&mut self) -> String {
+        let statistics = &self.statistics;
+        let seconds = self.age().as_secs_f64();
+        let period = statistics.haptics.period.distribution_us();
+        let update = statistics.god_object.update.distribution_us();
+        let force = linear(&self.wrench.newest().wrench).norm();
+        let checks = &statistics.checks;
+        format!(
+            "{seconds:5.0} s  haptics {:.0} Hz, p99 {:.2} ms  god-object p99 {:.2} ms  contacts {}  force {force:.2} N  clients {}  penetrations {} of {}",
+            period.count as f64 / seconds.max(f64::MIN_POSITIVE),
+            period.p99 * 1e-3,
+            update.p99 * 1e-3,
+            statistics.god_object.contacts.newest(),
+            self.network.clients.load(Ordering::Relaxed),
+            checks.penetrations.load(Ordering::Relaxed),
+            checks.checks.load(Ordering::Relaxed),
+        )
+    }
+}
+
+fn severity(event: &LinkEvent) -> Severity {
+    use proto::control::LogLevel;
+    match event {
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
+        // Whoever stands at the haptic PC should know that somebody knocked.
+        LinkEvent::Refused { .. } => Severity::Error,
+        LinkEvent::Forbidden { .. } => Severity::Warning,
+        LinkEvent::Log { event, .. } => match event.level {
+            LogLevel::Info => Severity::Info,
+            LogLevel::Warning => Severity::Warning,
+            LogLevel::Error => Severity::Error,
+        },
+    }
+}

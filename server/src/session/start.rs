@@ -1,0 +1,274 @@
+//! A session built and started: what a scene can be wrong in first, then network, device, loops, monitor.
+
+use std::sync::Arc;
+
+use god_object::{GodObject, Pose, Settings};
+use taut_bridge::edge::offer_of;
+use taut_bridge::realtime::{keep_cores_awake, lock_memory};
+use taut_bridge::{Device, RemoteDevice};
+use taut_link::proto::CouplingOffer;
+use taut_link::{ServerLink, ServerOptions, proto};
+use taut_recording::Recorder;
+use tokio::runtime::Runtime;
+
+use crate::broadcast::{BridgeCommands, StateWriter};
+use crate::checker::PenetrationChecker;
+use crate::clients::ClientLedger;
+use crate::clock::SessionClock;
+use crate::edge_sets::EdgeSets;
+use crate::failure::Failure;
+use crate::fidelity::FidelityWatch;
+use crate::looking_on::LookingOn;
+use crate::loops::incidents::IncidentNews;
+use crate::loops::wiring::WiredLoops;
+use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
+use crate::realtime::{RealtimeLedger, Scheduling};
+use crate::setup::{DeviceSource, SessionSetup};
+use crate::shutdown::Shutdown;
+
+use super::{Fidelity, Session};
+
+/// Threads of the network runtime: one for packets, one for joins.
+const NETWORK_THREADS: usize = 2;
+
+impl Session {
+    /// Builds and starts everything.
+    pub fn start(setup: SessionSetup) -> Result<Self, Failure> {
+        // What the scene can be wrong in, before anything is opened.
+        let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
+        let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
+            Failure::bad_input(
+                "a mesh of the scene cannot be checked for penetration: run `taut check` on it",
+            )
+        })?;
+
+        // The network, whose clock is everybody's; the device may be behind it.
+        let clock = SessionClock::start();
+        let ledger = RealtimeLedger::default();
+        let runtime = network_runtime(&ledger, setup.realtime.network_priority)?;
+        let picture = picture(&setup);
+        let opening = opening(&setup);
+        let scene_revision = setup.content.description.revision;
+        let coupling = match &setup.device {
+            DeviceSource::Remote { .. } => offer_of(
+                &setup.world,
+                &setup.settings,
+                setup.realtime.broadcast_period.as_secs_f64().recip(),
+            ),
+            DeviceSource::Local(_) => CouplingOffer::AtServer {
+                reason: "its workbench has a device of its own".to_owned(),
+            },
+        };
+        let options = ServerOptions {
+            coupling,
+            quic: setup.link.quic,
+            udp: setup.link.udp,
+            announced_udp_port: setup.link.announced_udp_port,
+            multicast: setup.link.multicast,
+            max_clients: setup.link.max_clients,
+            frames: setup.link.frames,
+            policy: setup.link.policy,
+            node_timeout: setup.link.node_timeout,
+            clock: clock.for_link(),
+            ..ServerOptions::new(setup.link.key)
+        };
+        // QUIC must not give up a node on a network whose pauses the workbench bears, nor before the eviction that says why.
+        let options = ServerOptions {
+            idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
+            ..options
+        };
+        let (looking_on, outlets) =
+            LookingOn::start(&setup.looking_on, &setup.content.description)?;
+        let link = runtime.block_on(taut_link::serve(options, setup.content))?;
+        let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
+        let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
+            Failure::failed(format!("the head tracker cannot be listened to ({error})"))
+        })?;
+
+        let (taps, recorder) = match &setup.recording {
+            Some(wanted) => {
+                let (taps, recorder) =
+                    Recorder::start(&wanted.directory, wanted.manifest.clone(), &wanted.scene)
+                        .map_err(Failure::bad_input)?;
+                (Some(taps), Some(recorder))
+            }
+            None => (None, None),
+        };
+
+        let fidelity = setup.fidelity.map(|plan| Fidelity {
+            watch: Arc::new(FidelityWatch::new(&plan)),
+            plan,
+            told: [false; 2],
+        });
+        let most_contacts = fidelity
+            .as_ref()
+            .map_or(proto::state::MAX_CONTACTS, |f| f.plan.contacts as usize);
+        // Figure 3.
+        let loops = WiredLoops::new(
+            &setup.world,
+            &setup.settings,
+            god_object,
+            device,
+            setup.safety,
+            taps,
+        )
+        .with_motions(setup.motions.clone());
+        let broadcaster = link.broadcaster();
+        let (grant, awake) = keep_cores_awake();
+        ledger.note("process", grant);
+        let mut session = Self {
+            clock,
+            started: clock.now(),
+            shutdown: Shutdown::default(),
+            ledger,
+            statistics: loops.statistics.clone(),
+            wrench: loops.observers.status,
+            arm_switch: loops.arm_switch.clone(),
+            incidents: IncidentNews::default(),
+            fidelity,
+            network: Arc::default(),
+            clients: ClientLedger::default(),
+            threads: Vec::new(),
+            monitor: None,
+            recorder,
+            looking_on,
+            link: Some(link),
+            runtime,
+            _awake: awake,
+        };
+
+        // From here on a failure drops the session, which ends what was started.
+        if let Some(settings) = &setup.monitor {
+            let sources = MonitorSources {
+                head: watched_head,
+                shared: loops.observers.monitor,
+                statistics: loops.statistics.clone(),
+                clock,
+            };
+            let feed = MonitorFeed::start(
+                settings,
+                &picture,
+                sources,
+                session.network.clone(),
+                &session.shutdown,
+            )?;
+            session.monitor = Some(feed);
+        }
+        if setup.realtime.lock_memory {
+            session.ledger.note("process", lock_memory());
+        }
+        let states = StateWriter::new(
+            loops.observers.broadcast,
+            head,
+            &setup.world.body.reference_point,
+            scene_revision,
+        )
+        .with_most_contacts(most_contacts);
+        session.start_coupling(
+            loops.coupling,
+            loops.coupling_waker.clone(),
+            &setup.realtime,
+        )?;
+        let watch = session.fidelity.as_ref().map(|f| f.watch.clone());
+        let god_object = loops.god_object.with_fidelity(watch);
+        session.start_god_object(god_object, loops.coupling_waker, &setup.realtime)?;
+        session.start_checker(checker, loops.observers.checker)?;
+        session.start_broadcast(
+            states,
+            broadcaster,
+            bridge_commands,
+            outlets,
+            &setup.realtime,
+        )?;
+        session.start_frames(&setup.realtime)?;
+        session.start_haptics(loops.haptics, &setup.realtime)?;
+        session.enforce(setup.realtime.policy)?;
+        session.tell_start(&opening);
+        Ok(session)
+    }
+
+    /// What runs here, and what of real time is in force, to the monitor's log.
+    pub(super) fn tell_start(&self, opening: &str) {
+        let Some(monitor) = &self.monitor else {
+            return;
+        };
+        monitor.log(Severity::Info, opening);
+        let realtime = self.ledger.report();
+        if !realtime.enforced.is_empty() {
+            let line = format!("real time in force: {}", realtime.enforced.join("; "));
+            monitor.log(Severity::Info, &line);
+        }
+        for line in &realtime.waived {
+            monitor.log(
+                Severity::Warning,
+                &format!("real time not in force: {line}"),
+            );
+        }
+    }
+}
+
+/// The threads that receive: device samples come this way, so they go before normal work.
+fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Failure> {
+    let ledger = ledger.clone();
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(NETWORK_THREADS)
+        .thread_name("network")
+        .on_thread_start(move || {
+            ledger.schedule("network", Scheduling::Fifo(priority));
+        })
+        .enable_all()
+        .build()
+        .map_err(|error| {
+            Failure::failed(format!("the network's threads cannot be started ({error})"))
+        })
+}
+
+/// The device, and the commands that go to its bridge if it is behind the network.
+fn connect_device(
+    source: DeviceSource,
+    link: &ServerLink,
+    settings: &Settings,
+) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
+    match source {
+        DeviceSource::Local(device) => Ok((device, None)),
+        DeviceSource::Remote { limits, max_age } => {
+            let inputs = link.device_inputs().ok_or_else(|| {
+                Failure::failed("the device's samples are read by somebody else: this is a fault of the program")
+            })?;
+            let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
+            let sets = EdgeSets::new(settings);
+            Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
+        }
+    }
+}
+
+/// What the monitor's log begins with.
+fn opening(setup: &SessionSetup) -> String {
+    let (body, settings) = (&setup.world.body, &setup.settings);
+    format!(
+        "session with scene \"{}\": stiffness {:.0} N/m, at most {} N and {} N m",
+        setup.content.description.name,
+        settings.stiffness(body.mass),
+        settings.force_limit,
+        settings.torque_limit
+    )
+}
+
+/// What the monitor draws once.
+fn picture(setup: &SessionSetup) -> MonitorPicture {
+    let description = &setup.content.description;
+    MonitorPicture {
+        name: description.name.clone(),
+        world: setup.world.clone(),
+        moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
+        start: setup.start,
+        screens: description.screens.clone(),
+        workbench_from_scene: description
+            .scene_origin
+            .to_isometry()
+            .unwrap_or_else(Pose::identity),
+        display_scale: description.display_scale,
+        head: setup.head.rest,
+        rest_distance: setup.settings.rest_distance,
+    }
+}

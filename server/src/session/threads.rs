@@ -1,0 +1,205 @@
+//! The threads of a session: who runs, at which priority, woken by what.
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
+
+use taut_bridge::realtime::{pin_to_core, sleep_until};
+use taut_link::{Broadcaster, ServerLink};
+
+use crate::broadcast::{self, BridgeCommands, StateWriter};
+use crate::checker::{self, PenetrationChecker};
+use crate::failure::Failure;
+use crate::looking_on::Outlets;
+use crate::loops::coupling::CouplingLoop;
+use crate::loops::god_object::GodObjectLoop;
+use crate::loops::haptics::HapticsLoop;
+use crate::loops::shell::{Beat, Waker, run_at_deadlines, spawn};
+use crate::realtime::{RealtimePolicy, Scheduling};
+use crate::setup::RealtimeSettings;
+use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::fanout::Subscriber;
+
+use super::Session;
+
+/// The coupling looks at the shared data at least this often, should nobody wake it.
+const COUPLING_TIMEOUT: Duration = Duration::from_millis(10);
+/// How long a session waits for the threads to ask the system for their scheduling.
+const SCHEDULING_TIME: Duration = Duration::from_millis(200);
+
+impl Session {
+    pub(super) fn start_coupling(
+        &mut self,
+        mut coupling: CouplingLoop,
+        waker: Waker,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        self.start_thread(
+            "coupling",
+            Scheduling::Fifo(realtime.coupling_priority),
+            realtime.coupling_core,
+            move || {
+                while !shutdown.is_asked() {
+                    if !coupling.tick(clock.now()) {
+                        waker.wait(COUPLING_TIMEOUT);
+                    }
+                }
+            },
+        )
+    }
+
+    pub(super) fn start_god_object(
+        &mut self,
+        mut god_object: GodObjectLoop,
+        waker: Waker,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) = (
+            self.clock,
+            self.shutdown.clone(),
+            realtime.god_object_period,
+        );
+        let scheduling = realtime
+            .god_object_priority
+            .map_or(Scheduling::Ahead, Scheduling::Fifo);
+        self.start_thread(
+            "god-object",
+            scheduling,
+            realtime.god_object_core,
+            move || {
+                // Updates that take longer than a period are no fault: the next one starts at once.
+                let late = AtomicU64::new(0);
+                let beat = Beat {
+                    period,
+                    phase: Beat::GOD_OBJECT,
+                };
+                run_at_deadlines(clock, beat, &shutdown, &late, |_| {
+                    god_object.tick(|| clock.now());
+                    waker.wake();
+                });
+            },
+        )
+    }
+
+    pub(super) fn start_checker(
+        &mut self,
+        checker: PenetrationChecker,
+        contacts: Subscriber<ContactSnapshot>,
+    ) -> Result<(), Failure> {
+        let (counts, shutdown) = (self.statistics.checks.clone(), self.shutdown.clone());
+        self.start_thread("checker", Scheduling::Background, None, move || {
+            checker::run(&checker, contacts, &counts, &shutdown);
+        })
+    }
+
+    pub(super) fn start_broadcast(
+        &mut self,
+        states: StateWriter,
+        broadcaster: Broadcaster,
+        bridge_commands: Option<BridgeCommands>,
+        outlets: Outlets,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) =
+            (self.clock, self.shutdown.clone(), realtime.broadcast_period);
+        self.start_thread(
+            "broadcast",
+            Scheduling::Fifo(realtime.broadcast_priority),
+            None,
+            move || {
+                broadcast::run(
+                    states,
+                    broadcaster,
+                    bridge_commands,
+                    outlets,
+                    clock,
+                    period,
+                    &shutdown,
+                );
+            },
+        )
+    }
+
+    /// The barrier of the render nodes' frames, where the workbench wants one.
+    pub(super) fn start_frames(&mut self, realtime: &RealtimeSettings) -> Result<(), Failure> {
+        let Some(mut master) = self.link.as_ref().and_then(ServerLink::frame_master) else {
+            return Ok(());
+        };
+        let shutdown = self.shutdown.clone();
+        self.start_thread(
+            "frames",
+            Scheduling::Fifo(realtime.broadcast_priority),
+            None,
+            move || master.run(&|| shutdown.is_asked()),
+        )
+    }
+
+    pub(super) fn start_haptics(
+        &mut self,
+        mut haptics: HapticsLoop,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let (clock, shutdown, period) =
+            (self.clock, self.shutdown.clone(), realtime.haptics_period);
+        let statistics = self.statistics.haptics.clone();
+        self.started = clock.now();
+        self.start_thread(
+            "haptics",
+            Scheduling::Fifo(realtime.haptics_priority),
+            realtime.haptics_core,
+            move || {
+                let ticked = catch_unwind(AssertUnwindSafe(|| {
+                    let beat = Beat {
+                        period,
+                        phase: Beat::HAPTICS,
+                    };
+                    run_at_deadlines(clock, beat, &shutdown, &statistics.deadline_misses, |now| {
+                        haptics.tick(now)
+                    });
+                }));
+                // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
+                let released = catch_unwind(AssertUnwindSafe(|| {
+                    while !haptics.release_step(clock.now()) {
+                        sleep_until(clock.monotonic(clock.now() + period));
+                    }
+                }));
+                if let Err(cause) = ticked.and(released) {
+                    resume_unwind(cause);
+                }
+            },
+        )
+    }
+
+    pub(super) fn start_thread(
+        &mut self,
+        name: &'static str,
+        scheduling: Scheduling,
+        core: Option<usize>,
+        body: impl FnOnce() + Send + 'static,
+    ) -> Result<(), Failure> {
+        let ledger = self.ledger.clone();
+        let thread = spawn(name, &self.shutdown, move || {
+            ledger.schedule(name, scheduling);
+            if let Some(core) = core {
+                ledger.note(name, pin_to_core(core));
+            }
+            body();
+        });
+        self.threads.push(thread.map_err(|error| {
+            Failure::failed(format!("the thread {name} cannot be started ({error}); check the limit on processes (ulimit -u)"))
+        })?);
+        Ok(())
+    }
+
+    /// Waits for the answers of the system, and takes a refusal as the policy says.
+    pub(super) fn enforce(&self, policy: RealtimePolicy) -> Result<(), Failure> {
+        std::thread::sleep(SCHEDULING_TIME);
+        match (policy, self.ledger.report().waived.first()) {
+            (RealtimePolicy::Enforce, Some(refused)) => Err(Failure::BadInput(format!(
+                "the workbench file enforces real time, but the system refused ({refused}); grant it, or set realtime.mode = \"waive\""
+            ))),
+            _ => Ok(()),
+        }
+    }
+}

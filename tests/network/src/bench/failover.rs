@@ -1,0 +1,216 @@
+//! The server's process is killed while nodes draw in step: how long they stand still, whether they go on together, and how soon the next server has
+//! them. On the way the node that leads dies as well.
+//!
+//! The server is a process of its own, of this program; the nodes are threads here, so that one clock sees all of them.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use taut_link::{ClientOptions, ClusterKey, Role, ServerOptions, serve};
+use taut_proto::barrier::{FRAMES_LEFT_OUT, Swap};
+
+use super::screen::{Screen, Swapped, longest_gap_ms, together};
+use super::skew::{Leading, settings};
+use super::{BenchError, Quantiles, request_fifo, small_content, wait_until};
+
+/// Frames per second.
+pub const RATE: u64 = 60;
+/// Nodes.
+pub const NODES: usize = 3;
+/// Real-time priority of all threads, where the system grants it.
+const PRIORITY: u8 = 60;
+/// Time for clocks to lock and nodes to fall in step.
+const WARM_UP: Duration = Duration::from_secs(3);
+/// Time that each leader leads.
+const REIGN: Duration = Duration::from_secs(3);
+/// Time after the return that counts as part of it.
+const RETURN: Duration = Duration::from_secs(2);
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Failover {
+    /// Whether the run was of the real-time class.
+    pub fifo: bool,
+    /// Longest time between two swaps of any node over the death of the server, ms.
+    pub gap_ms: f64,
+    /// The same over the death of the node that led then.
+    pub second_gap_ms: f64,
+    /// The same from the start of the next server on.
+    pub return_gap_ms: f64,
+    /// Last swap call of a frame less first while a node led, us.
+    pub skew_us: Quantiles,
+    /// The same while the server led: the control.
+    pub server_skew_us: Quantiles,
+    /// Frames while a node led that showed different states: must be 0.
+    pub different: u64,
+    /// From the start of the next server until all had joined it, s.
+    pub back_s: f64,
+}
+
+/// Runs it once, with a server that gives nodes up, and is given up, after `node_timeout`. `this` is this program, for the server's process.
+///
+/// # Errors
+/// The session does not come about, or nobody comes back.
+pub fn measure(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
+    let this = this.to_path_buf();
+    let run = std::thread::Builder::new()
+        .name("fail-over".to_owned())
+        .spawn(move || measure_here(&this, node_timeout))?;
+    run.join().unwrap_or_else(|_| {
+        Err(BenchError::Missing(
+            "the measuring thread panicked".to_owned(),
+        ))
+    })
+}
+
+fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
+    let fifo = request_fifo(PRIORITY);
+    let directory = tempfile::tempdir()?;
+    let path = directory.path().join("cluster.key");
+    let key: ClusterKey = taut_link::create_key_file(&path)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()?;
+    let any = "127.0.0.1:0";
+    let server = LeaderProcess::start(this, &path, (any, any), node_timeout)?;
+    let (quic, udp) = (server.quic.clone(), server.udp.clone());
+    let mut screens = Vec::new();
+    for number in 0..NODES {
+        let name = format!("node{number}");
+        let options = ClientOptions::new(quic.clone(), key.clone(), Role::Render, name);
+        screens.push(Screen::start(&runtime, options, number as u64)?);
+    }
+    wait_until("frames", || {
+        screens.iter().all(|screen| screen.frame() > 2 * RATE)
+    })?;
+    let in_step = Instant::now();
+    std::thread::sleep(WARM_UP);
+    let before = screens.iter().map(Screen::frame).max().unwrap_or(0);
+
+    let died = Instant::now();
+    drop(server); // SIGKILL
+    std::thread::sleep(REIGN);
+    // The one of the lowest session leads: it was the first.
+    let leader_died = Instant::now();
+    let first = screens.remove(0).end()?;
+    std::thread::sleep(REIGN);
+
+    let again = Instant::now();
+    let server = LeaderProcess::start(this, &path, (&quic, &udp), node_timeout)?;
+    wait_until("the nodes to come back", || {
+        screens.iter().all(|screen| screen.sessions() == 2)
+    })?;
+    let back_s = again.elapsed().as_secs_f64();
+    std::thread::sleep(RETURN);
+    let end = Instant::now();
+    let mut shown = vec![first];
+    for screen in screens {
+        shown.push(screen.end()?);
+    }
+    drop(server);
+
+    let longest = |nodes: &[Vec<Swapped>], from, to| {
+        let gaps = nodes.iter().map(|shown| longest_gap_ms(shown, from, to));
+        // NaN, a node that showed nothing, is the largest of all.
+        gaps.max_by(f64::total_cmp).unwrap_or(f64::NAN)
+    };
+    let of_nodes =
+        |swapped: &Swapped| swapped.sessions == 1 && swapped.frame > before + FRAMES_LEFT_OUT / 2;
+    let by_all = together(&shown, |swapped| {
+        of_nodes(swapped) && swapped.at < leader_died
+    });
+    let by_two = together(&shown[1..], |swapped| {
+        of_nodes(swapped) && swapped.at >= leader_died
+    });
+    let by_server = together(&shown, |swapped| swapped.at > in_step && swapped.at < died);
+    let skews = by_all.skew_us.into_iter().chain(by_two.skew_us);
+    Ok(Failover {
+        fifo,
+        gap_ms: longest(&shown, died, leader_died),
+        second_gap_ms: longest(&shown[1..], leader_died, again),
+        return_gap_ms: longest(&shown[1..], again, end),
+        skew_us: Quantiles::of(skews.collect()),
+        server_skew_us: Quantiles::of(by_server.skew_us),
+        different: by_all.different + by_two.different,
+        back_s,
+    })
+}
+
+/// A server that broadcasts and leads frames, as a process that is killed when dropped.
+struct LeaderProcess {
+    child: Child,
+    quic: String,
+    udp: String,
+}
+
+impl LeaderProcess {
+    fn start(
+        this: &Path,
+        key: &Path,
+        (quic, udp): (&str, &str),
+        node_timeout: Duration,
+    ) -> Result<LeaderProcess, BenchError> {
+        let mut child = Command::new(this)
+            .args(["--lead", quic, udp])
+            .arg(key)
+            .arg(node_timeout.as_millis().to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()?;
+        let mut line = String::new();
+        if let Some(out) = child.stdout.take() {
+            BufReader::new(out).read_line(&mut line)?;
+        }
+        let mut started = LeaderProcess {
+            child,
+            quic: String::new(),
+            udp: String::new(),
+        };
+        let Some((quic, udp)) = line.trim().split_once(' ') else {
+            return Err(BenchError::Missing(format!("no server started: {line}")));
+        };
+        (started.quic, started.udp) = (quic.to_owned(), udp.to_owned());
+        Ok(started)
+    }
+}
+
+impl Drop for LeaderProcess {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// What the server's process does: says where it serves, broadcasts, and leads frames until its standard input ends.
+///
+/// # Errors
+/// It cannot serve there.
+pub fn lead(quic: &str, udp: &str, key: &Path, node_timeout: Duration) -> Result<(), BenchError> {
+    let _ = request_fifo(PRIORITY);
+    let address = |text: &str| {
+        let parsed = text.parse();
+        parsed.map_err(|_| BenchError::Missing(format!("`{text}` is no address")))
+    };
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()?;
+    let options = ServerOptions {
+        quic: address(quic)?,
+        udp: address(udp)?,
+        node_timeout,
+        frames: Some(settings(Swap::Immediate, RATE)),
+        ..ServerOptions::loopback(taut_link::read_key_file(key)?)
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let leading = Leading::start(&server)?;
+    let mut out = std::io::stdout();
+    writeln!(out, "{} {}", server.quic_addr(), server.udp_addr())?;
+    out.flush()?;
+    let mut ignored = Vec::new();
+    std::io::stdin().read_to_end(&mut ignored)?;
+    leading.end()
+}

@@ -1,0 +1,209 @@
+//! The program `taut` in a directory of its own: a workbench file, a cluster key, processes that end with their owner.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, Stdio};
+
+use rustix::process::{Pid, Signal, kill_process};
+use taut_link::{ClusterKey, create_key_file};
+use tempfile::TempDir;
+use toml::{Table, Value};
+
+use super::BenchError;
+
+/// The workbench file that is shipped.
+const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
+/// The scene of all runs.
+pub(super) const SCENE: &str = "sphere-on-plane";
+
+/// A workbench on free ports of loopback.
+pub(super) struct Workbench {
+    program: PathBuf,
+    directory: TempDir,
+}
+
+impl Workbench {
+    /// The shipped one with the small scene, as `change` alters it.
+    pub(super) fn new(
+        program: &Path,
+        change: impl FnOnce(&mut Table) -> Result<(), BenchError>,
+    ) -> Result<Workbench, BenchError> {
+        let workbench = Workbench {
+            program: program.to_path_buf(),
+            directory: tempfile::tempdir()?,
+        };
+        let mut file: Table = SHIPPED_WORKBENCH.parse().map_err(|_| broken())?;
+        file.insert("scene".to_owned(), SCENE.into());
+        set(&mut file, "network.quic_port", 0)?;
+        set(&mut file, "network.udp_port", 0)?;
+        change(&mut file)?;
+        std::fs::write(workbench.config(), file.to_string())?;
+        create_key_file(&workbench.key_path())?;
+        Ok(workbench)
+    }
+
+    /// The cluster key.
+    pub(super) fn key(&self) -> Result<ClusterKey, BenchError> {
+        Ok(taut_link::read_key_file(&self.key_path())?)
+    }
+
+    pub(super) fn key_path(&self) -> PathBuf {
+        self.directory.path().join("cluster.key")
+    }
+
+    fn config(&self) -> PathBuf {
+        self.directory.path().join("workbench.toml")
+    }
+
+    /// Writes a file into its directory; where.
+    pub(super) fn write(&self, name: &str, content: &str) -> Result<PathBuf, BenchError> {
+        let path = self.directory.path().join(name);
+        std::fs::write(&path, content)?;
+        Ok(path)
+    }
+
+    /// Starts `taut serve`, at these addresses or at free ones, and waits until it serves.
+    pub(super) fn serve(&self, at: Option<(&str, &str)>) -> Result<Served, BenchError> {
+        let mut command = self.command();
+        command.args(["serve", "--json", "--no-monitor", "--config"]);
+        command.arg(self.config()).arg("--key").arg(self.key_path());
+        if let Some((quic, udp)) = at {
+            command.args(["--quic", quic, "--udp", udp]);
+        }
+        let mut process = Process::start(command.stderr(Stdio::piped()))?;
+        let errors = process.child.stderr.take();
+        let errors = errors
+            .ok_or_else(|| BenchError::Missing("the program has no standard error".to_owned()))?;
+        let mut served = Served {
+            process,
+            lines: BufReader::new(errors),
+            quic: String::new(),
+            udp: String::new(),
+        };
+        (served.quic, served.udp) = served.addresses()?;
+        Ok(served)
+    }
+
+    /// Starts another role that joins `server` as `node`.
+    pub(super) fn join(
+        &self,
+        role: &str,
+        node: &str,
+        server: &str,
+        arguments: &[&str],
+    ) -> Result<Process, BenchError> {
+        let mut command = self.command();
+        command.args([role, "--server", server, "--node", node, "--key"]);
+        command.arg(self.key_path()).args(arguments);
+        // What it says of a server that it lost is expected.
+        Process::start(command.stderr(Stdio::null()))
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.program);
+        command
+            .current_dir(self.directory.path())
+            .env_remove("TAUT_KEY_FILE")
+            .env_remove("DISPLAY")
+            .env_remove("WAYLAND_DISPLAY")
+            .env("XDG_CACHE_HOME", self.directory.path())
+            .env("XDG_RUNTIME_DIR", self.directory.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped());
+        command
+    }
+}
+
+/// Changes a value of a workbench file, such as `network.quic_port`.
+pub(super) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Result<(), BenchError> {
+    let (table, key) = key.split_once('.').ok_or_else(broken)?;
+    let table = file.get_mut(table).and_then(Value::as_table_mut);
+    table
+        .ok_or_else(broken)?
+        .insert(key.to_owned(), value.into());
+    Ok(())
+}
+
+fn broken() -> BenchError {
+    BenchError::Missing("the shipped workbench file is not as it was".to_owned())
+}
+
+/// A process that does not outlive its owner: killed when dropped.
+pub(super) struct Process {
+    child: Child,
+}
+
+impl Process {
+    fn start(command: &mut Command) -> Result<Process, BenchError> {
+        let child = command.spawn()?;
+        Ok(Process { child })
+    }
+
+    /// Sends it a signal.
+    pub(super) fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+        let id = Pid::from_child(&self.child);
+        Ok(kill_process(id, signal).map_err(std::io::Error::from)?)
+    }
+
+    /// Ends it as Ctrl-C does; what it wrote to standard output.
+    pub(super) fn end(mut self) -> Result<String, BenchError> {
+        self.signal(Signal::INT)?;
+        let mut text = String::new();
+        if let Some(mut out) = self.child.stdout.take() {
+            out.read_to_string(&mut text)?;
+        }
+        self.child.wait()?;
+        Ok(text)
+    }
+
+    /// The same; its report.
+    pub(super) fn report(self) -> Result<serde_json::Value, BenchError> {
+        let text = self.end()?;
+        serde_json::from_str(&text).map_err(|error| {
+            BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))
+        })
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // it has ended where all went well
+        let _ = self.child.wait();
+    }
+}
+
+/// A running `taut serve`; killed when dropped.
+pub(super) struct Served {
+    process: Process,
+    lines: BufReader<ChildStderr>,
+    /// Address of the control plane.
+    pub(super) quic: String,
+    /// Address of the pose plane.
+    pub(super) udp: String,
+}
+
+impl Served {
+    /// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
+    fn addresses(&mut self) -> Result<(String, String), BenchError> {
+        let (mut line, mut all) = (String::new(), String::new());
+        while self.lines.read_line(&mut line)? > 0 {
+            let found = line.trim_end().strip_prefix("serving on ");
+            let both =
+                found.and_then(|text| text.strip_suffix(" (poses)")?.split_once(" (control) and "));
+            if let Some((quic, udp)) = both {
+                return Ok((quic.to_owned(), udp.to_owned()));
+            }
+            all.push_str(&line);
+            line.clear();
+        }
+        Err(BenchError::Missing(format!(
+            "the program does not serve: {}",
+            all.trim()
+        )))
+    }
+
+    /// Ends it as Ctrl-C does; its report.
+    pub(super) fn stop(self) -> Result<serde_json::Value, BenchError> {
+        self.process.report()
+    }
+}

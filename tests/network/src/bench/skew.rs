@@ -1,0 +1,223 @@
+//! How far apart nodes call their swaps, how old their states are then, and whether they are the same: real sessions on loopback, by threads of one
+//! process, so that one clock sees all of them.
+//!
+//! Beside it stands a control of the same run: as many threads that wait for one bare UDP datagram each, sent one right after the other by one
+//! thread, at the same rate. What this machine's scheduler does to them it does to everybody.
+
+use std::net::UdpSocket;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use taut_link::{ClusterKey, Role, ServerLink, ServerOptions, serve};
+use taut_proto::barrier::{MasterSettings, Swap};
+
+use super::screen::{Screen, Swapped, together};
+use super::{BenchError, Quantiles, Ticker, client_options, request_fifo, small_content, state};
+
+/// Frames at the start do not count: clocks lock, nodes fall in step.
+const WARM_UP: Duration = Duration::from_secs(2);
+/// Longest that the control runs.
+const CONTROL: Duration = Duration::from_secs(5);
+/// Real-time priority of all threads of the run, where the system grants it.
+const PRIORITY: u8 = 60;
+
+/// What is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    /// Nodes.
+    pub nodes: u64,
+    /// Frames per second.
+    pub rate: u64,
+    /// When frames are swapped.
+    pub swap: Swap,
+    /// Time that counts.
+    pub duration: Duration,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug)]
+pub struct Skew {
+    /// Whether the run was of the real-time class.
+    pub fifo: bool,
+    /// Last swap call of a frame less first, us.
+    pub skew_us: Quantiles,
+    /// The same of the control.
+    pub control_us: Quantiles,
+    /// Age of the state at the swap call, ms.
+    pub age_ms: Quantiles,
+    /// From the moment at which a frame could be shown to the last swap call, as the server reports it, us: p50, p99.
+    pub overhead_us: (f64, f64),
+    /// Frames released without a node that was waited for.
+    pub lapses: u64,
+    /// Drawn states that the server compared with the released one.
+    pub compared: u64,
+    /// Of these, and of the frames compared here, other ones: must be 0.
+    pub different: u64,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// The session does not come about.
+pub fn measure(plan: Plan) -> Result<Skew, BenchError> {
+    // Threads inherit the class of the one that makes them.
+    let run = std::thread::Builder::new()
+        .name("skew".to_owned())
+        .spawn(move || measure_here(plan, request_fifo(PRIORITY)))?;
+    run.join().unwrap_or_else(|_| {
+        Err(BenchError::Missing(
+            "the measuring thread panicked".to_owned(),
+        ))
+    })
+}
+
+fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()?;
+    let key = ClusterKey::generate().map_err(|error| BenchError::Missing(error.to_string()))?;
+    let options = ServerOptions {
+        frames: Some(settings(plan.swap, plan.rate)),
+        ..ServerOptions::loopback(key.clone())
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let clock = server.clock();
+    let leading = Leading::start(&server)?;
+    let mut screens = Vec::new();
+    for number in 0..plan.nodes {
+        let options = client_options(&server, &key, Role::Render, &format!("node{number}"));
+        screens.push(Screen::start(&runtime, options, number)?);
+    }
+    std::thread::sleep(WARM_UP);
+    let begin = Instant::now();
+    std::thread::sleep(plan.duration);
+    let report = server
+        .frame_report()
+        .ok_or_else(|| BenchError::Missing("nobody leads".to_owned()))?;
+    let shown: Vec<_> = screens
+        .into_iter()
+        .map(Screen::end)
+        .collect::<Result<_, _>>()?;
+    leading.end()?;
+    runtime.block_on(server.shutdown());
+
+    let counts = |swapped: &Swapped| swapped.at >= begin;
+    let found = together(&shown, counts);
+    let age =
+        |swapped: &Swapped| clock.at(swapped.at).saturating_sub(swapped.sample_ns) as f64 * 1e-6;
+    let ages = shown.iter().flatten().filter(|swapped| counts(swapped));
+    Ok(Skew {
+        fifo,
+        skew_us: Quantiles::of(found.skew_us),
+        control_us: Quantiles::of(control(plan)?),
+        age_ms: Quantiles::of(ages.map(age).collect()),
+        overhead_us: (report.overhead.p50, report.overhead.p99),
+        lapses: report.counts.lapses,
+        compared: report.counts.compared,
+        different: found.different + report.counts.mismatches,
+    })
+}
+
+/// Frames of this rate.
+#[must_use]
+pub fn settings(swap: Swap, rate: u64) -> MasterSettings {
+    MasterSettings {
+        swap,
+        period_ns: 1_000_000_000 / rate,
+    }
+}
+
+/// The threads of a server that broadcasts a state per millisecond and leads frames.
+pub struct Leading {
+    stop: Arc<AtomicBool>,
+    threads: Vec<std::thread::JoinHandle<()>>,
+}
+
+impl Leading {
+    /// Starts them.
+    ///
+    /// # Errors
+    /// The server leads no frames, or the system has no thread.
+    pub fn start(server: &ServerLink) -> Result<Leading, BenchError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let (over, mut broadcaster, clock) = (stop.clone(), server.broadcaster(), server.clock());
+        let states = move || {
+            let (mut tick, mut ticker) = (0, Ticker::new(Duration::from_millis(1)));
+            while !over.load(Ordering::Relaxed) {
+                ticker.wait();
+                tick += 1;
+                let _ = broadcaster.send(&state(tick, clock.now_ns(), false));
+            }
+        };
+        let mut master = server
+            .frame_master()
+            .ok_or_else(|| BenchError::Missing("the server leads no frames".to_owned()))?;
+        let over = stop.clone();
+        let frames = move || master.run(&|| over.load(Ordering::Relaxed));
+        let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        Ok(Leading {
+            stop,
+            threads: vec![
+                named("states").spawn(states)?,
+                named("frames").spawn(frames)?,
+            ],
+        })
+    }
+
+    /// Ends them.
+    ///
+    /// # Errors
+    /// One panicked.
+    pub fn end(self) -> Result<(), BenchError> {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads {
+            let ended = thread.join();
+            ended.map_err(|_| BenchError::Missing("a thread panicked".to_owned()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Skew of the wake-ups of as many threads by one bare datagram each, us.
+fn control(plan: Plan) -> Result<Vec<f64>, BenchError> {
+    let rounds = (plan.duration.min(CONTROL).as_secs_f64() * plan.rate as f64) as usize;
+    let start = Instant::now();
+    let (mut sockets, mut threads) = (Vec::new(), Vec::new());
+    for _ in 0..plan.nodes {
+        let socket = UdpSocket::bind("127.0.0.1:0")?;
+        sockets.push(socket.local_addr()?);
+        let wait = move || {
+            let mut woken = Vec::with_capacity(rounds);
+            let mut buffer = [0; 1200];
+            while woken.len() < rounds && socket.recv(&mut buffer).is_ok() {
+                woken.push(start.elapsed().as_secs_f64() * 1e6);
+            }
+            woken
+        };
+        threads.push(
+            std::thread::Builder::new()
+                .name("control".to_owned())
+                .spawn(wait)?,
+        );
+    }
+    let sender = UdpSocket::bind("127.0.0.1:0")?;
+    let mut ticker = Ticker::new(Duration::from_secs(1) / plan.rate as u32);
+    for _ in 0..rounds {
+        ticker.wait();
+        for socket in &sockets {
+            sender.send_to(&[0; 600], socket)?;
+        }
+    }
+    let mut woken = Vec::new();
+    for thread in threads {
+        let joined = thread.join();
+        woken.push(joined.map_err(|_| BenchError::Missing("a control panicked".to_owned()))?);
+    }
+    let skew = |round: usize| {
+        let at = || woken.iter().map(|of: &Vec<f64>| of[round]);
+        at().fold(f64::MIN, f64::max) - at().fold(f64::MAX, f64::min)
+    };
+    Ok((0..rounds).map(skew).collect())
+}
