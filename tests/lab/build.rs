@@ -14,10 +14,12 @@ const LABORATORY: [&str; 4] = [
     "../../Cargo.lock",
 ];
 /// What only shows results: a page that looks better makes nothing be run again.
-const SHOWS: [&str; 7] = [
+const SHOWS: [&str; 9] = [
     "src/page.rs",
     "src/plot.rs",
     "src/chart.rs",
+    "src/overview.rs",
+    "src/maps",
     "src/report.rs",
     "src/run.rs",
     "src/main.rs",

@@ -33,7 +33,7 @@ pub use scene::{
     MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene,
     SceneSource, Shape, ShippedScene, View, shipped_scene_text,
 };
-pub use simplify::Simplified;
+pub use simplify::{Simplified, simplify};
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,
     TraceSample,

@@ -58,7 +58,7 @@ impl std::fmt::Display for Simplified {
 }
 
 /// The coarsest candidate within `max_error` (m) of `original`, both ways, that is closed, outward and does not run through itself; else the original.
-pub(crate) fn simplify(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
+pub fn simplify(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
     let before = original.triangles().len();
     let mut bar = Bar::new(body);
     let mut reason = "no candidate has fewer triangles".to_owned();

@@ -75,7 +75,9 @@ pub(crate) fn panel(
 ) -> (Frame, Vec<Mark>) {
     let frame = Frame {
         title: format!("{recipe}: {case}"),
-        times: TIMES,
+        costs: TIMES,
+        cost: "p99 of an update, us",
+        cost_line: Some(1000.0),
         errors: ERRORS,
         unit: "J",
         error_line: Some(1.0),
@@ -108,7 +110,7 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
     )?;
     let (legend, grid) = root.split_vertically(50);
     draw_legend(&legend)?;
-    let mut csv = format!("panel,{KEYS},update_p99_us,j,on_front\n");
+    let mut csv = format!("panel,{KEYS},j,update_p99_us,on_front\n");
     for (index, (area, panel)) in grid
         .split_evenly((lines, COLUMNS))
         .iter()
@@ -128,7 +130,7 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
             let (time, felt) = point(outcome);
             let on_front = front.contains(&(time, felt));
             let keys = keys(outcome);
-            writeln!(csv, "{index},{keys},{time:.2},{felt:.6e},{on_front}")?;
+            writeln!(csv, "{index},{keys},{felt:.6e},{time:.2},{on_front}")?;
         }
     }
     root.present()?;

@@ -10,23 +10,26 @@
 //! - [`measure`]: errors of force, steps, energy, penetration, in units of what people feel.
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
 //! - [`measured`]: what is measured of runs from every start phase; [`store`]: results that a later run need not make again.
-//! - [`sweeps`]: one setting of this project's method at a time, error against time.
-//! - [`run`]: all of it, with progress; [`page`]: the report as one HTML file; [`provenance`]: on what it was made.
+//! - [`sweeps`]: one setting of this project's method at a time, error against time; [`maps`]: stability, method by method.
+//! - [`crew`]: work side by side; [`run`]: all of it, with progress; [`page`]: the report as one HTML file; [`provenance`]: on what it was made.
 //! - [`row`]: the one type of row that tables and files are made of.
 //! - [`fidelity`]: is what a scene chooses for itself the cheapest that is good enough?
-//! - [`report`]: table and CSV; [`chart`]: error against time.
+//! - [`report`]: table and CSV; [`chart`]: error against time, recipe by recipe; [`overview`]: all of them in one picture.
 //!
 //! Same machine type, same answers: only times differ between runs, and those stand in a file of their own.
 
 pub mod chart;
 pub mod clock;
 pub mod cpu_time;
+pub mod crew;
 pub mod fidelity;
+pub mod maps;
 pub mod measure;
 pub mod measured;
 pub mod method;
 pub mod methods;
 pub mod outcome;
+pub mod overview;
 pub mod page;
 mod plot;
 pub mod provenance;

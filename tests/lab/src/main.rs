@@ -1,8 +1,8 @@
 //! Runs the recipes for every method and rate:
-//! `cargo run --release -p taut-lab -- [report] [--quick] [--out DIRECTORY] [--method NAME]... [--sweep NAME]... [--fresh] [RECIPE...]`.
+//! `cargo run --release -p taut-lab -- [report] [--quick] [--out DIRECTORY] [--threads N] [--method NAME]... [--sweep NAME]... [--maps] [--fresh] [RECIPE...]`.
 //!
 //! Prints the table and writes it, the CSV files and the charts. `report` (or `--report`) adds all sweeps and writes `report.html`, a page
-//! of everything. `--sweep NAME` runs that sweep, and recipes only where they are named. Results that are finished are kept in `done`
+//! of everything. `--maps` runs the stability maps. `--threads` is the number of cores unless it is given. `--sweep NAME` runs that sweep, and recipes only where they are named. Results that are finished are kept in `done`
 //! beside the files, and not run again; `--fresh` runs everything. Exit code 1 where this project's own method fails at 1 kHz, or a study or
 //! a reference answer does.
 
@@ -10,6 +10,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use taut_lab::crew;
 use taut_lab::method::Method;
 use taut_lab::recipes::Extent;
 use taut_lab::report;
@@ -58,13 +59,20 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
 fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, String> {
     let (mut extent, mut directory) = (Extent::Full, PathBuf::from(DIRECTORY));
     let (mut methods, mut sweeps, mut names) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut page, mut fresh) = (false, false);
+    let (mut page, mut fresh, mut maps, mut threads) = (false, false, false, crew::cores());
     while let Some(argument) = given.next() {
         match argument.as_str() {
             "report" | "--report" => page = true,
             "--quick" => extent = Extent::Quick,
             "--fresh" => fresh = true,
+            "--maps" => maps = true,
             "--out" => directory = given.next().ok_or("--out needs a directory")?.into(),
+            "--threads" => {
+                let number = given.next().and_then(|number| number.parse().ok());
+                threads = number
+                    .filter(|threads| *threads > 0)
+                    .ok_or("--threads needs a number above 0")?;
+            }
             "--method" => {
                 let name = given.next().ok_or("--method needs a name")?;
                 let known = Method::ALL.iter().find(|method| method.name() == name);
@@ -91,9 +99,10 @@ fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, Strin
         methods.extend(Method::ALL);
     }
     // A sweep alone runs no recipes, recipes alone no sweeps, and a report of everything all of both.
-    let everything = names.is_empty() && sweeps.is_empty();
+    let everything = names.is_empty() && sweeps.is_empty() && !maps;
     if everything && page {
         sweeps.extend(SWEEPS);
+        maps = true;
     }
     Ok(Arguments {
         plan: Plan {
@@ -101,6 +110,8 @@ fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, Strin
             recipes: (!everything).then_some(names),
             methods,
             sweeps,
+            maps,
+            threads,
         },
         directory,
         page,

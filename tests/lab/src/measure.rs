@@ -16,7 +16,6 @@
 use god_object::Vector6;
 use god_object::spatial::{angular, linear};
 use nalgebra::Vector3;
-use taut_method_tests::checker::PenetrationChecker;
 
 use crate::clock::Tick;
 use crate::cpu_time::quantile;
@@ -25,8 +24,8 @@ use crate::recipe::Recipe;
 /// Ideal forces below this have no direction to compare with, and smaller errors are not felt, N.
 const FELT_FORCE: f64 = 0.1;
 /// Just-noticeable differences: of direction, degrees; of magnitude and torque, shares.
-const JND_DIRECTION: f64 = 18.4;
-const JND_MAGNITUDE: f64 = 0.07;
+pub(crate) const JND_DIRECTION: f64 = 18.4;
+pub(crate) const JND_MAGNITUDE: f64 = 0.07;
 const JND_TORQUE: f64 = 0.127;
 /// The torque at which [`JND_TORQUE`] was measured, N m; smaller ones are compared as if they were this.
 const REFERENCE_TORQUE: f64 = 0.06;
@@ -87,7 +86,11 @@ measures! {
     FalseForce "false_force" "s",
     /// Forces or poses that are not finite.
     NotFinite "not_finite" "ticks",
-    /// Error in just-noticeable differences, J.
+    /// Largest of [`Self::ExcessStep`] in just-noticeable differences.
+    StepFelt "step_felt" "JND",
+    /// 95th percentile of the error of torque in just-noticeable differences.
+    TorqueFelt "torque_felt" "JND",
+    /// Error in just-noticeable differences, J: the largest of direction, magnitude, torque and step.
     Felt "felt" "JND",
 }
 
@@ -102,16 +105,14 @@ pub struct Measures {
 impl Measures {
     /// Of a run of a recipe.
     #[must_use]
-    pub fn of(recipe: &Recipe, checker: &PenetrationChecker, ticks: &[Tick]) -> Self {
+    pub fn of(recipe: &Recipe, ticks: &[Tick]) -> Self {
         let ideal = &recipe.answer().wrenches;
         let errors = ForceErrors::new(ticks, ideal);
         let values = Measure::ALL
             .iter()
             .map(|measure| match measure {
                 Measure::Penetration => largest(ticks.iter().map(|t| (recipe.depth)(&t.body))),
-                Measure::Intersections => {
-                    intersections(checker, ticks, recipe.check_every, recipe.moving.is_some())
-                }
+                Measure::Intersections => intersections(recipe, ticks),
                 Measure::Astray => largest(ticks.iter().map(|t| (recipe.astray)(t.time, &t.body))),
                 Measure::DirectionP95 => quantile(&errors.direction, 0.95),
                 Measure::DirectionMean => {
@@ -128,6 +129,8 @@ impl Measures {
                 Measure::FirstForceDepth => first_force(ticks, ideal) / recipe.scene.stiffness(),
                 Measure::FalseForce => errors.false_force,
                 Measure::NotFinite => ticks.iter().filter(|tick| !is_finite(tick)).count() as f64,
+                Measure::StepFelt => errors.step_jnd,
+                Measure::TorqueFelt => quantile(&errors.torque_jnd, 0.95),
                 Measure::Felt => errors.felt(),
             })
             .collect();
@@ -171,10 +174,11 @@ fn is_finite(tick: &Tick) -> bool {
 }
 
 /// NaN where the obstacle moves: the check knows obstacles at rest, and those recipes have a depth of their own.
-fn intersections(checker: &PenetrationChecker, ticks: &[Tick], every: u32, moving: bool) -> f64 {
-    if moving {
+fn intersections(recipe: &Recipe, ticks: &[Tick]) -> f64 {
+    if recipe.moving.is_some() {
         return f64::NAN;
     }
+    let (checker, every) = (recipe.checker(), recipe.check_every);
     let mut last = None;
     let (mut published, mut count) = (0_u32, 0);
     for tick in ticks {

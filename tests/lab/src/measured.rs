@@ -1,7 +1,5 @@
 //! What is measured of runs of one recipe from every start phase, whoever runs it.
 
-use taut_method_tests::checker::PenetrationChecker;
-
 use crate::clock;
 use crate::cpu_time::quantile;
 use crate::measure::{Measure, Measures};
@@ -34,7 +32,6 @@ impl Measured {
         count: u32,
         start: impl Fn() -> Box<dyn HapticMethod>,
     ) -> Self {
-        let checker = PenetrationChecker::new(&recipe.scene.world);
         let (mut updates, mut forces) = (Vec::new(), Vec::new());
         let phases = (0..count)
             .map(|k| {
@@ -42,7 +39,7 @@ impl Measured {
                 let run = clock::run(start().as_mut(), recipe, rate, phase);
                 updates.extend(run.update_us);
                 forces.extend(run.force_us);
-                Measures::of(recipe, &checker, &run.ticks)
+                Measures::of(recipe, &run.ticks)
             })
             .collect();
         Self {

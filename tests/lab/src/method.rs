@@ -10,8 +10,12 @@ use crate::methods::{Discrete, GodObjectMethod, Penalty, PointGodObject, Virtual
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
 /// an update is made, and one while it is used.
 const LOOK_AHEAD_PERIODS: f64 = 4.0;
-/// Rest distances that are tried for the paper's method, m: a ball on a convex surface loses a contact that is too tight.
-const TOUCHING: [f64; 2] = [10e-6, 50e-6];
+/// Share of the time between updates that this project's method may spend on looking ahead, and what a pair of triangles takes, nominally, s
+/// ([`Work`](god_object::collision::Work)).
+const LOOK_AHEAD_SHARE: f64 = 0.1;
+const PAIR_TIME: f64 = 50e-9;
+/// Rest distances that are tried for the paper's method, over the default: a ball on a convex surface loses a contact that is too tight.
+const TOUCHING: [f64; 2] = [5.0, 25.0];
 /// Inertias and damping ratios that are tried for virtual coupling.
 const PROXY_SHARES: [f64; 3] = [0.02, 0.005, 0.1];
 const DAMPING_RATIOS: [f64; 2] = [1.0, 0.3];
@@ -67,12 +71,15 @@ impl Scene {
         }
     }
 
-    /// The settings of [`Method::Ours`]: the look-ahead limit fitted to the speed of the device and the time between updates, s.
+    /// The settings of [`Method::Ours`]: how far it looks ahead is fitted to the speed of the device and the time between updates, s, and
+    /// how many pairs it may look at for that to this time.
     #[must_use]
     pub fn fitted(&self, period: f64) -> Settings {
         let reach = LOOK_AHEAD_PERIODS * self.speed * period;
+        let pairs = (LOOK_AHEAD_SHARE * period / PAIR_TIME) as u64;
         Settings {
             look_ahead_limit: self.settings.look_ahead_limit.max(reach),
+            look_ahead_pairs: self.settings.look_ahead_pairs.max(pairs),
             ..self.settings
         }
     }
@@ -87,9 +94,9 @@ impl Scene {
 /// The methods that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// This project's, its look-ahead limit fitted to the speed of the device and the rate of updates.
+    /// This project's, its look-ahead fitted to the speed of the device and the rate of updates.
     Ours,
-    /// This project's, with its default settings, whose look-ahead limit is fitted to the size of the body alone.
+    /// This project's, with its default settings, whose look-ahead is fitted to the size of the body alone.
     OursByDefault,
     /// As published, without the adaptation of constraints: a cone of touching contacts, one projection and one collision
     /// search in an update.
@@ -179,9 +186,9 @@ impl Method {
             implicit_rounds: 0,
             ..by_default
         };
-        if let Tuning::Touching(rest_distance) = tuning {
-            paper.rest_distance = rest_distance;
-            paper.activation_distance = paper.activation_distance.max(2.0 * rest_distance);
+        if let Tuning::Touching(share) = tuning {
+            paper.rest_distance *= share;
+            paper.activation_distance = paper.activation_distance.max(2.0 * paper.rest_distance);
         }
         match self {
             Self::Ours => Box::new(GodObjectMethod::new(scene, &scene.fitted(period))),
@@ -225,7 +232,7 @@ impl Method {
 pub enum Tuning {
     /// Nothing.
     Default,
-    /// Rest distance of the paper's god-object, m; contacts within two of them touch.
+    /// Rest distance of the paper's god-object, over the default; contacts within two of them touch.
     Touching(f64),
     /// The proxy of virtual coupling.
     Proxy {
@@ -273,7 +280,7 @@ impl fmt::Display for Tuning {
                 }
             }
             Self::Touch(share) => write!(f, "touching within {share} rest distances"),
-            Self::Touching(distance) => write!(f, "rest distance {:.0} um", distance * 1e6),
+            Self::Touching(share) => write!(f, "{share} rest distances"),
             Self::Proxy {
                 share,
                 damping_ratio,

@@ -49,26 +49,28 @@ impl Outcome {
     #[must_use]
     pub fn of(recipe: &Recipe, method: Method, rate: u32) -> Self {
         let tunings = method.tunings();
-        let trials: Vec<Trial> = match tunings.as_slice() {
+        let tried: Vec<Self> = match tunings.as_slice() {
             [_] => Vec::new(),
             several => several
                 .iter()
-                .map(|tuning| {
-                    let trial = Self::from_phases(recipe, method, rate, *tuning, 1);
-                    Trial {
-                        tuning: *tuning,
-                        missed: trial.missed(recipe),
-                        felt: trial.worst(Measure::Felt),
-                    }
-                })
+                .map(|tuning| Self::from_phases(recipe, method, rate, *tuning, 1))
                 .collect(),
         };
+        let trial = |tried: &Self| Trial {
+            tuning: tried.tuning,
+            missed: tried.missed(recipe),
+            felt: tried.worst(Measure::Felt),
+        };
+        let trials: Vec<Trial> = tried.iter().map(trial).collect();
         // NaN, where nothing is felt to be compared, is the same for all.
         let best = trials
             .iter()
             .min_by(|a, b| a.felt.total_cmp(&b.felt).then(a.missed.cmp(&b.missed)))
             .map_or(tunings[0], |trial| trial.tuning);
-        let mut outcome = Self::tuned(recipe, method, rate, best);
+        // A recipe of one phase was run whole when it was tried.
+        let whole = tried.into_iter().find(|tried| tried.tuning == best);
+        let whole = whole.filter(|_| recipe.phases == 1);
+        let mut outcome = whole.unwrap_or_else(|| Self::tuned(recipe, method, rate, best));
         outcome.trials = trials;
         outcome
     }
@@ -248,31 +250,30 @@ impl Outcome {
     }
 }
 
-/// Everything about one recipe: its reference answer, and each of these methods at every rate or why not. What `store` has is not run
-/// again. Calls `done` after each.
-pub fn run_recipe(
-    recipe: &Recipe,
-    methods: &[Method],
-    store: &Store,
-    mut done: impl FnMut(&Outcome),
-) -> (Vec<Outcome>, Vec<Row>) {
-    let (mut outcomes, mut rows) = (Vec::new(), Vec::new());
+/// Who runs a recipe: each method that has a part in it, at every rate.
+pub fn players(recipe: &Recipe, methods: &[Method]) -> Vec<(Method, u32)> {
+    let with_part = methods
+        .iter()
+        .filter(|method| (recipe.out_of_scope)(**method).is_none());
+    with_part
+        .flat_map(|method| RATES.map(|rate| (*method, rate)))
+        .collect()
+}
+
+/// Everything about one recipe: its reference answer, what came of its [`players`], in their order, and why other methods have no part.
+pub fn recipe_rows(recipe: &Recipe, methods: &[Method], outcomes: &[Outcome]) -> Vec<Row> {
+    let mut rows = Vec::new();
     if let Ideal::Reference = recipe.ideal {
         rows.extend(reference_rows(recipe));
     }
     for method in methods.iter().copied() {
         if let Some(reason) = (recipe.out_of_scope)(method) {
             rows.push(Row::new(recipe.name, &recipe.case, method.name()).out_of_scope(reason));
-            continue;
         }
-        for rate in RATES {
-            let outcome = Outcome::kept(store, recipe, method, rate);
-            rows.extend(outcome.rows(recipe));
-            done(&outcome);
-            outcomes.push(outcome);
-        }
+        let by_it = outcomes.iter().filter(|outcome| outcome.method == method);
+        rows.extend(by_it.flat_map(|outcome| outcome.rows(recipe)));
     }
-    (outcomes, rows)
+    rows
 }
 
 /// What is known of the error of a recipe's reference answer.

@@ -11,8 +11,8 @@ use crate::method::Method;
 use crate::report::{brief, verdict};
 use crate::row::{Row, Verdict};
 use crate::run::{Results, is_own};
-use crate::sweeps::{self, MISSING, Point, Sweep};
-use crate::{chart, provenance};
+use crate::sweeps::{self, Point, Sweep};
+use crate::{chart, maps, overview, provenance};
 
 const STYLE: &str = "
 body{font:14px/1.45 system-ui,sans-serif;color:#222;max-width:1500px;margin:24px auto;padding:0 20px}
@@ -37,6 +37,7 @@ pub fn html(results: &Results) -> Result<String, Box<dyn Error>> {
     );
     provenance_table(&mut page)?;
     if !results.rows.is_empty() {
+        overview_section(&mut page, results)?;
         summary(&mut page, results)?;
         not_kept(&mut page, results)?;
         for recipe in results.rows.chunk_by(|a, b| a.recipe == b.recipe) {
@@ -44,6 +45,7 @@ pub fn html(results: &Results) -> Result<String, Box<dyn Error>> {
         }
     }
     sweep_sections(&mut page, results)?;
+    maps_section(&mut page, results)?;
     page.push_str("</body></html>\n");
     Ok(page)
 }
@@ -99,6 +101,19 @@ fn players(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
     })
 }
 
+/// All recipes in one picture.
+fn overview_section(page: &mut String, results: &Results) -> Result<(), Box<dyn Error>> {
+    let summaries = overview::summaries(&results.rows, &results.outcomes);
+    if !summaries.is_empty() {
+        page.push_str("<h2>All recipes</h2>\n<div class=row>");
+        page.push_str(&overview::svg(&summaries)?);
+        page.push_str(
+            "</div>\n<p>Numbers are rows of <a href=\"overview.csv\">overview.csv</a>.</p>\n",
+        );
+    }
+    Ok(())
+}
+
 /// How many cases each method passes at each rate.
 fn summary(page: &mut String, results: &Results) -> std::fmt::Result {
     page.push_str("<h2>Cases by method and rate</h2>\n<table><tr><th>method");
@@ -126,6 +141,9 @@ fn summary(page: &mut String, results: &Results) -> std::fmt::Result {
     }
     for (sweep, _) in &results.sweeps {
         write!(page, "<a href=\"#sweep-{0}\">sweep of {0}</a>", sweep.name)?;
+    }
+    if !results.maps.is_empty() {
+        page.push_str("<a href=\"#maps\">stability maps</a>");
     }
     page.push_str("</nav>\n");
     Ok(())
@@ -324,20 +342,45 @@ fn sweep_sections(page: &mut String, results: &Results) -> Result<(), Box<dyn Er
     for (sweep, points) in &results.sweeps {
         sweep_section(page, sweep, points)?;
     }
-    page.push_str("<h2 id=missing>Sweeps that are not in this report</h2>\n<ul>\n");
-    for (what, why) in MISSING {
-        writeln!(page, "<li>{}: {}.", escaped(what), escaped(why))?;
-    }
-    for sweep in sweeps::SWEEPS {
-        if !results.sweeps.iter().any(|(run, _)| run.name == sweep.name) {
+    let not_run: Vec<&Sweep> = sweeps::SWEEPS
+        .iter()
+        .filter(|sweep| !results.sweeps.iter().any(|(run, _)| run.name == sweep.name))
+        .collect();
+    if !not_run.is_empty() {
+        page.push_str("<h2 id=missing>Sweeps that are not in this report</h2>\n<ul>\n");
+        for sweep in not_run {
+            let (about, name) = (escaped(sweep.about), sweep.name);
             writeln!(
                 page,
-                "<li>{}: not run by this command; --sweep {}.",
-                sweep.about, sweep.name
+                "<li>{about}: not run by this command; --sweep {name}."
             )?;
         }
+        page.push_str("</ul>\n");
     }
-    page.push_str("</ul>\n");
+    Ok(())
+}
+
+/// The stability maps, where they were run.
+fn maps_section(page: &mut String, results: &Results) -> Result<(), Box<dyn Error>> {
+    if results.maps.is_empty() {
+        return Ok(());
+    }
+    page.push_str(
+        "<h2 id=maps>Stiffest wall that is stable, method by method</h2>\n<p>A device of 0.2 kg and 1 N s/m that nobody holds, 1 kHz, a tick of delay, where \
+         the axis does not say otherwise. Points are lines of <a href=\"stability-methods.csv\">stability-methods.csv</a>; those of one place are \
+         drawn side by side.",
+    );
+    for method in maps::METHODS {
+        page.push_str(&key(chart::colour(method), 10, method.name()));
+    }
+    for (colour, text) in maps::COLOURS {
+        page.push_str(&key(colour, 4, text));
+    }
+    page.push_str("</p>\n<div class=row>");
+    for panel in maps::panels(&results.maps)? {
+        page.push_str(&panel);
+    }
+    page.push_str("</div>\n");
     Ok(())
 }
 
@@ -355,8 +398,11 @@ fn sweep_section(page: &mut String, sweep: &Sweep, points: &[Point]) -> Result<(
     for (frame, marks) in sweeps::panels(sweep, points) {
         page.push_str(&frame.svg(&marks)?);
     }
-    page.push_str("</div>\n<details><summary>Table</summary><table><tr><th>recipe<th>case<th>setting<th>p99, us");
-    write!(page, "<th>{}<th>line", escaped(sweep.error))?;
+    page.push_str(
+        "</div>\n<details><summary>Table</summary><table><tr><th>recipe<th>case<th>setting",
+    );
+    let cost = sweep.cost.label();
+    write!(page, "<th>{cost}<th>{}<th>line", escaped(sweep.error))?;
     for (index, point) in points.iter().enumerate() {
         write!(
             page,
@@ -364,7 +410,7 @@ fn sweep_section(page: &mut String, sweep: &Sweep, points: &[Point]) -> Result<(
             point.recipe,
             escaped(&point.case),
             escaped(&point.setting),
-            brief(point.p99_us),
+            brief(point.cost),
             brief(point.error),
             index + 2
         )?;

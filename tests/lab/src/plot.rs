@@ -1,4 +1,4 @@
-//! One panel of error against time, both logarithmic, with the Pareto front and lines of reference.
+//! One panel of error against time or another cost, both logarithmic, with the Pareto front and lines of reference.
 
 use std::error::Error;
 
@@ -11,7 +11,7 @@ pub(crate) const PANEL: (u32, u32) = (460, 340);
 /// One point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mark {
-    /// Time, us, and error.
+    /// Cost and error.
     pub(crate) place: (f64, f64),
     pub(crate) colour: RGBColor,
     /// Radius, pixels.
@@ -24,8 +24,12 @@ pub(crate) struct Mark {
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     pub(crate) title: String,
-    /// us.
-    pub(crate) times: [f64; 2],
+    /// Of the costs.
+    pub(crate) costs: [f64; 2],
+    /// What they are.
+    pub(crate) cost: &'static str,
+    /// A cost that is marked by a line.
+    pub(crate) cost_line: Option<f64>,
     pub(crate) errors: [f64; 2],
     /// Of the errors.
     pub(crate) unit: &'static str,
@@ -33,15 +37,13 @@ pub(crate) struct Frame {
     pub(crate) error_line: Option<f64>,
 }
 
-/// The update that lasts a period of 1 kHz, us.
-const TIME_LINE: f64 = 1000.0;
 /// Errors are drawn a little above the border.
 const LIFT: f64 = 1.4;
 
 impl Frame {
-    fn shown(&self, (time, error): (f64, f64)) -> (f64, f64) {
+    fn shown(&self, (cost, error): (f64, f64)) -> (f64, f64) {
         (
-            time.clamp(self.times[0], self.times[1]),
+            cost.clamp(self.costs[0], self.costs[1]),
             error.clamp(self.errors[0] * LIFT, self.errors[1]),
         )
     }
@@ -55,7 +57,7 @@ impl Frame {
     where
         B::ErrorType: 'static,
     {
-        let ([left, right], [bottom, top]) = (self.times, self.errors);
+        let ([left, right], [bottom, top]) = (self.costs, self.errors);
         let mut chart = ChartBuilder::on(area)
             .margin(10)
             .caption(&self.title, ("sans-serif", 17))
@@ -64,7 +66,7 @@ impl Frame {
             .build_cartesian_2d((left..right).log_scale(), (bottom..top).log_scale())?;
         chart
             .configure_mesh()
-            .x_desc("p99 of an update, us")
+            .x_desc(self.cost)
             .y_desc(self.unit)
             .x_labels(5)
             .y_labels(6)
@@ -77,8 +79,8 @@ impl Frame {
         if let Some(error) = self.error_line {
             chart.draw_series(LineSeries::new([(left, error), (right, error)], grey))?;
         }
-        if TIME_LINE < right {
-            let line = [(TIME_LINE, bottom), (TIME_LINE, top)];
+        if let Some(cost) = self.cost_line.filter(|cost| *cost < right) {
+            let line = [(cost, bottom), (cost, top)];
             chart.draw_series(LineSeries::new(line, grey))?;
         }
         let places: Vec<_> = marks.iter().map(|mark| mark.place).collect();

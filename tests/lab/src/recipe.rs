@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use god_object::{Pose, Vector6};
+use taut_method_tests::checker::PenetrationChecker;
 
 use crate::clock::{TICK, Tick};
 use crate::measure::Measure;
@@ -27,10 +28,13 @@ impl Line {
 }
 
 /// A length at a time, s, of a body at a pose.
-pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64>;
+pub type OverTime = Box<dyn Fn(f64, &Pose) -> f64 + Send + Sync>;
 
 /// A number of a whole run.
-pub type OfRun = Box<dyn Fn(&[Tick]) -> f64>;
+pub type OfRun = Box<dyn Fn(&[Tick]) -> f64 + Send + Sync>;
+
+/// A pose at a time, s.
+pub type Motion = Box<dyn Fn(f64) -> Pose + Send + Sync>;
 
 /// A number of one recipe alone, with its own limit.
 pub struct Probe {
@@ -41,7 +45,7 @@ pub struct Probe {
     /// Of a whole run.
     pub value: OfRun,
     /// Most that passes at a rate of updates, Hz; infinite where it is only shown.
-    pub limit: Box<dyn Fn(u32) -> f64>,
+    pub limit: Box<dyn Fn(u32) -> f64 + Send + Sync>,
 }
 
 impl Probe {
@@ -50,7 +54,7 @@ impl Probe {
         key: &'static str,
         unit: &'static str,
         limit: f64,
-        value: impl Fn(&[Tick]) -> f64 + 'static,
+        value: impl Fn(&[Tick]) -> f64 + Send + Sync + 'static,
     ) -> Self {
         Self {
             key,
@@ -64,7 +68,7 @@ impl Probe {
 /// Where the right answer comes from.
 pub enum Ideal {
     /// A formula: the wrench of the exact quasi-static problem at a time, s, in N and N m.
-    Closed(Box<dyn Fn(f64) -> Vector6>),
+    Closed(Box<dyn Fn(f64) -> Vector6 + Send + Sync>),
     /// A run of this project's method with fine steps, which says how far it is from its own limit: see [`mod@reference`].
     Reference,
     /// None: the recipe is judged by what must hold of any answer.
@@ -73,7 +77,7 @@ pub enum Ideal {
 
 impl Ideal {
     /// A formula.
-    pub fn closed(formula: impl Fn(f64) -> Vector6 + 'static) -> Self {
+    pub fn closed(formula: impl Fn(f64) -> Vector6 + Send + Sync + 'static) -> Self {
         Self::Closed(Box::new(formula))
     }
 }
@@ -100,30 +104,31 @@ pub struct Recipe {
     /// Body and obstacles.
     pub scene: Scene,
     /// Where the device is at a time, s.
-    pub device: Box<dyn Fn(f64) -> Pose>,
+    pub device: Motion,
     /// How long it takes, s.
     pub duration: f64,
     /// The right answer.
     pub ideal: Ideal,
     /// How deep the body at a pose is in an obstacle, m; 0 where it is free.
-    pub depth: Box<dyn Fn(&Pose) -> f64>,
+    pub depth: Box<dyn Fn(&Pose) -> f64 + Send + Sync>,
     /// How far the body at a time and a pose is beyond the side that it belongs to, m; 0 where it is on it.
     pub astray: OverTime,
     /// How many start phases of the updates are run, evenly over a period.
     pub phases: u32,
     /// What passes at a rate of updates, Hz.
-    pub lines: Box<dyn Fn(u32) -> Vec<Line>>,
+    pub lines: Box<dyn Fn(u32) -> Vec<Line> + Send + Sync>,
     /// Numbers of this recipe alone.
     pub probes: Vec<Probe>,
     /// Why a method has no part in it; `None` where it has.
     pub out_of_scope: fn(Method) -> Option<&'static str>,
     /// Where obstacle 0 is at a time, s; `None` where it stands still.
-    pub moving: Option<Box<dyn Fn(f64) -> Pose>>,
+    pub moving: Option<Motion>,
     /// One published pose in so many is given to the independent check for intersections.
     pub check_every: u32,
     /// Lines that this project's method is known not to keep.
     pub open: Vec<Open>,
     pub(crate) answer: OnceLock<Answer>,
+    pub(crate) checker: OnceLock<PenetrationChecker>,
 }
 
 impl Recipe {
@@ -134,7 +139,7 @@ impl Recipe {
         about: &'static str,
         scene: Scene,
         duration: f64,
-        device: impl Fn(f64) -> Pose + 'static,
+        device: impl Fn(f64) -> Pose + Send + Sync + 'static,
     ) -> Self {
         Self {
             name,
@@ -154,6 +159,7 @@ impl Recipe {
             check_every: 1,
             open: Vec::new(),
             answer: OnceLock::new(),
+            checker: OnceLock::new(),
         }
     }
 
@@ -172,6 +178,12 @@ impl Recipe {
             Ideal::Reference => reference::of(self),
             Ideal::None => Answer::exact(std::iter::empty()),
         })
+    }
+
+    /// The independent check for intersections, made on the first call.
+    pub fn checker(&self) -> &PenetrationChecker {
+        self.checker
+            .get_or_init(|| PenetrationChecker::new(&self.scene.world))
     }
 }
 

@@ -9,6 +9,7 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Settings, Vector6};
@@ -29,6 +30,8 @@ const NEARER: f64 = 0.1;
 const SUBSTEPS: u32 = 50;
 /// Rounds of implicit constraints.
 const ROUNDS: u32 = 3;
+/// Files begun by this process.
+static PARTS: AtomicUsize = AtomicUsize::new(0);
 /// First bytes of a cached answer; another layout gets another.
 const MAGIC: [u8; 8] = *b"tautref1";
 
@@ -106,7 +109,8 @@ pub(crate) fn of(recipe: &Recipe) -> Answer {
     cached.unwrap_or_else(|| {
         let answer = converge(recipe);
         // Renamed when it is whole: tests run side by side. A cache that cannot be written costs time and nothing else.
-        let part = file.with_extension(format!("{}.part", std::process::id()));
+        let turn = PARTS.fetch_add(1, Ordering::Relaxed);
+        let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));
         let written = fs::create_dir_all(directory())
             .and_then(|()| fs::write(&part, answer.to_bytes()))
             .and_then(|()| fs::rename(&part, &file));

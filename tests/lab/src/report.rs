@@ -7,7 +7,7 @@
 //! | `measures.csv` | a run from one start phase, with every measure                                    |
 //! | `trials.csv`   | a tuning that was tried                                                           |
 //! | `times.csv`    | a recipe for a method at a rate, with its CPU times: these alone differ           |
-//! | `chart.csv`    | a point of the chart                                                              |
+//! | `chart.csv`    | a point of the chart, its last columns a time and what follows from it            |
 
 use std::fmt::Write as _;
 use std::fs;

@@ -5,15 +5,16 @@ use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::clock::RATES;
+use crate::crew;
 use crate::method::Method;
-use crate::outcome::{Outcome, run_recipe};
-use crate::recipe::Recipe;
+use crate::outcome::{Outcome, players, recipe_rows};
+use crate::recipe::{Ideal, Recipe};
 use crate::recipes::{Extent, STUDIES, all};
 use crate::row::{Row, Verdict};
 use crate::store::Store;
+use crate::study::Study;
 use crate::sweeps::{self, Point, Sweep};
-use crate::{chart, page, report};
+use crate::{chart, maps, overview, page, report};
 
 /// The rate at which this project's method must pass every recipe, Hz.
 pub const OWN_RATE: u32 = 1000;
@@ -29,6 +30,22 @@ pub struct Plan {
     pub methods: Vec<Method>,
     /// Which sweeps.
     pub sweeps: Vec<Sweep>,
+    /// The stability maps, too.
+    pub maps: bool,
+    /// On how many threads. Answers do not depend on it; times do a little, since cores share what is behind them.
+    pub threads: usize,
+}
+
+/// One thing to be done, by itself.
+enum Task<'a> {
+    Study(&'a Study),
+    Run(&'a Recipe, Method, u32),
+}
+
+/// What came of it.
+enum Done {
+    Rows(Vec<Row>),
+    Outcome(Box<Outcome>),
 }
 
 /// Everything that came of a plan.
@@ -40,6 +57,8 @@ pub struct Results {
     pub outcomes: Vec<Outcome>,
     /// Points of each sweep.
     pub sweeps: Vec<(Sweep, Vec<Point>)>,
+    /// Points of the stability maps.
+    pub maps: Vec<maps::Point>,
     /// What each recipe and study is about: name, text.
     pub about: Vec<(&'static str, &'static str)>,
 }
@@ -65,37 +84,83 @@ impl Plan {
     }
 
     /// Runs everything that `store` does not have. The bar is drawn where standard error is a terminal.
+    ///
+    /// The order of rows, outcomes and points is that of the plan, whatever was done first.
     pub fn run(&self, store: &Store) -> Results {
         let recipes = all(self.extent);
         let wanted: Vec<&Recipe> = recipes.iter().filter(|r| self.wants(r.name)).collect();
-        let studies: Vec<_> = STUDIES.iter().filter(|s| self.wants(s.name)).collect();
-        let runs = |recipe: &&Recipe| {
-            let has_part = |method: &&Method| (recipe.out_of_scope)(**method).is_none();
-            self.methods.iter().filter(has_part).count() * RATES.len()
-        };
+        let studies: Vec<&Study> = STUDIES.iter().filter(|s| self.wants(s.name)).collect();
+        let runs = |recipe: &&&Recipe| players(recipe, &self.methods).len();
         let steps = studies.len()
-            + wanted.iter().map(runs).sum::<usize>()
-            + self.sweeps.iter().map(Sweep::count).sum::<usize>();
+            + wanted.iter().map(|recipe| runs(&recipe)).sum::<usize>()
+            + self
+                .sweeps
+                .iter()
+                .map(|sweep| sweep.count(self.extent))
+                .sum::<usize>()
+            + if self.maps {
+                maps::tasks(self.extent).len()
+            } else {
+                0
+            };
         let bar = bar(steps);
-        let mut results = Results::default();
-        for study in studies {
-            bar.set_message(format!("{}: {}", study.name, study.about));
-            results.rows.extend((study.run)(self.extent));
-            results.about.push((study.name, study.about));
+        // References first: whoever needs one while another makes it would wait.
+        let has_reference = |recipe: &&&Recipe| matches!(recipe.ideal, Ideal::Reference);
+        let references: Vec<&Recipe> = wanted.iter().filter(has_reference).copied().collect();
+        crew::map(self.threads, &references, |recipe| {
+            bar.set_message(format!("{recipe:?}: reference"));
+            let _ = recipe.answer();
+        });
+
+        let by_recipe = wanted.iter().flat_map(|recipe| {
+            let players = players(recipe, &self.methods).into_iter();
+            players.map(|(method, rate)| Task::Run(recipe, method, rate))
+        });
+        let tasks: Vec<Task<'_>> = studies
+            .iter()
+            .map(|study| Task::Study(study))
+            .chain(by_recipe)
+            .collect();
+        let done = crew::map(self.threads, &tasks, |task| {
+            let done = match task {
+                Task::Study(study) => {
+                    bar.set_message(format!("{}: {}", study.name, study.about));
+                    Done::Rows((study.run)(self.extent))
+                }
+                Task::Run(recipe, method, rate) => {
+                    bar.set_message(format!("{recipe:?}"));
+                    Done::Outcome(Box::new(Outcome::kept(store, recipe, *method, *rate)))
+                }
+            };
             bar.inc(1);
+            done
+        });
+
+        let mut results = Results::default();
+        for done in done {
+            match done {
+                Done::Rows(rows) => results.rows.extend(rows),
+                Done::Outcome(outcome) => results.outcomes.push(*outcome),
+            }
         }
+        let abouts = studies.iter().map(|study| (study.name, study.about));
+        results.about.extend(abouts);
+        let mut rest = results.outcomes.as_slice();
         for recipe in wanted {
-            bar.set_message(format!("{recipe:?}"));
-            let (outcomes, rows) = run_recipe(recipe, &self.methods, store, |_| bar.inc(1));
-            results.outcomes.extend(outcomes);
-            results.rows.extend(rows);
+            let (its, others) = rest.split_at(runs(&&recipe));
+            rest = others;
+            results.rows.extend(recipe_rows(recipe, &self.methods, its));
             results.about.push((recipe.name, recipe.about));
         }
         results.rows.sort_by(|a, b| a.recipe.cmp(b.recipe)); // stable: cases stay in their order
         for sweep in &self.sweeps {
             bar.set_message(format!("sweep of {}", sweep.name));
-            let points = sweep.run(self.extent, &recipes, store, || bar.inc(1));
+            let points = sweep.run(self.extent, &recipes, store, self.threads, || bar.inc(1));
             results.sweeps.push((*sweep, points));
+        }
+        if self.maps {
+            bar.set_message("stability maps");
+            results.maps = maps::run(self.extent, self.threads, || bar.inc(1));
         }
         bar.finish_and_clear();
         results
@@ -115,9 +180,13 @@ impl Results {
         if !self.about.is_empty() {
             report::write(&self.rows, &self.outcomes, directory)?;
             chart::write(&self.rows, &self.outcomes, directory)?;
+            overview::write(&self.rows, &self.outcomes, directory)?;
         }
         for (sweep, points) in &self.sweeps {
             sweeps::write(sweep, points, directory)?;
+        }
+        if !self.maps.is_empty() {
+            maps::write(&self.maps, directory)?;
         }
         if page {
             std::fs::write(directory.join("report.html"), page::html(self)?)?;
@@ -132,8 +201,10 @@ pub fn own_failure(row: &Row) -> bool {
     is_own(row) && row.verdict == Verdict::Fail
 }
 
-/// Whether a row is of this project's method at the rate that counts, or of something that has no rate.
+/// Whether a row is of this project's method at the rate that counts, or of something that has no rate and is no solver that stands beside ours for comparison.
 #[must_use]
 pub fn is_own(row: &Row) -> bool {
-    row.rate.is_none() || (row.method == Method::Ours.name() && row.rate == Some(OWN_RATE))
+    let compared = row.method == "projected Gauss-Seidel";
+    (row.rate.is_none() && !compared)
+        || (row.method == Method::Ours.name() && row.rate == Some(OWN_RATE))
 }

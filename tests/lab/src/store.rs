@@ -4,9 +4,9 @@
 //! laboratory, versions of crates, the profile of the build and the processor, since times are kept with the answers. A file that is
 //! not whole is none.
 
-use std::cell::Cell;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::provenance;
 use crate::recipe::Recipe;
@@ -15,11 +15,14 @@ use crate::reference;
 /// First bytes of a file; another layout gets another.
 const MAGIC: [u8; 8] = *b"tautdon1";
 
+/// Files begun by this process.
+static PARTS: AtomicUsize = AtomicUsize::new(0);
+
 /// A folder of results, or none.
 #[derive(Debug, Default)]
 pub struct Store {
     directory: Option<PathBuf>,
-    read: Cell<usize>,
+    read: AtomicUsize,
 }
 
 impl Store {
@@ -34,13 +37,13 @@ impl Store {
     pub fn in_directory(directory: &Path) -> Self {
         Self {
             directory: Some(directory.to_owned()),
-            read: Cell::new(0),
+            read: AtomicUsize::new(0),
         }
     }
 
     /// How many results were there already.
     pub fn read(&self) -> usize {
-        self.read.get()
+        self.read.load(Ordering::Relaxed)
     }
 
     /// What was kept under `key`, or what `make` makes, which is then kept. `name` makes the file easier to find.
@@ -58,12 +61,14 @@ impl Store {
         let file = directory.join(format!("{name}-{}.bin", &hash[..24]));
         let kept = fs::read(&file).ok().and_then(|bytes| numbers(&bytes));
         if let Some(result) = kept.and_then(|numbers| from(&numbers)) {
-            self.read.set(self.read.get() + 1);
+            self.read.fetch_add(1, Ordering::Relaxed);
             return result;
         }
         let (result, numbers) = make();
         // Renamed when it is whole. A folder that cannot be written costs time and nothing else.
-        let part = file.with_extension(format!("{}.part", std::process::id()));
+        // Two threads may have made the same: each writes a part of its own.
+        let turn = PARTS.fetch_add(1, Ordering::Relaxed);
+        let part = file.with_extension(format!("{}-{turn}.part", std::process::id()));
         let written = fs::create_dir_all(directory)
             .and_then(|()| fs::write(&part, bytes(&numbers)))
             .and_then(|()| fs::rename(&part, &file));
@@ -121,6 +126,8 @@ fn numbers(bytes: &[u8]) -> Option<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
 
     #[test]

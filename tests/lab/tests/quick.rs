@@ -6,7 +6,7 @@ use taut_lab::method::{Method, Tuning};
 use taut_lab::outcome::{Outcome, reference_rows};
 use taut_lab::recipe::{Ideal, Recipe};
 use taut_lab::recipes::{Extent, STUDIES, all};
-use taut_lab::report::{rows_csv, table, verdict};
+use taut_lab::report::verdict;
 use taut_lab::row::{Row, Verdict};
 
 /// The rate at which this project's method must pass every recipe, Hz.
@@ -215,30 +215,4 @@ fn the_tuning_shown_is_the_best_of_those_tried() {
             assert!(chosen.is_some_and(|t| t.felt <= least), "{method:?}");
         }
     }
-}
-
-/// Studies and a run of every method: the same bytes twice, whatever the times were.
-#[test]
-fn tables_are_the_same_in_every_run() {
-    let run = || {
-        let mut rows: Vec<Row> = STUDIES
-            .iter()
-            .flat_map(|s| (s.run)(Extent::Quick))
-            .collect();
-        for (name, case) in [
-            ("R02", "ball on a plane"),
-            ("R07", "ball in a corner"),
-            ("R10b", "bar past a pin"),
-            ("R30", "box on a rough table, pulled at 0.4 rad"),
-        ] {
-            let recipe = recipe(name, case);
-            for method in Method::ALL {
-                if (recipe.out_of_scope)(method).is_none() {
-                    rows.extend(Outcome::of(&recipe, method, 300).rows(&recipe));
-                }
-            }
-        }
-        (table(&rows), rows_csv(&rows))
-    };
-    assert!(run() == run(), "tables differ");
 }

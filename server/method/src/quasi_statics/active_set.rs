@@ -10,7 +10,7 @@
 use super::certificate::{Certificate, active_rows};
 use super::least_distance::{LeastDistance, Scan};
 use super::projection::SolverKind;
-use super::solve::{Answer, Outcome, Solve};
+use super::solve::{Answer, Outcome, Solve, SolverLimits};
 use super::working_set::{DEPENDENT_SINE, Refinement, WorkingSet};
 use crate::spatial::Vector6;
 
@@ -41,6 +41,7 @@ pub(crate) enum PivotRule {
 pub(crate) struct ActiveSet {
     set: WorkingSet,
     pivot_rule: PivotRule,
+    pub(crate) limits: SolverLimits,
 }
 
 impl ActiveSet {
@@ -48,6 +49,10 @@ impl ActiveSet {
         ActiveSet {
             set: WorkingSet::new(),
             pivot_rule: PivotRule::MostViolated,
+            limits: SolverLimits {
+                tolerance: FEASIBILITY_TOLERANCE,
+                max_iterations: MAX_ITERATIONS,
+            },
         }
     }
 
@@ -65,7 +70,7 @@ impl ActiveSet {
     /// Begins with those rows of the last answer that push here as well; returns the point they give.
     fn warm_start(&mut self, problem: &LeastDistance, rows: &[u32]) -> Vector6 {
         self.set.hold(problem, rows);
-        let tolerance = FEASIBILITY_TOLERANCE * problem.scale();
+        let tolerance = self.limits.tolerance * problem.scale();
         // Where no old row is violated by a_u there is nothing to keep, and a_u itself may be the answer.
         if !self.set.has_offset_above(tolerance) {
             self.set.clear();
@@ -138,14 +143,14 @@ impl Solve for ActiveSet {
         SolverKind::ActiveSet
     }
 
-    /// No allocation; at most `MAX_ITERATIONS` rows taken in.
+    /// No allocation; at most `limits.max_iterations` rows taken in.
     fn solve(&mut self, problem: &LeastDistance, warm_start: &[u32]) -> Answer {
         let mut y = self.warm_start(problem, warm_start);
         let mut polished = false;
-        for iteration in 0..MAX_ITERATIONS {
+        for iteration in 0..self.limits.max_iterations {
             let scan = problem.scan(&y);
             let scale = problem.scale() + y.norm();
-            let tolerance = FEASIBILITY_TOLERANCE * scale;
+            let tolerance = self.limits.tolerance * scale;
             let (row, violation) = self.pivot(problem, &scan, tolerance);
 
             let violated = violation > tolerance;
@@ -173,6 +178,11 @@ impl Solve for ActiveSet {
             }
         }
         let scan = problem.scan(&self.set.settle(Refinement::Once));
-        self.answer(problem, &scan, Outcome::IterationLimit, MAX_ITERATIONS)
+        self.answer(
+            problem,
+            &scan,
+            Outcome::IterationLimit,
+            self.limits.max_iterations,
+        )
     }
 }

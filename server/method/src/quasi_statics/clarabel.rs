@@ -9,13 +9,14 @@ use super::certificate::{ActiveRows, Certificate, active_rows};
 use super::least_distance::LeastDistance;
 use super::projection::SolverKind;
 use super::reduction::reduce;
-use super::solve::{Answer, Outcome, Solve};
+use super::solve::{Answer, Outcome, Solve, SolverLimits};
 use super::working_set::{Refinement, WorkingSet};
 use crate::spatial::Vector6;
 use ::clarabel::algebra::CscMatrix;
 use ::clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus,
 };
+use arrayvec::ArrayVec;
 
 /// Duality gap and feasibility at which Clarabel may stop, relative to the problem, which is scaled to one. The next one is
 /// tried where doubles do not reach the one before; the last is Clarabel's own default.
@@ -30,9 +31,11 @@ const FORCE_THRESHOLD: f64 = 1e-9;
 /// The polished answer is taken if it violates no row by more than this, relative to the problem's scale.
 const POLISHED_VIOLATION: f64 = 1e-12;
 
-/// The solver; see the file head.
-#[derive(Clone, Debug)]
-pub(crate) struct Clarabel;
+/// The solver; see the file head. With limits it tries once, and its answer is not polished.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Clarabel {
+    pub(crate) limits: Option<SolverLimits>,
+}
 
 impl Solve for Clarabel {
     fn kind(&self) -> SolverKind {
@@ -58,8 +61,17 @@ impl Solve for Clarabel {
         // Lengths in units of the deepest violation: the answer has at least that length.
         let mut best: Option<InteriorPoint> = None;
         let mut iterations = 0;
-        for tolerance in TOLERANCES {
-            best = interior_point(problem, &rows, deepest, tolerance);
+        let attempts: ArrayVec<SolverLimits, 3> = match self.limits {
+            Some(limits) => ArrayVec::from_iter([limits]),
+            None => TOLERANCES
+                .map(|tolerance| SolverLimits {
+                    tolerance,
+                    max_iterations: MAX_ITERATIONS,
+                })
+                .into(),
+        };
+        for limits in attempts {
+            best = interior_point(problem, &rows, deepest, limits);
             iterations += best.as_ref().map_or(0, |found| found.iterations);
             if best
                 .as_ref()
@@ -90,6 +102,9 @@ impl Solve for Clarabel {
         reduce(problem, forces.into_iter(), &mut set);
         let unpolished = active_rows(&set);
 
+        if self.limits.is_some() {
+            return answer(&found.correction, unpolished, found.outcome, iterations);
+        }
         let polished = set.settle(Refinement::Once);
         let tolerance = POLISHED_VIOLATION * (problem.scale() + polished.norm());
         if found.outcome != Outcome::Infeasible && problem.scan(&polished).violation() <= tolerance
@@ -113,7 +128,7 @@ fn interior_point(
     problem: &LeastDistance,
     rows: &[usize],
     unit: f64,
-    tolerance: f64,
+    limits: SolverLimits,
 ) -> Option<InteriorPoint> {
     let m = rows.len();
     let normals: Vec<Vector6> = rows.iter().map(|row| problem.normal(*row)).collect();
@@ -133,11 +148,11 @@ fn interior_point(
     );
     let settings = DefaultSettings {
         verbose: false,
-        max_iter: MAX_ITERATIONS,
-        tol_gap_abs: tolerance,
-        tol_gap_rel: tolerance,
-        tol_feas: tolerance,
-        tol_ktratio: tolerance,
+        max_iter: limits.max_iterations,
+        tol_gap_abs: limits.tolerance,
+        tol_gap_rel: limits.tolerance,
+        tol_feas: limits.tolerance,
+        tol_ktratio: limits.tolerance,
         ..DefaultSettings::default()
     };
     let cones = [NonnegativeConeT(m)];

@@ -9,7 +9,7 @@ use super::certificate::{Certificate, active_rows};
 use super::least_distance::LeastDistance;
 use super::projection::SolverKind;
 use super::reduction::reduce;
-use super::solve::{Answer, Outcome, Solve};
+use super::solve::{Answer, Outcome, Solve, SolverLimits};
 use super::working_set::WorkingSet;
 use crate::spatial::Vector6;
 
@@ -24,6 +24,7 @@ const CHANGE_TOLERANCE: f64 = 1e-14;
 pub(crate) struct GaussSeidel {
     multipliers: Vec<f64>,
     set: WorkingSet,
+    pub(crate) limits: SolverLimits,
 }
 
 impl GaussSeidel {
@@ -32,6 +33,10 @@ impl GaussSeidel {
         GaussSeidel {
             multipliers: Vec::with_capacity(max_rows),
             set: WorkingSet::new(),
+            limits: SolverLimits {
+                tolerance: CHANGE_TOLERANCE,
+                max_iterations: MAX_SWEEPS,
+            },
         }
     }
 }
@@ -47,7 +52,7 @@ impl Solve for GaussSeidel {
         let mut y = Vector6::zeros();
         let mut outcome = Outcome::IterationLimit;
         let mut sweeps = 0;
-        while sweeps < MAX_SWEEPS && outcome != Outcome::Optimal {
+        while sweeps < self.limits.max_iterations && outcome != Outcome::Optimal {
             sweeps += 1;
             let mut largest_change = 0.0_f64;
             for (row, multiplier) in self.multipliers.iter_mut().enumerate() {
@@ -60,7 +65,7 @@ impl Solve for GaussSeidel {
                     largest_change = largest_change.max(change.abs());
                 }
             }
-            if largest_change <= CHANGE_TOLERANCE * (problem.scale() + y.norm()) {
+            if largest_change <= self.limits.tolerance * (problem.scale() + y.norm()) {
                 outcome = Outcome::Optimal;
             }
         }

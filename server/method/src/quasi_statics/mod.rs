@@ -22,3 +22,4 @@ pub use metric::Metric;
 pub(crate) use projection::MAX_ACTIVE;
 pub use projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
 pub use projector::{KKT_TOLERANCE, Projector};
+pub use solve::SolverLimits;

@@ -17,7 +17,7 @@ use super::least_distance::{Bounds, LeastDistance};
 use super::metric::Metric;
 use super::projection::{ActiveRow, Projection, ProjectionStatus, SolverKind};
 use super::rows::Prepared;
-use super::solve::{Answer, Outcome, Solve};
+use super::solve::{Answer, Outcome, Solve, SolverLimits};
 use crate::spatial::Vector6;
 
 /// Largest relative KKT residual of a certified answer. Usual answers have 1e-15; a row that depends on others up to
@@ -32,6 +32,7 @@ pub struct Projector {
     problem: LeastDistance,
     active_set: ActiveSet,
     gauss_seidel: GaussSeidel,
+    clarabel: Clarabel,
 }
 
 impl Projector {
@@ -47,6 +48,7 @@ impl Projector {
             problem: LeastDistance::with_capacity(max_rows),
             active_set: ActiveSet::new(),
             gauss_seidel: GaussSeidel::with_capacity(relaxed_rows),
+            clarabel: Clarabel::default(),
         }
     }
 
@@ -54,6 +56,16 @@ impl Projector {
     #[must_use]
     pub fn with_reference_fallback(mut self, allowed: bool) -> Projector {
         self.reference_fallback = allowed;
+        self
+    }
+
+    /// Lets the solver stop earlier than where it is as accurate as doubles allow; the status still says whether the answer is certified. The
+    /// reference fallback keeps its own limits.
+    #[must_use]
+    pub fn with_limits(mut self, limits: SolverLimits) -> Projector {
+        self.active_set.limits = limits;
+        self.gauss_seidel.limits = limits;
+        self.clarabel.limits = Some(limits);
         self
     }
 
@@ -144,7 +156,7 @@ impl Projector {
     fn attempts(&mut self, warm_start: &[u32]) -> Projection {
         let problem = &self.problem;
         match self.kind {
-            SolverKind::Clarabel => attempt(&mut Clarabel, problem, warm_start),
+            SolverKind::Clarabel => attempt(&mut self.clarabel, problem, warm_start),
             SolverKind::ProjectedGaussSeidel => {
                 attempt(&mut self.gauss_seidel, problem, warm_start)
             }
@@ -167,7 +179,7 @@ impl Projector {
         let solver = self.active_set.with_pivot_rule(PivotRule::FirstViolated);
         let mut best = better(first, attempt(solver, problem, &[]));
         if best.status == ProjectionStatus::IterationLimit && self.reference_fallback {
-            best = better(best, attempt(&mut Clarabel, problem, &[]));
+            best = better(best, attempt(&mut Clarabel::default(), problem, &[]));
         }
         best
     }
@@ -311,7 +323,7 @@ mod tests {
         with_floor(|problem| {
             let correction = Vector6::zeros();
             let wrong = attempt(&mut Liar { correction }, problem, &[]);
-            let right = attempt(&mut Clarabel, problem, &[]);
+            let right = attempt(&mut Clarabel::default(), problem, &[]);
             for (first, second) in [(wrong.clone(), right.clone()), (right, wrong)] {
                 let best = better(first, second);
                 assert_eq!(best.status, ProjectionStatus::Solved);

@@ -12,6 +12,16 @@ pub(crate) enum Outcome {
     IterationLimit,
 }
 
+/// Where a solver stops, for those that chart one against the other. Without it each has its own, which is as accurate as doubles allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolverLimits {
+    /// What is still violated, changes or gapes when a solver may stop, relative to the problem's scale: a row's violation of the active set,
+    /// the change of a multiplier in a sweep of projected Gauss-Seidel, the duality gap and feasibility of Clarabel.
+    pub tolerance: f64,
+    /// Most rows taken in, sweeps over all rows, or interior-point steps.
+    pub max_iterations: u32,
+}
+
 /// A solver's answer in the coordinates of the least-distance problem.
 #[derive(Clone, Debug)]
 pub(crate) struct Answer {

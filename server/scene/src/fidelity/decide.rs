@@ -51,7 +51,7 @@ impl Chosen {
     }
 }
 
-/// Error of direction and of force, in just-noticeable differences: the parts that [`predicted`] puts together.
+/// Errors of direction, force and step, in just-noticeable differences: the parts that [`predicted`] puts together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parts {
     /// Turned normals of late sets.
@@ -68,6 +68,8 @@ pub struct Parts {
     pub tolerance: f64,
     /// Obstacles that moved on.
     pub obstacles: f64,
+    /// Steps of force from one set to the next.
+    pub step: f64,
 }
 
 impl Parts {
@@ -88,6 +90,10 @@ impl Parts {
             .zip(meshes)
             .filter(|(_, error)| **error > 0.0)
             .map(|(body, error)| 0.5 * errors::facet_angle(*error, body.curvature));
+        let between = need.speed / rate;
+        let (turn, own) = need.stair(between, meshes);
+        let (stiffness, force) = (need.stiffness, need.force);
+        let step = errors::set_step(stiffness, need.k_s, force, turn, own, between);
         Self {
             direction: errors::direction_jnd(errors::normal_turn(curvature, way)),
             sagitta: felt(errors::sagitta(curvature, way)),
@@ -102,14 +108,15 @@ impl Parts {
             obstacles: (need.stiffness * moved
                 / (errors::JND_MAGNITUDE * errors::ramp_force(need.force)))
             .max(need.stiffness * stepped / errors::JND_CHANGE),
+            step: errors::force_jnd(step, need.force),
         }
     }
 
-    /// The larger of direction and force; errors of force add up.
+    /// The largest of direction, force and step; errors of force add up.
     #[must_use]
     pub fn j(&self) -> f64 {
         let force = self.sagitta + self.linearisation + self.mesh + self.tolerance + self.obstacles;
-        force.max(self.direction + self.facets)
+        force.max(self.direction + self.facets).max(self.step)
     }
 }
 

@@ -22,6 +22,12 @@
 //! **Obstacles.** The row of an obstacle that moves at v is 1 to 2 periods old. An error that does not grow with the force is felt most where the force is
 //! least: the 95th percentile of an even ramp is at its weakest twentieth.
 //!
+//! **Steps.** When a set is replaced, the body has gone v T on. Its normals turned by theta(v T): the force of the new set points elsewhere by that, and acts
+//! from a plane that lies theta (v T / k_s + v T / 2) off the old one where the device is. Of both, what the right force does in a millisecond anyway is no step.
+//! On a smooth contact theta(w) = kappa w. Where facets at the angle phi stand for the curvature, the normal turns at the edges alone: over one by phi, as
+//! fast as the body that slides over it is round, kappa_b. The stair is above the slope it stands for by phi (1 - kappa / kappa_b) at most, so
+//! theta(w) <= min(kappa_b w, kappa w + phi (1 - kappa / kappa_b)).
+//!
 //! **Facets.** A chord that is at most e off a circle of curvature kappa spans the angle 2 acos(1 - e kappa).
 //!
 //! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006); 7 % of the force (Pang, Tan, Durlach 1991), at least 0.1 N for a change.
@@ -64,6 +70,28 @@ pub fn sagitta(curvature: f64, way: f64) -> f64 {
 pub fn linearisation(radius: f64, angle: f64, rounds: u32) -> f64 {
     let left = (0..rounds).fold(angle, |angle, _| 0.5 * angle * angle);
     0.5 * radius * left * left
+}
+
+/// Most that a normal turns along a way, rad: `curvature` in the mean, in facets that meet at `facet`, rad, passed by a body whose own curvature is
+/// `rounding`.
+#[must_use]
+pub fn stair_turn(curvature: f64, facet: f64, rounding: f64, way: f64) -> f64 {
+    let smooth = normal_turn(curvature, way);
+    let above = if rounding > curvature {
+        facet * (1.0 - curvature / rounding)
+    } else {
+        0.0
+    };
+    (smooth + above).min(normal_turn(rounding.max(curvature), way))
+}
+
+/// Step of force when a set is replaced whose normals turned by `turn`, rad, along `way`, m, of the device since the last, N: of its direction, and of the
+/// plane it acts from. `own`: the turn of the right force in a millisecond, rad.
+#[must_use]
+pub fn set_step(stiffness: f64, k_s: f64, force: f64, turn: f64, own: f64, way: f64) -> f64 {
+    let across = force * (turn - own).max(0.0);
+    let along = stiffness * turn * way * (k_s.recip() + 0.5);
+    across.hypot(along)
 }
 
 /// Angle between two facets that are at most `error`, m, off a circle of this curvature, rad.
@@ -147,6 +175,47 @@ mod tests {
         let (radius, way) = (0.02_f64, 1e-3_f64);
         let exact = radius - (radius * radius - way * way).sqrt();
         assert!((sagitta(radius.recip(), way) / exact - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_stair_turns_at_most_by_its_slope_and_one_step() {
+        // A ball of 10 mm round a polygon of 30 mm, in the space of its centre: arcs of 10 mm at the corners, straight between.
+        let (facet, rounding, curvature) = (0.035, 100.0, 25.0);
+        let (arc, pitch) = (facet / rounding, facet / curvature);
+        let turned = |at: f64| (at / pitch).floor() * facet + ((at % pitch) * rounding).min(facet);
+        for way in [0.1 * arc, arc, 0.5 * pitch, pitch, 3.3 * pitch] {
+            let most = (0..1000)
+                .map(|i| pitch * (1.0 + f64::from(i) / 1000.0))
+                .map(|from| turned(from + way) - turned(from))
+                .fold(0.0, f64::max);
+            let bound = stair_turn(curvature, facet, rounding, way);
+            assert!(
+                most <= bound + 1e-12 && most > 0.7 * bound,
+                "{way}: {most} of {bound}"
+            );
+        }
+        // What is as round as the stair has no steps.
+        assert_eq!(stair_turn(25.0, 0.1, 25.0, 1e-3), normal_turn(25.0, 1e-3));
+    }
+
+    #[test]
+    fn a_step_is_the_difference_of_two_tangent_planes() {
+        // A point on a circle of 40 mm, pressed 2 mm in; sets of a body 3 and 2 periods behind, 0.5 mm each.
+        let (radius, depth, stiffness, way) = (0.04_f64, 2e-3, 1000.0, 5e-4);
+        let place = |behind: f64| {
+            let angle = behind * way / radius;
+            Vector2::new(-angle.sin(), angle.cos())
+        };
+        let device = Vector2::new(0.0, radius - depth);
+        let force =
+            |behind: f64| place(behind) * (stiffness * (radius - device.dot(&place(behind))));
+        let step = (force(3.0) - force(2.0)).norm();
+        let turn = normal_turn(1.0 / radius, way);
+        let predicted = set_step(stiffness, 0.5, stiffness * depth, turn, 0.0, way);
+        assert!(
+            (predicted / step - 1.0).abs() < 0.1,
+            "{predicted} of {step}"
+        );
     }
 
     #[test]

@@ -3,6 +3,8 @@
 use god_object::geometry::mass_properties;
 use god_object::{Mesh, Primitive};
 
+use super::errors;
+
 /// Faces that meet at more than this are an edge and no curvature, rad: 40 degrees.
 pub const CREASE: f64 = 0.7;
 /// Faces that meet at less than this are one face, rad.
@@ -21,6 +23,10 @@ pub struct BodyNeed {
     pub sharp: bool,
     /// Angle at which the facets of its smooth parts meet, rad; 0 of an exact form.
     pub facet_angle: f64,
+    /// The largest angle between two of them that share an edge or a corner, rad.
+    pub largest_facet_angle: f64,
+    /// It has smooth hollow parts out of facets.
+    pub hollow: bool,
     /// Triangles; 0 of an exact form.
     pub triangles: usize,
     /// m^2.
@@ -47,6 +53,8 @@ impl BodyNeed {
             curvature: radius.recip(),
             sharp,
             facet_angle: 0.0,
+            largest_facet_angle: 0.0,
+            hollow: false,
             triangles: 0,
             area: 0.0,
             simplifiable: false,
@@ -59,7 +67,7 @@ impl BodyNeed {
     /// the two faces beside them (the distance of centroids in a regular mesh).
     #[must_use]
     pub fn of_mesh(name: &str, mesh: &Mesh) -> Self {
-        let (mut bends, mut total, mut sharp) = (Vec::new(), 0.0, false);
+        let (mut bends, mut total, mut sharp, mut hollow) = (Vec::new(), 0.0, false, 0.0);
         for edge in mesh.edges() {
             let [a, b] = edge.vertices.map(|v| mesh.vertices()[v as usize]);
             let length = (b - a).norm();
@@ -73,8 +81,12 @@ impl BodyNeed {
                 sharp = true;
             } else if edge.convexity > FLAT {
                 bends.push((edge.convexity / across, edge.convexity, length * across));
+            } else if (-CREASE..-FLAT).contains(&edge.convexity) {
+                hollow += length * across;
             }
         }
+        let largest = bends.iter().map(|bend| bend.1).fold(0.0, f64::max);
+        let largest = largest.max(largest_at_corners(mesh));
         bends.sort_by(|a, b| a.0.total_cmp(&b.0));
         // From the most curved down, until the share that is left out is spent.
         let mut left_out = (1.0 - COVERED) * total;
@@ -91,6 +103,8 @@ impl BodyNeed {
             curvature: found.0,
             sharp,
             facet_angle: found.1,
+            largest_facet_angle: largest,
+            hollow: hollow > (1.0 - COVERED) * total,
             triangles: mesh.triangles().len(),
             area: surface_area(mesh),
             simplifiable: false,
@@ -98,6 +112,27 @@ impl BodyNeed {
             speed: 0.0,
         }
     }
+}
+
+/// The largest angle between two faces at a corner without a hollow, rad: what slides over the corner goes from one to the other at once.
+fn largest_at_corners(mesh: &Mesh) -> f64 {
+    let mut hollow = vec![false; mesh.vertices().len()];
+    for edge in mesh.edges().iter().filter(|edge| edge.convexity < -FLAT) {
+        for v in edge.vertices {
+            hollow[v as usize] = true;
+        }
+    }
+    let mut faces = vec![Vec::new(); mesh.vertices().len()];
+    for (t, corners) in (0..).zip(mesh.triangles()) {
+        for v in corners.iter().filter(|v| !hollow[**v as usize]) {
+            faces[*v as usize].push(mesh.face_normal(t));
+        }
+    }
+    let between = faces.iter().flat_map(|around| {
+        let pairs = around.iter().enumerate();
+        pairs.flat_map(|(i, a)| around[..i].iter().map(|b| a.angle(b)))
+    });
+    between.filter(|angle| *angle <= CREASE).fold(0.0, f64::max)
 }
 
 fn surface_area(mesh: &Mesh) -> f64 {
@@ -150,6 +185,48 @@ impl SceneNeed {
         pairs.fold(0.0, f64::max)
     }
 
+    /// Most that normals turn while the device goes a way, m, and what they turn in a millisecond anyway, rad. `mesh_errors` of the bodies, god-object
+    /// first: a coarser mesh has larger facets. In a hollow the contact goes along the facets of the body in it, whose own curvature counts: an
+    /// estimate, and no bound.
+    #[must_use]
+    pub fn stair(&self, way: f64, mesh_errors: &[f64]) -> (f64, f64) {
+        let goes = way > 0.0; // false for NaN
+        if !goes {
+            return (0.0, 0.0);
+        }
+        let error = |index: usize| mesh_errors.get(index).copied().unwrap_or(0.0);
+        let facet = |body: &BodyNeed, error: f64| {
+            let coarser = errors::facet_angle(error, body.curvature);
+            body.largest_facet_angle.max(coarser)
+        };
+        let of_pair = |(index, o): (usize, &BodyNeed)| {
+            let a = &self.body;
+            let curvature = turning(a, o).into_iter().fold(0.0, f64::max);
+            let rounding = |body: &BodyNeed| {
+                if body.sharp {
+                    f64::INFINITY
+                } else {
+                    body.curvature
+                }
+            };
+            let stairs = [
+                errors::stair_turn(curvature, facet(o, error(index + 1)), rounding(a), way),
+                errors::stair_turn(curvature, facet(a, error(0)), o.curvature, way),
+                errors::normal_turn(if o.hollow { a.curvature } else { 0.0 }, way),
+                errors::normal_turn(if a.hollow { o.curvature } else { 0.0 }, way),
+            ];
+            let own = errors::normal_turn(curvature, self.speed * errors::TICK);
+            (stairs.into_iter().fold(0.0, f64::max), own)
+        };
+        let pairs = self.obstacles.iter().enumerate().map(of_pair);
+        pairs.fold(
+            (0.0, 0.0),
+            |most, pair| {
+                if pair.0 > most.0 { pair } else { most }
+            },
+        )
+    }
+
     /// The fastest obstacle, m/s.
     #[must_use]
     pub fn obstacle_speed(&self) -> f64 {
@@ -184,6 +261,23 @@ mod tests {
             assert!((found.curvature * 0.02 - 1.0).abs() < 0.3, "{found:?}");
             assert!(!found.sharp);
         }
+    }
+
+    #[test]
+    fn a_corner_of_a_ball_turns_more_than_an_edge_and_a_hole_does_not() {
+        let ball = BodyNeed::of_mesh("a", &mesh(shapes::sphere(0.02, 3)));
+        let ratio = ball.largest_facet_angle / ball.facet_angle;
+        assert!((1.3..3.0).contains(&ratio), "{ratio}");
+        let hole = shapes::box_with_hole([0.03; 3], 0.0105, 24, shapes::Axis::Z);
+        assert_eq!(BodyNeed::of_mesh("a", &mesh(hole)).largest_facet_angle, 0.0);
+    }
+
+    #[test]
+    fn a_hole_is_hollow_and_its_box_is_not() {
+        let hole = shapes::box_with_hole([0.03; 3], 0.0105, 24, shapes::Axis::Z);
+        assert!(BodyNeed::of_mesh("a", &mesh(hole)).hollow);
+        assert!(!BodyNeed::of_mesh("a", &mesh(shapes::cuboid([0.03; 3]))).hollow);
+        assert!(!BodyNeed::of_mesh("a", &mesh(shapes::sphere(0.02, 2))).hollow);
     }
 
     #[test]

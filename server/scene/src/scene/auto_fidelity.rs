@@ -268,11 +268,12 @@ fn choice(key: &str, value: String, set: bool, reason: String) -> Choice {
 
 fn rate_choice(need: &SceneNeed, parts: &Parts, rate: f64, set: bool) -> Choice {
     let reason = format!(
-        "normals turn by {:.1} per m at {:.3} m/s: {:.3} J of direction, {:.3} J off the tangent planes; {:.3} J of obstacles at {:.3} m/s",
+        "normals turn by {:.1} per m at {:.3} m/s: {:.3} J of direction, {:.3} J off the tangent planes, {:.3} J of steps from set to set; {:.3} J of obstacles at {:.3} m/s",
         need.curvature(),
         need.speed,
         parts.direction,
         parts.sagitta,
+        parts.step,
         parts.obstacles,
         need.obstacle_speed()
     );

@@ -33,6 +33,7 @@ pub fn run(arguments: impl Iterator<Item = String>) -> Result<ExitCode, Box<dyn 
     }
     fs::write(directory.join("fidelity.csv"), every_setting(&swept))?;
     fs::write(directory.join("fidelity_choice.csv"), choices(&swept))?;
+    fs::write(directory.join("fidelity_time.csv"), within_times(&swept))?;
     print!("{}", table(&swept));
     println!("files in {}", directory.display());
     let missed = swept
@@ -85,18 +86,51 @@ pub fn table(swept: &[Swept]) -> String {
     text
 }
 
+/// CSV of the choices within a time: what was predicted and measured of them, and the least error of any setting that fast.
+#[must_use]
+pub fn within_times(swept: &[Swept]) -> String {
+    let mut text =
+        "scene,time_us,rate_hz,rounds,predicted_us,measured_us,predicted_j,j,least_j_that_fast\n"
+            .to_owned();
+    for s in swept {
+        for timed in &s.timed {
+            let (plan, auto) = (&timed.plan, &timed.auto);
+            let _ = writeln!(
+                text,
+                "{},{},{},{},{:.3},{:.3},{:.6},{:.6},{:.6}",
+                s.name,
+                timed.time_us,
+                auto.setting.rate,
+                auto.setting.rounds,
+                plan.predicted_update_us,
+                auto.update_us(),
+                plan.predicted_j,
+                auto.j,
+                s.least_error_within(timed.time_us)
+            );
+        }
+    }
+    text
+}
+
 fn fields(m: &Measured) -> String {
     let s = &m.setting;
     format!(
-        "{},{:e},{},{:e},{:.6},{:.3}",
-        s.rate, s.gap_tolerance, s.rounds, s.mesh_error, m.j, m.cost
+        "{},{:e},{},{:e},{:.6},{},{:.3}",
+        s.rate,
+        s.gap_tolerance,
+        s.rounds,
+        s.mesh_error,
+        m.j,
+        m.parts.map(|part| format!("{part:.6}")).join(","),
+        m.cost
     )
 }
 
 /// CSV of every setting.
 #[must_use]
 pub fn every_setting(swept: &[Swept]) -> String {
-    let mut text = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,cost_us_per_s\n".to_owned();
+    let mut text = "scene,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s\n".to_owned();
     for s in swept {
         for measured in &s.all {
             let _ = writeln!(text, "{},{}", s.name, fields(measured));
@@ -109,7 +143,7 @@ pub fn every_setting(swept: &[Swept]) -> String {
 #[must_use]
 pub fn choices(swept: &[Swept]) -> String {
     let mut text =
-        "scene,chosen_by,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,cost_us_per_s,predicted_j\n"
+        "scene,chosen_by,rate_hz,gap_tolerance_m,rounds,mesh_error_m,j,j_direction,j_magnitude,j_torque,j_step,cost_us_per_s,predicted_j\n"
             .to_owned();
     for s in swept {
         let _ = writeln!(

@@ -4,21 +4,21 @@
 //! same on every machine of a type.
 
 use std::path::Path;
-use std::sync::OnceLock;
 
-use taut_method_tests::checker::PenetrationChecker;
 use taut_scene::fidelity::decide::{MESH_ERRORS, RATES, ROUNDS, TOLERANCES};
 use taut_scene::{BuiltScene, FidelityPlan, Scene as SceneFile, SceneError};
 
 use super::counted::Counted;
 use super::scenes::FidelityScene;
 use crate::clock::{TICK, run};
-use crate::measure::{Measure, Measures};
+use crate::measure::{JND_DIRECTION, JND_MAGNITUDE, Measure, Measures};
 use crate::method::Scene;
 use crate::recipe::{Ideal, Recipe};
 
 /// Shares of a period at which the first update begins.
 const PHASES: [f64; 2] = [0.25, 0.75];
+/// Times of an update that are allowed, nominal us.
+pub const TIMES: [f64; 4] = [20.0, 60.0, 120.0, 200.0];
 /// What is spent of the error, J.
 pub const BUDGET: f64 = 0.5;
 
@@ -42,8 +42,21 @@ pub struct Measured {
     pub setting: Setting,
     /// Error, in just-noticeable differences.
     pub j: f64,
+    /// What it is the largest of: direction, magnitude, torque, step.
+    pub parts: [f64; 4],
     /// Nominal us of the god-object loop a second.
     pub cost: f64,
+}
+
+/// A choice within a time.
+#[derive(Clone, Debug)]
+pub struct Timed {
+    /// Most nominal time of an update that was allowed, us.
+    pub time_us: f64,
+    /// What the scene chose.
+    pub plan: FidelityPlan,
+    /// The choice, measured.
+    pub auto: Measured,
 }
 
 /// A scene's sweep.
@@ -57,6 +70,16 @@ pub struct Swept {
     pub auto: Measured,
     /// Every setting.
     pub all: Vec<Measured>,
+    /// Choices by the time that an update may take.
+    pub timed: Vec<Timed>,
+}
+
+impl Measured {
+    /// Nominal time of an update, us.
+    #[must_use]
+    pub fn update_us(&self) -> f64 {
+        self.cost / self.setting.rate
+    }
 }
 
 impl Swept {
@@ -71,6 +94,13 @@ impl Swept {
     #[must_use]
     pub fn least_error(&self) -> f64 {
         self.all.iter().map(|m| m.j).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The least error of the settings whose updates take no more than a time, us; infinite where none is so fast.
+    #[must_use]
+    pub fn least_error_within(&self, time_us: f64) -> f64 {
+        let fast = self.all.iter().filter(|m| m.update_us() <= time_us);
+        fast.map(|m| m.j).fold(f64::INFINITY, f64::min)
     }
 
     /// Cost of the choice over the cheapest that is within the budget.
@@ -100,15 +130,23 @@ pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swe
         .fidelity
         .clone()
         .unwrap_or_else(|| panic!("the scene chooses"));
-    let setting = Setting {
-        rate: plan.update_rate_hz,
-        gap_tolerance: chosen.settings.gap_tolerance,
-        rounds: chosen.settings.implicit_rounds,
-        mesh_error: chosen.simplified.first().map_or(0.0, |s| s.max_error),
-    };
     let off = parsed.with_override("fidelity.mode=\"off\"")?.build()?;
     let right = answer(scene, &off);
-    let auto = measure(scene, &chosen, setting, &right);
+    let auto = measure(scene, &chosen, setting_of(&chosen, &plan), &right);
+    let choose = |time_us: &f64| -> Result<Timed, SceneError> {
+        let within = format!("fidelity.time_us={time_us:?}");
+        let chosen = parsed.with_override(&within)?.build()?;
+        let plan = chosen
+            .fidelity
+            .clone()
+            .unwrap_or_else(|| panic!("the scene chooses"));
+        Ok(Timed {
+            time_us: *time_us,
+            auto: measure(scene, &chosen, setting_of(&chosen, &plan), &right),
+            plan,
+        })
+    };
+    let timed = TIMES.iter().map(choose).collect::<Result<Vec<_>, _>>()?;
     let has_meshes = scene.text.contains("{simplify}");
     let mesh_errors = if has_meshes { &MESH_ERRORS[..] } else { &[0.0] };
     let mut all = Vec::new();
@@ -143,7 +181,17 @@ pub fn sweep(scene: &FidelityScene, directory: &Path, quick: bool) -> Result<Swe
         plan,
         auto,
         all,
+        timed,
     })
+}
+
+fn setting_of(chosen: &BuiltScene, plan: &FidelityPlan) -> Setting {
+    Setting {
+        rate: plan.update_rate_hz,
+        gap_tolerance: chosen.settings.gap_tolerance,
+        rounds: chosen.settings.implicit_rounds,
+        mesh_error: chosen.simplified.first().map_or(0.0, |s| s.max_error),
+    }
 }
 
 fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
@@ -156,11 +204,9 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
     let moving = built.motions.first().cloned();
     Recipe {
         ideal,
-        moving: moving.map(|motion| -> Box<dyn Fn(f64) -> god_object::Pose> {
-            Box::new(move |time| motion.pose_at(time))
-        }),
+        moving: moving
+            .map(|motion| -> crate::recipe::Motion { Box::new(move |time| motion.pose_at(time)) }),
         check_every: u32::MAX,
-        answer: OnceLock::new(),
         ..Recipe::new(
             ("fidelity", scene.name.to_owned()),
             "fidelity",
@@ -188,23 +234,33 @@ fn measure(
     let mut recipe = recipe(scene, built, Ideal::closed(at));
     recipe.scene.settings.gap_tolerance = setting.gap_tolerance;
     recipe.scene.settings.implicit_rounds = setting.rounds;
-    let checker = PenetrationChecker::new(&recipe.scene.world);
-    let (mut j, mut work) = (0.0_f64, 0);
+    let (mut j, mut parts, mut work) = (0.0_f64, [0.0_f64; 4], 0);
     for phase in PHASES {
         let mut method = Counted::new(&recipe.scene);
         let ran = run(&mut method, &recipe, setting.rate as u32, phase);
-        let felt = Measures::of(&recipe, &checker, &ran.ticks).get(Measure::Felt);
+        let measures = Measures::of(&recipe, &ran.ticks);
+        let felt = measures.get(Measure::Felt);
         // What is not a number is no small error.
         j = if felt.is_nan() {
             f64::INFINITY
         } else {
             j.max(felt)
         };
+        let of_phase = [
+            measures.get(Measure::DirectionP95) / JND_DIRECTION,
+            measures.get(Measure::MagnitudeP95) / (100.0 * JND_MAGNITUDE),
+            measures.get(Measure::TorqueFelt),
+            measures.get(Measure::StepFelt),
+        ];
+        for (part, felt) in parts.iter_mut().zip(of_phase) {
+            *part = part.max(felt);
+        }
         work += method.work.nominal_us();
     }
     Measured {
         setting,
         j,
+        parts,
         cost: work as f64 / (PHASES.len() as f64 * scene.duration),
     }
 }

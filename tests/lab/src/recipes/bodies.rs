@@ -19,7 +19,7 @@ const TICK: f64 = crate::clock::TICK;
 const STEP_SLACK: f64 = 1.5;
 
 /// An exact sphere of 1 kg.
-pub(super) fn ball(radius: f64) -> Body {
+pub(crate) fn ball(radius: f64) -> Body {
     Body {
         primitive: Some(Primitive::Sphere {
             center: Point3::origin(),
@@ -47,7 +47,7 @@ pub(super) fn block(name: &str, low: Point3<f64>, high: Point3<f64>) -> Obstacle
 }
 
 /// A large block whose upper face is z = 0.
-pub(super) fn ground() -> Obstacle {
+pub(crate) fn ground() -> Obstacle {
     block(
         "ground",
         Point3::new(-0.3, -0.3, -0.1),
@@ -56,7 +56,7 @@ pub(super) fn ground() -> Obstacle {
 }
 
 /// A force alone, N.
-pub(super) fn force(x: f64, y: f64, z: f64) -> Vector6 {
+pub(crate) fn force(x: f64, y: f64, z: f64) -> Vector6 {
     Vector6::new(x, y, z, 0.0, 0.0, 0.0)
 }
 
@@ -150,8 +150,8 @@ pub(super) fn ours_alone(method: Method, reason: &'static str) -> Option<&'stati
 /// The largest of a number of the ticks from `begin` on, s.
 pub(super) fn largest_from(
     begin: f64,
-    value: impl Fn(&Tick) -> f64 + 'static,
-) -> impl Fn(&[Tick]) -> f64 + 'static {
+    value: impl Fn(&Tick) -> f64 + Send + Sync + 'static,
+) -> impl Fn(&[Tick]) -> f64 + Send + Sync + 'static {
     move |ticks| {
         let late = ticks.iter().filter(|tick| tick.time >= begin);
         // f64::max drops NaN: a number that is none must not be dropped.

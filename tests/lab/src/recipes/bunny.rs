@@ -11,7 +11,7 @@ use super::Extent;
 use super::bodies::{sound, turns};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Open, Recipe};
+use crate::recipe::{Ideal, Line, Recipe};
 use crate::row::Row;
 
 /// Which mesh: that of 5,000 triangles, so that every method at every rate is done within an hour.
@@ -20,7 +20,8 @@ const SIZE: f64 = 0.15;
 /// Where the held one is at the start and when it is pressed, m above the other: their centres.
 const APART: f64 = 0.2;
 const PRESSED: f64 = 0.115;
-/// N.
+/// N: the recipe asks to compare and to record, and names no line. This one is two hundredths of the 10 N that press here, less than
+/// a third of the 7 % that is just felt of them.
 const FORCE_ERROR: f64 = 0.2;
 
 /// Says why there is none, where there is none.
@@ -68,11 +69,6 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::ForceP95, FORCE_ERROR));
             lines
         }),
-        open: vec![Open {
-            key: Measure::ForceP95.key(),
-            rate: 1000,
-            reason: "off the reference while it slides and turns under load; not traced yet",
-        }],
         check_every: 10,
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, 1.8, device)

@@ -12,7 +12,7 @@ use super::Extent;
 use super::bodies::{Path, force, largest_from, smooth, sound, turns};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Open, Probe, Recipe};
+use crate::recipe::{Ideal, Line, Probe, Recipe};
 
 const PITCH: f64 = 4e-3;
 const TOOTH: f64 = 2e-3;
@@ -74,19 +74,7 @@ fn comb(extent: Extent, clearance: f64) -> Recipe {
     let case = ("R25", format!("combs, clearance {} mm", clearance * 1e3));
     let about = "many contacts: locks after its clearance, whatever their number";
     let duration = path.duration();
-    let tight = clearance == CLEARANCES[1];
-    let torque = tight.then_some(Open {
-        key: "torque",
-        rate: 1000,
-        reason: "a seventh of what is felt, while the teeth meet: of rows that are equally near some are taken in before others",
-    });
-    let step = (tight && extent == Extent::Full).then_some(Open {
-        key: Measure::Step.key(),
-        rate: 1000,
-        reason: "from some start phases a step when the teeth meet; not traced yet",
-    });
     Recipe {
-        open: torque.into_iter().chain(step).collect(),
         ideal: Ideal::closed(move |time| {
             let x = ideal.at(time).x;
             force(

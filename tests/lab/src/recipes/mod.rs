@@ -28,6 +28,9 @@ mod texture;
 mod thin_plate;
 mod wrong_side;
 
+pub(crate) use bodies::{ball, force, ground};
+pub(crate) use oracles::many_contacts::random_contacts;
+
 use crate::recipe::Recipe;
 use crate::study::Study;
 

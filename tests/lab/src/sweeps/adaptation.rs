@@ -2,12 +2,13 @@
 
 use god_object::{Adaptation, Settings};
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "adaptation",
     about: "time over which a violated new constraint enters, without look-ahead, at 300 Hz",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R02", "ball on a plane"),

@@ -2,12 +2,13 @@
 
 use god_object::Settings;
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "ccd-tolerance",
     about: "where continuous collision detection may stop, over the minimum gap, at 1 kHz",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R09", "plate of 0.1 mm"),

@@ -6,24 +6,33 @@ use std::path::Path;
 
 use plotters::prelude::*;
 
-use super::{Point, SHOWN, Sweep};
+use super::{Cost, Point, SHOWN, Sweep};
 use crate::plot::{Frame, Mark, PANEL, front};
 use crate::report::quoted;
 
 /// Colours of settings, in their order; more begin again.
-const COLOURS: [RGBColor; 6] = [
+const COLOURS: [RGBColor; 12] = [
     RGBColor(0, 90, 170),
     RGBColor(200, 90, 0),
     RGBColor(0, 130, 80),
     RGBColor(140, 60, 150),
     RGBColor(190, 40, 70),
     RGBColor(110, 110, 60),
+    RGBColor(90, 170, 220),
+    RGBColor(230, 160, 60),
+    RGBColor(100, 190, 140),
+    RGBColor(190, 130, 210),
+    RGBColor(120, 120, 120),
+    RGBColor(0, 0, 0),
 ];
 const RADIUS: i32 = 5;
 /// Errors below these are drawn there: nobody feels them, or they are rounding.
 const LEAST_FELT: f64 = 1e-3;
 const LEAST_RELATIVE: f64 = 1e-17;
 const COLUMNS: usize = 2;
+/// Settings in a line of the legend, and its height, pixels.
+const LEGEND_COLUMNS: usize = 5;
+const LEGEND_LINE: u32 = 22;
 
 impl Sweep {
     fn is_felt(&self) -> bool {
@@ -58,21 +67,30 @@ pub(crate) fn panels(sweep: &Sweep, points: &[Point]) -> Vec<(Frame, Vec<Mark>)>
         LEAST_RELATIVE
     };
     let largest = |values: &dyn Fn(&Point) -> f64| points.iter().map(values).fold(0.0, f64::max);
-    let times = [0.5, largest(&|p| p.p99_us).max(1100.0) * 1.5];
+    let most = largest(&|p| p.cost);
+    let (costs, cost_line) = match sweep.cost {
+        Cost::Time => ([0.5, most.max(1100.0) * 1.5], Some(1000.0)),
+        Cost::Bandwidth => {
+            let least = points.iter().map(|p| p.cost).fold(most, f64::min);
+            ([0.7 * least, 1.4 * most], None)
+        }
+    };
     let errors = [0.5 * least, largest(&|p| p.error).max(2.0 * least) * 3.0];
     sorted
         .chunk_by(|a, b| of_same(a, b))
         .map(|panel| {
             let frame = Frame {
                 title: format!("{}: {}", panel[0].recipe, panel[0].case),
-                times,
+                costs,
+                cost: sweep.cost.label(),
+                cost_line,
                 errors,
                 unit: sweep.error,
                 error_line: sweep.is_felt().then_some(1.0),
             };
             let drawn = panel.iter().filter(|point| !point.error.is_nan());
             let marks = drawn.map(|point| Mark {
-                place: (point.p99_us, point.error),
+                place: (point.cost, point.error),
                 colour: legend
                     .iter()
                     .find(|(setting, _)| *setting == point.setting)
@@ -85,34 +103,29 @@ pub(crate) fn panels(sweep: &Sweep, points: &[Point]) -> Vec<(Frame, Vec<Mark>)>
         .collect()
 }
 
-/// Points as CSV.
+/// Points as CSV. What may differ between runs stands in the last two columns: the cost where it is a time, and the front that follows from it.
 #[must_use]
 pub fn csv(sweep: &Sweep, points: &[Point]) -> String {
-    let mut text = String::from("sweep,recipe,case,setting,rate_hz,update_p99_us,error,unit");
+    let mut text = String::from("sweep,recipe,case,setting,rate_hz,error,unit");
     for measure in SHOWN {
-        let _ = write!(
-            text,
-            ",{}_{}",
-            measure.key(),
-            measure.unit().replace([' ', '/'], "_")
-        );
+        let unit = measure.unit().replace([' ', '/'], "_");
+        let _ = write!(text, ",{}_{unit}", measure.key());
     }
-    text.push_str(",on_front\n");
+    let _ = writeln!(text, ",{},on_front", sweep.cost.key());
     for point in points {
         let of_panel = points
             .iter()
             .filter(|p| (p.recipe, &p.case) == (point.recipe, &point.case));
-        let places: Vec<_> = of_panel.map(|p| (p.p99_us, p.error)).collect();
-        let on_front = front(&places).contains(&(point.p99_us, point.error));
+        let places: Vec<_> = of_panel.map(|p| (p.cost, p.error)).collect();
+        let on_front = front(&places).contains(&(point.cost, point.error));
         let rate = point.rate.map_or_else(String::new, |rate| rate.to_string());
         let _ = write!(
             text,
-            "{},{},{},{},{rate},{:.2},{:.6e},{}",
+            "{},{},{},{},{rate},{:.6e},{}",
             sweep.name,
             point.recipe,
             quoted(&point.case),
             quoted(&point.setting),
-            point.p99_us,
             point.error,
             sweep.error
         );
@@ -122,7 +135,7 @@ pub fn csv(sweep: &Sweep, points: &[Point]) -> String {
                 None => text.push(','),
             }
         }
-        let _ = writeln!(text, ",{on_front}");
+        let _ = writeln!(text, ",{:.2},{on_front}", point.cost);
     }
     text
 }
@@ -137,18 +150,25 @@ pub fn write(sweep: &Sweep, points: &[Point], directory: &Path) -> Result<(), Bo
     )?;
     let panels = panels(sweep, points);
     let lines = panels.len().div_ceil(COLUMNS).max(1);
-    let size = (PANEL.0 * COLUMNS as u32, PANEL.1 * lines as u32 + 70);
+    let legend = legend(points);
+    let head_height = 46 + LEGEND_LINE * legend.len().div_ceil(LEGEND_COLUMNS).max(1) as u32;
+    let size = (
+        PANEL.0 * COLUMNS as u32,
+        PANEL.1 * lines as u32 + head_height,
+    );
     let file = directory.join(&name).with_extension("svg");
     let root = SVGBackend::new(&file, size).into_drawing_area();
     root.fill(&WHITE)?;
-    let (head, grid) = root.split_vertically(70);
+    let (head, grid) = root.split_vertically(head_height);
     head.draw(&Text::new(sweep.about, (20, 10), ("sans-serif", 16)))?;
-    let legend = legend(points);
-    let step = (size.0 as i32 - 40) / legend.len().max(1) as i32;
+    let step = (size.0 as i32 - 40) / LEGEND_COLUMNS as i32;
     for (index, (setting, colour)) in legend.iter().enumerate() {
-        let x = 30 + index as i32 * step;
-        head.draw(&Circle::new((x, 48), RADIUS, colour.filled()))?;
-        head.draw(&Text::new(*setting, (x + 12, 41), ("sans-serif", 14)))?;
+        let (x, y) = (
+            30 + (index % LEGEND_COLUMNS) as i32 * step,
+            46 + (index / LEGEND_COLUMNS) as i32 * LEGEND_LINE as i32,
+        );
+        head.draw(&Circle::new((x, y), RADIUS, colour.filled()))?;
+        head.draw(&Text::new(*setting, (x + 12, y - 7), ("sans-serif", 14)))?;
     }
     for (area, (frame, marks)) in grid.split_evenly((lines, COLUMNS)).iter().zip(&panels) {
         frame.draw(area, marks)?;

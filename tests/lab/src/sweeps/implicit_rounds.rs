@@ -2,12 +2,13 @@
 
 use god_object::Settings;
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "rounds",
     about: "rounds of implicit constraints, 0 is linear, at 1 kHz",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R04", "box on a plane, tilted"),

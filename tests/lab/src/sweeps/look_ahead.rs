@@ -2,13 +2,14 @@
 
 use god_object::Settings;
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 use crate::clock::RATES;
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "look-ahead",
     about: "contacts published before they touch or not until then, by rate",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R02", "ball on a plane"),

@@ -8,15 +8,19 @@ mod ccd_tolerance;
 mod files;
 mod implicit_rounds;
 mod look_ahead;
+mod mesh_level;
 mod share;
+mod solver_limits;
 mod solvers;
 mod update_rate;
+mod wire;
 
 use god_object::Settings;
 
 pub use files::{csv, write};
 pub(crate) use files::{legend, panels};
 
+use crate::crew;
 use crate::measure::Measure;
 use crate::measured::Measured;
 use crate::methods::GodObjectMethod;
@@ -25,7 +29,7 @@ use crate::recipes::Extent;
 use crate::store::{Store, recipe_key};
 
 /// All, most telling first.
-pub const SWEEPS: [Sweep; 7] = [
+pub const SWEEPS: [Sweep; 10] = [
     share::SWEEP,
     implicit_rounds::SWEEP,
     update_rate::SWEEP,
@@ -33,23 +37,9 @@ pub const SWEEPS: [Sweep; 7] = [
     adaptation::SWEEP,
     ccd_tolerance::SWEEP,
     solvers::SWEEP,
-];
-
-/// Sweeps that are wanted and not there: what, and why.
-pub const MISSING: [(&str, &str); 4] = [
-    (
-        "solvers by tolerance and iteration cap",
-        "tolerances and caps are constants of the solvers; they are swept by the number of contacts instead",
-    ),
-    ("mesh level", "recipes are not run on simplified meshes yet"),
-    (
-        "quantisation and rate of poses on the wire",
-        "poses go as 32-bit floats; there is no other coding to compare with",
-    ),
-    (
-        "stability: stiffness against delay, rate, damping, quantisation",
-        "maps of their own: see docs/stability.md and cargo run --release -p taut-control-tests --bin stability_map",
-    ),
+    solver_limits::SWEEP,
+    mesh_level::SWEEP,
+    wire::SWEEP,
 ];
 
 /// What a sweep varies.
@@ -65,6 +55,46 @@ pub struct Variant {
     pub value: f64,
 }
 
+/// A run of a recipe that a sweep has made for itself.
+#[derive(Debug)]
+pub struct Case {
+    /// With its settings.
+    pub recipe: Recipe,
+    /// What it is called in files and legends.
+    pub label: String,
+    /// Updates a second, Hz.
+    pub rate: u32,
+    /// What it costs, where that is not the time of an update.
+    pub cost: Option<f64>,
+}
+
+/// What a sweep's errors are bought with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// 99th percentile of the CPU time of an update or a projection, us: differs between runs.
+    Time,
+    /// Bytes on the wire a second, kB/s.
+    Bandwidth,
+}
+
+impl Cost {
+    /// Name of the column.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Time => "update_p99_us",
+            Self::Bandwidth => "bandwidth_kb_per_s",
+        }
+    }
+
+    /// Name of the axis.
+    pub(crate) fn label(self) -> &'static str {
+        match self {
+            Self::Time => "p99 of an update, us",
+            Self::Bandwidth => "on the wire, kB/s",
+        }
+    }
+}
+
 /// How a sweep runs.
 #[derive(Clone, Copy, Debug)]
 pub enum Runs {
@@ -73,8 +103,10 @@ pub enum Runs {
         &'static [(&'static str, &'static str)],
         fn() -> Vec<Variant>,
     ),
-    /// Something that is no run along a path.
-    Own(fn(Extent) -> Vec<Point>),
+    /// Recipes of its own.
+    Recipes(fn(Extent) -> Vec<Case>),
+    /// Something else; on so many threads.
+    Own(fn(Extent, usize) -> Vec<Point>),
 }
 
 /// One sweep.
@@ -86,6 +118,8 @@ pub struct Sweep {
     pub about: &'static str,
     /// What the error is, and its unit.
     pub error: &'static str,
+    /// What it is drawn over.
+    pub cost: Cost,
     /// What runs.
     pub runs: Runs,
 }
@@ -103,8 +137,8 @@ pub struct Point {
     pub rate: Option<u32>,
     /// Of the sweep.
     pub error: f64,
-    /// 99th percentile of the CPU time, us: no other field differs between runs.
-    pub p99_us: f64,
+    /// Of [`Sweep::cost`]; where that is a time, no other field differs between runs.
+    pub cost: f64,
     /// Other measures, in the order of the CSV; empty where there are none.
     pub measures: Vec<f64>,
 }
@@ -121,16 +155,17 @@ pub(crate) const SHOWN: [Measure; 7] = [
 ];
 
 impl Sweep {
-    /// How many runs of recipes it has.
+    /// How many steps of progress it is, in an extent.
     #[must_use]
-    pub fn count(&self) -> usize {
+    pub fn count(&self, extent: Extent) -> usize {
         match self.runs {
             Runs::Settings(recipes, variants) => recipes.len() * variants().len(),
+            Runs::Recipes(cases) => cases(extent).len(),
             Runs::Own(_) => 1,
         }
     }
 
-    /// All its points; calls `done` after each run.
+    /// All its points, made on so many threads; calls `done` after each run.
     ///
     /// # Panics
     ///
@@ -140,45 +175,57 @@ impl Sweep {
         extent: Extent,
         recipes: &[Recipe],
         store: &Store,
-        mut done: impl FnMut(),
+        threads: usize,
+        done: impl Fn() + Sync,
     ) -> Vec<Point> {
-        let (names, variants) = match self.runs {
-            Runs::Own(run) => {
-                let points = run(extent);
-                done();
-                return points;
+        let point = |recipe: &Recipe, label: &str, rate, cost: Option<f64>, settings: &Settings| {
+            let measured = run(recipe, rate, settings, store);
+            done();
+            Point {
+                recipe: recipe.name,
+                case: recipe.case.clone(),
+                setting: label.to_owned(),
+                rate: Some(rate),
+                error: measured.worst(Measure::Felt),
+                cost: cost.unwrap_or(measured.times.update[1]),
+                measures: SHOWN.map(|measure| measured.worst(measure)).to_vec(),
             }
-            Runs::Settings(names, variants) => (names, variants()),
         };
-        let mut points = Vec::new();
-        for (name, case) in names {
-            let recipe = recipes.iter().find(|r| r.name == *name && r.case == *case);
-            let recipe = recipe.unwrap_or_else(|| panic!("no recipe {name}, {case}"));
-            for variant in &variants {
-                let measured = run(recipe, variant, store);
-                points.push(Point {
-                    recipe: recipe.name,
-                    case: recipe.case.clone(),
-                    setting: variant.label.clone(),
-                    rate: Some(variant.rate),
-                    error: measured.worst(Measure::Felt),
-                    p99_us: measured.times.update[1],
-                    measures: SHOWN.map(|measure| measured.worst(measure)).to_vec(),
-                });
+        match self.runs {
+            Runs::Own(run) => {
+                let points = run(extent, threads);
                 done();
+                points
+            }
+            Runs::Recipes(cases) => crew::map(threads, &cases(extent), |case| {
+                let fitted = case.recipe.scene.fitted(1.0 / f64::from(case.rate));
+                point(&case.recipe, &case.label, case.rate, case.cost, &fitted)
+            }),
+            Runs::Settings(names, variants) => {
+                let variants = variants();
+                let tasks: Vec<(&Recipe, &Variant)> = names
+                    .iter()
+                    .flat_map(|(name, case)| {
+                        let recipe = recipes.iter().find(|r| r.name == *name && r.case == *case);
+                        let recipe = recipe.unwrap_or_else(|| panic!("no recipe {name}, {case}"));
+                        variants.iter().map(move |variant| (recipe, variant))
+                    })
+                    .collect();
+                crew::map(threads, &tasks, |(recipe, variant)| {
+                    let fitted = recipe.scene.fitted(1.0 / f64::from(variant.rate));
+                    let settings = (variant.settings)(fitted, variant.value);
+                    point(recipe, &variant.label, variant.rate, None, &settings)
+                })
             }
         }
-        points
     }
 }
 
-fn run(recipe: &Recipe, variant: &Variant, store: &Store) -> Measured {
-    let fitted = recipe.scene.fitted(1.0 / f64::from(variant.rate));
-    let settings = (variant.settings)(fitted, variant.value);
-    let key = format!("sweep {} {} {settings:?}", recipe_key(recipe), variant.rate);
+fn run(recipe: &Recipe, rate: u32, settings: &Settings, store: &Store) -> Measured {
+    let key = format!("sweep {} {rate} {settings:?}", recipe_key(recipe));
     store.get(recipe.name, &key, Measured::from_numbers, || {
-        let start = || Box::new(GodObjectMethod::new(&recipe.scene, &settings)) as _;
-        let measured = Measured::of(recipe, variant.rate, recipe.phases, start);
+        let start = || Box::new(GodObjectMethod::new(&recipe.scene, settings)) as _;
+        let measured = Measured::of(recipe, rate, recipe.phases, start);
         let numbers = Measured::to_numbers(&measured.phases, &measured.times);
         (measured, numbers)
     })

@@ -2,12 +2,13 @@
 
 use god_object::Settings;
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "k_s",
     about: "share of the pose difference covered in one update, at the same stiffness and 1 kHz",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R02", "ball on a plane"),

@@ -1,12 +1,13 @@
 //! The three solvers of the projection by the number of contacts, against the oracle of R38.
 
-use super::{Point, Runs, Sweep};
+use super::{Cost, Point, Runs, Sweep};
 use crate::recipes::{Extent, STUDIES};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "solvers",
     about: "solvers by the number of random contacts, each with its own tolerance and cap, against non-negative least squares",
     error: "relative error",
+    cost: Cost::Time,
     runs: Runs::Own(run),
 };
 
@@ -14,7 +15,7 @@ pub(super) const SWEEP: Sweep = Sweep {
 const STUDY: &str = "R38";
 const MEASURE: &str = "relative_error";
 
-fn run(extent: Extent) -> Vec<Point> {
+fn run(extent: Extent, _threads: usize) -> Vec<Point> {
     let study = STUDIES.iter().filter(|study| study.name == STUDY);
     study
         .flat_map(|study| (study.run)(extent))
@@ -25,7 +26,7 @@ fn run(extent: Extent) -> Vec<Point> {
             setting: row.settings,
             rate: None,
             error: row.value,
-            p99_us: row.p99_us,
+            cost: row.p99_us,
             measures: Vec::new(),
         })
         .collect()

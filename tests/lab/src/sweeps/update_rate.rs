@@ -1,11 +1,12 @@
 //! Updates a second; forces are made every millisecond all the same.
 
-use super::{Runs, Sweep, Variant};
+use super::{Cost, Runs, Sweep, Variant};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "rate",
     about: "updates of the god-object a second; the coupling stays at 1 kHz",
     error: "J",
+    cost: Cost::Time,
     runs: Runs::Settings(
         &[
             ("R08", "edge of 90 degrees"),

@@ -8,14 +8,18 @@
 //!
 //! Source: Lawson and Hanson 1974, chapter 23: least distance programming by non-negative least squares.
 
+use god_object::SolverKind;
 use god_object::Vector6;
-use god_object::quasi_statics::{HalfSpace, Metric};
+use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverLimits};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{Random, contact, for_solvers};
+use crate::cpu_time::{quantile, thread_us};
 use crate::recipes::Extent;
 use crate::row::Row;
 
+/// Of the body, about its axes, kg m^2.
+const INERTIA: Vector3<f64> = Vector3::new(2e-3, 3e-3, 4e-3);
 /// Of the norm of the wish.
 const RELATIVE_ERROR: f64 = 1e-9;
 /// Rounds of the oracle, at most.
@@ -28,7 +32,7 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
         &[(1, 50), (7, 50), (40, 50), (300, 20), (1000, 10), (5000, 6)],
         &[(1, 10), (7, 10), (40, 10), (300, 4)],
     );
-    let inertia = Matrix3::from_diagonal(&Vector3::new(2e-3, 3e-3, 4e-3));
+    let inertia = Matrix3::from_diagonal(&INERTIA);
     let metric = Metric::new(1.0, &inertia).expect("the tensor is positive definite");
     for_solvers("R38", |solver| {
         let mut random = Random(38);
@@ -37,19 +41,7 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
             solver.forget_times();
             let (mut worst, mut most_active): (f64, usize) = (0.0, 0);
             for _ in 0..*repeats {
-                let up = random.direction();
-                let set: Vec<HalfSpace> = (0..*count)
-                    .map(|_| {
-                        let normal = random.direction();
-                        let normal = normal * normal.dot(&up).signum();
-                        let bound = -0.5e-3 * (1.0 + random.number());
-                        let arm = random.vector() * 0.05;
-                        HalfSpace {
-                            bound,
-                            ..contact(&arm, &normal)
-                        }
-                    })
-                    .collect();
+                let set = contacts(*count, &mut random);
                 let wish = random.wish();
                 let answer = solver.project(&metric, &wish, &set);
                 let expected = oracle(&inertia, &wish, &set);
@@ -66,6 +58,47 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
         }
         rows
     })
+}
+
+/// Unit normals on one side, anywhere within 5 cm, up to a millimetre away.
+fn contacts(count: usize, random: &mut Random) -> Vec<HalfSpace> {
+    let up = random.direction();
+    let contact = |_| {
+        let normal = random.direction();
+        let normal = normal * normal.dot(&up).signum();
+        let bound = -0.5e-3 * (1.0 + random.number());
+        let arm = random.vector() * 0.05;
+        HalfSpace {
+            bound,
+            ..contact(&arm, &normal)
+        }
+    };
+    (0..count).map(contact).collect()
+}
+
+/// Largest relative error of a solver that stops at its limits, on some sets of `count` contacts, and the 99th percentile of its CPU time, us.
+pub(crate) fn random_contacts(
+    extent: Extent,
+    count: usize,
+    kind: SolverKind,
+    limits: SolverLimits,
+) -> (f64, f64) {
+    let inertia = Matrix3::from_diagonal(&INERTIA);
+    let metric = Metric::new(1.0, &inertia).expect("the tensor is positive definite");
+    let mut projector = Projector::new(kind, count).with_limits(limits);
+    let mut random = Random(38);
+    let mut worst = 0.0_f64;
+    let mut times = Vec::new();
+    for _ in 0..extent.choose(100, 20) {
+        let set = contacts(count, &mut random);
+        let wish = random.wish();
+        let before = thread_us();
+        let answer = projector.project(&metric, &wish, &set, &[]);
+        times.push(thread_us() - before);
+        let off = answer.acceleration - oracle(&inertia, &wish, &set);
+        worst = worst.max(metric.norm(&off) / metric.norm(&wish));
+    }
+    (worst, quantile(&times, 0.99))
 }
 
 /// The projection for a body of 1 kg with this diagonal tensor.

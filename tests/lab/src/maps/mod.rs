@@ -1,0 +1,379 @@
+//! Stability maps: the stiffest wall that each method renders to a simulated device, against delay, rate, damping and quantisation.
+//!
+//! A ball of 1 kg in the hand is pressed on a wall through a device that nobody holds; 0.1 mm more is a disturbance. Above the critical stiffness
+//! it grows, below it dies away. What a map does not sweep is a device of 0.2 kg and 1 N s/m, forces and updates at 1 kHz, a tick of delay, no
+//! quantisation.
+//!
+//! | symbol | name in code | unit  | meaning                                    |
+//! |--------|--------------|-------|--------------------------------------------|
+//! | t_d    | `delay`      | s     | of the force                               |
+//! | f      | `updates`    | Hz    | updates of the method; forces stay at 1 kHz |
+//! | b      | `damping`    | N s/m | of the device                              |
+//! | Delta  | `resolution` | m     | one count of its encoder                   |
+//!
+//! Theory, in the same picture: eigenvalues of the sampled loop of device and spring (exact where the method is that spring), the rule
+//! `b / (T/2 + t_d)`, and for quantisation the bound of passivity `min(2 b / T, 2 f_c / Delta)`
+//! (Abbott and Okamura 2005).
+
+mod files;
+
+use std::time::Duration;
+
+use god_object::{Pose, Settings, Vector6, World};
+use nalgebra::Vector3;
+use taut_control_tests::closed_loop::{PERIOD, grip};
+use taut_plant::stability::{SampledLoop, linear_limit, passive_limit_quantised};
+use taut_plant::{Encoder, Grip, Hand, MinJerkPath, Motors, Plant};
+
+pub use files::write;
+pub(crate) use files::{COLOURS, panels};
+
+use crate::crew;
+use crate::method::{Method, Scene};
+use crate::recipes::{Extent, ball, ground};
+
+/// Who is mapped: what differs from them by adaptation or look-ahead differs before a contact, not in it.
+pub const METHODS: [Method; 6] = [
+    Method::Ours,
+    Method::Paper,
+    Method::VirtualCoupling,
+    Method::Discrete,
+    Method::Penalty,
+    Method::Point,
+];
+/// Of the ball, m.
+const RADIUS: f64 = 0.01;
+/// What presses the device on the wall, N.
+const PUSH: f64 = 5.0;
+/// m.
+const DISTURBANCE: f64 = 1e-4;
+/// Updates before the device is let go: the method has settled.
+const SETTLING: u32 = 100;
+/// Ticks of a run, s / ms, and which of them are early and late.
+const TICKS: u32 = 1500;
+const EARLY: std::ops::Range<u32> = 100..500;
+const LATE: std::ops::Range<u32> = 1100..1500;
+/// A disturbance that has grown this much need not be followed further.
+const GROWN: f64 = 100.0;
+/// Softest and stiffest wall of the search, N/m, and the relative width at which it ends.
+const SEARCH: [f64; 2] = [20.0, 100_000.0];
+const SEARCH_WIDTH: f64 = 0.02;
+/// Of force and torque, N and N m: none is in the way.
+const LIMIT: f64 = 1e9;
+/// Coulomb friction where a count is swept, N: without it no count is passive.
+const COULOMB: f64 = 0.02;
+
+/// What is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conditions {
+    /// t_d, s.
+    pub delay: f64,
+    /// f, Hz.
+    pub updates: u32,
+    /// b, N s/m.
+    pub damping: f64,
+    /// f_c, N.
+    pub coulomb: f64,
+    /// Delta, m; 0 is none.
+    pub resolution: f64,
+}
+
+const STANDARD: Conditions = Conditions {
+    delay: 1e-3,
+    updates: 1000,
+    damping: 1.0,
+    coulomb: 0.0,
+    resolution: 0.0,
+};
+
+/// One map.
+#[derive(Clone, Copy, Debug)]
+pub struct Map {
+    /// Name in files.
+    pub name: &'static str,
+    /// What is swept, with its unit.
+    pub axis: &'static str,
+    /// Where.
+    values: &'static [f64],
+    at: fn(f64) -> Conditions,
+}
+
+/// All.
+pub const MAPS: [Map; 4] = [
+    Map {
+        name: "delay",
+        axis: "delay of the force, ms",
+        values: &[0.25, 0.5, 1.0, 2.0, 4.0, 8.0],
+        at: |ms| Conditions {
+            delay: ms * 1e-3,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "rate",
+        axis: "updates of the method, Hz (forces 1 kHz)",
+        values: &[70.0, 140.0, 300.0, 500.0, 1000.0],
+        at: |hz| Conditions {
+            updates: hz as u32,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "damping",
+        axis: "damping of the device, N s/m",
+        values: &[0.2, 0.5, 1.0, 2.0, 5.0, 10.0],
+        at: |damping| Conditions {
+            damping,
+            ..STANDARD
+        },
+    },
+    Map {
+        name: "quantisation",
+        axis: "a count of the encoder, um (friction 0.02 N)",
+        values: &[1.0, 5.0, 29.24, 100.0, 300.0],
+        at: |um| Conditions {
+            coulomb: COULOMB,
+            resolution: um * 1e-6,
+            ..STANDARD
+        },
+    },
+];
+
+/// One point of a map: a row of its CSV.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Of the map.
+    pub map: &'static str,
+    /// Where on its axis.
+    pub at: f64,
+    /// Who.
+    pub method: Method,
+    /// K_crit by simulation, N/m; an end of the search where nothing within it changes.
+    pub critical: f64,
+    /// By the eigenvalues of device and spring, N/m.
+    pub by_eigenvalues: f64,
+    /// `b / (T/2 + t_d)`, N/m.
+    pub by_rule: f64,
+    /// The bound of passivity with a count and friction, N/m; NaN where nothing is counted.
+    pub passive: f64,
+}
+
+impl Conditions {
+    fn device(&self) -> Grip {
+        Grip {
+            coulomb_force: Vector3::repeat(self.coulomb),
+            ..grip(self.damping)
+        }
+    }
+
+    /// Of the sampled loop of device and spring, N/m.
+    #[must_use]
+    pub fn by_eigenvalues(&self) -> f64 {
+        let loop_of_it = SampledLoop {
+            mass: self.device().mass,
+            damping: self.damping,
+            delay: self.delay,
+            ..SampledLoop::at_period(PERIOD.as_secs_f64())
+        };
+        loop_of_it.critical_stiffness()
+    }
+
+    /// `b / (T/2 + t_d)`, N/m.
+    #[must_use]
+    pub fn by_rule(&self) -> f64 {
+        linear_limit(self.damping, 0.0, PERIOD.as_secs_f64(), self.delay)
+    }
+
+    fn passive(&self) -> f64 {
+        if self.resolution > 0.0 {
+            let period = PERIOD.as_secs_f64();
+            passive_limit_quantised(self.damping, self.coulomb, period, self.resolution)
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// K_crit of a method, N/m.
+    #[must_use]
+    pub fn critical(&self, method: Method) -> f64 {
+        let [mut calm, mut wild] = SEARCH;
+        while wild / calm > 1.0 + SEARCH_WIDTH {
+            let middle = (calm * wild).sqrt();
+            if self.grows(method, middle) {
+                wild = middle;
+            } else {
+                calm = middle;
+            }
+        }
+        (calm * wild).sqrt()
+    }
+
+    /// Whether the disturbance of a wall of this stiffness, N/m, grows.
+    fn grows(&self, method: Method, stiffness: f64) -> bool {
+        let scene = scene(stiffness);
+        let period = 1.0 / f64::from(self.updates);
+        let tuning = method.tunings()[0];
+        let mut method = method.start(&scene, period, tuning);
+        let pressed = RADIUS - PUSH / stiffness;
+        let at_rest = Pose::translation(0.0, 0.0, pressed);
+        let mut updates = f64::from(SETTLING);
+        for update in 0..SETTLING {
+            // Down in steps, so that every method has the contact before the device is past it.
+            let share = f64::from(update + 1) / f64::from(SETTLING / 2);
+            let place = scene
+                .start
+                .translation
+                .vector
+                .lerp(&at_rest.translation.vector, share.min(1.0));
+            method.update(
+                f64::from(update) * period,
+                &Pose::from_parts(place.into(), at_rest.rotation),
+            );
+            method.publish();
+            let _ = method.force(f64::from(update) * period, &at_rest);
+        }
+        let before = updates * period;
+        let mut plant = self.plant(&at_rest);
+        let frequency = (stiffness / self.device().mass).sqrt();
+        let (mut early, mut late) = (0.0_f64, 0.0_f64);
+        for tick in 0..TICKS {
+            let now = PERIOD * tick;
+            plant.advance(now);
+            let time = before + now.as_secs_f64();
+            let measured = plant.measured_pose();
+            // Half a tick late: no update begins at the instant of a force.
+            while (updates + 0.5) * period <= time {
+                method.publish();
+                method.update(time, &measured);
+                updates += 1.0;
+            }
+            let mut wrench = method.force(time, &measured);
+            wrench[2] -= PUSH;
+            plant.command(&(wrench.component_mul(&ALONG_Z)));
+            let place = plant.pose().translation.z - pressed;
+            let size = place.hypot(plant.velocity()[2] / frequency);
+            if size.is_nan() || size > GROWN * DISTURBANCE {
+                return true;
+            }
+            if EARLY.contains(&tick) {
+                early = early.max(size);
+            } else if LATE.contains(&tick) {
+                late = late.max(size);
+            }
+        }
+        // A count of the encoder is never at rest: what stays as large as a count has not grown.
+        late > early.max(2.0 * self.resolution)
+    }
+
+    fn plant(&self, at_rest: &Pose) -> Plant {
+        let mut plant = Plant::new(self.device(), Hand::RELEASED, MinJerkPath::hold(*at_rest))
+            .with_motors(Motors {
+                delay: Duration::from_secs_f64(self.delay),
+                lag: Duration::ZERO,
+            })
+            .with_longest_step(PERIOD);
+        if self.resolution > 0.0 {
+            plant = plant.with_encoder(Encoder {
+                length: self.resolution,
+                angle: 0.0,
+            });
+        }
+        let disturbed = Pose::translation(0.0, 0.0, at_rest.translation.z - DISTURBANCE);
+        plant.place(disturbed, Vector6::zeros());
+        plant
+    }
+}
+
+/// The wall is one axis: what a method does beside it is another map.
+const ALONG_Z: Vector6 = Vector6::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+
+/// A ball just above a wall.
+fn scene(stiffness: f64) -> Scene {
+    let world = World {
+        body: ball(RADIUS),
+        obstacles: vec![ground()],
+    };
+    let start = Pose::translation(0.0, 0.0, RADIUS + 1e-4);
+    let mut scene = Scene::new(world, 2.0 * RADIUS, 0.1, start);
+    let mass = scene.world.body.mass;
+    scene.settings = Settings {
+        k_h: stiffness / (scene.settings.k_s * mass),
+        force_limit: LIMIT,
+        torque_limit: LIMIT,
+        adaptation: None,
+        ..scene.settings
+    };
+    scene
+}
+
+/// All points of all maps, on so many threads; the quick extent has the ends of each axis alone. Calls `done` after each.
+pub fn run(extent: Extent, threads: usize, done: impl Fn() + Sync) -> Vec<Point> {
+    crew::map(threads, &tasks(extent), |(map, at, method)| {
+        let conditions = (map.at)(*at);
+        let point = Point {
+            map: map.name,
+            at: *at,
+            method: *method,
+            critical: conditions.critical(*method),
+            by_eigenvalues: conditions.by_eigenvalues(),
+            by_rule: conditions.by_rule(),
+            passive: conditions.passive(),
+        };
+        done();
+        point
+    })
+}
+
+/// Map, place, method.
+pub(crate) fn tasks(extent: Extent) -> Vec<(Map, f64, Method)> {
+    let places = |map: &Map| -> Vec<f64> {
+        let last = map.values.len() - 1;
+        match extent {
+            Extent::Full => map.values.to_vec(),
+            Extent::Quick => vec![map.values[0], map.values[last]],
+        }
+    };
+    let points = MAPS.iter().flat_map(|map| {
+        let places = places(map).into_iter();
+        places.flat_map(|at| METHODS.map(|method| (*map, at, method)))
+    });
+    points.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The method of this project is a spring to the wall: its limit is that of the eigenvalues.
+    #[test]
+    fn a_wall_of_ours_is_as_stable_as_its_spring() {
+        for map in MAPS.iter().filter(|map| map.name != "quantisation") {
+            for at in [map.values[0], map.values[map.values.len() - 1]] {
+                let conditions = (map.at)(at);
+                let (found, exact) = (
+                    conditions.critical(Method::Ours),
+                    conditions.by_eigenvalues(),
+                );
+                let ratio = found / exact;
+                assert!(
+                    (0.95..1.05).contains(&ratio),
+                    "{} {at}: {found} of {exact}",
+                    map.name
+                );
+            }
+        }
+    }
+
+    /// A mass and a damper between hand and wall take stiffness: the device's limit is not reached at slow updates.
+    #[test]
+    fn slow_updates_cost_virtual_coupling_its_stability() {
+        let at = |updates| {
+            Conditions {
+                updates,
+                ..STANDARD
+            }
+            .critical(Method::VirtualCoupling)
+        };
+        assert!(at(70) < at(1000), "{} {}", at(70), at(1000));
+    }
+}

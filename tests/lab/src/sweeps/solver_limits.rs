@@ -1,0 +1,73 @@
+//! The three solvers of the projection by tolerance and by cap of iterations, on random contacts, against the oracle of R38.
+
+use god_object::SolverKind;
+use god_object::quasi_statics::SolverLimits;
+
+use super::{Cost, Point, Runs, Sweep};
+use crate::crew;
+use crate::recipes::{Extent, random_contacts};
+
+pub(super) const SWEEP: Sweep = Sweep {
+    name: "solver-limits",
+    about: "solvers by tolerance and by cap of iterations, not polished, against non-negative least squares",
+    error: "relative error",
+    cost: Cost::Time,
+    runs: Runs::Own(run),
+};
+
+/// Contacts of a projection.
+const COUNTS: [usize; 2] = [12, 200];
+/// Tolerances without a cap, and caps at the finest tolerance.
+const TOLERANCES: [f64; 5] = [1e-1, 1e-3, 1e-6, 1e-9, 1e-13];
+const CAPS: [u32; 6] = [1, 3, 10, 30, 100, 1000];
+/// No cap.
+const ALL: u32 = 10_000;
+const FINEST: f64 = 1e-13;
+const SOLVERS: [(SolverKind, &str); 3] = [
+    (SolverKind::ActiveSet, "active set"),
+    (SolverKind::Clarabel, "Clarabel"),
+    (SolverKind::ProjectedGaussSeidel, "projected Gauss-Seidel"),
+];
+
+fn run(extent: Extent, threads: usize) -> Vec<Point> {
+    let mut tasks = Vec::new();
+    for count in COUNTS {
+        for (kind, name) in SOLVERS {
+            let by_tolerance = TOLERANCES.map(|tolerance| (tolerance, ALL));
+            let by_cap = CAPS.map(|cap| (FINEST, cap));
+            for (index, (tolerance, cap)) in by_tolerance.into_iter().chain(by_cap).enumerate() {
+                let case = if index < TOLERANCES.len() {
+                    format!("{count} contacts, by tolerance")
+                } else {
+                    format!("{count} contacts, by cap of iterations")
+                };
+                let value = if index < TOLERANCES.len() {
+                    format!("{tolerance:e}")
+                } else {
+                    cap.to_string()
+                };
+                let limits = SolverLimits {
+                    tolerance,
+                    max_iterations: cap,
+                };
+                tasks.push((count, kind, name, case, value, limits));
+            }
+        }
+    }
+    crew::map(
+        threads,
+        &tasks,
+        |(count, kind, name, case, value, limits)| {
+            let (error, p99_us) = random_contacts(extent, *count, *kind, *limits);
+            Point {
+                recipe: "R38",
+                case: case.clone(),
+                setting: format!("{name} {value}"),
+                rate: None,
+                error,
+                cost: p99_us,
+                measures: Vec::new(),
+            }
+        },
+    )
+}
