@@ -91,9 +91,9 @@ fn for_each_child(node: u32, beyond: &Lanes, mut each: impl FnMut(Child, f32)) {
 #[inline(always)]
 fn near(beyond: &Lanes) -> u32 {
     let mut bits = [0_u32; LANES];
-    for k in 0..LANES {
-        let off = beyond.0[k] > 0.0; // false for NaN
-        bits[k] = if off { 0 } else { 1 << k };
+    for (k, (bit, lane)) in bits.iter_mut().zip(&beyond.0).enumerate() {
+        let off = *lane > 0.0; // false for NaN
+        *bit = if off { 0 } else { 1 << k };
     }
     bits.iter().fold(0, |mask, bit| mask | bit)
 }

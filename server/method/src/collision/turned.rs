@@ -105,6 +105,10 @@ impl Turned {
     }
 
     /// One loop over the lanes, without branches: the compiler makes vectors of it.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "coordinates of many vectors side by side"
+    )]
     #[inline(never)]
     fn turn(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
         let frame = volumes.frame(side);
