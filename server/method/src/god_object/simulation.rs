@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::obstacles::PlacedObstacle;
-use super::substep::Update;
+use super::substep::{Going, Update};
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
 use crate::constraint::{ConstraintSet, Contact, RowReduction};
@@ -39,6 +39,8 @@ pub struct GodObject {
     pub(super) turn: TurnMemory,
     pub(super) radius: f64,
     pub(super) trust_length: f64,
+    /// What the last update's motions showed, for the next one: where the hand rests, updates go on from each other.
+    pub(super) going: Going,
     pub(super) last_device: Option<Pose>,
     /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
     pub(super) device_ahead: f64,
@@ -85,6 +87,7 @@ impl GodObject {
             turn: TurnMemory::default(),
             radius,
             trust_length: f64::INFINITY,
+            going: Going::default(),
             last_device: None,
             device_ahead: 0.0,
             collected_within: 0.0,
@@ -146,12 +149,16 @@ impl GodObject {
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);
+        let all_moved = device_moved + obstacles_moved;
         let mut update = Update {
-            all_moved: device_moved + obstacles_moved,
-            look_ahead: device_moved + obstacles_moved,
+            all_moved,
+            look_ahead: all_moved,
             made: 0.0,
-            last_motion: Vector6::zeros(),
-            damping: 1.0,
+            going: if all_moved <= self.settings.rest_distance {
+                self.going
+            } else {
+                Going::default()
+            },
             turns: 0,
         };
         report.unfinished = true;
@@ -171,6 +178,7 @@ impl GodObject {
                 break;
             }
         }
+        self.going = update.going;
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
         if self.reduction.is_none() && self.collected_within < published {

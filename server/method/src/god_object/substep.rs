@@ -34,12 +34,29 @@ pub(super) struct Update {
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
     pub(super) made: f64,
-    /// Motion of the sub-step before.
-    pub(super) last_motion: Vector6,
-    /// Share of the projected motion that is made; shrinks while motions turn back on each other.
-    pub(super) damping: f64,
+    /// Last motion and damping.
+    pub(super) going: Going,
     /// How often a motion has turned back on the last.
     pub(super) turns: u32,
+}
+
+/// What one motion says about the next. Where the hand rests it outlives the update: motions that turn back on each other would else
+/// do the same in every update, and end in a cycle instead of at the minimum.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Going {
+    /// Motion of the sub-step before.
+    last_motion: Vector6,
+    /// Share of the projected motion that is made; shrinks while motions turn back on each other.
+    damping: f64,
+}
+
+impl Default for Going {
+    fn default() -> Self {
+        Self {
+            last_motion: Vector6::zeros(),
+            damping: 1.0,
+        }
+    }
 }
 
 impl GodObject {
@@ -69,7 +86,9 @@ impl GodObject {
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
         // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
         // little that was cut to what is trusted.
-        update.relax(&projected.acceleration, self.radius);
+        if update.going.relax(&projected.acceleration, self.radius) {
+            update.turns += 1;
+        }
         let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
         let little = if tight || cut {
             0.0
@@ -79,14 +98,14 @@ impl GodObject {
         let settling = update.turns > MAX_TURNS && !tight && !cut;
         let worth_moving = !settling
             && covered > self.settings.motion_tolerance
-            && covered * update.damping > little; // false for NaN
+            && covered * update.going.damping > little; // false for NaN
         if !worth_moving {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
-        let constrained = projected.acceleration * update.damping;
-        let covered = covered * update.damping;
+        let constrained = projected.acceleration * update.going.damping;
+        let covered = covered * update.going.damping;
         let gap_before = self.set.gap_min.min(self.settings.rest_distance);
         let time = self.go(&projected, &constrained, report);
         update.made += covered * time;
@@ -113,7 +132,7 @@ impl GodObject {
         }
         if time < TRUSTED_SHARE || !true_rows {
             // What comes next is a way out, and no turning back.
-            update.last_motion = Vector6::zeros();
+            update.going.last_motion = Vector6::zeros();
         }
         true
     }
@@ -191,21 +210,23 @@ impl GodObject {
     }
 }
 
-impl Update {
-    /// Takes note of a projected motion, before it is made: one that turns back on the last says that the last went too far.
-    fn relax(&mut self, motion: &Vector6, radius: f64) {
+impl Going {
+    /// Takes note of a projected motion, before it is made: one that turns back on the last, for which this is true, says that the last went
+    /// too far.
+    fn relax(&mut self, motion: &Vector6, radius: f64) -> bool {
         let weighed = |a: &Vector6, b: &Vector6| {
             linear(a).dot(&linear(b)) + radius * radius * angular(a).dot(&angular(b))
         };
         let along = weighed(motion, &self.last_motion);
-        if along < 0.0 {
+        let turns_back = along < 0.0;
+        if turns_back {
             // Aitken's extrapolation: motions in proportion to the way that is left would end here.
-            self.turns += 1;
             let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
-        } else {
+        } else if along > 0.0 {
             self.damping = (2.0 * self.damping).min(1.0);
         }
         self.last_motion = *motion;
+        turns_back
     }
 }
