@@ -12,9 +12,6 @@ use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::world::World;
 
-/// A row that is violated by less than this share of the rest distance is left out: 0.1 um for a body of 0.1 m, by which a force of 2 N at
-/// 1000 N/m is off by at most one per cent.
-const TOLERANCE_PER_REST_DISTANCE: f64 = 0.01;
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
 
@@ -189,7 +186,8 @@ impl GodObject {
             reference: self.pose_at_reference_point(),
             metric,
             rest_distance: self.settings.rest_distance,
-            tolerance: TOLERANCE_PER_REST_DISTANCE * self.settings.rest_distance,
+            // What a row would change by less is no motion.
+            tolerance: self.settings.motion_tolerance,
         })
     }
 
