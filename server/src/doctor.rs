@@ -85,29 +85,29 @@ impl fmt::Display for DoctorReport {
 }
 
 /// Graphics drivers complain on standard error, once for each way in which they look for a screen, where nobody has set a directory for
-/// what a login session needs. Nothing is put there: this program begins anew, in the same process, with one. Returns only if
-/// there is no need, or with the reason why that failed.
-pub fn begin_anew_without_complaints() -> Option<std::io::Error> {
+/// what a login session needs. Nothing is put there: this program begins anew, in the same process, with one. Returns if there is no need, or
+/// if that failed, which the log tells.
+pub fn begin_anew_without_complaints() {
     const DIRECTORY: &str = "XDG_RUNTIME_DIR";
     let is_set = std::env::var_os(DIRECTORY).is_some_and(|directory| !directory.is_empty());
     if is_set || !crate::rendering::BUILT_IN {
-        return None;
+        return;
     }
     #[cfg(unix)]
     {
         use std::os::unix::process::CommandExt;
 
-        let program = match std::env::current_exe() {
-            Ok(program) => program,
-            Err(error) => return Some(error),
-        };
-        let mut again = std::process::Command::new(program);
-        again.args(std::env::args_os().skip(1));
-        again.env(DIRECTORY, std::env::temp_dir());
-        Some(again.exec())
+        let error = std::env::current_exe().map_or_else(
+            |error| error,
+            |program| {
+                std::process::Command::new(program)
+                    .args(std::env::args_os().skip(1))
+                    .env(DIRECTORY, std::env::temp_dir())
+                    .exec()
+            },
+        );
+        tracing::warn!("graphics drivers may complain of {DIRECTORY} ({error})");
     }
-    #[cfg(not(unix))]
-    None
 }
 
 /// Looks at this machine; takes a second and a little.

@@ -159,9 +159,7 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
-    if let Some(error) = doctor::begin_anew_without_complaints() {
-        tracing::warn!("graphics drivers may complain of XDG_RUNTIME_DIR ({error})");
-    }
+    doctor::begin_anew_without_complaints();
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;
