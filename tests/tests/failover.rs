@@ -134,7 +134,7 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
         "--fps",
         RATE,
     ];
-    let mut node = |name: &str| {
+    let node = |name: &str| {
         let process = workbench.join("render", name, &server, &small);
         let line = format!("{name} joined");
         wait_for(&line, LIMIT, || {
