@@ -67,6 +67,10 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         let good = got.states > 0 && got.disordered == 0;
         return Ok(ExitCode::from(u8::from(!good)));
     }
+    if arguments.next_if(|first| first == "--help").is_some() {
+        print!("{}", help());
+        return Ok(ExitCode::SUCCESS);
+    }
     let Arguments {
         extent,
         csv: file,
@@ -93,6 +97,32 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     }
     let missed = rows.iter().any(|row| row.verdict == Verdict::Missed);
     Ok(ExitCode::from(if broken { 2 } else { u8::from(missed) }))
+}
+
+fn help() -> String {
+    let sections = SECTIONS
+        .iter()
+        .map(|section| format!("  {:<10} {}\n", section.name, section.about));
+    format!(
+        "\
+Prints the table of the cluster's targets with what this machine keeps of them now.
+
+taut-network-tests [OPTION...] [SECTION...]
+
+  --quick          seconds instead of minutes: invariants, no speeds
+  --seconds S      length of each latency or age run
+  --turns N        turns of the isolation runs, each without and with clients
+  --soak S         clients come, go and die for S seconds while datagrams are forged
+  --taut PROGRAM   the program that serves and draws; build it by cargo build --release -p taut
+  --csv FILE       writes the table, too
+
+Sections, all of them unless some are named:
+{}
+Exit code 1: a target is missed. 2: something could not be measured.
+Example: taut-network-tests --taut target/release/taut skew screens
+",
+        sections.collect::<String>()
+    )
 }
 
 fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dyn Error>> {
