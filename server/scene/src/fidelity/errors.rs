@@ -189,8 +189,9 @@ mod tests {
                 .map(|from| turned(from + way) - turned(from))
                 .fold(0.0, f64::max);
             let bound = stair_turn(curvature, facet, rounding, way);
+            // Least tight after whole facets, which begin and end at the same place of the stair.
             assert!(
-                most <= bound + 1e-12 && most > 0.7 * bound,
+                most <= bound + 1e-12 && most > 0.55 * bound,
                 "{way}: {most} of {bound}"
             );
         }
