@@ -140,7 +140,8 @@ fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dy
             "--soak" => extent.soak_seconds = Some(positive(&value()?)?),
             "--seconds" => extent.seconds = positive(&value()?)?,
             "--turns" => extent.turns = positive(&value()?)?.ceil() as usize,
-            "--taut" => extent.program = value()?.into(),
+            // Some of those that run it do so from a folder of their own.
+            "--taut" => extent.program = program(&value()?)?,
             "--csv" => csv = Some(value()?.into()),
             name => {
                 let known = SECTIONS.iter().find(|section| section.name == name);
@@ -164,6 +165,19 @@ fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dy
             wanted
         },
     })
+}
+
+/// The program by its whole path.
+fn program(named: &str) -> Result<PathBuf, String> {
+    let path = std::path::absolute(named).map_err(|error| format!("{named}: {error}"))?;
+    if path.is_file() {
+        Ok(path)
+    } else {
+        Err(format!(
+            "there is no program {}; build it: cargo build --release -p taut",
+            path.display()
+        ))
+    }
 }
 
 fn positive(text: &str) -> Result<f64, String> {
