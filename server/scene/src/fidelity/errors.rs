@@ -189,11 +189,13 @@ mod tests {
                 .map(|from| turned(from + way) - turned(from))
                 .fold(0.0, f64::max);
             let bound = stair_turn(curvature, facet, rounding, way);
-            // Least tight after whole facets, which begin and end at the same place of the stair.
-            assert!(
-                most <= bound + 1e-12 && most > 0.55 * bound,
-                "{way}: {most} of {bound}"
-            );
+            assert!(most <= bound + 1e-12, "{way}: {most} of {bound}");
+            if way == pitch {
+                // A whole facet on, the stair has turned by just one step, wherever it began: the bound allows for part of a second.
+                assert!((most - facet).abs() < 1e-12, "{way}: {most}");
+            } else {
+                assert!(most > 0.7 * bound, "{way}: {most} of {bound}");
+            }
         }
         // What is as round as the stair has no steps.
         assert_eq!(stair_turn(25.0, 0.1, 25.0, 1e-3), normal_turn(25.0, 1e-3));

@@ -6,7 +6,7 @@ use taut_link::{ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink,
 use taut_proto::{
     HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
     mesh_blob::Positions,
-    scene::{BodyDescription, ShowOptions},
+    scene::BodyDescription,
     state::{BodyState, ContactState, MAX_BODIES, MAX_CONTACTS, RunState, ToolState},
 };
 
@@ -80,26 +80,8 @@ pub fn content_with(triangles: u32) -> Content {
         pose: PoseF64::IDENTITY,
         colour: [1.0, 0.5, 0.1, 1.0],
     };
-    let description = SceneDescription {
-        name: "bench".to_owned(),
-        revision: 1,
-        god_object: body,
-        obstacles: Vec::new(),
-        reference_point: [0.0; 3],
-        scene_origin: PoseF64::IDENTITY,
-        display_scale: 1.0,
-        screens: Vec::new(),
-        nodes: Vec::new(),
-        viewer: PoseF64::IDENTITY,
-        eye_separation: 0.064,
-        separation_scale: 1.0,
-        nearest_disparity: 0.0,
-        near: 0.05,
-        far: 10.0,
-        show: ShowOptions::default(),
-    };
     Content {
-        description,
+        description: SceneDescription::of_body("bench", body),
         meshes: vec![mesh],
     }
 }
