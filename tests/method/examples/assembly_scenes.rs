@@ -46,11 +46,12 @@ fn main() {
             }
             bar.set_message(format!("{} hand {seed}", assembly.name));
             let mut times = Vec::new();
-            let mut last = thread_cpu_us();
+            // The first update comes after the trees of the independent check are built: it has no time of its own.
+            let mut last = None;
             let outcome = Assembly::run(&scene, &trace, hand.as_ref(), 1, 1, |share| {
-                times.push(thread_cpu_us() - last);
+                times.extend(last.map(|before: f64| thread_cpu_us() - before));
                 bar.set_position((share * PARTS as f64) as u64);
-                last = thread_cpu_us();
+                last = Some(thread_cpu_us());
             });
             bar.finish_and_clear();
             print(assembly, seed, &outcome, &mut times);

@@ -14,6 +14,11 @@ use crate::world::World;
 
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
+/// A collection that is given up may be blind where surfaces are to touch: flat faces are cut into long triangles, which lie over each other
+/// in their thousands. While no row holds the body, what is nearer than this many rest distances is looked for with more work, since a
+/// body that lands unforeseen costs still more: it is stopped below the rest distance, where volumes in single precision tell nothing apart.
+const NEAR_REST_DISTANCES: f64 = 4.0;
+const LANDING_FACTOR: u64 = 64;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
@@ -61,18 +66,26 @@ impl GodObject {
         self.set.gap_min = f64::INFINITY;
         let mut pairs = self.settings.look_ahead_pairs;
         let mut obstacles_left = at.world.obstacles.len() as u64;
+        let near = distance.min(NEAR_REST_DISTANCES * at.rest_distance);
+        let lands = !reduction.holds(at.rest_distance);
         for (index, obstacle) in at.world.obstacles.iter().enumerate() {
-            self.contacts.clear();
-            let collected = collect_bounded(
-                (&at.world.body.mesh, &at.pose),
-                (&obstacle.mesh, &obstacle.pose),
-                u16::try_from(index).unwrap_or(u16::MAX),
-                distance,
-                (pairs / obstacles_left).max(1),
-                &mut self.collision,
-                &mut self.contacts,
-                work,
-            );
+            let mut collect = |distance, pairs| {
+                self.contacts.clear();
+                collect_bounded(
+                    (&at.world.body.mesh, &at.pose),
+                    (&obstacle.mesh, &obstacle.pose),
+                    u16::try_from(index).unwrap_or(u16::MAX),
+                    distance,
+                    pairs,
+                    &mut self.collision,
+                    &mut self.contacts,
+                    work,
+                )
+            };
+            let mut collected = collect(distance, (pairs / obstacles_left).max(1));
+            if lands && collected.complete_within < near {
+                collected = collect(near, LANDING_FACTOR * self.settings.look_ahead_pairs);
+            }
             pairs = pairs.saturating_sub(collected.looked_at);
             obstacles_left -= 1;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);

@@ -194,6 +194,12 @@ impl RowReduction {
         (self.candidates.complete_within - self.moved(radius)).max(0.0)
     }
 
+    /// Whether a row known touches.
+    pub(crate) fn holds(&self, rest_distance: f64) -> bool {
+        self.contacts()
+            .any(|c| c.gap <= TOUCHING_REST_DISTANCES * rest_distance)
+    }
+
     /// Smallest gap of the rows and candidates, m; that of candidates to first order. Infinite when there are none.
     pub(crate) fn gap_min(&self) -> f64 {
         let known = self.known.iter().map(|row| row.contact.gap);
