@@ -66,7 +66,7 @@ impl Facing<'_> {
             && (is_over(&pair.x[k], &pair.y, &normal, gap)
                 || self.past_hollows && {
                     let place = |t| self.obstacle.corners(t);
-                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k], &normal)
+                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k])
                 });
         if !over {
             return None;
@@ -96,7 +96,7 @@ impl Facing<'_> {
             && (is_over(&pair.y[k], &pair.x, &-normal, gap)
                 || self.past_hollows && {
                     let place = |t| self.pair(t, pair.b).x;
-                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k], &-normal)
+                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k])
                 });
         if !over {
             return None;
