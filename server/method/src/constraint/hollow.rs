@@ -108,11 +108,11 @@ pub(super) fn covers_foot(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A block whose upper edge has a notch in its middle: two gables that lean on each other.
-    fn notched(depth: f64) -> Mesh {
+    pub(in crate::constraint) fn notched(depth: f64) -> Mesh {
         // A prism along x with a ridge at y = 0, its middle lower by `depth`.
         let mut vertices = Vec::new();
         for (x, drop) in [(-1.0, 0.0), (0.0, depth), (1.0, 0.0)] {

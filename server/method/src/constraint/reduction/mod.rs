@@ -15,7 +15,7 @@
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Rows of pairs that an active one turns into
-//! across a corner of the hollow are added likewise, though they do not face yet.
+//! across a corner of the hollow are added likewise, though they do not face yet; and those that a pair has turned into which slid off its features.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
@@ -36,7 +36,7 @@ use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind}
 use crate::spatial::{Pose, Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
-use neighbours::for_neighbours;
+use neighbours::{Sides, for_neighbours};
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
@@ -49,6 +49,8 @@ const MAX_STALE: u32 = 64;
 /// Hints that are looked at, and how near a pair there must be to become a row.
 const HINTS_TAKEN: usize = 2;
 const HINT_REST_DISTANCES: f64 = 4.0;
+/// Most pairs that have slid off their features which are followed, in one motion.
+const MAX_FOLLOWED: usize = 16;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
 const IDLE_UPDATES: u32 = 8;
 /// The same for a row that is implied: it matters in the corner that the body is in, and nowhere else.
@@ -157,10 +159,15 @@ impl RowReduction {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
+        let mut left = ArrayVec::<FeaturePair, MAX_FOLLOWED>::new();
         self.known.retain_mut(|row| {
             let facing = face(at, &row.contact.features, false, work);
             let was_implied = std::mem::replace(&mut row.implied, facing.is_none());
-            *outdated |= row.implied && !was_implied && row.contact.gap <= near;
+            let mattered = row.implied && !was_implied && row.contact.gap <= near;
+            *outdated |= mattered;
+            if mattered && !left.is_full() {
+                left.push(row.contact.features);
+            }
             let contact = facing.or_else(|| face(at, &row.contact.features, true, work));
             if let Some(contact) = contact {
                 row.contact = contact;
@@ -168,6 +175,9 @@ impl RowReduction {
             }
             contact.is_some()
         });
+        for pair in &left {
+            self.follow(at, pair, work);
+        }
         self.candidates.move_to(&at.reference);
         for &hint in hints.iter().take(HINTS_TAKEN) {
             self.take_hint(at, hint, work);
@@ -309,25 +319,49 @@ impl RowReduction {
         for row in &projection.active {
             let pair = self.known[row.row as usize].contact.features;
             let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
-            for_neighbours(&at.world.body.mesh, &obstacle.mesh, &pair, |features| {
-                if self.known.len() == MAX_ROWS || self.knows(&features) {
-                    return;
-                }
-                let Some(contact) = face(at, &features, true, work) else {
-                    return;
-                };
-                let row = jacobian(&contact, &at.center());
-                let violation = at.rest_distance - contact.gap - row.dot(&projection.acceleration);
-                if violation > at.tolerance {
-                    self.add(at, &contact);
-                    if let Some(row) = self.known.last_mut() {
-                        // It does not face yet.
-                        row.implied = true;
+            for_neighbours(
+                &at.world.body.mesh,
+                &obstacle.mesh,
+                &pair,
+                Sides::Hollow,
+                |features| {
+                    if self.known.len() == MAX_ROWS || self.knows(&features) {
+                        return;
                     }
-                }
-            });
+                    let Some(contact) = face(at, &features, true, work) else {
+                        return;
+                    };
+                    let row = jacobian(&contact, &at.center());
+                    let violation =
+                        at.rest_distance - contact.gap - row.dot(&projection.acceleration);
+                    if violation > at.tolerance {
+                        self.add(at, &contact);
+                        if let Some(row) = self.known.last_mut() {
+                            // It does not face yet.
+                            row.implied = true;
+                        }
+                    }
+                },
+            );
         }
         self.known.len() > before
+    }
+
+    /// Adds the pairs that one turned into which has slid off its features.
+    fn follow(&mut self, at: &At, pair: &FeaturePair, work: &mut Work) {
+        let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
+        let near = NEAR_REST_DISTANCES * at.rest_distance;
+        let body = &at.world.body.mesh;
+        for_neighbours(body, &obstacle.mesh, pair, Sides::All, |features| {
+            if self.known.len() == MAX_ROWS || self.knows(&features) {
+                return;
+            }
+            if let Some(contact) = face(at, &features, false, work)
+                && contact.gap <= near
+            {
+                self.add(at, &contact);
+            }
+        });
     }
 
     fn knows(&self, features: &FeaturePair) -> bool {
