@@ -179,6 +179,7 @@ impl GodObject {
     ) -> f64 {
         let motion = self.motion(displacement, &projected.straight);
         let time = self.free_time(motion, report);
+        self.stopped |= time < 1.0;
         if time > 0.0 {
             let reached = motion.pose_at(time);
             self.pose = from_reference_point(&reached, &motion.reference_point);
