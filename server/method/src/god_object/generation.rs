@@ -42,7 +42,13 @@ impl GodObject {
             return false;
         };
         if let Some(at) = self.place() {
-            reduction.move_to(&at, &self.collision.hints, work);
+            let stopped = std::mem::take(&mut self.stopped);
+            let hints = if stopped {
+                &self.collision.hints[..]
+            } else {
+                &[]
+            };
+            reduction.move_to(&at, hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;

@@ -116,13 +116,13 @@ impl GodObject {
         let time = self.go(&projected, &constrained, report);
         update.made += covered * time;
 
-        // 5. Collect at the pose reached: for the next sub-step what it can reach, or all when it is likely the last.
+        // 5. Collect at the pose reached: what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
+        // in what is near, and a set that serves the next sub-step alone is collected again when there is none.
+        let published = self.published_distance(update);
         let distance = if covered < self.settings.rest_distance {
-            self.published_distance(update)
+            published
         } else {
-            self.settings
-                .activation_distance
-                .min(2.0 * self.settings.rest_distance + covered)
+            published.min(self.settings.activation_distance)
         };
         self.collect(distance, &mut report.work);
 
@@ -190,6 +190,7 @@ impl GodObject {
     ) -> f64 {
         let motion = self.motion(displacement, &projected.straight);
         let time = self.free_time(motion, report);
+        self.stopped |= time < 1.0;
         if time > 0.0 {
             let reached = motion.pose_at(time);
             self.pose = from_reference_point(&reached, &motion.reference_point);

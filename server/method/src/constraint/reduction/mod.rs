@@ -154,7 +154,7 @@ impl RowReduction {
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
-    /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
+    /// `hints` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
     pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
