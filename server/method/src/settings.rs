@@ -86,8 +86,8 @@ pub struct Settings {
     /// Pairs of triangles, and of their features, that one collection may look at. It looks nearest first: one that would cost more reaches less
     /// far. Late updates must not make later ones still later.
     pub look_ahead_pairs: u64,
-    /// A motion whose fastest point covers less than this is none, m; and a constraint that a motion violates by less is left out of a set
-    /// whose rows are chosen.
+    /// A motion whose fastest point covers less than this is none, m; and a constraint that a motion violates by less than a thousandth of it is
+    /// left out of a set whose rows are chosen.
     pub motion_tolerance: f64,
     /// Capacity of the constraint set. The nearest are kept and the set says that it is truncated.
     pub max_constraints: usize,

@@ -12,7 +12,7 @@ use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, World};
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
+use proptest::test_runner::TestCaseError;
 use support::penetrates;
 
 const SIDES: u32 = 72;
@@ -45,24 +45,77 @@ fn peg_in_hole(clearance: f64, placed: &Pose) -> Arc<World> {
     })
 }
 
-/// The same draws in every run, unless PROPTEST_RNG_SEED says otherwise: in one of some 700 draws (the third of seed 2) a set lacks one row of
-/// the hole's rim, and the torque about the axis is 4e-6 of the force at the radius.
-fn draws() -> ProptestConfig {
-    let asked = ProptestConfig::default();
-    let rng_seed = match asked.rng_seed {
-        RngSeed::Random => RngSeed::Fixed(1),
-        fixed @ RngSeed::Fixed(_) => fixed,
+/// One draw: where the ring is, where the hand pulls, and how tight the hole is.
+#[derive(Clone, Copy, Debug)]
+struct Draw {
+    rotation: [f64; 3],
+    position: [f64; 3],
+    half_sides: u32,
+    pull: f64,
+    clearance: f64,
+}
+
+/// Pulls the inserted peg sideways and along, and checks what is felt where it comes to rest.
+fn check(draw: &Draw) -> Result<(), TestCaseError> {
+    let Draw {
+        clearance, pull, ..
+    } = *draw;
+    let placed = Pose::from_parts(
+        Vector3::from(draw.position).into(),
+        UnitQuaternion::from_scaled_axis(Vector3::from(draw.rotation)),
+    );
+    let world = peg_in_hole(clearance, &placed);
+    let settings = Settings {
+        force_limit: 1e3,
+        torque_limit: 1e3,
+        ..Settings::for_size(2.0 * HALF_LENGTH)
     };
-    ProptestConfig {
-        cases: 12,
-        rng_seed,
-        failure_persistence: None,
-        ..asked
+    let start = placed * Pose::translation(0.0, 0.0, OUT);
+    let mut god_object = GodObject::new(world.clone(), settings, start).expect("the peg fits");
+    let mut coupling = Coupling::new(&world, &settings);
+    let angle = PI * f64::from(draw.half_sides) / f64::from(SIDES);
+    let offset = 3e-3;
+    let device = placed * Pose::translation(offset * angle.cos(), offset * angle.sin(), OUT + pull);
+    for update in 0..80 {
+        let report = god_object.step(&device, None);
+        prop_assert!(report.gap_min >= settings.minimum_gap);
+        prop_assert_eq!(report.solver_failures, 0);
+        if update % 20 == 0 {
+            prop_assert!(!penetrates(&world, god_object.pose()));
+        }
     }
+    let felt = coupling
+        .step(0.0, &device, god_object.constraint_set())
+        .wrench;
+    let (force, torque) = (
+        placed.rotation.inverse() * linear(&felt),
+        placed.rotation.inverse() * angular(&felt),
+    );
+    let expected = settings.stiffness(1.0) * (offset - clearance + settings.rest_distance);
+    // A facet is up to 2.5 degrees off the radius, and a corner of the hole a little deeper than a side.
+    prop_assert!(
+        (force.norm() - expected).abs() < 0.03 * expected,
+        "{force} {expected}"
+    );
+    prop_assert!(force.z.abs() <= 1e-6 * expected, "axial {force}");
+    prop_assert!(
+        torque.z.abs() <= 1e-6 * expected * RADIUS,
+        "torque {torque}"
+    );
+    let outward = Vector3::new(angle.cos(), angle.sin(), 0.0);
+    prop_assert!(force.dot(&outward) < 0.0);
+    prop_assert!(
+        force.cross(&outward).norm() <= 1e-6 * expected,
+        "sideways {force}"
+    );
+    // It slides to where the hand pulls it.
+    let slid = (placed.inverse() * god_object.pose()).translation.vector.z;
+    prop_assert!((slid - OUT - pull).abs() < 1e-6, "{slid} {pull}");
+    Ok(())
 }
 
 proptest! {
-    #![proptest_config(draws())]
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn an_inserted_peg_feels_the_wall_and_neither_axial_force_nor_torque_about_the_axis(
@@ -74,38 +127,19 @@ proptest! {
         pull in -0.02..0.02f64,
         clearance in prop::sample::select(vec![5e-4, 1e-4, 5e-5]),
     ) {
-        let placed = Pose::from_parts(
-            Vector3::from(position).into(),
-            UnitQuaternion::from_scaled_axis(Vector3::from(rotation)),
-        );
-        let world = peg_in_hole(clearance, &placed);
-        let settings = Settings { force_limit: 1e3, torque_limit: 1e3, ..Settings::for_size(2.0 * HALF_LENGTH) };
-        let start = placed * Pose::translation(0.0, 0.0, OUT);
-        let mut god_object = GodObject::new(world.clone(), settings, start).expect("the peg fits");
-        let mut coupling = Coupling::new(&world, &settings);
-        let angle = PI * f64::from(half_sides) / f64::from(SIDES);
-        let offset = 3e-3;
-        let device = placed * Pose::translation(offset * angle.cos(), offset * angle.sin(), OUT + pull);
-        for update in 0..80 {
-            let report = god_object.step(&device, None);
-            prop_assert!(report.gap_min >= settings.minimum_gap);
-            prop_assert_eq!(report.solver_failures, 0);
-            if update % 20 == 0 {
-                prop_assert!(!penetrates(&world, god_object.pose()));
-            }
-        }
-        let felt = coupling.step(0.0, &device, god_object.constraint_set()).wrench;
-        let (force, torque) = (placed.rotation.inverse() * linear(&felt), placed.rotation.inverse() * angular(&felt));
-        let expected = settings.stiffness(1.0) * (offset - clearance + settings.rest_distance);
-        // A facet is up to 2.5 degrees off the radius, and a corner of the hole a little deeper than a side.
-        prop_assert!((force.norm() - expected).abs() < 0.03 * expected, "{force} {expected}");
-        prop_assert!(force.z.abs() <= 1e-6 * expected, "axial {force}");
-        prop_assert!(torque.z.abs() <= 1e-6 * expected * RADIUS, "torque {torque}");
-        let outward = Vector3::new(angle.cos(), angle.sin(), 0.0);
-        prop_assert!(force.dot(&outward) < 0.0);
-        prop_assert!(force.cross(&outward).norm() <= 1e-6 * expected, "sideways {force}");
-        // It slides to where the hand pulls it.
-        let slid = (placed.inverse() * god_object.pose()).translation.vector.z;
-        prop_assert!((slid - OUT - pull).abs() < 1e-6, "{slid} {pull}");
+        check(&Draw { rotation, position, half_sides, pull, clearance })?;
     }
+}
+
+/// Its ends 2.5 um inside those of the ring, the peg turned about its axis by 6.8 urad, where two rows were violated by 6 nm and none was chosen.
+#[test]
+fn a_peg_whose_ends_are_at_the_rims_is_not_left_turned() {
+    let draw = Draw {
+        rotation: [0.0, -1.593_016_305_952_149_2, 0.170_162_794_363_538_07],
+        position: [0.122_164_350_451_533_48, 0.0, 0.041_524_422_425_535_23],
+        half_sides: 62,
+        pull: -0.010_002_549_746_233_13,
+        clearance: 5e-5,
+    };
+    check(&draw).expect("neither axial force nor torque");
 }

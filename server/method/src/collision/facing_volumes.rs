@@ -60,6 +60,7 @@ pub(crate) struct FacingVolumes {
     /// Tells these volumes from others.
     pub(super) serial: u32,
     frames: [Frame; 2],
+    moves: bool,
     /// Bound on half the path of any point of the body, m.
     longest_half_sweep: f32,
     /// What volumes stray by, all over the body, and rounding, m: without the margin and with it.
@@ -97,14 +98,18 @@ impl FacingVolumes {
     ) -> Self {
         let half = 0.5 * (to - from);
         let placement = motion.at(0.5 * (from + to));
-        Self::new(
+        let volumes = Self::new(
             trees,
             &placement,
             [motion.velocity * half, motion.spin * half],
             margin,
             CONE_WIDENING,
             turned,
-        )
+        );
+        Self {
+            moves: true,
+            ..volumes
+        }
     }
 
     /// At rest; volumes count as meeting within `margin`, m, and as facing within `tilt`, rad.
@@ -166,12 +171,19 @@ impl FacingVolumes {
         Self {
             serial: turned.next_serial(),
             frames: [of_body, of_obstacle],
+            moves: false,
             longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
             bare_stray: bare_stray as f32,
             stray: (bare_stray + margin) as f32,
             margin: margin as f32,
             turn: [turn.cos() as f32, turn.sin() as f32],
         }
+    }
+
+    /// Whether they are of an interval of a motion, though it may be none.
+    #[inline(always)]
+    pub(super) fn moves(&self) -> bool {
+        self.moves
     }
 
     #[inline(always)]

@@ -29,7 +29,7 @@ pub(super) struct Turned {
     pub(super) sine: Lanes,
     /// Margin along the tangents, m: what faces these features is no farther aside.
     pub(super) margin_aside: Lanes,
-    /// Of volumes that move: the path, what their points stray by along the axis, and the path of the farthest about the centre.
+    /// Of volumes of a motion, otherwise without meaning: the path, what their points stray by along the axis, and the path of the farthest about the centre.
     pub(super) sweep: [Lanes; 3],
     pub(super) stray_along_axis: Lanes,
     pub(super) turning: Lanes,
@@ -78,7 +78,12 @@ impl TurnedNodes {
         let key = u64::from(volumes.serial) << 32 | u64::from(node);
         if self.keys[place] != key {
             self.keys[place] = key;
-            self.kept[place].turn(volumes, side, tree.node(node));
+            let (kept, node) = (&mut self.kept[place], tree.node(node));
+            if volumes.moves() {
+                kept.turn::<true>(volumes, side, node);
+            } else {
+                kept.turn::<false>(volumes, side, node);
+            }
         }
         &self.kept[place]
     }
@@ -110,7 +115,7 @@ impl Turned {
         reason = "coordinates of many vectors side by side"
     )]
     #[inline(never)]
-    fn turn(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
+    fn turn<const MOVES: bool>(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
         let frame = volumes.frame(side);
         let (n, rotation) = (node, &frame.rotation);
         for k in 0..LANES {
@@ -121,9 +126,8 @@ impl Turned {
             let bitangent = product(&axis, &tangent);
             let (along, across) = (n.along.0[k], n.across.0[k]);
             let (middle, slab, radius) = (n.middle.0[k], n.slab.0[k], n.radius.0[k]);
-            let turning = frame.angle * radius;
+            let turning = if MOVES { frame.angle * radius } else { 0.0 };
             let half = apply(&frame.rotation_abs, &lane(&n.half));
-            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
             // The box about the axis is the narrower one where the surface runs aslant.
             let thickness = middle.abs() + slab;
             for i in 0..3 {
@@ -137,7 +141,6 @@ impl Turned {
                 self.axis[i].0[k] = -axis[i];
                 self.tangents[0][i].0[k] = tangent[i];
                 self.tangents[1][i].0[k] = bitangent[i];
-                self.sweep[i].0[k] = sweep[i];
             }
             let (cosine, sine) = volumes.widened(n.cosine.0[k], n.sine.0[k]);
             self.sides[0].0[k] = along;
@@ -147,6 +150,13 @@ impl Turned {
             self.cosine.0[k] = cosine;
             self.sine.0[k] = sine;
             self.margin_aside.0[k] = volumes.margin * if cosine > 0.0 { aside(sine) } else { 1.0 };
+            if !MOVES {
+                continue;
+            }
+            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
+            for i in 0..3 {
+                self.sweep[i].0[k] = sweep[i];
+            }
             // What points stray by along the axis while they turn.
             let own_across = product(&own_axis, &own_tangent);
             let turn = &frame.own_half_turn;

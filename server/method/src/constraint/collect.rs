@@ -89,10 +89,9 @@ pub(crate) fn collect_bounded(
     let mut looked_at = 0;
     let mut look = |a, b, work: &mut Work| {
         let before = work.feature_pairs;
-        let pair = facing.pair(a, b);
-        if facing.may_face(&pair) {
-            for_contacts(&facing, &pair, work, |contact| nearest.take(contact));
-        }
+        for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+            nearest.take(contact);
+        });
         looked_at += 1 + work.feature_pairs - before;
         looked_at < pairs
     };

@@ -17,8 +17,8 @@ use super::collect::triangle_of;
 use super::hollow;
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::Placement;
+use crate::geometry::Mesh;
 use crate::geometry::distance::barycentric;
-use crate::geometry::{Mesh, NormalCone};
 
 /// How far outside both normal cones the direction may lie, rad: bodies that rest flat on each other do so to about a
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
@@ -66,7 +66,7 @@ impl Facing<'_> {
             && (is_over(&pair.x[k], &pair.y, &normal, gap)
                 || self.past_hollows && {
                     let place = |t| self.obstacle.corners(t);
-                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k], &normal)
+                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k])
                 });
         if !over {
             return None;
@@ -96,7 +96,7 @@ impl Facing<'_> {
             && (is_over(&pair.y[k], &pair.x, &-normal, gap)
                 || self.past_hollows && {
                     let place = |t| self.pair(t, pair.b).x;
-                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k], &-normal)
+                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k])
                 });
         if !over {
             return None;
@@ -253,49 +253,6 @@ impl Facing<'_> {
             x: self.body.corners(a).map(|p| self.placement.point(&p)),
             y: self.obstacle.corners(b),
         }
-    }
-
-    /// Whether features of the two triangles can face each other within the activation distance along some line between the triangles: each
-    /// line is within a cone about that of the middles, each normal within the cones of the triangles. To tolerance; true for NaN.
-    pub(super) fn may_face(&self, pair: &Pair) -> bool {
-        let third = 1.0 / 3.0;
-        let middle = |t: &[Point3<f64>; 3]| (t[0].coords + t[1].coords + t[2].coords) * third;
-        let (x, y) = (middle(&pair.x), middle(&pair.y));
-        let radius = |t: &[Point3<f64>; 3], m: &Vector3<f64>| {
-            t.iter()
-                .map(|p| (p.coords - m).norm_squared())
-                .fold(0.0, f64::max)
-        };
-        let line = x - y;
-        // (a + b)^2 <= 2 a^2 + 2 b^2: no root.
-        let spread = 2.0 * (radius(&pair.x, &x) + radius(&pair.y, &y));
-        let (square, spread) = (line.norm_squared(), spread.sqrt());
-        let within = spread + self.activation_distance * (1.0 + FOOT_TOLERANCE_PER_GAP);
-        let far = square > within * within; // false for NaN
-        if far {
-            return false;
-        }
-        let squared = square - spread * spread;
-        let apart = squared > 0.0; // false for NaN
-        if !apart {
-            return true;
-        }
-        let along = squared.sqrt();
-        let tilt = LOOK_AHEAD_TILT * (line.x.abs() + line.y.abs() + line.z.abs());
-        let off_line = |cosine: f64, cone: &NormalCone| {
-            // cos(sum + tilt) >= cos(sum) - tilt, for cones narrower than a right angle.
-            let [cos, sin] = cone.cos_sin;
-            cos > LOOK_AHEAD_TILT && cosine < cos * along - sin * spread - tilt
-        };
-        let (on_body, on_obstacle) = (
-            self.body.triangle_cone(pair.a),
-            self.obstacle.triangle_cone(pair.b),
-        );
-        !off_line(on_obstacle.axis.dot(&line), on_obstacle)
-            && !off_line(
-                -(self.placement.rotation * on_body.axis).dot(&line),
-                on_body,
-            )
     }
 
     /// The contact between two features by their names, when they face each other here.

@@ -16,6 +16,12 @@ use crate::geometry::Mesh;
 
 /// Most faces at a vertex that are looked at: beyond, it is no notch.
 const MAX_FACES: usize = 32;
+/// Most faces between the end of a face and the place under which it goes on.
+const MAX_STEPS: usize = 4;
+/// A face seen at a flatter angle than that of this sine does not lie over anything.
+const GRAZING: f64 = 0.05;
+/// A way along the rim of a face runs by the face, though vertices are off by this share of it: the rim's next edge is not quite in line.
+const RIM_SHARE: f64 = 0.01;
 
 /// Whether the surface at vertex `v` lies above the straight way that goes on from there, all the way: `way` ends within the faces at `v`, and the one
 /// that it goes under rises from it towards `outward`. Both in the mesh's frame.
@@ -54,55 +60,59 @@ fn height_over(
 ) -> Option<f64> {
     let normal = a.cross(b);
     let facing = normal.dot(outward);
-    let seen = facing > 0.0; // false for NaN
+    let squared = normal.norm_squared();
+    let seen = facing > GRAZING * squared.sqrt(); // false for NaN
     if !seen {
         return None;
     }
     let height = -normal.dot(way) / facing;
     let over = way + outward * height;
-    let squared = normal.norm_squared();
     let shares = [
         over.cross(b).dot(&normal) / squared,
         a.cross(&over).dot(&normal) / squared,
     ];
-    let inside = shares.iter().all(|share| *share >= 0.0) && shares[0] + shares[1] <= 1.0;
+    let inside = shares.iter().all(|share| *share >= -RIM_SHARE) && shares[0] + shares[1] <= 1.0;
     inside.then_some(height)
 }
 
-/// Whether a point lies beyond one side of triangle `t` alone, and there under the face across that side, which rises. Corners by `place`, the point and the
-/// triangle's unit `normal` in one frame.
+/// Whether a point lies beyond triangle `t`, and there under other faces. Corners by `place`, in one frame with the point.
+///
+/// The faces between them are passed one by one, each across a side that the point lies beyond and that does not stand out: then the next face is
+/// above the plane of the last at the point, and so above that of `t`.
 pub(super) fn covers_foot(
     mesh: &Mesh,
     t: u32,
     place: impl Fn(u32) -> [Point3<f64>; 3],
     point: &Point3<f64>,
-    normal: &Vector3<f64>,
 ) -> bool {
-    let corners = place(t);
-    let outside = |corners: &[Point3<f64>; 3], k: usize| {
-        let side = corners[(k + 1) % 3] - corners[k];
-        normal.cross(&side).dot(&(point - corners[k])) < 0.0
-    };
-    let mut beyond = (0..3).filter(|k| outside(&corners, *k));
-    let (Some(side), None) = (beyond.next(), beyond.next()) else {
-        return false;
-    };
-    let edge = &mesh.edges()[mesh.triangle_edges(t)[side] as usize];
-    let other = if edge.faces[0] == t {
-        edge.faces[1]
-    } else {
-        edge.faces[0]
-    };
-    let across = place(other);
-    edge.convexity <= 0.0 && (0..3).all(|k| !outside(&across, k))
+    let mut face = t;
+    for _ in 0..=MAX_STEPS {
+        let corners = place(face);
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let beyond = (0..3).find(|k| {
+            let side = corners[(k + 1) % 3] - corners[*k];
+            let inside = normal.cross(&side).dot(&(point - corners[*k])) >= 0.0;
+            !inside
+        });
+        let Some(side) = beyond else {
+            return face != t;
+        };
+        let edge = &mesh.edges()[mesh.triangle_edges(face)[side] as usize];
+        if edge.is_convex() {
+            return false;
+        }
+        let [left, right] = edge.faces;
+        face = if left == face { right } else { left };
+    }
+    false
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// A block whose upper edge has a notch in its middle: two gables that lean on each other.
-    fn notched(depth: f64) -> Mesh {
+    pub(in crate::constraint) fn notched(depth: f64) -> Mesh {
         // A prism along x with a ridge at y = 0, its middle lower by `depth`.
         let mut vertices = Vec::new();
         for (x, drop) in [(-1.0, 0.0), (0.0, depth), (1.0, 0.0)] {
@@ -158,7 +168,7 @@ mod tests {
                 let corners = mesh.corners(t);
                 let left = corners.iter().all(|p| p.x <= 0.0) && normal.z > 0.1;
                 let point = Point3::new(0.05, 0.5, 0.0);
-                left && covers_foot(&mesh, t, |t| mesh.corners(t), &point, &normal)
+                left && covers_foot(&mesh, t, |t| mesh.corners(t), &point)
             });
             assert_eq!(covered, expected, "{depth}");
         }

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::mesh_error::MeshError;
-use super::normal_cone::{NormalCone, triangle_cones};
+use super::normal_cone::triangle_cones;
 use super::topology::{Edge, Topology};
 use super::tree::Tree;
 use super::wide_tree::WideTree;
@@ -21,7 +21,6 @@ pub struct Mesh {
     triangles: Vec<[u32; 3]>,
     face_normals: Vec<Vector3<f64>>,
     topology: Topology,
-    cones: Vec<NormalCone>,
     tree: Tree,
     wide_tree: WideTree,
     identity: u64,
@@ -69,7 +68,6 @@ impl Mesh {
             triangles,
             face_normals,
             topology,
-            cones,
             tree,
             wide_tree,
             identity,
@@ -129,12 +127,6 @@ impl Mesh {
     #[inline]
     pub fn vertex_owner(&self, v: u32) -> Option<u32> {
         Some(self.topology.vertex_owner[v as usize]).filter(|t| *t != u32::MAX)
-    }
-
-    /// A cone that holds the normal of triangle `t` and the normal cones of the features that it owns.
-    #[inline]
-    pub(crate) fn triangle_cone(&self, t: u32) -> &NormalCone {
-        &self.cones[t as usize]
     }
 
     /// Features that triangle `t` owns and that can touch: bits 0-2 its corners, bits 3-5 its edges.

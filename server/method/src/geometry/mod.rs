@@ -22,7 +22,6 @@ pub use mass::{MassProperties, mass_properties};
 pub use mesh::Mesh;
 pub use mesh_error::MeshError;
 pub use nearest::{NearestOnMesh, nearest_on_mesh};
-pub use normal_cone::NormalCone;
 pub use normals::corner_normals;
 pub use one_sided_distance::{OneSidedDistance, one_sided_distance};
 pub use report::MeshReport;

@@ -21,23 +21,11 @@ const MAX_RING: usize = 32;
 
 /// A cone that holds the normal of a triangle and the normal cones of the features that it owns.
 #[derive(Clone, Copy, Debug)]
-pub struct NormalCone {
+pub(crate) struct NormalCone {
     /// Unit axis.
-    pub axis: Vector3<f64>,
+    pub(crate) axis: Vector3<f64>,
     /// Half-angle, rad; pi holds every direction.
-    pub angle: f64,
-    /// Cosine and sine of `angle`.
-    pub cos_sin: [f64; 2],
-}
-
-impl NormalCone {
-    pub(crate) fn new(axis: Vector3<f64>, angle: f64) -> Self {
-        Self {
-            axis,
-            angle,
-            cos_sin: [angle.cos(), angle.sin()],
-        }
-    }
+    pub(crate) angle: f64,
 }
 
 /// The extreme rays of a vertex's normal cone, unit length: none for a saddle or a hollow. `None` when it was not looked at.
@@ -133,7 +121,7 @@ pub(crate) fn triangle_cones(
         let angle = least.min(1.0).acos() + spread;
         let narrow = least > 0.0 && angle < std::f64::consts::FRAC_PI_2; // false for NaN
         let angle = if narrow { angle } else { std::f64::consts::PI };
-        cones.push(NormalCone::new(axis, angle));
+        cones.push(NormalCone { axis, angle });
     }
     cones
 }

@@ -6,7 +6,7 @@ use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::Work;
 use crate::constraint::{
-    At, NonPenetrationConstraint, Purpose, RowReduction, Separation, collect_bounded,
+    At, Contact, NonPenetrationConstraint, Purpose, RowReduction, Separation, collect_bounded,
 };
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
@@ -14,6 +14,10 @@ use crate::world::World;
 
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
+/// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
+/// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
+const ROW_TOLERANCE_SHARE: f64 = 1e-3;
+
 /// A collection that is given up may be blind where surfaces are to touch: flat faces are cut into long triangles, which lie over each other
 /// in their thousands. While no row holds the body, what is nearer than this many rest distances is looked for with more work, since a
 /// body that lands unforeseen costs still more: it is stopped below the rest distance, where volumes in single precision tell nothing apart.
@@ -29,8 +33,12 @@ impl GodObject {
         let linear = settings.implicit_rounds == 0;
         let exact =
             world.body.primitive.is_some() || world.obstacles.iter().any(|o| o.primitive.is_some());
-        (settings.look_ahead && linear && !shaded && !rough && !exact)
-            .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints)))
+        (settings.look_ahead && linear && !shaded && !rough && !exact).then(|| {
+            Box::new(RowReduction::with_capacity(
+                settings.max_constraints,
+                world.obstacles.len(),
+            ))
+        })
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
@@ -40,7 +48,13 @@ impl GodObject {
             return false;
         };
         if let Some(at) = self.place() {
-            reduction.move_to(&at, &self.collision.hints, work);
+            let stopped = std::mem::take(&mut self.stopped);
+            let hints = if stopped {
+                &self.collision.hints[..]
+            } else {
+                &[]
+            };
+            reduction.move_to(&at, hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
@@ -69,22 +83,40 @@ impl GodObject {
         let near = distance.min(NEAR_REST_DISTANCES * at.rest_distance);
         let lands = !reduction.holds(at.rest_distance);
         for (index, obstacle) in at.world.obstacles.iter().enumerate() {
-            let mut collect = |distance, pairs| {
-                self.contacts.clear();
+            let share = (pairs / obstacles_left).max(1);
+            let mut collect_within = |reach: f64, pairs: u64, contacts: &mut Vec<Contact>| {
                 collect_bounded(
                     (&at.world.body.mesh, &at.pose),
                     (&obstacle.mesh, &obstacle.pose),
                     u16::try_from(index).unwrap_or(u16::MAX),
-                    distance,
+                    reach,
                     pairs,
                     &mut self.collision,
-                    &mut self.contacts,
+                    contacts,
                     work,
                 )
             };
-            let mut collected = collect(distance, (pairs / obstacles_left).max(1));
+            self.contacts.clear();
+            let mut reach = reduction.reach(index, distance);
+            let mut collected = collect_within(reach, share, &mut self.contacts);
+            // That was little: there is work left for the rest.
+            let done = collected.looked_at;
+            if reach < distance && collected.complete_within >= reach && done < share / 2 {
+                reach = distance;
+                self.contacts.clear();
+                collected = collect_within(reach, share - done, &mut self.contacts);
+                collected.looked_at += done;
+            }
+            reduction.reached(at, index, [reach, distance], collected.complete_within);
             if lands && collected.complete_within < near {
-                collected = collect(near, LANDING_FACTOR * self.settings.look_ahead_pairs);
+                // What was found farther away stays.
+                self.contacts.retain(|contact| contact.gap > near);
+                let found = collected.gap_min;
+                let most = LANDING_FACTOR * self.settings.look_ahead_pairs;
+                collected = collect_within(near, most, &mut self.contacts);
+                collected.gap_min = collected.gap_min.min(found);
+                self.contacts
+                    .sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap));
             }
             pairs = pairs.saturating_sub(collected.looked_at);
             obstacles_left -= 1;
@@ -199,8 +231,7 @@ impl GodObject {
             reference: self.pose_at_reference_point(),
             metric,
             rest_distance: self.settings.rest_distance,
-            // What a row would change by less is no motion.
-            tolerance: self.settings.motion_tolerance,
+            tolerance: ROW_TOLERANCE_SHARE * self.settings.motion_tolerance,
         })
     }
 

@@ -44,6 +44,8 @@ pub struct GodObject {
     pub(super) last_device: Option<Pose>,
     /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
     pub(super) device_ahead: f64,
+    /// An obstacle has stopped a motion since the rows were last taken to the body's pose: the pair that did is a row.
+    pub(super) stopped: bool,
     /// Distance within which the present set has every row, m.
     pub(super) collected_within: f64,
     /// Longest look-ahead that the last ones' cost allows, m.
@@ -90,6 +92,7 @@ impl GodObject {
             going: Going::default(),
             last_device: None,
             device_ahead: 0.0,
+            stopped: false,
             collected_within: 0.0,
             affordable: settings.activation_distance + settings.look_ahead_limit,
         };

@@ -14,11 +14,13 @@
 //!
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
-//! they are near or stop the body: continuous collision detection names the pair, which becomes a row.
+//! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Rows of pairs that an active one turns into
+//! across a corner of the hollow are added likewise, though they do not face yet; and those that a pair has turned into which slid off its features.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
 mod candidates;
+mod neighbours;
 
 use std::sync::Arc;
 
@@ -34,6 +36,7 @@ use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind}
 use crate::spatial::{Pose, Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
+use neighbours::{Sides, for_neighbours};
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
@@ -46,8 +49,12 @@ const MAX_STALE: u32 = 64;
 /// Hints that are looked at, and how near a pair there must be to become a row.
 const HINTS_TAKEN: usize = 2;
 const HINT_REST_DISTANCES: f64 = 4.0;
+/// Most pairs that have slid off their features which are followed, in one motion.
+const MAX_FOLLOWED: usize = 16;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
 const IDLE_UPDATES: u32 = 8;
+/// The same for a row that is implied: it matters in the corner that the body is in, and nowhere else.
+const IDLE_UPDATES_IMPLIED: u32 = 1;
 
 /// A row, and when it was last of use.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +70,9 @@ struct Known {
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
+
+/// A collection reaches for so many times what the last one was complete within, where that was given up.
+const HOPED_WITHIN: f64 = 2.0;
 
 /// Where the rows are to hold.
 #[derive(Clone, Debug)]
@@ -104,13 +114,15 @@ pub(crate) struct RowReduction {
     /// A row that touches may be missing.
     truncated: bool,
     asked: f64,
+    /// How far the next collection of each obstacle's pairs is to reach, m.
+    hoped: Vec<f64>,
     /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
     outdated: bool,
 }
 
 impl RowReduction {
-    /// A reduction of at most `candidates` rows. Allocates everything that it will ever need.
-    pub(crate) fn with_capacity(candidates: usize) -> Self {
+    /// A reduction of at most `candidates` rows, for so many obstacles. Allocates everything that it will ever need.
+    pub(crate) fn with_capacity(candidates: usize, obstacles: usize) -> Self {
         Self {
             projector: Projector::new(SolverKind::ActiveSet, MAX_ROWS),
             candidates: Candidates::with_capacity(candidates),
@@ -120,6 +132,7 @@ impl RowReduction {
             error: 0.0,
             truncated: false,
             asked: 0.0,
+            hoped: vec![f64::INFINITY; obstacles],
             outdated: false,
         }
     }
@@ -141,15 +154,20 @@ impl RowReduction {
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
-    /// `hints` are triangle pairs that stopped the last motions: what faces there becomes a row.
+    /// `hints` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
     pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
+        let mut left = ArrayVec::<FeaturePair, MAX_FOLLOWED>::new();
         self.known.retain_mut(|row| {
             let facing = face(at, &row.contact.features, false, work);
             let was_implied = std::mem::replace(&mut row.implied, facing.is_none());
-            *outdated |= row.implied && !was_implied && row.contact.gap <= near;
+            let mattered = row.implied && !was_implied && row.contact.gap <= near;
+            *outdated |= mattered;
+            if mattered && !left.is_full() {
+                left.push(row.contact.features);
+            }
             let contact = facing.or_else(|| face(at, &row.contact.features, true, work));
             if let Some(contact) = contact {
                 row.contact = contact;
@@ -157,6 +175,9 @@ impl RowReduction {
             }
             contact.is_some()
         });
+        for pair in &left {
+            self.follow(at, pair, work);
+        }
         self.candidates.move_to(&at.reference);
         for &hint in hints.iter().take(HINTS_TAKEN) {
             self.take_hint(at, hint, work);
@@ -215,6 +236,27 @@ impl RowReduction {
         self.candidates.clear(&at.reference);
     }
 
+    /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
+    pub(crate) fn reach(&self, obstacle: usize, asked: f64) -> f64 {
+        asked.min(self.hoped[obstacle])
+    }
+
+    /// Takes note of how far a collection came that was to reach so far of what was asked for, m.
+    pub(crate) fn reached(
+        &mut self,
+        at: &At,
+        obstacle: usize,
+        [reach, asked]: [f64; 2],
+        within: f64,
+    ) {
+        let whole = within >= reach && reach >= asked; // false for NaN
+        self.hoped[obstacle] = if whole {
+            f64::INFINITY
+        } else {
+            HOPED_WITHIN * within.max(at.rest_distance)
+        };
+    }
+
     /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m).
     pub(crate) fn offer(&mut self, at: &At, contacts: &[Contact], collected: &Collected) {
         let room = self.candidates.room();
@@ -265,10 +307,73 @@ impl RowReduction {
             let violation = self.add_most_violated(at, &projection.acceleration, least_gap, work);
             let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
             if finished || !violation.is_finite() {
+                let turns_a_corner = purpose == Purpose::Motion
+                    && rounds < MAX_ROUNDS
+                    && self.add_neighbours(at, &projection, work);
+                if turns_a_corner {
+                    continue;
+                }
                 self.error = self.error.max(violation);
                 return projection;
             }
         }
+    }
+
+    /// Adds the pairs that those of active rows turn into, where the motion violates them by more than the tolerance; whether there are any.
+    fn add_neighbours(&mut self, at: &At, projection: &Projection, work: &mut Work) -> bool {
+        let before = self.known.len();
+        for row in &projection.active {
+            let pair = self.known[row.row as usize].contact.features;
+            let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
+            for_neighbours(
+                &at.world.body.mesh,
+                &obstacle.mesh,
+                &pair,
+                Sides::Hollow,
+                |features| {
+                    if self.known.len() == MAX_ROWS || self.knows(&features) {
+                        return;
+                    }
+                    let Some(contact) = face(at, &features, true, work) else {
+                        return;
+                    };
+                    let row = jacobian(&contact, &at.center());
+                    let violation =
+                        at.rest_distance - contact.gap - row.dot(&projection.acceleration);
+                    if violation > at.tolerance {
+                        self.add(at, &contact);
+                        if let Some(row) = self.known.last_mut() {
+                            // It does not face yet.
+                            row.implied = true;
+                        }
+                    }
+                },
+            );
+        }
+        self.known.len() > before
+    }
+
+    /// Adds the pairs that one turned into which has slid off its features.
+    fn follow(&mut self, at: &At, pair: &FeaturePair, work: &mut Work) {
+        let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
+        let near = NEAR_REST_DISTANCES * at.rest_distance;
+        let body = &at.world.body.mesh;
+        for_neighbours(body, &obstacle.mesh, pair, Sides::All, |features| {
+            if self.known.len() == MAX_ROWS || self.knows(&features) {
+                return;
+            }
+            if let Some(contact) = face(at, &features, false, work)
+                && contact.gap <= near
+            {
+                self.add(at, &contact);
+            }
+        });
+    }
+
+    fn knows(&self, features: &FeaturePair) -> bool {
+        self.known
+            .iter()
+            .any(|row| row.contact.features == *features)
     }
 
     /// Adds the candidate that `motion` violates most, if by more than the tolerance; by how much it is violated, m.
@@ -290,11 +395,7 @@ impl RowReduction {
             let features = self.candidates.contacts[k].features;
             // Known rows are satisfied; one that was carried here to first order is looked at as it is.
             self.candidates.gap[k] = f64::INFINITY;
-            if self
-                .known
-                .iter()
-                .any(|row| row.contact.features == features)
-            {
+            if self.knows(&features) {
                 continue;
             }
             let contact = if self.candidates.moved == Vector6::zeros() {
@@ -337,7 +438,14 @@ impl RowReduction {
     /// An update has ended: rows that were of no use for long are let go.
     pub(crate) fn retire(&mut self) {
         self.known.iter_mut().for_each(|row| row.idle += 1);
-        self.known.retain(|row| row.idle <= IDLE_UPDATES);
+        self.known.retain(|row| {
+            let longest = if row.implied {
+                IDLE_UPDATES_IMPLIED
+            } else {
+                IDLE_UPDATES
+            };
+            row.idle <= longest
+        });
     }
 
     fn add(&mut self, at: &At, contact: &Contact) {
@@ -378,11 +486,7 @@ impl RowReduction {
             for a in owners(body, a) {
                 for b in owners(&obstacle.mesh, b) {
                     for_contacts(&facing, &facing.pair(a, b), work, |contact| {
-                        let known = self
-                            .known
-                            .iter()
-                            .any(|row| row.contact.features == contact.features);
-                        if !known {
+                        if !self.knows(&contact.features) {
                             self.add(at, &in_world(&contact, &obstacle.pose));
                         }
                     });

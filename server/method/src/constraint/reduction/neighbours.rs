@@ -1,0 +1,159 @@
+//! Pairs that a row's pair turns into where it slides off its feature into a hollow.
+//!
+//! In the corner of two walls the rows of both hold, but only the one under the foot faces. A motion that crosses the corner would
+//! find the other wall by running into it, and the next would run back into the first: to and fro, because no projection knew both.
+
+use arrayvec::ArrayVec;
+
+use crate::constraint::{Feature, FeaturePair};
+use crate::geometry::Mesh;
+
+/// Most neighbours of one feature: faces across the sides of a face and across theirs, or edges that go on at either end of an edge.
+const MAX_NEIGHBOURS: usize = 9;
+/// Most faces at a vertex that are looked at.
+const MAX_FACES: usize = 32;
+/// An edge goes on in another one that turns by less than the angle of this cosine.
+const GOES_ON: f64 = 0.5;
+
+/// Which sides of a face lead to a neighbour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sides {
+    /// Those that do not stand out: across them the row of the neighbour is implied before it faces.
+    Hollow,
+    All,
+}
+
+/// Calls `each` for the pairs of one of the features with a neighbour of the other.
+pub(super) fn for_neighbours(
+    body: &Mesh,
+    obstacle: &Mesh,
+    pair: &FeaturePair,
+    sides: Sides,
+    mut each: impl FnMut(FeaturePair),
+) {
+    for on_obstacle in neighbours(obstacle, pair.on_obstacle, sides) {
+        each(FeaturePair {
+            on_obstacle,
+            ..*pair
+        });
+    }
+    for on_body in neighbours(body, pair.on_body, sides) {
+        each(FeaturePair { on_body, ..*pair });
+    }
+}
+
+/// Faces across the sides of a face, and theirs; edges in which an edge goes on.
+fn neighbours(mesh: &Mesh, feature: Feature, sides: Sides) -> ArrayVec<Feature, MAX_NEIGHBOURS> {
+    let mut found = ArrayVec::new();
+    match feature {
+        Feature::Face(t) => {
+            across(mesh, t, sides, &mut found);
+            for k in 0..found.len() {
+                if let Feature::Face(s) = found[k] {
+                    across(mesh, s, sides, &mut found);
+                }
+            }
+            found.retain(|face| *face != feature);
+        }
+        Feature::Edge(e) => {
+            for end in [0, 1] {
+                go_on(mesh, e, end, &mut found);
+            }
+        }
+        _ => {}
+    }
+    found
+}
+
+/// Adds the faces across the sides of a face.
+fn across(mesh: &Mesh, t: u32, sides: Sides, found: &mut ArrayVec<Feature, MAX_NEIGHBOURS>) {
+    for e in mesh.triangle_edges(t) {
+        let edge = &mesh.edges()[e as usize];
+        let [left, right] = edge.faces;
+        let face = Feature::Face(if left == t { right } else { left });
+        let leads = sides == Sides::All || !edge.is_convex();
+        if leads && !found.contains(&face) && found.try_push(face).is_err() {
+            return;
+        }
+    }
+}
+
+/// The convex edges in which edge `e` goes on beyond its end `end`.
+fn go_on(mesh: &Mesh, e: u32, end: usize, found: &mut ArrayVec<Feature, MAX_NEIGHBOURS>) {
+    let vertices = mesh.edges()[e as usize].vertices;
+    let (v, from) = (vertices[end], vertices[1 - end]);
+    let apex = mesh.vertices()[v as usize];
+    let way = apex - mesh.vertices()[from as usize];
+    let Some(first) = mesh.vertex_owner(v) else {
+        return;
+    };
+    let mut face = first;
+    for _ in 0..MAX_FACES {
+        let corners = mesh.triangles()[face as usize];
+        let Some(k) = corners.iter().position(|w| *w == v) else {
+            return;
+        };
+        // Round the vertex: across the side that leads back to it.
+        let side = mesh.triangle_edges(face)[(k + 2) % 3];
+        let edge = &mesh.edges()[side as usize];
+        let on = mesh.vertices()[corners[(k + 2) % 3] as usize] - apex;
+        let straight = way.dot(&on) > GOES_ON * way.norm() * on.norm();
+        if side != e && edge.is_convex() && straight && found.try_push(Feature::Edge(side)).is_err()
+        {
+            return;
+        }
+        let [left, right] = edge.faces;
+        face = if left == face { right } else { left };
+        if face == first {
+            return;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::constraint::hollow::tests::notched;
+
+    /// The faces at the ridge, left or right of the notch.
+    fn at_ridge(mesh: &Mesh, right: bool) -> Vec<u32> {
+        let of_half = |t: &u32| {
+            let up = mesh.face_normal(*t).z > 0.1;
+            let x: f64 = mesh.corners(*t).iter().map(|p| p.x).sum();
+            up && (x > 0.0) == right
+        };
+        (0..mesh.triangles().len() as u32).filter(of_half).collect()
+    }
+
+    #[test]
+    fn faces_lead_on_across_a_notch_and_only_of_all_sides_across_a_peak() {
+        for (depth, hollow) in [(0.1, true), (-0.1, false)] {
+            let mesh = notched(depth);
+            let right = at_ridge(&mesh, true);
+            let crosses = |sides| {
+                at_ridge(&mesh, false).iter().any(|t| {
+                    neighbours(&mesh, Feature::Face(*t), sides)
+                        .iter()
+                        .any(|f| right.iter().any(|s| *f == Feature::Face(*s)))
+                })
+            };
+            assert_eq!(crosses(Sides::Hollow), hollow, "{depth}");
+            assert!(crosses(Sides::All), "{depth}");
+        }
+    }
+
+    #[test]
+    fn an_edge_goes_on_in_the_one_in_line_with_it() {
+        let mesh = notched(0.1);
+        let ridge = |ends: [u32; 2]| {
+            let found = mesh
+                .edges()
+                .iter()
+                .position(|e| e.vertices == ends || e.vertices == [ends[1], ends[0]]);
+            found.expect("an edge of the ridge") as u32
+        };
+        let (left, right) = (ridge([2, 5]), ridge([5, 8]));
+        let found = neighbours(&mesh, Feature::Edge(left), Sides::Hollow);
+        assert_eq!(found.as_slice(), [Feature::Edge(right)]);
+    }
+}
