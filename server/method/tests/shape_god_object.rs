@@ -329,3 +329,39 @@ fn a_start_inside_a_primitive_or_with_a_bad_one_is_told() {
         .expect_err("a negative radius");
     assert!(error.to_string().contains("radius"), "{error}");
 }
+
+#[test]
+fn a_ball_that_passes_an_edge_falls_in_that_update_however_little_of_it_is_past() {
+    let (radius, step, past) = (1e-3, 0.2e-3, 4e-6);
+    let settings = Settings {
+        adaptation: None,
+        ..Settings::for_size(2.0 * radius)
+    };
+    for offset in 0..20 {
+        let begin = -3e-3 + 1e-5 * f64::from(offset);
+        // The edge is x = z = 0, and the hand goes past it five times deeper than the ball's radius.
+        let world = one(
+            Form::Sphere(radius),
+            Form::Cube(0.05),
+            Pose::translation(-0.05, 0.0, -0.05),
+        );
+        let device = |k: u32| Pose::translation(begin + step * f64::from(k), 0.0, -4.0 * radius);
+        let start = Pose::translation(begin, 0.0, 1.1 * radius);
+        let mut ball = GodObject::new(Arc::new(world), settings, start).expect("a free start");
+        for _ in 0..20 {
+            ball.step(&device(0), None);
+        }
+        let mut fell = false;
+        for k in 1..40 {
+            let before = ball.pose().translation.x;
+            let goal = before + settings.k_s * (device(k).translation.x - before);
+            ball.step(&device(k), None);
+            fell = goal > past;
+            assert_eq!(ball.pose().translation.z < 0.0, fell, "{offset}: {goal} m");
+            if fell {
+                break;
+            }
+        }
+        assert!(fell);
+    }
+}

@@ -79,7 +79,7 @@ pub(crate) fn panel(
         cost: "p99 of an update, us",
         cost_line: Some(1000.0),
         errors: ERRORS,
-        unit: "J",
+        unit: "error felt, J",
         error_line: Some(1.0),
     };
     let of_panel = |o: &&Outcome| (o.recipe, o.case.as_str()) == (recipe, case);

@@ -1,5 +1,9 @@
 //! The report: one HTML file that needs nothing else and no network. Every figure says in which row of which CSV file it stands.
 
+mod glance;
+mod reading;
+pub mod traces;
+
 use std::error::Error;
 use std::fmt::Write as _;
 
@@ -36,10 +40,15 @@ pub fn html(results: &Results) -> Result<String, Box<dyn Error>> {
          <h1>Laboratory: speed against accuracy of haptic methods</h1>\n"
     );
     provenance_table(&mut page)?;
+    reading::section(&mut page)?;
     if !results.rows.is_empty() {
         overview_section(&mut page, results)?;
         summary(&mut page, results)?;
+        glance::matrices(&mut page, results)?;
+        glance::foretold(&mut page, results)?;
+        traces::section(&mut page, &results.traces)?;
         not_kept(&mut page, results)?;
+        glance::out_of_scope(&mut page, results)?;
         for recipe in results.rows.chunk_by(|a, b| a.recipe == b.recipe) {
             section(&mut page, results, recipe)?;
         }
@@ -67,7 +76,8 @@ fn provenance_table(page: &mut String) -> std::fmt::Result {
         page,
         "<p>Figures are rows of files beside this page: <a href=\"rows.csv\">rows.csv</a> (measures and pass lines), \
          <a href=\"measures.csv\">measures.csv</a> (every start phase), <a href=\"trials.csv\">trials.csv</a> (tunings that were tried), \
-         <a href=\"times.csv\">times.csv</a> (CPU times), <a href=\"chart.csv\">chart.csv</a> (points of the charts). \
+         <a href=\"times.csv\">times.csv</a> (CPU times), <a href=\"chart.csv\">chart.csv</a> (points of the charts), which \
+         <a href=\"speed-accuracy.svg\">speed-accuracy.svg</a> shows on one sheet. \
          Lines are counted from 1, the head included. Answers are the same in every run on this type of machine; only times differ.</p>"
     )
 }

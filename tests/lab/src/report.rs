@@ -8,6 +8,7 @@
 //! | `trials.csv`   | a tuning that was tried                                                           |
 //! | `times.csv`    | a recipe for a method at a rate, with its CPU times: these alone differ           |
 //! | `chart.csv`    | a point of the chart, its last columns a time and what follows from it            |
+//! | `traces.csv`   | a force at an instant, of a few recipes                                           |
 
 use std::fmt::Write as _;
 use std::fs;

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::crew;
 use crate::method::Method;
 use crate::outcome::{Outcome, players, recipe_rows};
+use crate::page::traces::{self, Trace};
 use crate::recipe::{Ideal, Recipe};
 use crate::recipes::{Extent, STUDIES, all};
 use crate::row::{Row, Verdict};
@@ -59,6 +60,8 @@ pub struct Results {
     pub sweeps: Vec<(Sweep, Vec<Point>)>,
     /// Points of the stability maps.
     pub maps: Vec<maps::Point>,
+    /// Forces over time in some recipes.
+    pub traces: Vec<Trace>,
     /// What each recipe and study is about: name, text.
     pub about: Vec<(&'static str, &'static str)>,
 }
@@ -153,6 +156,7 @@ impl Plan {
             results.about.push((recipe.name, recipe.about));
         }
         results.rows.sort_by(|a, b| a.recipe.cmp(b.recipe)); // stable: cases stay in their order
+        results.traces = traces::run(&recipes, &results.outcomes);
         for sweep in &self.sweeps {
             bar.set_message(format!("sweep of {}", sweep.name));
             let points = sweep.run(self.extent, &recipes, store, self.threads, || bar.inc(1));
@@ -181,6 +185,9 @@ impl Results {
             report::write(&self.rows, &self.outcomes, directory)?;
             chart::write(&self.rows, &self.outcomes, directory)?;
             overview::write(&self.rows, &self.outcomes, directory)?;
+            if !self.traces.is_empty() {
+                std::fs::write(directory.join("traces.csv"), traces::csv(&self.traces))?;
+            }
         }
         for (sweep, points) in &self.sweeps {
             sweeps::write(sweep, points, directory)?;

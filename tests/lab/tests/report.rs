@@ -111,6 +111,39 @@ fn a_miss_of_our_own_is_named() {
     assert!(after.contains(&format!("open: a reason &lt;of mine&gt;<td>{}", index + 2)));
 }
 
+/// A trace is what the run was: the one of discrete detection loses the plate that ours is held by, at the limit of the force.
+#[test]
+fn a_trace_shows_the_fall_through_the_plate() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let results = plan(Vec::new()).run(&Store::none());
+    results
+        .write(folder.path(), true)
+        .expect("files are written");
+    let traces = text(&folder.path().join("traces.csv"));
+    let last = |method: &str| -> f64 {
+        let its = traces
+            .lines()
+            .filter(|line| line.contains(&format!(",{method},")));
+        let line = its.last().unwrap_or_else(|| panic!("no trace of {method}"));
+        let value = line.rsplit(',').next().expect("a last column");
+        value.parse().expect("a number")
+    };
+    let (right, ours, discrete) = (last("right answer"), last("ours"), last("discrete"));
+    assert!(
+        (ours - right).abs() <= 1e-6 * right,
+        "{ours} N, not {right} N"
+    );
+    assert!(discrete.abs() < 0.1 * right, "{discrete} N: it is through");
+    let page = text(&folder.path().join("report.html"));
+    for section in ["matrix", "foretold", "traces", "scope", "reading"] {
+        assert!(page.contains(&format!("id={section}>")), "{section}");
+    }
+    // Every method of the plan in a line of the picture, and the right answer.
+    let window = page.split("id=traces>").nth(1).expect("the section");
+    let window = window.split("<h2").next().expect("its end");
+    assert!(window.matches("<polyline").count() > results.traces.len());
+}
+
 #[test]
 fn sweeps_name_recipes_that_are_there_and_settings_that_are_valid() {
     let recipes = all(Extent::Quick);

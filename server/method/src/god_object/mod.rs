@@ -16,6 +16,7 @@
 //! | `simulation.rs` | [`GodObject`]: its state, and one update as a whole                               |
 //! | `start.rs`      | whether a body can start where it is, and why not                                 |
 //! | `substep.rs`    | one repetition of project, move, collect; the trust length                        |
+//! | `tipping.rs`    | whether a little motion is the beginning of a fall                                |
 //! | `projection.rs` | the rows of the present set and Eq. (1) on them                                   |
 //! | `free_motion.rs`| how far a motion is free of every obstacle                                        |
 //! | `collection.rs` | the constraint set of a pose                                                      |
@@ -34,6 +35,7 @@ mod report;
 mod simulation;
 mod start;
 mod substep;
+mod tipping;
 
 pub use report::StepReport;
 pub use simulation::GodObject;

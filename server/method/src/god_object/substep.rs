@@ -91,7 +91,7 @@ impl GodObject {
         }
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
         // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
-        // little that was cut to what is trusted.
+        // little that was cut to what is trusted, or that begins a fall.
         if update.going.relax(&projected.acceleration, self.radius) {
             update.turns += 1;
         }
@@ -104,7 +104,8 @@ impl GodObject {
         let settling = update.turns > MAX_TURNS && !tight && !cut;
         let worth_moving = !settling
             && covered > self.settings.motion_tolerance
-            && covered * update.going.damping > little; // false for NaN
+            && (covered * update.going.damping > little // false for NaN
+                || self.tips_over(&projected.acceleration, left, report));
         if !worth_moving {
             return false;
         }
@@ -113,6 +114,7 @@ impl GodObject {
         let constrained = projected.acceleration * update.going.damping;
         let covered = covered * update.going.damping;
         let gap_before = self.set.gap_min.min(self.settings.rest_distance);
+        let known_within = self.set.complete_within;
         let time = self.go(&projected, &constrained, report);
         update.made += covered * time;
 
@@ -129,8 +131,11 @@ impl GodObject {
         // The linear rows foretell no gap below the rest distance that was not there before.
         let lost = gap_before - self.set.gap_min;
         let true_rows = lost <= LOST_GAP_SHARE * self.settings.rest_distance; // false for NaN
+        let foreseen = covered * time < known_within; // of what lies beyond, the rows said nothing
         if time < TRUSTED_SHARE {
-            self.trust_length = (covered * time).max(self.settings.rest_distance);
+            if foreseen {
+                self.trust_length = (covered * time).max(self.settings.rest_distance);
+            }
         } else if !true_rows {
             self.trust_length = (TRUSTED_SHARE * covered).max(self.settings.motion_tolerance);
         } else if time >= 1.0 {

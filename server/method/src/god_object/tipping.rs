@@ -1,0 +1,54 @@
+//! Whether a little motion is the end of an update or the beginning of a fall.
+//!
+//! Where the body is pressed onto something convex, a projected motion `a` turns the normal by `a / R`, and the wish's share `w` along the
+//! old normal pushes by `w a / R` along the surface. Less deep than the radius R that is less than `a`, and motions come to an end; deeper
+//! it is more, and the body tips over, however little the first motion was: a ball that has just passed the edge of a plate.
+
+use nalgebra::Point3;
+
+use super::{GodObject, StepReport};
+use crate::constraint::contact_jacobian;
+use crate::quasi_statics::{HalfSpace, ProjectionStatus};
+use crate::spatial::{Vector6, advance_pose};
+
+impl GodObject {
+    /// Whether the projected motion `first` of the wish `left` would be followed by one that is no shorter, by the rows that held the body,
+    /// as they are where it leads to. One projection on at most six rows, and no search.
+    pub(super) fn tips_over(
+        &mut self,
+        first: &Vector6,
+        left: &Vector6,
+        report: &mut StepReport,
+    ) -> bool {
+        let start = self.pose_at_reference_point();
+        let reached = advance_pose(&start, first, 1.0);
+        let Some(metric) = self
+            .world
+            .body
+            .metric(self.settings.rotation_metric, &self.pose)
+        else {
+            return false;
+        };
+        let center = Point3::from(reached.translation.vector);
+        self.rows.clear();
+        for row in &self.warm_start {
+            let Some(constraint) = self.set.constraints.get(*row as usize) else {
+                continue;
+            };
+            let moved = constraint.moved(&start, &reached, false);
+            self.rows.push(HalfSpace {
+                jacobian: contact_jacobian(&moved.normal, &moved.point, &center),
+                bound: self.settings.motion_bound(moved.gap),
+            });
+        }
+        if self.rows.is_empty() {
+            return false;
+        }
+        report.work.projections += 1;
+        let second = self
+            .projector
+            .project(&metric, &(left - first), &self.rows, &[]);
+        second.status == ProjectionStatus::Solved
+            && self.motion_length(&second.acceleration) >= self.motion_length(first) // false for NaN
+    }
+}

@@ -1,0 +1,70 @@
+//! What a reader has to know: the methods, the unit of error, the times, and how to put another method beside these.
+
+use std::fmt::Write as _;
+
+use super::escaped;
+use crate::method::Method;
+
+/// What a method is, in a line.
+fn about(method: Method) -> &'static str {
+    match method {
+        Method::Ours => {
+            "this project's god-object method, its look-ahead fitted to the speed of the device and the rate of updates"
+        }
+        Method::OursByDefault => {
+            "the same with its default settings, which know the size of the body alone"
+        }
+        Method::Paper => {
+            "Ortega, Redon, Coquillart 2007, to the letter: a cone of touching contacts, one projection and one continuous search in an update, k_s = 0.5"
+        }
+        Method::PaperAdapted => {
+            "the same with the paper's adaptation of constraints: new ones are let in over a time"
+        }
+        Method::VirtualCoupling => "spring and damper to a dynamic proxy that contacts hold",
+        Method::Discrete => "a god-object that looks for collisions only where a step ends",
+        Method::Penalty => {
+            "points of the body pushed out of a signed distance, as in voxel sampling"
+        }
+        Method::Point => {
+            "Zilles and Salisbury 1995: the body moves, held by up to three planes, and never turns"
+        }
+    }
+}
+
+/// The section of the page.
+pub(super) fn section(page: &mut String) -> std::fmt::Result {
+    page.push_str(
+        "<h2 id=reading>How to read this page</h2>\n<details><summary>Methods</summary><table>\n",
+    );
+    for method in Method::ALL {
+        let count = method.tunings().len();
+        let tuned = if count > 1 {
+            format!("the best of {count} tunings in each case and at each rate: trials.csv")
+        } else {
+            "nothing is tuned".to_owned()
+        };
+        writeln!(
+            page,
+            "<tr><th>{}<td>{}<td>{tuned}",
+            method.name(),
+            escaped(about(method))
+        )?;
+    }
+    page.push_str(
+        "</table></details>\n<details><summary>Error felt, J</summary><p>The largest of four errors against the right answer, each over what people just \
+         notice: angle of the force over 18.4 degrees (Barbagli et al. 2006), its magnitude over 7 % (Pang, Tan, Durlach 1991), torque over 12.7 %, \
+         at 60 mN m at least (Jandura, Srinivasan 1994), and the largest change of force in a millisecond beyond the right one over 7 % of the force, at least \
+         0.1 N. The first three are 95th percentiles in time; of the start phases the worst counts. The right answer is a closed form, or a run of this \
+         project's method with fine steps that says how far it is from its own limit. J &lt; 1 is not felt.</p></details>\n\
+         <details><summary>Times</summary><p>CPU time of one thread, 99th percentile over all updates of all start phases. The clock of the recipes is \
+         virtual: an update is published when the next begins, however long it took, so that accuracy does not depend on the machine, and a method whose update \
+         takes longer than its period could not keep that rate.</p></details>\n\
+         <details><summary>Rates</summary><p>Forces are computed at 1 kHz from the last published state; the state itself is updated at 70, 300 or \
+         1000 Hz. Start phases shift the updates against the motion, since late contact depends on it.</p></details>\n\
+         <details><summary>Another method, another recipe</summary><p>A method is an implementation of <code>HapticMethod</code> (update, publish, force, pose) in \
+         <code>tests/lab/src/methods</code> and a line of <code>Method</code>; a recipe is a file in <code>tests/lab/src/recipes</code> with scene, motion, right answer \
+         and pass lines. Everything on this page then includes it. Whether scenes choose their fidelity well is a page of its own: \
+         <code>taut-lab fidelity</code>.</p></details>\n",
+    );
+    Ok(())
+}
