@@ -115,8 +115,9 @@ impl GodObject {
                 let most = LANDING_FACTOR * self.settings.look_ahead_pairs;
                 collected = collect_within(near, most, &mut self.contacts);
                 collected.gap_min = collected.gap_min.min(found);
-                self.contacts
-                    .sort_unstable_by(|a, b| a.gap.total_cmp(&b.gap));
+                self.contacts.sort_unstable_by(|a, b| {
+                    a.gap.total_cmp(&b.gap).then(a.features.cmp(&b.features))
+                });
             }
             pairs = pairs.saturating_sub(collected.looked_at);
             obstacles_left -= 1;
