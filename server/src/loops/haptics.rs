@@ -28,6 +28,8 @@ pub struct HapticsLoop {
     switch: Arc<ArmSwitch>,
     state: DeviceState,
     last_tick: Option<Duration>,
+    /// CPU time of the coupling up to the command rendered last.
+    coupling_cpu_time: Duration,
     recording: Option<Tap<HapticsRecord>>,
     statistics: Arc<HapticsStatistics>,
 }
@@ -39,6 +41,10 @@ pub struct HapticsStatistics {
     pub period: Histogram,
     /// Thread CPU time of a string-driven device's pose and tensions in one tick; empty for other devices.
     pub tension: Histogram,
+    /// The same and that of the coupling in one cycle of this loop: of all forces between the command rendered last and the one rendered now.
+    pub coupling_and_tension: Histogram,
+    /// Time from the reading of a device sample to the rendering of the newest force that answers it.
+    pub force_latency: Histogram,
     /// Deadlines that passed without a tick in their period.
     pub deadline_misses: AtomicU64,
     /// Times at which the port changed the force or lost the device.
@@ -90,6 +96,7 @@ impl HapticsLoop {
             switch,
             state: DeviceState::at_start(start),
             last_tick: None,
+            coupling_cpu_time: Duration::ZERO,
             recording: None,
             statistics: Arc::default(),
         }
@@ -125,12 +132,12 @@ impl HapticsLoop {
         let (state, states, wrench) = (&mut self.state, &mut self.states, &mut self.wrench);
         let coupling = &self.coupling;
         let report = self.port.tick(now, |reading| {
-            follow(state, reading);
+            follow(state, reading, now);
             states.publish(state);
             coupling.wake();
             Some(newest_command(wrench))
         });
-        self.count(&report);
+        self.count(now, &report);
     }
 
     /// Lets the force come down without reading the device; whether it is zero. Call it once per period until it is.
@@ -148,7 +155,26 @@ impl HapticsLoop {
         store(&self.statistics.energy_generated_bits, generated);
     }
 
-    fn count(&mut self, report: &TickReport) {
+    /// What the force that was rendered now cost, and how old it is.
+    fn count_cycle(&mut self, now: Duration) {
+        let statistics = &self.statistics;
+        let command = self.wrench.held();
+        let coupling = command.cpu_time.saturating_sub(self.coupling_cpu_time);
+        self.coupling_cpu_time = command.cpu_time;
+        if command.sequence > 0 {
+            let latency = now.saturating_sub(command.sample_read);
+            statistics.force_latency.record_time(latency);
+        }
+        if let Some(tension) = self.port.computing_time() {
+            statistics.tension.record_time(tension);
+            statistics
+                .coupling_and_tension
+                .record_time(coupling + tension);
+        }
+    }
+
+    fn count(&mut self, now: Duration, report: &TickReport) {
+        self.count_cycle(now);
         let statistics = &self.statistics;
         for event in report.events.iter() {
             statistics.incidents.count(event);
@@ -164,9 +190,6 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
-        if let Some(time) = self.port.computing_time() {
-            statistics.tension.record_time(time);
-        }
         self.tell_obstacle_work();
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
@@ -183,8 +206,9 @@ impl HapticsLoop {
 }
 
 /// Takes the reading over into the state that is published.
-fn follow(state: &mut DeviceState, reading: &Reading) {
+fn follow(state: &mut DeviceState, reading: &Reading, now: Duration) {
     state.sequence += 1;
+    state.read = now;
     state.faulty = reading.fault.is_some();
     state.time = reading.sample.time;
     state.pose = reading.sample.pose;

@@ -17,6 +17,10 @@ pub struct WrenchCommand {
     pub sequence: u64,
     /// Session time at which it was computed.
     pub time: Duration,
+    /// Session time at which the device sample that it answers was read.
+    pub sample_read: Duration,
+    /// Thread CPU time that the coupling has taken since the start, for this answer and all before it: who reads two of them knows the cost of all between.
+    pub cpu_time: Duration,
     /// Force and torque on the hand at the reference point, N and N m, world axes.
     pub wrench: Vector6,
     /// Sequence number of the constraint set that it rests on.
@@ -41,6 +45,8 @@ impl WrenchCommand {
         Self {
             sequence: 0,
             time: Duration::ZERO,
+            sample_read: Duration::ZERO,
+            cpu_time: Duration::ZERO,
             wrench: Vector6::zeros(),
             constraint_sequence: 0,
             constraint_age: Duration::ZERO,
