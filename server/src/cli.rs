@@ -197,9 +197,15 @@ pub struct RecordArgs {
     /// How states come here
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// End after this many seconds (default: at Ctrl-C, or with the session)
+    /// End after this many seconds (default: at Ctrl-C, or when the server stops)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
+    /// Stay when the server stops, and wait for one that is not there yet
+    #[arg(long)]
+    pub stay: bool,
+    /// End when there was no server for this many seconds (default: a server that is lost is waited for)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub give_up: Option<f64>,
 }
 
 /// `taut arm`.

@@ -226,3 +226,100 @@ fn newest_command(wrench: &mut Subscriber<WrenchCommand>) -> Command {
         constraint_age: command.constraint_age,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::{device_state, wrench_command};
+    use crate::timing::Distribution;
+    use god_object::nalgebra::Point3;
+    use god_object::spatial::Vector6;
+    use taut_bridge::{
+        Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, SafetySettings,
+    };
+
+    const TENSIONS: Duration = Duration::from_micros(40);
+
+    /// Strings whose arithmetic takes the same time in every tick.
+    struct Strings(DeviceInfo);
+
+    impl Device for Strings {
+        fn info(&self) -> &DeviceInfo {
+            &self.0
+        }
+
+        fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+            Ok(DeviceSample {
+                time: now,
+                pose: Pose::identity(),
+                velocity: Vector6::zeros(),
+                buttons: 0,
+            })
+        }
+
+        fn write(&mut self, _now: Duration, _wrench: &Vector6) {}
+
+        fn computing_time(&self) -> Option<Duration> {
+            Some(TENSIONS)
+        }
+    }
+
+    #[test]
+    fn a_cycle_costs_its_tensions_and_every_force_since_the_cycle_before() {
+        let device = Strings(DeviceInfo {
+            name: "strings".to_owned(),
+            sensed_degrees_of_freedom: 6,
+            actuated_degrees_of_freedom: 6,
+            limits: DeviceLimits::UNLIMITED,
+            rate_hz: 1000.0,
+        });
+        let start = Pose::identity();
+        let (mut commands, readers) = wrench_command::channel();
+        let (states, _state_readers) = device_state::channel(&start);
+        let mut haptics = HapticsLoop::new(
+            DevicePort::new(
+                Box::new(device),
+                SafetySettings::default(),
+                Point3::origin(),
+                &start,
+            ),
+            &start,
+            readers.haptics,
+            states,
+            Waker::default(),
+            Arc::default(),
+        );
+        let ms = Duration::from_millis;
+        // The forces up to each tick, CPU time in all, us, and when the sample was read that the newest answers, ms.
+        let cycles: [(&[u64], u64); 4] = [
+            (&[], 0),      // no force yet
+            (&[3], 1),     // one
+            (&[5, 12], 2), // of a sample and of a constraint set
+            (&[], 2),      // the coupling came too late: the same force again
+        ];
+        let mut costs = Vec::new();
+        let mut sequence = 0;
+        for (tick, (forces, read)) in (1..).zip(cycles) {
+            for cpu_us in forces {
+                sequence += 1;
+                commands.publish(&WrenchCommand {
+                    sequence,
+                    time: ms(read),
+                    sample_read: ms(read),
+                    cpu_time: Duration::from_micros(*cpu_us),
+                    ..WrenchCommand::at_start()
+                });
+            }
+            haptics.tick(ms(tick));
+            costs.push(haptics.statistics.coupling_and_tension.newest_time());
+        }
+        let us = |us| TENSIONS + Duration::from_micros(us);
+        assert_eq!(costs, [us(0), us(3), us(9), us(0)]);
+        // Answers to the samples read at 1, 2 and 2 ms, rendered at 2, 3 and 4 ms.
+        let Distribution {
+            p50, max, count, ..
+        } = haptics.statistics.force_latency.distribution_us();
+        assert_eq!((max, count), (2000.0, 3));
+        assert!((p50 / 1000.0 - 1.0).abs() < 0.016, "{p50}");
+    }
+}
