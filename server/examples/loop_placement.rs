@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let end = Arc::new(AtomicBool::new(false));
     let streamers: Vec<_> = (0..if busy { 2 } else { 0 })
         .map(|_| stream(end.clone()))
-        .collect();
+        .collect::<Result<_, _>>()?;
     let mut reports: Vec<Vec<SessionReport>> = cases.iter().map(|_| Vec::new()).collect();
     for turn in 0..turns as usize {
         for case in 0..cases.len() {
@@ -143,8 +143,9 @@ fn session(
 }
 
 /// A thread that streams through memory, behind the loops and ahead of nobody, until the end.
-fn stream(end: Arc<AtomicBool>) -> std::thread::JoinHandle<()> {
-    std::thread::spawn(move || {
+fn stream(end: Arc<AtomicBool>) -> std::io::Result<std::thread::JoinHandle<()>> {
+    let thread = std::thread::Builder::new().name("stream".into());
+    thread.spawn(move || {
         let mut memory = vec![0_u64; STREAMED_BYTES / size_of::<u64>()];
         while !end.load(Ordering::Relaxed) {
             for word in memory.iter_mut().step_by(LINE) {

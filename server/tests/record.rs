@@ -21,14 +21,17 @@ fn follow_errors(child: &mut Child) -> Arc<Mutex<String>> {
         panic!("no pipe");
     };
     let shared = text.clone();
-    std::thread::spawn(move || {
-        let mut bytes = [0; 4096];
-        while let Ok(length @ 1..) = pipe.read(&mut bytes) {
-            if let Ok(mut text) = shared.lock() {
-                text.push_str(&String::from_utf8_lossy(&bytes[..length]));
+    let reader = std::thread::Builder::new()
+        .name("errors".into())
+        .spawn(move || {
+            let mut bytes = [0; 4096];
+            while let Ok(length @ 1..) = pipe.read(&mut bytes) {
+                if let Ok(mut text) = shared.lock() {
+                    text.push_str(&String::from_utf8_lossy(&bytes[..length]));
+                }
             }
-        }
-    });
+        });
+    assert!(reader.is_ok());
     text
 }
 

@@ -6,13 +6,13 @@ use std::process::{Child, Command, Output, Stdio};
 use taut_scene::SHIPPED_WORKBENCH;
 
 /// A directory with a key and a workbench on free ports.
-pub struct Workplace {
+pub(crate) struct Workplace {
     directory: tempfile::TempDir,
 }
 
 impl Workplace {
     /// With a workbench file of a plain scene.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let Ok(directory) = tempfile::tempdir() else {
             panic!("no temporary directory");
         };
@@ -24,22 +24,22 @@ impl Workplace {
     }
 
     /// A file in it.
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
 
     /// The same as text.
-    pub fn text(&self, name: &str) -> String {
+    pub(crate) fn text(&self, name: &str) -> String {
         self.path(name).display().to_string()
     }
 
     /// Writes a file.
-    pub fn write(&self, name: &str, text: &str) {
+    pub(crate) fn write(&self, name: &str, text: &str) {
         assert!(std::fs::write(self.path(name), text).is_ok());
     }
 
     /// `taut serve` of the workbench file `name`, for `seconds`.
-    pub fn serve(&self, name: &str, seconds: &str, more: &[&str]) -> Vec<String> {
+    pub(crate) fn serve(&self, name: &str, seconds: &str, more: &[&str]) -> Vec<String> {
         let mut arguments: Vec<String> = ["serve", "--no-monitor", "--json", "--duration", seconds]
             .map(String::from)
             .into();
@@ -55,7 +55,7 @@ impl Workplace {
 }
 
 /// The shipped workbench with a plain scene and free ports.
-pub fn workbench() -> String {
+pub(crate) fn workbench() -> String {
     let text = SHIPPED_WORKBENCH
         .replace("scene = \"peg-in-a-hole\"", "scene = \"sphere-on-plane\"")
         .replace("quic_port = 4857", "quic_port = 0")
@@ -65,7 +65,7 @@ pub fn workbench() -> String {
 }
 
 /// Runs the program to its end.
-pub fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
+pub(crate) fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
     let child = start(arguments);
     match child.wait_with_output() {
         Ok(output) => output,
@@ -74,7 +74,7 @@ pub fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
 }
 
 /// Starts the program; what it says can be read.
-pub fn start<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Child {
+pub(crate) fn start<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Child {
     let child = Command::new(env!("CARGO_BIN_EXE_taut"))
         .args(arguments)
         .env_remove("TAUT_KEY_FILE")
