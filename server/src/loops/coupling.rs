@@ -104,7 +104,10 @@ impl CouplingLoop {
         }
 
         let constraint_age = now.saturating_sub(contacts.published);
-        self.statistics.constraint_age.record_time(constraint_age);
+        // The set at the start is of no update: it has no age.
+        if contacts.published > Duration::ZERO {
+            self.statistics.constraint_age.record_time(constraint_age);
+        }
         self.sequence += 1;
         self.wrench.publish(&WrenchCommand {
             sequence: self.sequence,

@@ -161,7 +161,8 @@ impl HapticsLoop {
         let command = self.wrench.held();
         let coupling = command.cpu_time.saturating_sub(self.coupling_cpu_time);
         self.coupling_cpu_time = command.cpu_time;
-        if command.sequence > 0 {
+        // The pose at the start was not read: what answers it has no age.
+        if command.sample_read > Duration::ZERO {
             let latency = now.saturating_sub(command.sample_read);
             statistics.force_latency.record_time(latency);
         }
@@ -291,11 +292,12 @@ mod tests {
         );
         let ms = Duration::from_millis;
         // The forces up to each tick, CPU time in all, us, and when the sample was read that the newest answers, ms.
-        let cycles: [(&[u64], u64); 4] = [
+        let cycles: [(&[u64], u64); 5] = [
             (&[], 0),      // no force yet
-            (&[3], 1),     // one
-            (&[5, 12], 2), // of a sample and of a constraint set
-            (&[], 2),      // the coupling came too late: the same force again
+            (&[2], 0),     // one that answers the pose at the start, which nobody read
+            (&[5], 2),     // one
+            (&[7, 14], 3), // of a sample and of a constraint set
+            (&[], 3),      // the coupling came too late: the same force again
         ];
         let mut costs = Vec::new();
         let mut sequence = 0;
@@ -314,8 +316,8 @@ mod tests {
             costs.push(haptics.statistics.coupling_and_tension.newest_time());
         }
         let us = |us| TENSIONS + Duration::from_micros(us);
-        assert_eq!(costs, [us(0), us(3), us(9), us(0)]);
-        // Answers to the samples read at 1, 2 and 2 ms, rendered at 2, 3 and 4 ms.
+        assert_eq!(costs, [us(0), us(2), us(3), us(9), us(0)]);
+        // Answers to the samples read at 2, 3 and 3 ms, rendered at 3, 4 and 5 ms.
         let Distribution {
             p50, max, count, ..
         } = haptics.statistics.force_latency.distribution_us();
