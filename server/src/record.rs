@@ -48,9 +48,8 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         ..ClientOptions::new(&args.server, key, role, node)
     };
     let policy = RejoinPolicy {
-        stay: args.stay,
-        give_up: args.give_up.map(Duration::from_secs_f64),
         dead_after: Some(DEAD_AFTER),
+        ..args.membership.policy()
     };
     let joined = tokio::select! {
         joined = SupervisedLink::join(options, policy, |_| ready(Ok::<(), LinkError>(()))) => joined?,
