@@ -4,9 +4,9 @@
 //!
 //! Each turn starts one session per case with the demo's scene and a simulated device with strings, and lets it run. Cases: as the program has them; all loops due
 //! at one time; haptics due just before the kernel's tick; all loops due just before it; and as the program has them, with haptics and coupling on a core
-//! each. Printed are, by case, the median of its turns and all of them in ascending order: the time from the reading of a
-//! device sample to the start of the force that answers it and to its rendering, the CPU time of coupling and tensions of one cycle, the age of constraint
-//! sets, and missed deadlines. With `--busy` two threads of the nodes' class stream through memory meanwhile, as drawing in software does.
+//! each. Printed are, by case, the median of its turns and all of them in ascending order: the time from the reading of a device sample to the start of the
+//! force that answers it and to its rendering, the CPU time of coupling and tensions of one cycle, the time from a sample to the rendering of a force whose
+//! constraint set answers it, and missed deadlines. With `--busy` two threads stream through memory meanwhile, as drawing in software does.
 
 use std::hint::black_box;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         show("coupling and tensions", &|r| {
             r.coupling_and_tension_us.unwrap_or_default()
         });
-        show("age of constraints", &|r| r.constraint_age_us);
+        show("constraints rendered", &|r| r.constraint_latency_us);
         let missed: Vec<String> = reports
             .iter()
             .map(|report| report.deadline_misses.to_string())
@@ -142,7 +142,7 @@ fn session(
     failure.map_or(Ok(report), |failure| Err(failure.into()))
 }
 
-/// A thread that streams through memory, behind the loops and ahead of nobody, until the end.
+/// A thread of the normal class that streams through memory until the end.
 fn stream(end: Arc<AtomicBool>) -> std::io::Result<std::thread::JoinHandle<()>> {
     let thread = std::thread::Builder::new().name("stream".into());
     thread.spawn(move || {

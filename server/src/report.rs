@@ -39,6 +39,8 @@ pub struct SessionReport {
     /// Time from the reading of a device sample to the rendering of the force that answers it, on the clock: a period, as the loop never waits
     /// for the coupling, or more where the coupling came late.
     pub force_latency_us: Distribution,
+    /// Time from a device sample to the rendering of a force whose constraint set answers it: how late the god-object is felt.
+    pub constraint_latency_us: Distribution,
     /// Age of the constraint set that a force rests on.
     pub constraint_age_us: Distribution,
     /// Rows in the constraint set, over the updates.
@@ -428,6 +430,7 @@ mod tests {
                 "coupling_and_tension_us",
                 "answer_wait_us",
                 "force_latency_us",
+                "constraint_latency_us",
                 "constraint_age_us",
                 "contacts",
                 "penetrations",

@@ -116,6 +116,7 @@ impl CouplingLoop {
             cpu_time: self.cpu_time,
             wrench: output.wrench,
             constraint_sequence: contacts.set.sequence,
+            constraint_sample: contacts.device_time,
             constraint_age,
             active: output.active,
             kkt: output.kkt,

@@ -45,6 +45,8 @@ pub struct HapticsStatistics {
     pub coupling_and_tension: Histogram,
     /// Time from the reading of a device sample to the rendering of the newest force that answers it.
     pub force_latency: Histogram,
+    /// Time from a device sample to the rendering of the newest force whose constraint set answers it.
+    pub constraint_latency: Histogram,
     /// Deadlines that passed without a tick in their period.
     pub deadline_misses: AtomicU64,
     /// Times at which the port changed the force or lost the device.
@@ -165,6 +167,10 @@ impl HapticsLoop {
         if command.sample_read > Duration::ZERO {
             let latency = now.saturating_sub(command.sample_read);
             statistics.force_latency.record_time(latency);
+        }
+        if command.constraint_sample > Duration::ZERO {
+            let latency = now.saturating_sub(command.constraint_sample);
+            statistics.constraint_latency.record_time(latency);
         }
         if let Some(tension) = self.port.computing_time() {
             statistics.tension.record_time(tension);
@@ -308,6 +314,7 @@ mod tests {
                     sequence,
                     time: ms(read),
                     sample_read: ms(read),
+                    constraint_sample: ms(read / 2),
                     cpu_time: Duration::from_micros(*cpu_us),
                     ..WrenchCommand::at_start()
                 });
@@ -323,5 +330,8 @@ mod tests {
         } = haptics.statistics.force_latency.distribution_us();
         assert_eq!((max, count), (2000.0, 3));
         assert!((p50 / 1000.0 - 1.0).abs() < 0.016, "{p50}");
+        // Constraints for the sample at 1 ms: in the forces that were rendered at 3, 4 and 5 ms.
+        let constraints = haptics.statistics.constraint_latency.distribution_us();
+        assert_eq!((constraints.max, constraints.count), (4000.0, 3));
     }
 }

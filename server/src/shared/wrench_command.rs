@@ -25,6 +25,8 @@ pub struct WrenchCommand {
     pub wrench: Vector6,
     /// Sequence number of the constraint set that it rests on.
     pub constraint_sequence: u64,
+    /// Session time of the device sample that this constraint set answers.
+    pub constraint_sample: Duration,
     /// How old that constraint set was.
     pub constraint_age: Duration,
     /// Rows in the active set.
@@ -49,6 +51,7 @@ impl WrenchCommand {
             cpu_time: Duration::ZERO,
             wrench: Vector6::zeros(),
             constraint_sequence: 0,
+            constraint_sample: Duration::ZERO,
             constraint_age: Duration::ZERO,
             active: 0,
             kkt: 0.0,
