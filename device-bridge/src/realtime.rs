@@ -5,11 +5,13 @@
 //! has no such call, the sleep falls back to the standard library and requests are waived.
 
 mod awake;
+mod beat;
 
 use std::fmt;
 use std::time::Duration;
 
 pub use awake::{AWAKE, Awake, keep_cores_awake};
+pub use beat::{CLEAR_OF_KERNEL_TICK, Ticker, first_on_beat};
 
 /// The answer to one request to the operating system.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,41 +113,6 @@ pub fn sharpen_timers() -> RealtimeGrant {
         },
         |()| RealtimeGrant::Granted { what: what.clone() },
     )
-}
-
-/// Deadlines of a periodic loop on the monotonic clock.
-#[derive(Clone, Copy, Debug)]
-pub struct Ticker {
-    period: Duration,
-    next: Duration,
-}
-
-impl Ticker {
-    /// The first deadline is one `period` from now.
-    #[must_use]
-    pub fn new(period: Duration) -> Self {
-        Self {
-            period,
-            next: monotonic_now() + period,
-        }
-    }
-
-    /// Sleeps to the next deadline. Returns how many whole periods were missed before it: they are skipped, not
-    /// caught up, so a stall does not end in a burst.
-    pub fn wait(&mut self) -> u64 {
-        sleep_until(self.next);
-        let missed = whole_periods(monotonic_now().saturating_sub(self.next), self.period);
-        self.next += self
-            .period
-            .saturating_mul(u32::try_from(missed).unwrap_or(u32::MAX))
-            + self.period;
-        missed
-    }
-}
-
-fn whole_periods(late: Duration, period: Duration) -> u64 {
-    let periods = late.as_nanos().checked_div(period.as_nanos()).unwrap_or(0);
-    u64::try_from(periods).unwrap_or(u64::MAX)
 }
 
 #[cfg(target_os = "linux")]
@@ -334,19 +301,6 @@ mod tests {
             assert!(monotonic_now() >= deadline);
         }
         sleep_until(Duration::ZERO);
-    }
-
-    #[test]
-    fn a_ticker_skips_what_it_missed_and_keeps_its_phase() {
-        let period = Duration::from_millis(2);
-        let mut ticker = Ticker::new(period);
-        let first = ticker.next;
-        sleep_until(first + 3 * period);
-        let missed = ticker.wait();
-        assert!(missed >= 3);
-        let offset = (ticker.next - first).as_nanos() % period.as_nanos();
-        assert_eq!(offset, 0);
-        assert!(ticker.next > first + 3 * period);
     }
 
     #[test]

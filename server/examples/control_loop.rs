@@ -1,12 +1,13 @@
 //! What this machine adds to a computation that is always the same: a control for the times in a session's report.
 //!
-//! `cargo run --release -p taut --no-default-features --example control_loop [seconds] [--awake]`
+//! `cargo run --release -p taut --no-default-features --example control_loop -- [seconds] [--awake] [--by-phase]`
 //!
 //! Beside a running session, or alone, a thread of the haptics loop's class wakes at 1 kHz and computes one pose and one set of tensions from
 //! the same lengths and the same wrench every time: the same instructions on the same data. What then differs between two ticks
 //! is the machine's: cold caches after the sleep, interrupts within the measured span (their time counts as the thread's where the kernel does
 //! not account for it apart), a host that took the core away. A second span computes the same again at once, with warm caches. With `--awake`
-//! idle cores are kept awake, as a session does.
+//! idle cores are kept awake, as a session does. With `--by-phase` the thread takes turns of half a second at several places of the monotonic clock's
+//! millisecond, and prints each apart: the kernel's own tick is at one of them.
 
 use std::time::Duration;
 
@@ -15,7 +16,8 @@ use god_object::nalgebra::Vector3;
 use taut::realtime::thread_cpu_time;
 use taut::timing::{Distribution, Histogram};
 use taut_bridge::realtime::{
-    keep_cores_awake, lock_memory, monotonic_now, request_fifo, sleep_until,
+    CLEAR_OF_KERNEL_TICK, first_on_beat, keep_cores_awake, lock_memory, monotonic_now,
+    request_fifo, sleep_until,
 };
 use taut_spidar::{
     ForwardKinematics, Geometry, Pose, StringMatrix, TensionSettings, TensionSolver,
@@ -24,15 +26,32 @@ use taut_spidar::{
 /// Of the haptics loop.
 const PRIORITY: u8 = 80;
 const PERIOD: Duration = Duration::from_millis(1);
+/// Ticks of one turn.
+const TURN: u32 = 500;
+/// Places of the millisecond for `--by-phase`, us; the kernel's tick is at 0.
+const PHASES_US: [u64; 10] = [0, 50, 150, 250, 400, 550, 700, 850, 950, 975];
+
+/// What one place of the millisecond saw.
+#[derive(Default)]
+struct Seen {
+    cold: Histogram,
+    warm: Histogram,
+    wall: Histogram,
+    late: Histogram,
+    misses: u32,
+}
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut seconds = 60;
     let mut awake = None;
+    let mut phases = vec![CLEAR_OF_KERNEL_TICK];
     for argument in std::env::args().skip(1) {
         if argument == "--awake" {
             let (grant, held) = keep_cores_awake();
             println!("{grant}");
             awake = held;
+        } else if argument == "--by-phase" {
+            phases = PHASES_US.map(Duration::from_micros).to_vec();
         } else {
             seconds = argument.parse()?;
         }
@@ -70,36 +89,44 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         compute().factorisations
     );
 
-    let (cold, warm) = (Histogram::default(), Histogram::default());
-    let (wall, late) = (Histogram::default(), Histogram::default());
-    let mut misses = 0_u32;
-    let mut deadline = monotonic_now();
-    for _ in 0..1000 * seconds {
-        deadline += PERIOD;
-        sleep_until(deadline);
-        let woken = monotonic_now();
-        let before = thread_cpu_time();
-        let first = std::hint::black_box(compute());
-        let between = thread_cpu_time();
-        let done = monotonic_now();
-        let second = std::hint::black_box(compute());
-        let after = thread_cpu_time();
-        assert_eq!(first.tensions, second.tensions);
-        cold.record_time(between.saturating_sub(before));
-        warm.record_time(after.saturating_sub(between));
-        wall.record_time(done.saturating_sub(woken));
-        late.record_time(woken.saturating_sub(deadline));
-        if done > deadline + PERIOD {
-            misses += 1;
-            deadline = done;
+    let mut seen: Vec<Seen> = phases.iter().map(|_| Seen::default()).collect();
+    for turn in 0..1000 * seconds / TURN {
+        let which = turn as usize % phases.len();
+        let seen = &mut seen[which];
+        let mut deadline = first_on_beat(monotonic_now(), PERIOD, phases[which]);
+        for _ in 0..TURN {
+            sleep_until(deadline);
+            let woken = monotonic_now();
+            let before = thread_cpu_time();
+            let first = std::hint::black_box(compute());
+            let between = thread_cpu_time();
+            let done = monotonic_now();
+            let second = std::hint::black_box(compute());
+            let after = thread_cpu_time();
+            assert_eq!(first.tensions, second.tensions);
+            seen.cold.record_time(between.saturating_sub(before));
+            seen.warm.record_time(after.saturating_sub(between));
+            seen.wall.record_time(done.saturating_sub(woken));
+            seen.late.record_time(woken.saturating_sub(deadline));
+            deadline += PERIOD;
+            if done > deadline {
+                seen.misses += 1;
+                deadline = first_on_beat(done, PERIOD, phases[which]);
+            }
         }
     }
     drop(awake);
-    show("CPU, after the sleep", &cold.distribution_us());
-    show("CPU, again at once", &warm.distribution_us());
-    show("elapsed, after the sleep", &wall.distribution_us());
-    show("woken late by", &late.distribution_us());
-    println!("deadlines missed: {misses}");
+    for (phase, seen) in phases.iter().zip(&seen) {
+        println!(
+            "due {:.3} ms after the millisecond, deadlines missed: {}",
+            phase.as_secs_f64() * 1e3,
+            seen.misses
+        );
+        show("CPU, after the sleep", &seen.cold.distribution_us());
+        show("CPU, again at once", &seen.warm.distribution_us());
+        show("elapsed, after the sleep", &seen.wall.distribution_us());
+        show("woken late by", &seen.late.distribution_us());
+    }
     println!("load of the machine: {}", first_line("/proc/loadavg"));
     for line in std::fs::read_to_string("/proc/thread-self/status")?.lines() {
         if line.contains("ctxt_switches") {

@@ -40,15 +40,21 @@ pub async fn run(args: &ArmArgs) -> Result<&'static str, Failure> {
         if answer.knows() && !asked {
             asked = link.post_arm(!args.off);
         }
-        if Instant::now() >= deadline {
+        if Instant::now() >= deadline || link.is_closed().is_some() {
             break None;
         }
         tokio::time::sleep(LOOK_PERIOD).await;
     };
+    let is_lost = link.is_closed().is_some();
     link.close().await;
     match told {
         Some(Ok(sentence)) => Ok(sentence),
         Some(Err(sentence)) => Err(Failure::failed(sentence)),
+        // Not asked again of the next session: who wants force looks at the device first.
+        None if is_lost => Err(Failure::failed(format!(
+            "the session with {} ended before it answered; look at the device, and ask again",
+            args.server
+        ))),
         None if asked => Err(Failure::failed(format!(
             "{} did not answer; look at its log",
             args.server

@@ -53,15 +53,11 @@ pub fn run(
     mut bridge_commands: Option<BridgeCommands>,
     mut outlets: Outlets,
     clock: SessionClock,
-    period: Duration,
+    beat: Beat,
     shutdown: &Shutdown,
 ) {
     // A state that comes late is followed by the next one; nothing is owed to anybody.
     let late = AtomicU64::new(0);
-    let beat = Beat {
-        period,
-        phase: Beat::BROADCAST,
-    };
     run_at_deadlines(clock, beat, shutdown, &late, |now| {
         if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
             let fresh = wrenches.update();

@@ -2,8 +2,10 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use taut_link::RejoinPolicy;
 
 /// Six-degree-of-freedom haptics for a cluster of screens.
 #[derive(Debug, Parser)]
@@ -197,9 +199,34 @@ pub struct RecordArgs {
     /// How states come here
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// End after this many seconds (default: at Ctrl-C, or with the session)
+    /// End after this many seconds (default: at Ctrl-C, or when the server stops)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
+    /// Without a server
+    #[command(flatten)]
+    pub membership: MembershipArgs,
+}
+
+/// What a client does without a server.
+#[derive(Clone, Copy, Debug, Default, Args)]
+pub struct MembershipArgs {
+    /// Stay when the server stops, and wait for one that is not there yet
+    #[arg(long)]
+    pub stay: bool,
+    /// End when there was no server for this many seconds (default: a server that is lost is waited for)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub give_up: Option<f64>,
+}
+
+impl MembershipArgs {
+    /// As the link takes it.
+    pub fn policy(self) -> RejoinPolicy {
+        RejoinPolicy {
+            stay: self.stay,
+            give_up: self.give_up.map(Duration::from_secs_f64),
+            ..RejoinPolicy::default()
+        }
+    }
 }
 
 /// `taut arm`.
@@ -299,9 +326,12 @@ pub struct TrackArgs {
     /// How readings travel
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// End after this many seconds (default: at Ctrl-C, or with the session)
+    /// End after this many seconds (default: at Ctrl-C, or when the server stops)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
+    /// Without a server
+    #[command(flatten)]
+    pub membership: MembershipArgs,
 }
 
 /// How poses reach a client.

@@ -22,6 +22,7 @@ use crate::failure::Failure;
 use crate::frames;
 use crate::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::looking_on::LookingOnSettings;
+use crate::loops::shell::Phases;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
@@ -245,6 +246,7 @@ fn realtime(workbench: &Workbench) -> RealtimeSettings {
         haptics_period: HAPTICS_PERIOD,
         god_object_period: Duration::from_secs_f64(god_object_rate.recip()),
         broadcast_period: Duration::from_secs_f64(workbench.network.broadcast_rate.recip()),
+        phases: Phases::default(),
         haptics_priority: wanted.haptics_priority,
         coupling_priority: wanted.coupling_priority,
         broadcast_priority: BROADCAST_PRIORITY,

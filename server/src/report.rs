@@ -31,6 +31,16 @@ pub struct SessionReport {
     pub force_us: Distribution,
     /// Thread CPU time of pose and tensions of one tick of a string-driven device; `null` without one.
     pub tension_us: Option<Distribution>,
+    /// The same and the coupling together, in one cycle of the haptics loop: thread CPU time of every force since the cycle before, and of
+    /// this cycle's pose and tensions; `null` without strings. Not the sum of two quantiles: each value is one cycle's.
+    pub coupling_and_tension_us: Option<Distribution>,
+    /// Time from the reading of a device sample to the start of the force that answers it, on the clock, whoever else ran meanwhile.
+    pub answer_wait_us: Distribution,
+    /// Time from the reading of a device sample to the rendering of the force that answers it, on the clock: a period, as the loop never waits
+    /// for the coupling, or more where the coupling came late.
+    pub force_latency_us: Distribution,
+    /// Time from a device sample to the rendering of a force whose constraint set answers it: how late the god-object is felt.
+    pub constraint_latency_us: Distribution,
     /// Age of the constraint set that a force rests on.
     pub constraint_age_us: Distribution,
     /// Rows in the constraint set, over the updates.
@@ -187,8 +197,8 @@ impl fmt::Display for SessionReport {
         writeln!(f, "ran for             {:.1} s", self.duration_s)?;
         writeln!(
             f,
-            "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, max {:.0} us, {} deadlines missed",
-            self.haptics_hz, period.p50, period.p99, period.max, self.deadline_misses
+            "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us, max {:.0} us, {} deadlines missed",
+            self.haptics_hz, period.p50, period.p99, period.p999, period.max, self.deadline_misses
         )?;
         let ticks = period.count.max(1) as f64;
         for bin in self
@@ -210,14 +220,24 @@ impl fmt::Display for SessionReport {
         )?;
         writeln!(
             f,
-            "force               p50 {:.1} us, p99 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
-            force.p50, force.p99, force.max, age.p99
+            "force               p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us; constraints {:.0} us old at p99",
+            force.p50, force.p99, force.p999, force.max, age.p99
         )?;
-        if let Some(tension) = &self.tension_us {
+        let (wait, latency) = (&self.answer_wait_us, &self.force_latency_us);
+        writeln!(
+            f,
+            "  after its sample  begun p50 {:.0} us, p99 {:.0} us; rendered p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us",
+            wait.p50, wait.p99, latency.p50, latency.p99, latency.p999
+        )?;
+        for (what, times) in [
+            ("pose and tensions", &self.tension_us),
+            ("  with coupling", &self.coupling_and_tension_us),
+        ] {
+            let Some(times) = times else { continue };
             writeln!(
                 f,
-                "pose and tensions   p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
-                tension.p50, tension.p99, tension.p999, tension.max
+                "{what:<19} p50 {:.1} us, p99 {:.1} us, p99.9 {:.1} us, max {:.1} us",
+                times.p50, times.p99, times.p999, times.max
             )?;
         }
         writeln!(
@@ -407,6 +427,10 @@ mod tests {
                 "god_object_update_us",
                 "force_us",
                 "tension_us",
+                "coupling_and_tension_us",
+                "answer_wait_us",
+                "force_latency_us",
+                "constraint_latency_us",
                 "constraint_age_us",
                 "contacts",
                 "penetrations",

@@ -14,6 +14,7 @@ use taut_scene::{BuiltMotion, FidelityPlan};
 
 use crate::head::HeadSource;
 use crate::looking_on::LookingOnSettings;
+use crate::loops::shell::Phases;
 use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 
@@ -108,6 +109,8 @@ pub struct RealtimeSettings {
     pub god_object_period: Duration,
     /// Time between two states to a client.
     pub broadcast_period: Duration,
+    /// Where in their periods the loops tick.
+    pub phases: Phases,
     /// Real-time priority of the haptics loop.
     pub haptics_priority: u8,
     /// Real-time priority of the coupling; below that of the haptics loop.

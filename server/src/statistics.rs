@@ -51,6 +51,11 @@ impl Statistics {
             god_object_update_us,
             tension_us: Some(self.haptics.tension.distribution_us())
                 .filter(|times| times.count > 0),
+            coupling_and_tension_us: Some(self.haptics.coupling_and_tension.distribution_us())
+                .filter(|times| times.count > 0),
+            answer_wait_us: self.coupling.answer_wait.distribution_us(),
+            force_latency_us: self.haptics.force_latency.distribution_us(),
+            constraint_latency_us: self.haptics.constraint_latency.distribution_us(),
             force_us: self.coupling.force.distribution_us(),
             constraint_age_us: self.coupling.constraint_age.distribution_us(),
             contacts: self.god_object.contacts.distribution(),

@@ -1,14 +1,16 @@
 //! `taut track`: says where the viewer's head is to a server whose workbench file has `remote_tracker = true` in `[viewer]`.
 
+use std::future::ready;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use god_object::spatial::Pose;
 use taut_bridge::{
     DeviceChoice, InputChoice, Trace, TrackerFeed, UnknownDevice, VrpnSettings, read_trace,
 };
-use taut_link::{ClientLink, ClientOptions, Role, SessionEnd, connect};
+use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
 use taut_proto::{HeadSample, PoseF64};
 
 use crate::cli::TrackArgs;
@@ -57,7 +59,8 @@ impl FromStr for HeadFrom {
     }
 }
 
-/// Tracks until the duration is over, the user ends it, or the session does; how many readings were sent.
+/// Tracks until the duration is over, the user ends it, or the server stops; a server that is lost is joined again. How many readings were
+/// sent.
 pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
     let key = key::read_to_join(args.key.as_deref())?;
     let mut signal = EndSignal::listen().map_err(Failure::failed)?;
@@ -79,28 +82,35 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         transport: args.transport.into(),
         ..ClientOptions::new(&args.server, key, Role::Tracker, &args.node)
     };
-    let link = connect(options).await?;
-    if let Source::Still(pose) = &mut source {
-        *pose = link.description().viewer.to_isometry();
-    }
-    let sent = send_readings(&link, &mut source, args, &mut signal).await;
-    let ended = link.ended();
-    link.close().await;
-    match ended {
+    let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
+        ready(Ok::<(), LinkError>(()))
+    });
+    let (supervised, mut link, ()) = tokio::select! {
+        joined = joining => joined?,
+        () = signal.given() => return Ok(0),
+    };
+    source.rest_as_in(&link);
+    let (sent, end) = send_readings(&supervised, &mut link, &mut source, args, &mut signal).await;
+    // Nobody is to join again for the session that is left here.
+    drop(supervised);
+    link.leave().await;
+    match end {
         Some(SessionEnd::Lost(reason)) => Err(Failure::Failed(format!(
-            "the link to {} is closed: {reason}",
+            "the server at {} was lost: {reason}",
             args.server
         ))),
         Some(SessionEnd::ServerStopped) | None => Ok(sent),
     }
 }
 
+/// How many readings were sent, and what ended it if nobody here did.
 async fn send_readings(
-    link: &ClientLink,
+    supervised: &SupervisedLink<()>,
+    link: &mut Arc<ClientLink>,
     source: &mut Source,
     args: &TrackArgs,
     signal: &mut EndSignal,
-) -> u64 {
+) -> (u64, Option<SessionEnd>) {
     let looks = match source {
         Source::Tracker { .. } => args.rate * LOOKS_PER_READING,
         Source::Still(_) | Source::Trace(_) => args.rate,
@@ -111,15 +121,23 @@ async fn send_readings(
     let mut index = 0;
     loop {
         tokio::select! {
-            () = signal.given() => return index,
+            () = signal.given() => return (index, None),
             _ = period.tick() => {}
         }
         let since_start = start.elapsed();
         let is_over = args
             .duration
             .is_some_and(|wanted| since_start.as_secs_f64() >= wanted);
-        if is_over || link.is_closed().is_some() {
-            return index;
+        if is_over {
+            return (index, None);
+        }
+        match supervised.take_renewal() {
+            None => {}
+            Some(Renewal::Session { link: next, .. }) => {
+                source.rest_as_in(&next);
+                *link = next;
+            }
+            Some(Renewal::Ended(end)) => return (index, Some(end)),
         }
         if let Some(pose) = source.newest(since_start) {
             index += 1;
@@ -145,6 +163,13 @@ enum Source {
 }
 
 impl Source {
+    /// A head that stays is where this session's workbench has it.
+    fn rest_as_in(&mut self, link: &ClientLink) {
+        if let Self::Still(pose) = self {
+            *pose = link.description().viewer.to_isometry();
+        }
+    }
+
     /// The head, workbench frame, if there is anything new.
     fn newest(&mut self, since_start: Duration) -> Option<Pose> {
         match self {

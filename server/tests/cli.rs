@@ -1,91 +1,16 @@
 //! The program from outside: what bad input gives, and that nothing is left running or lying about.
 
+mod support;
+
 use std::net::UdpSocket;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-use taut_scene::SHIPPED_WORKBENCH;
+use support::{Workplace, start, taut, workbench};
 
 /// Longer than any refusal takes, shorter than a hang.
 const PATIENCE: Duration = Duration::from_secs(20);
-
-/// A directory with a key and a workbench on free ports.
-struct Workplace {
-    directory: tempfile::TempDir,
-}
-
-impl Workplace {
-    fn new() -> Self {
-        let Ok(directory) = tempfile::tempdir() else {
-            panic!("no temporary directory");
-        };
-        let workplace = Self { directory };
-        workplace.write("workbench.toml", &workbench());
-        let output = taut(&["keys", "--out", workplace.text("cluster.key").as_str()]);
-        assert!(output.status.success());
-        workplace
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.directory.path().join(name)
-    }
-
-    fn text(&self, name: &str) -> String {
-        self.path(name).display().to_string()
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        assert!(std::fs::write(self.path(name), text).is_ok());
-    }
-
-    /// `taut serve` of the workbench file `name`, for `seconds`.
-    fn serve(&self, name: &str, seconds: &str, more: &[&str]) -> Vec<String> {
-        let mut arguments: Vec<String> = ["serve", "--no-monitor", "--json", "--duration", seconds]
-            .map(String::from)
-            .into();
-        arguments.extend([
-            "--config".into(),
-            self.text(name),
-            "--key".into(),
-            self.text("cluster.key"),
-        ]);
-        arguments.extend(more.iter().map(|argument| (*argument).to_owned()));
-        arguments
-    }
-}
-
-/// The shipped workbench with a plain scene and free ports.
-fn workbench() -> String {
-    let text = SHIPPED_WORKBENCH
-        .replace("scene = \"peg-in-a-hole\"", "scene = \"sphere-on-plane\"")
-        .replace("quic_port = 4857", "quic_port = 0")
-        .replace("udp_port = 4858", "udp_port = 0");
-    assert_ne!(text, SHIPPED_WORKBENCH);
-    text
-}
-
-fn taut<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Output {
-    let child = start(arguments);
-    match child.wait_with_output() {
-        Ok(output) => output,
-        Err(error) => panic!("taut cannot be waited for: {error}"),
-    }
-}
-
-fn start<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> Child {
-    let child = Command::new(env!("CARGO_BIN_EXE_taut"))
-        .args(arguments)
-        .env_remove("TAUT_KEY_FILE")
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn();
-    match child {
-        Ok(child) => child,
-        Err(error) => panic!("taut does not start: {error}"),
-    }
-}
 
 /// The command is refused with exit code 2 and one sentence that holds all of `parts`.
 fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {

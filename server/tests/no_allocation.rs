@@ -98,11 +98,18 @@ fn loops_two_and_three_allocate_nothing() {
             .incidents
             .of(EventKind::DeviceStrings);
         assert_eq!(faults, 0, "{name} with {strings:?}");
-        let tensions = loops.statistics.report(Duration::from_secs(4)).tension_us;
+        let report = loops.statistics.report(Duration::from_secs(4));
+        for times in [report.tension_us, report.coupling_and_tension_us] {
+            assert_eq!(
+                times.map(|times| times.count),
+                strings.map(|_| 4000),
+                "pose and tensions of every tick are timed"
+            );
+        }
+        assert_eq!(report.answer_wait_us.count, 4000);
         assert_eq!(
-            tensions.map(|times| times.count),
-            strings.map(|_| 4000),
-            "pose and tensions of every tick are timed"
+            report.force_latency_us.count, 3999,
+            "no force answers before the first sample"
         );
     }
 }

@@ -8,12 +8,16 @@ use std::time::{Duration, Instant};
 
 use god_object::nalgebra::Point3;
 use god_object::{Pose, Vector6};
+use taut::arm;
+use taut::cli::ArmArgs;
 use taut::config::{Overrides, session_setup};
 use taut::session::Session;
 use taut::setup::{DeviceSource, SessionSetup};
 use taut::terminal::Terminal;
-use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceSample};
-use taut_link::{ClientOptions, ClusterKey, ReceivedState, Role, connect};
+use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
+use taut_link::{
+    ClientOptions, ClusterKey, ReceivedState, Role, connect, create_key_file, read_key_file,
+};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
 /// Much longer than a session takes to notice; the machine may be busy.
@@ -131,6 +135,69 @@ fn a_session_that_is_dropped_gives_its_ports_back() {
             "{address} is still in use"
         );
     }
+}
+
+/// What `taut arm` says of a session without a device, which ends as soon as the request is there.
+fn answer_of_a_session_that_ends(key_file: &Path) -> String {
+    let Ok(key) = read_key_file(key_file) else {
+        panic!("the key cannot be read");
+    };
+    let mut setup = setup_of("sphere-on-plane", key);
+    setup.device = DeviceSource::Remote {
+        limits: DeviceLimits::UNLIMITED,
+        max_age: Duration::from_millis(100),
+    };
+    let Ok(mut session) = Session::start(setup) else {
+        panic!("the session does not start");
+    };
+    let Some(server) = session.quic_address() else {
+        panic!("no address");
+    };
+    let asked = ArmArgs {
+        server: server.to_string(),
+        key: Some(key_file.to_path_buf()),
+        off: false,
+    };
+    let asking = std::thread::Builder::new()
+        .name("arm".into())
+        .spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build()?;
+            Ok::<_, std::io::Error>(runtime.block_on(arm::run(&asked)))
+        });
+    let Ok(asking) = asking else {
+        panic!("no thread");
+    };
+    let begun = Instant::now();
+    while !session.status_line().contains("clients 1") && !asking.is_finished() {
+        assert!(begun.elapsed() < PATIENCE, "nobody joins");
+        session.follow_network(&Terminal::standard_error());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    drop(session);
+    match asking.join() {
+        Ok(Ok(Err(failure))) => failure.to_string(),
+        other => panic!("armed without a device: {other:?}"),
+    }
+}
+
+#[test]
+fn who_asks_for_force_is_told_when_the_session_ends_before_it_answers() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let key_file = directory.path().join("cluster.key");
+    assert!(create_key_file(&key_file).is_ok());
+    // On a busy machine the request may have been given up before the session was ended: then once more.
+    let told = (0..10).any(|_| {
+        let answer = answer_of_a_session_that_ends(&key_file);
+        let gave_up = answer.contains("no device sample came");
+        let told = answer.contains("ended before it answered");
+        assert!(told || gave_up, "{answer}");
+        told
+    });
+    assert!(told, "it was never told");
 }
 
 /// What an operator's client receives of a session until its god-object loop has run for `session_s`.

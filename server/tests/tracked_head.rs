@@ -21,7 +21,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// A head that stands half a metre beside its rest, for as long as the test wants.
 const TRACE: &str = "t,x,y,z,qw,qx,qy,qz\n0,0.5,-1.3,0.9,1,0,0,0\n1,0.5,-1.3,0.9,1,0,0,0\n";
 
-fn session(key: ClusterKey) -> Session {
+/// A session on this port, or on a free one for 0.
+fn session(key: ClusterKey, quic_port: u16) -> Session {
     let text = SHIPPED_WORKBENCH
         .lines()
         .map(|line| match line.starts_with("sway") {
@@ -30,8 +31,9 @@ fn session(key: ClusterKey) -> Session {
         })
         .collect::<Vec<_>>()
         .join("\n");
+    let quic_port = format!("network.quic_port={quic_port}");
     let overrides = [
-        "network.quic_port=0",
+        quic_port.as_str(),
         "network.udp_port=0",
         "scene=\"sphere-on-plane\"",
         "network.roles=[\"tracker\", \"observer\"]",
@@ -48,14 +50,14 @@ fn session(key: ClusterKey) -> Session {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn track_arguments(server: &str, key: &Path, trace: &Path) -> TrackArgs {
+fn track_arguments(server: &str, key: &Path, trace: &Path, more: &str) -> TrackArgs {
     let line = [
         "taut".to_owned(),
         "track".to_owned(),
         format!("--server={server}"),
         format!("--key={}", key.display()),
         format!("--source=trace:{}", trace.display()),
-        "--duration=4".to_owned(),
+        more.to_owned(),
     ];
     match Cli::try_parse_from(line).map(|cli| cli.command) {
         Ok(Some(Command::Track(args))) => args,
@@ -87,7 +89,7 @@ async fn head_at(link: &ClientLink, x: f32) {
 fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_back_to_rest() {
     let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
     let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
-    let session = session(key.clone());
+    let session = session(key.clone(), 0);
     let server = session
         .quic_address()
         .map(|address| address.to_string())
@@ -109,7 +111,7 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
             .await
             .unwrap_or_else(|error| panic!("{error}"));
         head_at(&observer, 0.0).await;
-        let args = track_arguments(&server, &tracker_key, &trace);
+        let args = track_arguments(&server, &tracker_key, &trace, "--duration=4");
         let tracking = tokio::spawn(async move { taut::track::run(&args).await });
         head_at(&observer, 0.5).await;
         match tracking.await {
@@ -129,4 +131,37 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
     });
     let (_, failure) = session.stop(&Terminal::standard_error());
     assert!(failure.is_none());
+}
+
+#[test]
+fn a_tracker_that_stays_moves_the_head_of_the_next_session_too() {
+    let folder = tempfile::tempdir().unwrap_or_else(|error| panic!("{error}"));
+    let key = ClusterKey::generate().unwrap_or_else(|error| panic!("{error}"));
+    let first = session(key.clone(), 0);
+    let address = first.quic_address().unwrap_or_else(|| panic!("no address"));
+    let server = address.to_string();
+    let trace = folder.path().join("head.csv");
+    assert!(std::fs::write(&trace, TRACE).is_ok());
+    let tracker_key = folder.path().join("tracker.key");
+    let made = key.credential(Role::Tracker, Holder::AnyNode, 1);
+    write_credential_file(&tracker_key, &made).unwrap_or_else(|error| panic!("{error}"));
+    let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
+    let watch = async || {
+        let observer = key.credential(Role::Observer, Holder::AnyNode, 1);
+        let options = ClientOptions::new(&server, observer, Role::Observer, "web");
+        let observer = connect(options)
+            .await
+            .unwrap_or_else(|error| panic!("{error}"));
+        head_at(&observer, 0.5).await;
+        observer.close().await;
+    };
+    let args = track_arguments(&server, &tracker_key, &trace, "--stay");
+    let tracking = runtime.spawn(async move { taut::track::run(&args).await });
+    runtime.block_on(watch());
+    drop(first);
+    let second = session(key.clone(), address.port());
+    runtime.block_on(watch());
+    assert!(!tracking.is_finished());
+    tracking.abort();
+    drop(second);
 }

@@ -10,13 +10,17 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// How long the demo runs, s.
 const DURATION_S: u64 = 12;
 /// The keys of the report that scripts rely on.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 21] = [
     "duration_s",
     "haptics_hz",
     "haptics_period_us",
     "deadline_misses",
     "god_object_update_us",
     "force_us",
+    "coupling_and_tension_us",
+    "answer_wait_us",
+    "force_latency_us",
+    "constraint_latency_us",
     "constraint_age_us",
     "contacts",
     "penetrations",

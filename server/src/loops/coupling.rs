@@ -28,6 +28,8 @@ pub struct CouplingLoop {
     /// The last pass of force shading was a real one: its end must be told once.
     shading: bool,
     sequence: u64,
+    /// Of all forces since the start.
+    cpu_time: Duration,
     recording: Option<Tap<ForceRecord>>,
     statistics: Arc<CouplingStatistics>,
 }
@@ -37,6 +39,8 @@ pub struct CouplingLoop {
 pub struct CouplingStatistics {
     /// Thread CPU time of one force.
     pub force: Histogram,
+    /// Time from the reading of a device sample to the start of the force that answers it.
+    pub answer_wait: Histogram,
     /// Age of the constraint set that a force rests on.
     pub constraint_age: Histogram,
 }
@@ -59,6 +63,7 @@ impl CouplingLoop {
             shaded,
             shading: false,
             sequence: 0,
+            cpu_time: Duration::ZERO,
             recording,
             statistics: Arc::default(),
         }
@@ -90,18 +95,28 @@ impl CouplingLoop {
         let output = self
             .coupling
             .step(now.as_secs_f64(), &device.pose, &contacts.set);
-        self.statistics
-            .force
-            .record_time(thread_cpu_time().saturating_sub(before));
+        let took = thread_cpu_time().saturating_sub(before);
+        self.cpu_time += took;
+        self.statistics.force.record_time(took);
+        if new_sample {
+            let waited = now.saturating_sub(device.read);
+            self.statistics.answer_wait.record_time(waited);
+        }
 
         let constraint_age = now.saturating_sub(contacts.published);
-        self.statistics.constraint_age.record_time(constraint_age);
+        // The set at the start is of no update: it has no age.
+        if contacts.published > Duration::ZERO {
+            self.statistics.constraint_age.record_time(constraint_age);
+        }
         self.sequence += 1;
         self.wrench.publish(&WrenchCommand {
             sequence: self.sequence,
             time: now,
+            sample_read: device.read,
+            cpu_time: self.cpu_time,
             wrench: output.wrench,
             constraint_sequence: contacts.set.sequence,
+            constraint_sample: contacts.device_time,
             constraint_age,
             active: output.active,
             kkt: output.kkt,

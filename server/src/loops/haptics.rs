@@ -28,6 +28,8 @@ pub struct HapticsLoop {
     switch: Arc<ArmSwitch>,
     state: DeviceState,
     last_tick: Option<Duration>,
+    /// CPU time of the coupling up to the command rendered last.
+    coupling_cpu_time: Duration,
     recording: Option<Tap<HapticsRecord>>,
     statistics: Arc<HapticsStatistics>,
 }
@@ -39,6 +41,12 @@ pub struct HapticsStatistics {
     pub period: Histogram,
     /// Thread CPU time of a string-driven device's pose and tensions in one tick; empty for other devices.
     pub tension: Histogram,
+    /// The same and that of the coupling in one cycle of this loop: of all forces between the command rendered last and the one rendered now.
+    pub coupling_and_tension: Histogram,
+    /// Time from the reading of a device sample to the rendering of the newest force that answers it.
+    pub force_latency: Histogram,
+    /// Time from a device sample to the rendering of the newest force whose constraint set answers it.
+    pub constraint_latency: Histogram,
     /// Deadlines that passed without a tick in their period.
     pub deadline_misses: AtomicU64,
     /// Times at which the port changed the force or lost the device.
@@ -90,6 +98,7 @@ impl HapticsLoop {
             switch,
             state: DeviceState::at_start(start),
             last_tick: None,
+            coupling_cpu_time: Duration::ZERO,
             recording: None,
             statistics: Arc::default(),
         }
@@ -125,12 +134,12 @@ impl HapticsLoop {
         let (state, states, wrench) = (&mut self.state, &mut self.states, &mut self.wrench);
         let coupling = &self.coupling;
         let report = self.port.tick(now, |reading| {
-            follow(state, reading);
+            follow(state, reading, now);
             states.publish(state);
             coupling.wake();
             Some(newest_command(wrench))
         });
-        self.count(&report);
+        self.count(now, &report);
     }
 
     /// Lets the force come down without reading the device; whether it is zero. Call it once per period until it is.
@@ -148,7 +157,31 @@ impl HapticsLoop {
         store(&self.statistics.energy_generated_bits, generated);
     }
 
-    fn count(&mut self, report: &TickReport) {
+    /// What the force that was rendered now cost, and how old it is.
+    fn count_cycle(&mut self, now: Duration) {
+        let statistics = &self.statistics;
+        let command = self.wrench.held();
+        let coupling = command.cpu_time.saturating_sub(self.coupling_cpu_time);
+        self.coupling_cpu_time = command.cpu_time;
+        // The pose at the start was not read: what answers it has no age.
+        if command.sample_read > Duration::ZERO {
+            let latency = now.saturating_sub(command.sample_read);
+            statistics.force_latency.record_time(latency);
+        }
+        if command.constraint_sample > Duration::ZERO {
+            let latency = now.saturating_sub(command.constraint_sample);
+            statistics.constraint_latency.record_time(latency);
+        }
+        if let Some(tension) = self.port.computing_time() {
+            statistics.tension.record_time(tension);
+            statistics
+                .coupling_and_tension
+                .record_time(coupling + tension);
+        }
+    }
+
+    fn count(&mut self, now: Duration, report: &TickReport) {
+        self.count_cycle(now);
         let statistics = &self.statistics;
         for event in report.events.iter() {
             statistics.incidents.count(event);
@@ -164,9 +197,6 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
-        if let Some(time) = self.port.computing_time() {
-            statistics.tension.record_time(time);
-        }
         self.tell_obstacle_work();
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
@@ -183,8 +213,9 @@ impl HapticsLoop {
 }
 
 /// Takes the reading over into the state that is published.
-fn follow(state: &mut DeviceState, reading: &Reading) {
+fn follow(state: &mut DeviceState, reading: &Reading, now: Duration) {
     state.sequence += 1;
+    state.read = now;
     state.faulty = reading.fault.is_some();
     state.time = reading.sample.time;
     state.pose = reading.sample.pose;
@@ -200,5 +231,107 @@ fn newest_command(wrench: &mut Subscriber<WrenchCommand>) -> Command {
         wrench: command.wrench,
         made: command.time,
         constraint_age: command.constraint_age,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::{device_state, wrench_command};
+    use crate::timing::Distribution;
+    use god_object::nalgebra::Point3;
+    use god_object::spatial::Vector6;
+    use taut_bridge::{
+        Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, SafetySettings,
+    };
+
+    const TENSIONS: Duration = Duration::from_micros(40);
+
+    /// Strings whose arithmetic takes the same time in every tick.
+    struct Strings(DeviceInfo);
+
+    impl Device for Strings {
+        fn info(&self) -> &DeviceInfo {
+            &self.0
+        }
+
+        fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+            Ok(DeviceSample {
+                time: now,
+                pose: Pose::identity(),
+                velocity: Vector6::zeros(),
+                buttons: 0,
+            })
+        }
+
+        fn write(&mut self, _now: Duration, _wrench: &Vector6) {}
+
+        fn computing_time(&self) -> Option<Duration> {
+            Some(TENSIONS)
+        }
+    }
+
+    #[test]
+    fn a_cycle_costs_its_tensions_and_every_force_since_the_cycle_before() {
+        let device = Strings(DeviceInfo {
+            name: "strings".to_owned(),
+            sensed_degrees_of_freedom: 6,
+            actuated_degrees_of_freedom: 6,
+            limits: DeviceLimits::UNLIMITED,
+            rate_hz: 1000.0,
+        });
+        let start = Pose::identity();
+        let (mut commands, readers) = wrench_command::channel();
+        let (states, _state_readers) = device_state::channel(&start);
+        let mut haptics = HapticsLoop::new(
+            DevicePort::new(
+                Box::new(device),
+                SafetySettings::default(),
+                Point3::origin(),
+                &start,
+            ),
+            &start,
+            readers.haptics,
+            states,
+            Waker::default(),
+            Arc::default(),
+        );
+        let ms = Duration::from_millis;
+        // The forces up to each tick, CPU time in all, us, and when the sample was read that the newest answers, ms.
+        let cycles: [(&[u64], u64); 5] = [
+            (&[], 0),      // no force yet
+            (&[2], 0),     // one that answers the pose at the start, which nobody read
+            (&[5], 2),     // one
+            (&[7, 14], 3), // of a sample and of a constraint set
+            (&[], 3),      // the coupling came too late: the same force again
+        ];
+        let mut costs = Vec::new();
+        let mut sequence = 0;
+        for (tick, (forces, read)) in (1..).zip(cycles) {
+            for cpu_us in forces {
+                sequence += 1;
+                commands.publish(&WrenchCommand {
+                    sequence,
+                    time: ms(read),
+                    sample_read: ms(read),
+                    constraint_sample: ms(read / 2),
+                    cpu_time: Duration::from_micros(*cpu_us),
+                    ..WrenchCommand::at_start()
+                });
+            }
+            haptics.tick(ms(tick));
+            costs.push(haptics.statistics.coupling_and_tension.newest_time());
+        }
+        let us = |us| TENSIONS + Duration::from_micros(us);
+        assert_eq!(costs, [us(0), us(2), us(3), us(9), us(0)]);
+        // Answers to the samples read at 2, 3 and 3 ms, rendered at 3, 4 and 5 ms.
+        let Distribution {
+            p50, max, count, ..
+        } = haptics.statistics.force_latency.distribution_us();
+        assert_eq!((max, count), (2000.0, 3));
+        assert!((p50 / 1000.0 - 1.0).abs() < 0.016, "{p50}");
+        // Constraints for the sample at 1 ms: in the forces that were rendered at 3, 4 and 5 ms.
+        let constraints = haptics.statistics.constraint_latency.distribution_us();
+        assert_eq!((constraints.max, constraints.count), (4000.0, 3));
     }
 }

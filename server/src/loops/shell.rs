@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread::{JoinHandle, Thread};
 use std::time::Duration;
 
-use taut_bridge::realtime::sleep_until;
+use taut_bridge::realtime::{CLEAR_OF_KERNEL_TICK, first_on_beat, sleep_until};
 
 use crate::clock::SessionClock;
 use crate::shutdown::Shutdown;
@@ -50,10 +50,7 @@ pub fn spawn(
     })
 }
 
-/// When a loop ticks: at the session times `phase + k period`.
-///
-/// The session's loops have phases of their own: loops of one period that began at a chance would keep the distance that they began with,
-/// and where that is none, the timer of one interrupts the other within its tick, every time.
+/// When a loop ticks: at the times `phase + k period` of the system's monotonic clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Beat {
     /// Time between two ticks.
@@ -62,33 +59,33 @@ pub struct Beat {
     pub phase: Duration,
 }
 
-impl Beat {
-    /// Phase of the haptics loop. The coupling follows it at once.
-    pub const HAPTICS: Duration = Duration::ZERO;
-    /// Phase of the god-object loop at the rate of the haptics loop: when the coupling has answered the sample.
-    pub const GOD_OBJECT: Duration = Duration::from_micros(200);
-    /// Phase of the broadcaster: when most updates of the god-object are done.
-    pub const BROADCAST: Duration = Duration::from_micros(500);
+/// The phases of a session's loops.
+///
+/// Loops of one period that began at a chance would keep the distance that they began with, to each other and to the kernel's tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Phases {
+    /// Of the haptics loop. The coupling follows it at once.
+    pub haptics: Duration,
+    /// Of the god-object loop.
+    pub god_object: Duration,
+    /// Of the broadcaster.
+    pub broadcast: Duration,
+}
 
-    /// The first deadline that is at least one period after `now`.
-    fn first_after(&self, now: Duration) -> Duration {
-        let earliest = now + self.period;
-        let beyond = earliest
-            .saturating_sub(self.phase)
-            .as_nanos()
-            .checked_rem(self.period.as_nanos())
-            .unwrap_or(0);
-        // Less than a period, which is far less than 2^64 ns.
-        let beyond = Duration::from_nanos(beyond as u64);
-        if beyond.is_zero() {
-            earliest
-        } else {
-            earliest + (self.period - beyond)
+impl Default for Phases {
+    /// Haptics clear of the kernel's tick; the god-object at the rate of the haptics loop when the coupling has answered the sample; the
+    /// broadcaster when most updates of the god-object are done.
+    fn default() -> Self {
+        let haptics = CLEAR_OF_KERNEL_TICK;
+        Self {
+            haptics,
+            god_object: haptics + Duration::from_micros(200),
+            broadcast: haptics + Duration::from_micros(500),
         }
     }
 }
 
-/// Calls `tick` at every deadline of `beat` until the end is asked for. Missed deadlines are added to `misses`.
+/// Calls `tick` with the session time at every deadline of `beat` until the end is asked for. Missed deadlines are added to `misses`.
 pub fn run_at_deadlines(
     clock: SessionClock,
     beat: Beat,
@@ -96,7 +93,9 @@ pub fn run_at_deadlines(
     misses: &AtomicU64,
     mut tick: impl FnMut(Duration),
 ) {
-    let mut deadline = beat.first_after(clock.now());
+    let start = clock.monotonic(Duration::ZERO);
+    let now = clock.monotonic(clock.now());
+    let mut deadline = first_on_beat(now, beat.period, beat.phase) - start;
     while !shutdown.is_asked() {
         sleep_until(clock.monotonic(deadline));
         tick(clock.now());
@@ -133,29 +132,6 @@ mod tests {
         assert_eq!(next_deadline(10 * MS, 11 * MS - MS / 10, MS), (11 * MS, 0));
         assert_eq!(next_deadline(10 * MS, 11 * MS + MS / 10, MS), (11 * MS, 1));
         assert_eq!(next_deadline(10 * MS, 15 * MS + MS / 2, MS), (15 * MS, 5));
-    }
-
-    #[test]
-    fn a_loop_begins_on_its_beat_and_not_before_a_period_has_passed() {
-        let beat = Beat {
-            period: MS,
-            phase: MS / 5,
-        };
-        for now_us in [0, 199, 200, 201, 999, 1000, 12_345] {
-            let now = Duration::from_micros(now_us);
-            let first = beat.first_after(now);
-            assert!(
-                first >= now + MS && first < now + 2 * MS,
-                "{now:?} {first:?}"
-            );
-            assert_eq!((first - MS / 5).as_nanos() % MS.as_nanos(), 0, "{first:?}");
-        }
-        // Nothing to divide by: at once.
-        let none = Beat {
-            period: Duration::ZERO,
-            phase: Duration::ZERO,
-        };
-        assert_eq!(none.first_after(MS), MS);
     }
 
     #[test]
@@ -197,7 +173,7 @@ mod tests {
         let asked = shutdown.clone();
         let beat = Beat {
             period: MS,
-            phase: Beat::HAPTICS,
+            phase: Phases::default().haptics,
         };
         run_at_deadlines(SessionClock::start(), beat, &shutdown, &misses, |now| {
             times.push(now);

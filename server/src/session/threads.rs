@@ -55,11 +55,11 @@ impl Session {
         waker: Waker,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
-        let (clock, shutdown, period) = (
-            self.clock,
-            self.shutdown.clone(),
-            realtime.god_object_period,
-        );
+        let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        let beat = Beat {
+            period: realtime.god_object_period,
+            phase: realtime.phases.god_object,
+        };
         let scheduling = realtime
             .god_object_priority
             .map_or(Scheduling::Ahead, Scheduling::Fifo);
@@ -70,10 +70,6 @@ impl Session {
             move || {
                 // Updates that take longer than a period are no fault: the next one starts at once.
                 let late = AtomicU64::new(0);
-                let beat = Beat {
-                    period,
-                    phase: Beat::GOD_OBJECT,
-                };
                 run_at_deadlines(clock, beat, &shutdown, &late, |_| {
                     god_object.tick(|| clock.now());
                     waker.wake();
@@ -101,8 +97,11 @@ impl Session {
         outlets: Outlets,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
-        let (clock, shutdown, period) =
-            (self.clock, self.shutdown.clone(), realtime.broadcast_period);
+        let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        let beat = Beat {
+            period: realtime.broadcast_period,
+            phase: realtime.phases.broadcast,
+        };
         self.start_thread(
             "broadcast",
             Scheduling::Fifo(realtime.broadcast_priority),
@@ -114,7 +113,7 @@ impl Session {
                     bridge_commands,
                     outlets,
                     clock,
-                    period,
+                    beat,
                     &shutdown,
                 );
             },
@@ -140,8 +139,11 @@ impl Session {
         mut haptics: HapticsLoop,
         realtime: &RealtimeSettings,
     ) -> Result<(), Failure> {
-        let (clock, shutdown, period) =
-            (self.clock, self.shutdown.clone(), realtime.haptics_period);
+        let (clock, shutdown) = (self.clock, self.shutdown.clone());
+        let beat = Beat {
+            period: realtime.haptics_period,
+            phase: realtime.phases.haptics,
+        };
         let statistics = self.statistics.haptics.clone();
         self.started = clock.now();
         self.start_thread(
@@ -150,10 +152,6 @@ impl Session {
             realtime.haptics_core,
             move || {
                 let ticked = catch_unwind(AssertUnwindSafe(|| {
-                    let beat = Beat {
-                        period,
-                        phase: Beat::HAPTICS,
-                    };
                     run_at_deadlines(clock, beat, &shutdown, &statistics.deadline_misses, |now| {
                         haptics.tick(now)
                     });
@@ -161,7 +159,7 @@ impl Session {
                 // Whatever ended the loop: the force comes down by the slew limit, without another reading, and none is left.
                 let released = catch_unwind(AssertUnwindSafe(|| {
                     while !haptics.release_step(clock.now()) {
-                        sleep_until(clock.monotonic(clock.now() + period));
+                        sleep_until(clock.monotonic(clock.now() + beat.period));
                     }
                 }));
                 if let Err(cause) = ticked.and(released) {

@@ -19,6 +19,8 @@ pub struct DeviceState {
     pub sequence: u64,
     /// Session time at which the device was there.
     pub time: Duration,
+    /// Session time at which the haptics loop read it, later than `time` by what the device and its way take.
+    pub read: Duration,
     /// The device pose x_h, as the pose of the body's own frame.
     pub pose: Pose,
     /// Velocity of the reference point and angular velocity, m/s and rad/s, world axes.
@@ -72,6 +74,7 @@ impl DeviceState {
         Self {
             sequence: 0,
             time: Duration::ZERO,
+            read: Duration::ZERO,
             pose: *pose,
             velocity: Vector6::zeros(),
             buttons: 0,

@@ -17,10 +17,16 @@ pub struct WrenchCommand {
     pub sequence: u64,
     /// Session time at which it was computed.
     pub time: Duration,
+    /// Session time at which the device sample that it answers was read.
+    pub sample_read: Duration,
+    /// Thread CPU time that the coupling has taken since the start, for this answer and all before it: who reads two of them knows the cost of all between.
+    pub cpu_time: Duration,
     /// Force and torque on the hand at the reference point, N and N m, world axes.
     pub wrench: Vector6,
     /// Sequence number of the constraint set that it rests on.
     pub constraint_sequence: u64,
+    /// Session time of the device sample that this constraint set answers.
+    pub constraint_sample: Duration,
     /// How old that constraint set was.
     pub constraint_age: Duration,
     /// Rows in the active set.
@@ -41,8 +47,11 @@ impl WrenchCommand {
         Self {
             sequence: 0,
             time: Duration::ZERO,
+            sample_read: Duration::ZERO,
+            cpu_time: Duration::ZERO,
             wrench: Vector6::zeros(),
             constraint_sequence: 0,
+            constraint_sample: Duration::ZERO,
             constraint_age: Duration::ZERO,
             active: 0,
             kkt: 0.0,

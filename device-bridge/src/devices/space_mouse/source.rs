@@ -31,7 +31,7 @@ pub trait ReportSource: Send {
 pub enum SourceError {
     /// None is plugged in.
     #[error(
-        "no SpaceMouse is plugged in (looked for 3Dconnexion's known models among the HID devices)"
+        "no SpaceMouse is plugged in (looked for 3Dconnexion's known models among the HID devices); plug one in, or choose another device"
     )]
     NotFound,
     /// There is one, but not for this user.
