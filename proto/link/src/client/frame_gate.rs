@@ -1,6 +1,7 @@
 //! What a render node's drawing thread does with the barrier: take a frame, draw it, say so, wait, show it.
 
 use super::{frames::Part, hot::Hot};
+use crate::realtime::{Raised, raise};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -22,6 +23,9 @@ const FARTHEST_SWAP: Duration = Duration::from_millis(100);
 pub struct FrameGate {
     hot: Arc<Hot>,
     drawing: Option<Drawing>,
+    /// Real-time priority of the wait, until the system refuses it.
+    priority: Option<u8>,
+    raised: Option<Raised>,
 }
 
 /// What is drawn and not shown yet.
@@ -90,7 +94,12 @@ impl FrameGate {
         let now_ns = hot.inbound.local_ns(Instant::now());
         let part = Part::new(session, period_us, silence_ns, now_ns);
         hot.inbound.frames.take_part(part);
-        FrameGate { hot, drawing: None }
+        FrameGate {
+            priority: hot.priority,
+            hot,
+            drawing: None,
+            raised: None,
+        }
     }
 
     /// What to draw now; the barrier hears from this node meanwhile. Does not wait.
@@ -150,6 +159,13 @@ impl FrameGate {
             part.node.message(now_ns)
         });
         self.send(message.flatten());
+        // Drawing may take long and is not for the real-time class; from here on every microsecond is one between the screens.
+        if self.raised.is_none()
+            && let Some(priority) = self.priority
+        {
+            self.raised = raise(priority);
+            self.priority = self.raised.as_ref().map(|_| priority);
+        }
     }
 
     /// Waits until the drawn frame is to be shown, and tells the master again and again until then. Show it at once, and call
@@ -157,13 +173,26 @@ impl FrameGate {
     ///
     /// Ends after half a second without a release, or three frames where they are slow.
     pub fn wait(&mut self) -> Option<Instant> {
+        let found = self.wait_for_release();
+        self.hot.seat.give_back();
+        found.map(|swap_ns| self.sleep_until(swap_ns))
+    }
+
+    /// The session time at which the frame is to be shown, 0 for at once; `None` if the barrier is gone.
+    fn wait_for_release(&self) -> Option<u64> {
+        let (hot, frames) = (&self.hot, &self.hot.inbound.frames);
         loop {
-            if self.hot.is_over() {
+            if hot.is_over() {
                 return None;
             }
-            let now_ns = self.hot.inbound.local_ns(Instant::now());
+            if hot.has_seat() {
+                hot.seat.ask();
+            } else {
+                hot.seat.give_back();
+            }
+            let now_ns = hot.inbound.local_ns(Instant::now());
             let mut message = None;
-            let found = self.hot.inbound.frames.wait(|part| {
+            let mut look = |part: &mut Part| {
                 match part.node.turn(now_ns) {
                     Turn::Swap { swap_ns, .. } => return Ok(Some(swap_ns)),
                     Turn::Free | Turn::Draw { .. } => return Ok(None),
@@ -179,12 +208,34 @@ impl FrameGate {
                     }
                     Turn::Swap { .. } | Turn::Free | Turn::Draw { .. } => Err(Duration::ZERO),
                 }
-            });
-            match found {
-                Some(Some(swap_ns)) => {
-                    return Some(self.sleep_until(swap_ns));
+            };
+            let found = if hot.seat.is_at_drawer() {
+                match frames.with(look) {
+                    Some(Ok(found)) => Some(found),
+                    Some(Err(longest)) => {
+                        if !longest.is_zero() {
+                            hot.receive_within(longest);
+                            // The shortest way from a RELEASE to the swap.
+                            if let Some(Turn::Swap { swap_ns, .. }) =
+                                frames.with(|part| part.node.turn(now_ns))
+                            {
+                                return Some(swap_ns);
+                            }
+                        }
+                        None
+                    }
+                    None => return None,
                 }
-                Some(None) => return None,
+            } else {
+                // The seat may be given between the two looks: then there is nothing to wait for here.
+                let given = || hot.seat.is_at_drawer();
+                frames.wait(|part| match look(part) {
+                    Err(_) if given() => Err(Duration::ZERO),
+                    looked => looked,
+                })
+            };
+            match found {
+                Some(found) => return found,
                 None => self.send(message),
             }
         }
@@ -197,6 +248,8 @@ impl FrameGate {
             .inbound
             .frames
             .with(|part| part.node.swapped(swapped_ns));
+        self.hot.seat.wake_receiver();
+        self.raised = None;
     }
 
     /// How the node stands.
@@ -230,6 +283,9 @@ impl FrameGate {
     /// Sleeps, then spins, until a session time, and tells it on this machine's clock; at once where it is 0, over, not known or implausible.
     fn sleep_until(&self, swap_ns: u64) -> Instant {
         let now = Instant::now();
+        if swap_ns == 0 {
+            return now;
+        }
         let left = match self.session_ns(now) {
             0 => Duration::ZERO,
             now_ns => Duration::from_nanos(swap_ns.saturating_sub(now_ns)),
@@ -242,7 +298,7 @@ impl FrameGate {
             std::thread::sleep(sleep);
         }
         while Instant::now() < swap {
-            std::hint::spin_loop();
+            std::thread::yield_now(); // another node of this machine, of the same real-time priority, is to be ready as well
         }
         swap
     }
@@ -259,6 +315,8 @@ fn planned_ns(release: &ReleaseHead, sample_ns: u64) -> u64 {
 
 impl Drop for FrameGate {
     fn drop(&mut self) {
+        self.hot.seat.give_back();
+        self.hot.seat.wake_receiver();
         self.hot.inbound.frames.take_leave();
     }
 }

@@ -1,8 +1,8 @@
 //! The hot plane of a client: a UDP socket with a thread, or QUIC datagrams with a task. Both receive, and both keep the path and the
 //! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
-use super::{group::GroupEnd, inbound::Inbound, multicast};
-use crate::{LinkError, framing::CLOSE_STOPPING};
+use super::{group::GroupEnd, inbound::Inbound, multicast, seat::Seat};
+use crate::{LinkError, framing::CLOSE_STOPPING, readiness::wait_readable, realtime::raise};
 use quinn::{Connection, ConnectionError};
 use std::{
     io,
@@ -19,7 +19,7 @@ use taut_proto::{
     events::EventAck,
     group::{SERVER_SENDER, is_grouped},
     header::MAX_DATAGRAM_BYTES,
-    seal::Sealer,
+    seal::{DatagramBuffer, Sealer},
     time::TimeRequest,
 };
 
@@ -52,6 +52,9 @@ pub(crate) struct Hot {
     pub(crate) inbound: Inbound,
     pub(crate) group: GroupEnd,
     pub(crate) connection: Connection,
+    pub(crate) seat: Seat,
+    /// Real-time priority of the threads of frames.
+    pub(crate) priority: Option<u8>,
     sealer: Sealer,
     path: Path,
     /// To the control stream.
@@ -87,11 +90,14 @@ impl Hot {
         inbound: Inbound,
         group: GroupEnd,
         path: Path,
+        priority: Option<u8>,
     ) -> Hot {
         Hot {
+            priority,
             inbound,
             group,
             connection,
+            seat: Seat::default(),
             sealer,
             path,
             outbox: OnceLock::new(),
@@ -123,15 +129,27 @@ impl Hot {
 
     /// Sends `payload` to a member under the group key, or counts the failure; `false` where that is not possible. No allocation.
     pub(crate) fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        let mut buffer = [0; MAX_DATAGRAM_BYTES];
+        self.seal_for_members(payload, &mut buffer)
+            .is_some_and(|datagram| self.send_sealed(member, datagram))
+    }
+
+    /// Seals `payload` under the group key, for any members; `None` where that is not possible.
+    pub(crate) fn seal_for_members<'a>(
+        &self,
+        payload: &Payload,
+        buffer: &'a mut DatagramBuffer,
+    ) -> Option<&'a [u8]> {
+        let now_ns = self.inbound.local_ns(Instant::now());
+        self.group.seal(payload, now_ns, buffer)
+    }
+
+    /// Sends what is sealed to a member, or counts the failure; `false` where there is no way to it.
+    pub(crate) fn send_sealed(&self, member: u16, datagram: &[u8]) -> bool {
         let Path::Udp { socket, .. } = &self.path else {
             return false;
         };
         let Some(address) = self.group.address(member) else {
-            return false;
-        };
-        let mut buffer = [0; MAX_DATAGRAM_BYTES];
-        let now_ns = self.inbound.local_ns(Instant::now());
-        let Some(datagram) = self.group.seal(payload, now_ns, &mut buffer) else {
             return false;
         };
         let sent = socket.send_to(datagram, address).is_ok();
@@ -277,6 +295,7 @@ impl Hot {
         let Path::Udp { socket, .. } = &self.path else {
             return;
         };
+        let _raised = self.priority.and_then(raise);
         let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
         let mut rhythm = Rhythm::start(Instant::now());
         let mut wait = None;
@@ -297,6 +316,12 @@ impl Hot {
             if self.inbound.frames.takes_part() {
                 longest = longest.min(LOOK_PERIOD);
             }
+            if self.seat.leave() {
+                self.inbound.frames.wake(); // to take it
+            }
+            if !self.seat.wait(longest) {
+                continue; // the thread that draws receives
+            }
             // The timeout is a system call: only when the rhythm changes. A stream of states keeps the loop going anyway.
             let longest = longest.max(SHORTEST_WAIT);
             if wait != Some(longest) {
@@ -305,17 +330,42 @@ impl Hot {
                 }
                 wait = Some(longest);
             }
-            match socket.recv(&mut buffer) {
-                Ok(length) => self.receive(&buffer[..length], Instant::now()),
-                Err(error)
-                    if matches!(
-                        error.kind(),
-                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-                    ) => {}
+            if !self.receive_one(socket, &mut buffer) {
                 // A datagram bounced, or a signal came: soft, but no reason to spin.
-                Err(_) => std::thread::sleep(SHORTEST_WAIT),
+                std::thread::sleep(SHORTEST_WAIT);
             }
         }
+    }
+
+    /// Takes one datagram in, if one comes before the socket's timeout; `false` if the system has something else to say.
+    fn receive_one(&self, socket: &UdpSocket, buffer: &mut [u8]) -> bool {
+        match socket.recv(buffer) {
+            Ok(length) => {
+                self.receive(&buffer[..length], Instant::now());
+                true
+            }
+            Err(error) => matches!(
+                error.kind(),
+                io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+            ),
+        }
+    }
+
+    /// For the thread that draws, while it has the seat: takes one datagram in, if one comes within `longest`. No allocation.
+    pub(crate) fn receive_within(&self, longest: Duration) {
+        let Path::Udp { socket, .. } = &self.path else {
+            return;
+        };
+        let mut buffer = [0; MAX_DATAGRAM_BYTES + 1];
+        if wait_readable(socket, longest) && !self.receive_one(socket, &mut buffer) {
+            std::thread::sleep(SHORTEST_WAIT);
+        }
+    }
+
+    /// Whether the thread that draws may take the seat: not over QUIC, where a task receives, and not where the RELEASE comes from this node itself.
+    pub(crate) fn has_seat(&self) -> bool {
+        let leads = |part: &mut super::frames::Part| part.node.master() == self.group.own();
+        matches!(self.path, Path::Udp { .. }) && self.inbound.frames.with(leads) == Some(false)
     }
 
     async fn run_quic(&self) {

@@ -13,6 +13,7 @@ mod multicast;
 mod options;
 mod reign;
 mod rejoiner;
+mod seat;
 mod supervised;
 mod told;
 mod watch;
