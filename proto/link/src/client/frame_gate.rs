@@ -173,26 +173,13 @@ impl FrameGate {
     ///
     /// Ends after half a second without a release, or three frames where they are slow.
     pub fn wait(&mut self) -> Option<Instant> {
-        let found = self.wait_for_release();
-        self.hot.seat.give_back();
-        found.map(|swap_ns| self.sleep_until(swap_ns))
-    }
-
-    /// The session time at which the frame is to be shown, 0 for at once; `None` if the barrier is gone.
-    fn wait_for_release(&self) -> Option<u64> {
-        let (hot, frames) = (&self.hot, &self.hot.inbound.frames);
         loop {
-            if hot.is_over() {
+            if self.hot.is_over() {
                 return None;
             }
-            if hot.has_seat() {
-                hot.seat.ask();
-            } else {
-                hot.seat.give_back();
-            }
-            let now_ns = hot.inbound.local_ns(Instant::now());
+            let now_ns = self.hot.inbound.local_ns(Instant::now());
             let mut message = None;
-            let mut look = |part: &mut Part| {
+            let found = self.hot.inbound.frames.wait(|part| {
                 match part.node.turn(now_ns) {
                     Turn::Swap { swap_ns, .. } => return Ok(Some(swap_ns)),
                     Turn::Free | Turn::Draw { .. } => return Ok(None),
@@ -208,34 +195,12 @@ impl FrameGate {
                     }
                     Turn::Swap { .. } | Turn::Free | Turn::Draw { .. } => Err(Duration::ZERO),
                 }
-            };
-            let found = if hot.seat.is_at_drawer() {
-                match frames.with(look) {
-                    Some(Ok(found)) => Some(found),
-                    Some(Err(longest)) => {
-                        if !longest.is_zero() {
-                            hot.receive_within(longest);
-                            // The shortest way from a RELEASE to the swap.
-                            if let Some(Turn::Swap { swap_ns, .. }) =
-                                frames.with(|part| part.node.turn(now_ns))
-                            {
-                                return Some(swap_ns);
-                            }
-                        }
-                        None
-                    }
-                    None => return None,
-                }
-            } else {
-                // The seat may be given between the two looks: then there is nothing to wait for here.
-                let given = || hot.seat.is_at_drawer();
-                frames.wait(|part| match look(part) {
-                    Err(_) if given() => Err(Duration::ZERO),
-                    looked => looked,
-                })
-            };
+            });
             match found {
-                Some(found) => return found,
+                Some(Some(swap_ns)) => {
+                    return Some(self.sleep_until(swap_ns));
+                }
+                Some(None) => return None,
                 None => self.send(message),
             }
         }
@@ -243,12 +208,13 @@ impl FrameGate {
 
     /// The frame's swap was called at `swap`.
     pub fn swapped(&mut self, swap: Instant) {
+        // Other nodes of this machine may be waiting for the processor to show theirs, too.
+        std::thread::yield_now();
         let swapped_ns = self.session_ns(swap);
         self.hot
             .inbound
             .frames
             .with(|part| part.node.swapped(swapped_ns));
-        self.hot.seat.wake_receiver();
         self.raised = None;
     }
 
@@ -298,7 +264,7 @@ impl FrameGate {
             std::thread::sleep(sleep);
         }
         while Instant::now() < swap {
-            std::thread::yield_now(); // another node of this machine, of the same real-time priority, is to be ready as well
+            std::hint::spin_loop();
         }
         swap
     }
@@ -315,8 +281,6 @@ fn planned_ns(release: &ReleaseHead, sample_ns: u64) -> u64 {
 
 impl Drop for FrameGate {
     fn drop(&mut self) {
-        self.hot.seat.give_back();
-        self.hot.seat.wake_receiver();
         self.hot.inbound.frames.take_leave();
     }
 }

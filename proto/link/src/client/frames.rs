@@ -370,12 +370,6 @@ impl Frames {
         }
     }
 
-    /// Wakes the thread that waits for a RELEASE, to look again.
-    pub(crate) fn wake(&self) {
-        drop(self.lock()); // between its look and its wait it would miss it
-        self.released.notify_one();
-    }
-
     fn lock(&self) -> MutexGuard<'_, Option<Part>> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }

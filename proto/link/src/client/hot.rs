@@ -1,8 +1,8 @@
 //! The hot plane of a client: a UDP socket with a thread, or QUIC datagrams with a task. Both receive, and both keep the path and the
 //! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
-use super::{group::GroupEnd, inbound::Inbound, multicast, seat::Seat};
-use crate::{LinkError, framing::CLOSE_STOPPING, readiness::wait_readable, realtime::raise};
+use super::{group::GroupEnd, inbound::Inbound, multicast};
+use crate::{LinkError, framing::CLOSE_STOPPING, realtime::raise};
 use quinn::{Connection, ConnectionError};
 use std::{
     io,
@@ -52,7 +52,6 @@ pub(crate) struct Hot {
     pub(crate) inbound: Inbound,
     pub(crate) group: GroupEnd,
     pub(crate) connection: Connection,
-    pub(crate) seat: Seat,
     /// Real-time priority of the threads of frames.
     pub(crate) priority: Option<u8>,
     sealer: Sealer,
@@ -97,7 +96,6 @@ impl Hot {
             inbound,
             group,
             connection,
-            seat: Seat::default(),
             sealer,
             path,
             outbox: OnceLock::new(),
@@ -316,12 +314,6 @@ impl Hot {
             if self.inbound.frames.takes_part() {
                 longest = longest.min(LOOK_PERIOD);
             }
-            if self.seat.leave() {
-                self.inbound.frames.wake(); // to take it
-            }
-            if !self.seat.wait(longest) {
-                continue; // the thread that draws receives
-            }
             // The timeout is a system call: only when the rhythm changes. A stream of states keeps the loop going anyway.
             let longest = longest.max(SHORTEST_WAIT);
             if wait != Some(longest) {
@@ -330,42 +322,17 @@ impl Hot {
                 }
                 wait = Some(longest);
             }
-            if !self.receive_one(socket, &mut buffer) {
+            match socket.recv(&mut buffer) {
+                Ok(length) => self.receive(&buffer[..length], Instant::now()),
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+                    ) => {}
                 // A datagram bounced, or a signal came: soft, but no reason to spin.
-                std::thread::sleep(SHORTEST_WAIT);
+                Err(_) => std::thread::sleep(SHORTEST_WAIT),
             }
         }
-    }
-
-    /// Takes one datagram in, if one comes before the socket's timeout; `false` if the system has something else to say.
-    fn receive_one(&self, socket: &UdpSocket, buffer: &mut [u8]) -> bool {
-        match socket.recv(buffer) {
-            Ok(length) => {
-                self.receive(&buffer[..length], Instant::now());
-                true
-            }
-            Err(error) => matches!(
-                error.kind(),
-                io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
-            ),
-        }
-    }
-
-    /// For the thread that draws, while it has the seat: takes one datagram in, if one comes within `longest`. No allocation.
-    pub(crate) fn receive_within(&self, longest: Duration) {
-        let Path::Udp { socket, .. } = &self.path else {
-            return;
-        };
-        let mut buffer = [0; MAX_DATAGRAM_BYTES + 1];
-        if wait_readable(socket, longest) && !self.receive_one(socket, &mut buffer) {
-            std::thread::sleep(SHORTEST_WAIT);
-        }
-    }
-
-    /// Whether the thread that draws may take the seat: not over QUIC, where a task receives, and not where the RELEASE comes from this node itself.
-    pub(crate) fn has_seat(&self) -> bool {
-        let leads = |part: &mut super::frames::Part| part.node.master() == self.group.own();
-        matches!(self.path, Path::Udp { .. }) && self.inbound.frames.with(leads) == Some(false)
     }
 
     async fn run_quic(&self) {

@@ -13,7 +13,6 @@ mod multicast;
 mod options;
 mod reign;
 mod rejoiner;
-mod seat;
 mod supervised;
 mod told;
 mod watch;

@@ -34,9 +34,7 @@ pub(crate) fn run_udp(shared: &Arc<Shared>) {
                 receive_udp(shared, &buffer[..length], from, now_ns);
             }
             // Nothing there, or an earlier datagram bounced (a client that is gone): both are soft.
-            Err(_) => {
-                wait_readable(&shared.udp, STOP_CHECK);
-            }
+            Err(_) => wait_readable(&shared.udp, STOP_CHECK),
         }
     }
 }
