@@ -203,7 +203,7 @@ impl Node {
         // Only a copy: the first ARRIVE of a frame, which the master may wait for, is never held back.
         if next_ns + HUSH_NS > due_ns && now_ns < due_ns + ARRIVE_PERIOD_NS {
             self.repeat_ns = ARRIVE_PERIOD_NS;
-            return next_ns.max(due_ns + ARRIVE_PERIOD_NS);
+            return now_ns.max(due_ns) + ARRIVE_PERIOD_NS;
         }
         next_ns
     }

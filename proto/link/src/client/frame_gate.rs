@@ -13,6 +13,8 @@ use taut_proto::{
 
 /// The last of the way to a planned swap is waited for without sleep, because no timer is that sharp.
 const SPIN: Duration = Duration::from_micros(80);
+/// A session time that is known worse than this is not told, and no swap is planned by it, ns: half a round trip says how well it is known.
+const WORST_CLOCK_NS: u64 = 1_000_000;
 /// A planned swap that is further away is an error of a clock: the frame is shown at once.
 const FARTHEST_SWAP: Duration = Duration::from_millis(100);
 
@@ -234,10 +236,11 @@ impl FrameGate {
         status.flatten().unwrap_or_default()
     }
 
-    /// Session time, ns; 0 while it is not known.
+    /// Session time, ns; 0 while it is not known well enough.
     fn session_ns(&self, moment: Instant) -> u64 {
         let time = self.hot.inbound.session_at(moment);
-        time.map_or(0, |time| time.ns)
+        time.filter(|time| time.uncertainty_ns <= WORST_CLOCK_NS)
+            .map_or(0, |time| time.ns)
     }
 
     fn send(&self, message: Option<Arrive>) {

@@ -27,6 +27,8 @@ pub struct Extent {
     pub deaths: usize,
     /// Numbers of nodes whose swaps are compared.
     pub screens: &'static [u64],
+    /// Runs of each sort of frames, of which the median counts.
+    pub skew_turns: usize,
     /// Silence after which nodes and server give each other up where the server dies.
     pub node_timeout: Duration,
     /// Turns of the isolation runs, each without and with clients.
@@ -456,6 +458,7 @@ impl Extent {
             joins: 10,
             deaths: 5,
             screens: &[2, 4],
+            skew_turns: 5,
             node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),
             turns: 6,
             turn_seconds: 8.0,
@@ -474,6 +477,7 @@ impl Extent {
             joins: 1,
             deaths: 1,
             screens: &[2],
+            skew_turns: 1,
             // A busy machine starves a thread for longer than a workbench forgives.
             node_timeout: Duration::from_secs(2),
             turns: 1,
