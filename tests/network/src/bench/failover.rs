@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
 use taut_link::{ClientOptions, ClusterKey, Role, ServerOptions, serve};
 use taut_proto::barrier::{FRAMES_LEFT_OUT, Swap};
 
@@ -140,14 +141,19 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
 }
 
 /// A server that broadcasts and leads frames, as a process that is killed when dropped.
-struct LeaderProcess {
+#[derive(Debug)]
+pub struct LeaderProcess {
     child: Child,
     quic: String,
     udp: String,
 }
 
 impl LeaderProcess {
-    fn start(
+    /// Starts it as `this` program's `--lead`, with the cluster key of a file, at the addresses of both planes.
+    ///
+    /// # Errors
+    /// No server started.
+    pub fn start(
         this: &Path,
         key: &Path,
         (quic, udp): (&str, &str),
@@ -174,6 +180,21 @@ impl LeaderProcess {
         };
         (started.quic, started.udp) = (quic.to_owned(), udp.to_owned());
         Ok(started)
+    }
+
+    /// Address of its control plane.
+    #[must_use]
+    pub fn quic(&self) -> &str {
+        &self.quic
+    }
+
+    /// Stops it as it stands, or lets it go on.
+    ///
+    /// # Errors
+    /// It is gone.
+    pub fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+        kill_process(Pid::from_child(&self.child), signal).map_err(std::io::Error::from)?;
+        Ok(())
     }
 }
 
@@ -202,6 +223,7 @@ pub fn lead(quic: &str, udp: &str, key: &Path, node_timeout: Duration) -> Result
         quic: address(quic)?,
         udp: address(udp)?,
         node_timeout,
+        idle_timeout: 2 * node_timeout, // as `taut serve`: QUIC gives nobody up before
         frames: Some(settings(Swap::Immediate, RATE)),
         ..ServerOptions::loopback(taut_link::read_key_file(key)?)
     };
