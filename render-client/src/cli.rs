@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use taut_bridge::realtime::keep_cores_awake;
 use taut_link::{ClientOptions, Role, Transport, read_join_key};
 
 use crate::canvas::Canvas;
@@ -210,6 +211,9 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         return Ok(RenderReport::of_nothing(&args));
     };
 
+    // Nodes show a frame together: one whose processors sleep deeply between two frames wakes up later than the others.
+    let (grant, _awake) = keep_cores_awake();
+    tracing::debug!("{grant}");
     let mut timeline = Timeline::new(delay_ns);
     let mut statistics = Statistics::new();
     let ended = if let Some(gpu) = gpu {

@@ -14,7 +14,7 @@ use taut_proto::barrier::{FRAMES_LEFT_OUT, Swap};
 
 use super::screen::{Screen, Swapped, longest_gap_ms, together};
 use super::skew::{Leading, settings};
-use super::{BenchError, Quantiles, request_fifo, small_content, wait_until};
+use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, small_content, wait_until};
 
 /// Frames per second.
 pub const RATE: u64 = 60;
@@ -67,21 +67,26 @@ pub fn measure(this: &Path, node_timeout: Duration) -> Result<Failover, BenchErr
 }
 
 fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
-    let fifo = request_fifo(PRIORITY);
     let directory = tempfile::tempdir()?;
     let path = directory.path().join("cluster.key");
     let key: ClusterKey = taut_link::create_key_file(&path)?;
+    // Before this thread is of the real-time class: looking for a server that is gone is not, nor is it in `taut render`.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()?;
+    let fifo = request_fifo(PRIORITY);
+    let _awake = keep_cores_awake(); // as `taut render` does
     let any = "127.0.0.1:0";
     let server = LeaderProcess::start(this, &path, (any, any), node_timeout)?;
     let (quic, udp) = (server.quic.clone(), server.udp.clone());
     let mut screens = Vec::new();
     for number in 0..NODES {
         let name = format!("node{number}");
-        let options = ClientOptions::new(quic.clone(), key.clone(), Role::Render, name);
+        let options = ClientOptions {
+            priority: Some(PRIORITY),
+            ..ClientOptions::new(quic.clone(), key.clone(), Role::Render, name)
+        };
         screens.push(Screen::start(&runtime, options, number as u64)?);
     }
     wait_until("frames", || {

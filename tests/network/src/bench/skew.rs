@@ -79,7 +79,19 @@ pub struct OverTurns {
 impl Turns {
     /// A figure of each turn. NaN, a turn without frames, is the largest of all.
     pub fn over(&self, figure: impl Fn(&Skew) -> f64) -> OverTurns {
-        let each: Vec<f64> = self.0.iter().map(figure).collect();
+        OverTurns::of(self.0.iter().map(figure).collect())
+    }
+
+    /// The sum of a count.
+    pub fn sum(&self, count: impl Fn(&Skew) -> u64) -> u64 {
+        self.0.iter().map(count).sum()
+    }
+}
+
+impl OverTurns {
+    /// Of each turn's figure.
+    #[must_use]
+    pub fn of(each: Vec<f64>) -> OverTurns {
         let mut sorted = each.clone();
         sorted.sort_by(f64::total_cmp);
         OverTurns {
@@ -87,11 +99,6 @@ impl Turns {
             worst: sorted.last().copied().unwrap_or(f64::NAN),
             each,
         }
-    }
-
-    /// The sum of a count.
-    pub fn sum(&self, count: impl Fn(&Skew) -> u64) -> u64 {
-        self.0.iter().map(count).sum()
     }
 }
 

@@ -137,6 +137,11 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         let values = runs.iter().map(of);
         values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
     };
+    let over = |of: fn(&failover::Failover) -> f64| OverTurns::of(runs.iter().map(of).collect());
+    let (led, by_server) = (
+        over(|run| run.skew_us.p99),
+        over(|run| run.server_skew_us.p99),
+    );
     let fifo = runs.iter().all(|run| run.fifo);
     let setting = format!(
         "largest of {}, {} nodes at {} Hz, {}",
@@ -163,16 +168,21 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
             FAILOVER_MS,
             "ms",
         ),
-        Row::at_most(
-            "fail-over: swap-call skew while a node leads: p99",
-            worst(|run| run.skew_us.p99),
+        Row::at_most_beside(
+            format!(
+                "fail-over: swap-call skew while a node leads: p99, median of {} runs",
+                led.each.len()
+            ),
+            led.median,
             SKEW_US.1,
             "us",
+            ("p99 while the server leads", by_server.median),
             format!(
-                "p50 {} us; while the server led {}/{} us; {setting}",
-                brief(worst(|run| run.skew_us.p50)),
-                brief(worst(|run| run.server_skew_us.p50)),
-                brief(worst(|run| run.server_skew_us.p99)),
+                "runs {}; p50 {} us; while the server led {}, median {}; {setting}",
+                each(&led),
+                brief(over(|run| run.skew_us.p50).median),
+                each(&by_server),
+                brief(by_server.median),
             ),
         ),
         row(
