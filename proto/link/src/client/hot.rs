@@ -52,6 +52,8 @@ pub(crate) struct Hot {
     pub(crate) inbound: Inbound,
     pub(crate) group: GroupEnd,
     pub(crate) connection: Connection,
+    /// Why the connection ended, once it has. Asked of QUIC itself it would take a lock that threads of another class hold while they work.
+    ended: OnceLock<ConnectionError>,
     /// Real-time priority of the threads of frames.
     pub(crate) priority: Option<u8>,
     sealer: Sealer,
@@ -96,6 +98,7 @@ impl Hot {
             inbound,
             group,
             connection,
+            ended: OnceLock::new(),
             sealer,
             path,
             outbox: OnceLock::new(),
@@ -235,6 +238,11 @@ impl Hot {
 
     /// Starts receiving; ends by itself with the session.
     pub(crate) fn start(self: Arc<Hot>) -> Result<(), LinkError> {
+        let (hot, connection) = (self.clone(), self.connection.clone());
+        tokio::spawn(async move {
+            let reason = connection.closed().await;
+            let _ = hot.ended.set(reason); // it ends once
+        });
         match self.path {
             Path::Udp { .. } => {
                 std::thread::Builder::new()
@@ -262,14 +270,14 @@ impl Hot {
     pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
             || self
-                .connection
-                .close_reason()
-                .is_some_and(|reason| !self.outlives(&reason))
+                .ended
+                .get()
+                .is_some_and(|reason| !self.outlives(reason))
     }
 
     /// Whether the server's own planes are closed.
     pub(crate) fn is_orphaned(&self) -> bool {
-        self.connection.close_reason().is_some()
+        self.ended.get().is_some()
     }
 
     /// Whether the frames go on after an end of the connection like this.
