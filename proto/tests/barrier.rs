@@ -5,9 +5,9 @@ mod barrier_support;
 use barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
-    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, MAX_MISSES, Master, MasterSettings, Newest, Node,
-    NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, SUCCESSION_NS, Succession, Swap,
-    TERMS_LEFT_OUT, Turn,
+    ARRIVE_PERIOD_NS, Arrive, Drawn, FARTHEST_AHEAD, FRAMES_LEFT_OUT, HUSH_NS, LEAD_NS, MAX_MISSES,
+    Master, MasterSettings, Newest, Node, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS,
+    SLOWEST_ARRIVE_NS, SUCCESSION_NS, Succession, Swap, TERMS_LEFT_OUT, Turn,
 };
 
 const MS: u64 = 1_000_000;
@@ -45,6 +45,7 @@ fn arrived(frame: u64) -> Arrive {
     Arrive {
         term: 1,
         frame,
+        ready_ns: 1,
         ..Arrive::default()
     }
 }
@@ -362,6 +363,71 @@ fn a_member_is_followed_only_while_the_server_is_silent() {
     assert!(!heir.may_follow(silent, 0, &of_server));
     assert!(!heir.may_follow(silent, 2, &of_member(u32::MAX, 1094)));
     assert!(!heir.may_follow(silent, 2, &of_member(2, u64::MAX)));
+}
+
+#[test]
+fn a_swap_is_planned_only_while_all_that_are_waited_for_know_the_time() {
+    let (mut master, last) = in_step(Swap::Scheduled, &[1, 2]);
+    let mut now = last;
+    let mut swap_ns = |ready_ns: u64| {
+        let frame = released(&master) + 1;
+        let _ = master.arrive(now + 5 * MS, 1, &arrived(frame));
+        let second = Arrive {
+            ready_ns,
+            ..arrived(frame)
+        };
+        let _ = master.arrive(now + 5 * MS, 2, &second);
+        now = release_when_due(&mut master);
+        (now, master.newest().map_or(0, |newest| newest.swap_ns))
+    };
+    let (now, planned) = swap_ns(7);
+    assert!(planned >= now + LEAD_NS);
+    assert_eq!(swap_ns(0).1, 0);
+    assert_eq!(swap_ns(0).1, 0);
+    let (now, planned) = swap_ns(9);
+    assert!(planned >= now + LEAD_NS);
+}
+
+/// What a node sends while it waits, from the RELEASE of the frame before on: times after that RELEASE, ns.
+fn copies(drawn_ns: u64, until_ns: u64) -> Vec<u64> {
+    let mut node = Node::new(1, 0);
+    let head = ReleaseHead {
+        frame: 1,
+        term: 1,
+        period_us: 16_667,
+        members: [1].into_iter().collect(),
+        ..ReleaseHead::default()
+    };
+    assert!(node.release(MS, &head));
+    assert_eq!(node.turn(MS), Turn::Draw { frame: 2 });
+    node.drawn(MS + drawn_ns, Drawn::default());
+    let times = (MS + drawn_ns..MS + until_ns).step_by(1000);
+    times
+        .filter(|now| node.message(*now).is_some())
+        .map(|now| now - MS)
+        .collect()
+}
+
+#[test]
+fn copies_come_ever_more_rarely_and_none_shortly_before_the_release_is_due() {
+    let due = 16_667_000;
+    for drawn in [3 * MS, 8 * MS, due - HUSH_NS / 2, due + MS] {
+        let sent = copies(drawn, due + 40 * MS);
+        assert_eq!(sent[0], drawn, "the first is never held back");
+        let hushed = |at: &&u64| **at > due - HUSH_NS && **at < due + ARRIVE_PERIOD_NS;
+        assert_eq!(sent[1..].iter().filter(hushed).count(), 0, "{sent:?}");
+        let longest = sent.windows(2).map(|pair| pair[1] - pair[0]).max();
+        assert!(longest <= Some(SLOWEST_ARRIVE_NS + HUSH_NS + ARRIVE_PERIOD_NS));
+        // A RELEASE that was lost is asked for soon after it was due, and again.
+        let after = sent.iter().filter(|at| **at >= due + ARRIVE_PERIOD_NS);
+        let asked = after.clone().take(2).collect::<Vec<_>>();
+        let soon = due.max(drawn) + 2 * ARRIVE_PERIOD_NS;
+        assert!(
+            *asked[0] <= soon && *asked[1] <= soon + ARRIVE_PERIOD_NS,
+            "{sent:?}"
+        );
+        assert!(sent.len() < 24, "{}", sent.len());
+    }
 }
 
 proptest! {

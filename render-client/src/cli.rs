@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use taut_bridge::realtime::keep_cores_awake;
 use taut_link::{ClientOptions, Role, Transport, read_join_key};
 
 use crate::canvas::Canvas;
@@ -34,6 +35,9 @@ const MAX_DELAY_MS: f64 = 200.0;
 
 /// From handing a picture over to its light, in milliseconds: half a frame of 60 Hz.
 const DISPLAY_MS: f64 = 8.0;
+
+/// Real-time priority of what stands between a RELEASE and the showing of a frame: below the loops of a server on the same machine.
+const FRAME_PRIORITY: u8 = 40;
 
 /// One node of the render cluster.
 #[derive(Args, Clone, Debug)]
@@ -194,6 +198,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         ClientOptions::new(args.server.as_str(), key, Role::Render, args.node.as_str());
     options.transport = args.transport.into();
     options.mesh_cache = args.membership.cache()?;
+    options.priority = Some(FRAME_PRIORITY); // drawing itself stays in the class of everybody
     let overrides = Overrides {
         width: args.width,
         height: args.height,
@@ -206,6 +211,9 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         return Ok(RenderReport::of_nothing(&args));
     };
 
+    // Nodes show a frame together: one whose processors sleep deeply between two frames wakes up later than the others.
+    let (grant, _awake) = keep_cores_awake();
+    tracing::debug!("{grant}");
     let mut timeline = Timeline::new(delay_ns);
     let mut statistics = Statistics::new();
     let ended = if let Some(gpu) = gpu {

@@ -22,6 +22,7 @@ pub mod key_file;
 pub mod multicast;
 pub mod pinning;
 mod readiness;
+mod realtime;
 pub mod server;
 pub mod transport;
 

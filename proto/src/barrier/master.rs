@@ -35,7 +35,7 @@ pub enum Swap {
     /// When the RELEASE arrives.
     #[default]
     Immediate,
-    /// At a session time that the RELEASE names, [`LEAD_NS`] ahead.
+    /// At a session time that the RELEASE names, [`LEAD_NS`] ahead; when the RELEASE arrives while a node that is waited for has no session time.
     Scheduled,
 }
 
@@ -383,6 +383,7 @@ impl Master {
         }
 
         let swap_ns = match self.settings.swap {
+            Swap::Scheduled if self.members.iter().any(Member::has_no_clock) => 0,
             Swap::Immediate => 0,
             Swap::Scheduled => self.due_ns.max(now_ns + LEAD_NS),
         };

@@ -41,6 +41,8 @@ pub(super) struct Member {
     pub(super) missed: u32,
     pub(super) draw_us: u32,
     pub(super) period_us: u32,
+    /// It told session time with its last frame.
+    knows_time: bool,
     /// When it was heard last: session time, ns.
     pub(super) heard_ns: u64,
     /// Frames in a row at which it arrived in time.
@@ -61,6 +63,7 @@ impl Member {
             missed: 0,
             draw_us: 0,
             period_us: 0,
+            knows_time: false,
             heard_ns: now_ns,
             on_time: 0,
             misses: 0,
@@ -73,6 +76,7 @@ impl Member {
         self.arrived = arrive.frame;
         self.missed = arrive.missed;
         self.draw_us = arrive.draw_us;
+        self.knows_time = arrive.ready_ns != 0;
         self.arrived_lately = true;
         self.on_time = if in_time { self.on_time + 1 } else { 0 };
         self.state = match self.state {
@@ -94,6 +98,11 @@ impl Member {
 
     pub(super) fn is_waited_for(&self) -> bool {
         self.state == NodeState::Synced
+    }
+
+    /// Whether a planned swap would find it without a clock, so that it would show its frame before the others.
+    pub(super) fn has_no_clock(&self) -> bool {
+        self.is_waited_for() && !self.knows_time
     }
 
     pub(super) fn status(&self) -> MemberStatus {

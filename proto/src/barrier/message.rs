@@ -16,7 +16,7 @@ const FIXED_BYTES: usize = 38;
 
 /// ARRIVE payload, node to master: a frame is drawn.
 ///
-/// Session times are 0 while the node's clock is not locked.
+/// Session times are 0 while the node's clock is not locked, or known too badly to plan a swap by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arrive {
     /// [`ReleaseHead::term`] that the node follows; 0 for none.

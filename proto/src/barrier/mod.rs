@@ -2,7 +2,7 @@
 //!
 //! | message | from   | says                                                                                   |
 //! |---------|--------|----------------------------------------------------------------------------------------|
-//! | ARRIVE  | node   | frame N is drawn; repeated every [`ARRIVE_PERIOD_NS`] until it is released             |
+//! | ARRIVE  | node   | frame N is drawn; repeated until it is released, ever more rarely up to [`SLOWEST_ARRIVE_NS`] |
 //! | RELEASE | master | show frame N, now or at a time; the whole state of frame N + 1; who takes part, who is late |
 //!
 //! The RELEASE carries the state, so that every node draws the same bytes whatever else it lost. A lost ARRIVE is repeated, a lost RELEASE is
@@ -30,8 +30,12 @@ pub use node::{Drawn, Node, Turn};
 pub use skew::{FrameSkew, NodeSwap};
 pub use succession::{Succession, Successor};
 
-/// Time between two ARRIVEs of one frame, ns.
+/// Time between the first two ARRIVEs of one frame, and after its RELEASE was due, ns; each further one comes after twice the time.
 pub const ARRIVE_PERIOD_NS: u64 = 500_000;
+/// Longest time between two ARRIVEs of one frame, ns.
+pub const SLOWEST_ARRIVE_NS: u64 = 4_000_000;
+/// Time before a RELEASE is due in which nobody speaks: whatever runs then, on a node or at the master, comes between the RELEASE and the swap, ns.
+pub const HUSH_NS: u64 = 400_000;
 /// Time between two invitations of a node that has no frame yet, ns.
 pub const JOIN_PERIOD_NS: u64 = 50_000_000;
 /// Time between the two copies of a RELEASE, ns.

@@ -4,11 +4,13 @@
 //!            RELEASE            turn: Draw          drawn             RELEASE ≥ frame
 //!   Free ──────────────► Ready ───────────► Drawing ──────► Waiting ──────────────────► turn: Swap
 //!    ▲                     ▲                                   │  │                         │
-//!    └── nothing for FREE_NS ──────────────────────────────────┘  └─ ARRIVE every 500 µs    │
+//!    └── nothing for FREE_NS ──────────────────────────────────┘  └─ ARRIVE, repeated        │
 //!                          └───────────────────────── swapped ──────────────────────────────┘
 //! ```
 
-use super::{ARRIVE_PERIOD_NS, Arrive, FREE_NS, JOIN_PERIOD_NS, ReleaseHead};
+use super::{
+    ARRIVE_PERIOD_NS, Arrive, FREE_NS, HUSH_NS, JOIN_PERIOD_NS, ReleaseHead, SLOWEST_ARRIVE_NS,
+};
 use crate::group::SERVER_SENDER;
 
 /// What a node is to do now.
@@ -66,7 +68,11 @@ pub struct Node {
     newest: Option<ReleaseHead>,
     /// Since when nothing new was released, or since when it waits.
     quiet_since_ns: u64,
+    /// When the newest RELEASE came.
+    released_ns: u64,
     next_message_ns: u64,
+    /// Time from the next ARRIVE to that after it.
+    repeat_ns: u64,
     next_appeal_ns: u64,
     arrive: Arrive,
     missed: u32,
@@ -81,7 +87,9 @@ impl Node {
             phase: Phase::Free,
             newest: None,
             quiet_since_ns: 0,
+            released_ns: 0,
             next_message_ns: 0,
+            repeat_ns: ARRIVE_PERIOD_NS,
             next_appeal_ns: 0,
             arrive: Arrive::default(),
             missed: 0,
@@ -100,6 +108,7 @@ impl Node {
         }
         self.newest = Some(head.clone());
         self.quiet_since_ns = now_ns;
+        self.released_ns = now_ns;
         if self.phase == Phase::Free {
             self.phase = Phase::Ready;
         }
@@ -159,27 +168,44 @@ impl Node {
         };
         self.quiet_since_ns = now_ns;
         self.next_message_ns = now_ns;
+        self.repeat_ns = ARRIVE_PERIOD_NS;
     }
 
     /// The message that is due, if one is: an ARRIVE again and again while the node waits, an invitation now and then while it is free.
+    ///
+    /// Copies of an ARRIVE come ever more rarely, none shortly before the RELEASE is due, and one soon after it was.
     pub fn message(&mut self, now_ns: u64) -> Option<Arrive> {
         if now_ns < self.next_message_ns {
             return None;
         }
-        let (message, period_ns) = match self.phase {
+        let (message, next_ns) = match self.phase {
             Phase::Ready | Phase::Drawing { .. } => return None,
-            Phase::Waiting { .. } => (self.arrive, ARRIVE_PERIOD_NS),
+            Phase::Waiting { .. } => (self.arrive, self.next_copy_ns(now_ns)),
             Phase::Free => {
                 let invitation = Arrive {
                     period_us: self.period_us,
                     missed: self.missed,
                     ..Arrive::default()
                 };
-                (invitation, JOIN_PERIOD_NS)
+                (invitation, now_ns + JOIN_PERIOD_NS)
             }
         };
-        self.next_message_ns = now_ns + period_ns;
+        self.next_message_ns = next_ns;
         Some(message)
+    }
+
+    /// When the ARRIVE that is sent now is to be repeated.
+    fn next_copy_ns(&mut self, now_ns: u64) -> u64 {
+        let period_us = self.newest.as_ref().map_or(0, |newest| newest.period_us);
+        let due_ns = self.released_ns + u64::from(period_us) * 1000;
+        let next_ns = now_ns + self.repeat_ns;
+        self.repeat_ns = (2 * self.repeat_ns).min(SLOWEST_ARRIVE_NS);
+        // Only a copy: the first ARRIVE of a frame, which the master may wait for, is never held back.
+        if next_ns + HUSH_NS > due_ns && now_ns < due_ns + ARRIVE_PERIOD_NS {
+            self.repeat_ns = ARRIVE_PERIOD_NS;
+            return now_ns.max(due_ns) + ARRIVE_PERIOD_NS;
+        }
+        next_ns
     }
 
     /// The message to the server that is due while another node leads: it names that reign, so that a server that is there again takes the

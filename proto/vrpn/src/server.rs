@@ -42,6 +42,11 @@ const TYPES: [&str; 7] = [
     PONG,
 ];
 const PONG_NUMBER: i32 = 6;
+/// Numbers of the answers that few clients ask for: they are named to those that do.
+const TO_ROOM_NUMBER: i32 = TYPES.len() as i32;
+const UNIT_TO_SENSOR_NUMBER: i32 = TO_ROOM_NUMBER + 1;
+/// Sensors of the device: god-object, device, head.
+const SENSORS: i32 = 3;
 
 /// What a server says of its device.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,6 +96,9 @@ pub struct ServerSession {
     device_number: Option<i32>,
     /// The client's number of [`PING`].
     ping_number: Option<i32>,
+    /// The client's numbers of the questions that are answered.
+    to_room_number: Option<i32>,
+    unit_to_sensor_number: Option<i32>,
     sent: u32,
 }
 
@@ -108,6 +116,8 @@ impl ServerSession {
             datagrams_to: None,
             device_number: None,
             ping_number: None,
+            to_room_number: None,
+            unit_to_sensor_number: None,
             sent: 0,
         }
     }
@@ -237,8 +247,27 @@ impl ServerSession {
                 learn(&mut self.device_number, sender, is_device);
             }
             description::TYPE => {
-                let is_ping = description::name(message.payload)? == PING;
-                learn(&mut self.ping_number, sender, is_ping);
+                let name = description::name(message.payload)?;
+                learn(&mut self.ping_number, sender, name == PING);
+                for (number, known, question, answer) in [
+                    (
+                        TO_ROOM_NUMBER,
+                        &mut self.to_room_number,
+                        tracker::REQUEST_TO_ROOM,
+                        tracker::TO_ROOM,
+                    ),
+                    (
+                        UNIT_TO_SENSOR_NUMBER,
+                        &mut self.unit_to_sensor_number,
+                        tracker::REQUEST_UNIT_TO_SENSOR,
+                        tracker::UNIT_TO_SENSOR,
+                    ),
+                ] {
+                    learn(known, sender, name == question);
+                    if name == question {
+                        name_type(&mut self.pending, number, answer)?;
+                    }
+                }
             }
             description::UDP => {
                 let address = description::udp(message)?;
@@ -250,11 +279,31 @@ impl ServerSession {
             _ if Some(kind) == self.ping_number && Some(sender) == self.device_number => {
                 self.say(PONG_NUMBER, &[], now, false)?;
             }
+            _ if Some(kind) == self.to_room_number && Some(sender) == self.device_number => {
+                self.say(TO_ROOM_NUMBER, &tracker::to_room(), now, false)?;
+            }
+            _ if Some(kind) == self.unit_to_sensor_number && Some(sender) == self.device_number => {
+                for sensor in 0..SENSORS {
+                    let payload = tracker::unit_to_sensor(sensor);
+                    self.say(UNIT_TO_SENSOR_NUMBER, &payload, now, false)?;
+                }
+            }
             // Whatever else a client wants of a device, this one only reports.
             _ => {}
         }
         Ok(())
     }
+}
+
+/// Names a type to the client, where there is room for that: it may ask for it again and again.
+fn name_type(pending: &mut Vec<u8>, number: i32, name: &str) -> Result<(), ServerError> {
+    let before = pending.len();
+    description::append_name(pending, description::TYPE, number, name);
+    if pending.len() > MAX_PENDING_BYTES {
+        pending.truncate(before);
+        return Err(ServerError::Slow);
+    }
+    Ok(())
 }
 
 /// Notes that the peer's `number` means the name that is looked for, or no longer does.
@@ -451,6 +500,90 @@ mod tests {
         let events = events(&mut client);
         assert!(matches!(events[..], [Event::Open(_)]), "{events:?}");
         assert_eq!(client.senders(), ["taut"]);
+    }
+
+    /// What a client says that asks `question`, under number 21, of the device, its sender 1.
+    fn asking(question: &str) -> Vec<u8> {
+        let mut said = cookie().to_vec();
+        description::append_name(&mut said, description::SENDER, 1, "taut");
+        description::append_name(&mut said, description::TYPE, 21, question);
+        let header = Header {
+            time: NOW,
+            sender: 1,
+            kind: 21,
+            sequence: 5,
+        };
+        append(&mut said, &header, &[]);
+        said
+    }
+
+    /// The messages of what a server said after its greeting: sender, type and payload.
+    fn said(server: &ServerSession) -> Vec<(i32, i32, Vec<u8>)> {
+        let mut rest = &server.pending()[COOKIE_BYTES..];
+        let mut messages = Vec::new();
+        while let Some((message, taken)) = first(rest).expect("its own messages") {
+            let Header { sender, kind, .. } = message.header;
+            messages.push((sender, kind, message.payload.to_vec()));
+            rest = &rest[taken..];
+        }
+        messages
+    }
+
+    #[test]
+    fn a_client_that_asks_how_the_tracker_stands_is_told_that_its_poses_are_those_of_the_room() {
+        let mut server = ServerSession::new("taut", Ipv4Addr::LOCALHOST);
+        let question = asking(tracker::REQUEST_TO_ROOM);
+        server.receive(&question, NOW).expect("a client");
+        let messages = said(&server);
+        let [.., (named, as_type, name), (sender, kind, payload)] = &messages[..] else {
+            panic!("{messages:?}");
+        };
+        assert_eq!(*as_type, description::TYPE);
+        assert_eq!(description::name(name), Ok(tracker::TO_ROOM.to_owned()));
+        assert_eq!((*sender, kind), (DEVICE, named));
+        let mut expected = vec![0; 48];
+        expected.extend(1.0_f64.to_be_bytes());
+        assert_eq!(*payload, expected);
+    }
+
+    #[test]
+    fn each_sensor_is_itself_what_is_tracked() {
+        let mut server = ServerSession::new("taut", Ipv4Addr::LOCALHOST);
+        let question = asking(tracker::REQUEST_UNIT_TO_SENSOR);
+        server.receive(&question, NOW).expect("a client");
+        let messages = said(&server);
+        let answers = &messages[messages.len() - SENSORS as usize..];
+        let (named, _, name) = &messages[messages.len() - SENSORS as usize - 1];
+        assert_eq!(
+            description::name(name),
+            Ok(tracker::UNIT_TO_SENSOR.to_owned())
+        );
+        for (sensor, (sender, kind, payload)) in (0..).zip(answers) {
+            assert_eq!((*sender, kind), (DEVICE, named));
+            let told = PoseReport::decode(payload).expect("valid");
+            let expected = PoseReport {
+                sensor,
+                position: [0.0; 3],
+                rotation: [0.0, 0.0, 0.0, 1.0],
+            };
+            assert_eq!((told, payload.len()), (expected, PoseReport::BYTES));
+        }
+        // Of another device nothing is told.
+        let mut other = ServerSession::new("Tracker0", Ipv4Addr::LOCALHOST);
+        other.receive(&question, NOW).expect("a client");
+        assert!(said(&other).iter().all(|(_, kind, _)| *kind < 0));
+    }
+
+    #[test]
+    fn a_client_that_asks_for_ever_and_reads_nothing_is_given_up() {
+        for question in [tracker::REQUEST_TO_ROOM, tracker::REQUEST_UNIT_TO_SENSOR] {
+            let mut server = ServerSession::new("taut", Ipv4Addr::LOCALHOST);
+            let asked = asking(question);
+            server.receive(&asked, NOW).expect("a client");
+            let again = &asked[COOKIE_BYTES..];
+            while server.receive(again, NOW).is_ok() {}
+            assert!(server.pending().len() <= MAX_PENDING_BYTES);
+        }
     }
 
     #[test]

@@ -16,6 +16,31 @@ pub const POSE: &str = "vrpn_Tracker Pos_Quat";
 /// The type of a [`VelocityReport`].
 pub const VELOCITY: &str = "vrpn_Tracker Velocity";
 
+/// A client asks how the tracker stands in the room.
+pub const REQUEST_TO_ROOM: &str = "vrpn_Tracker Request_Tracker_To_Room";
+/// The answer: [`to_room`].
+pub const TO_ROOM: &str = "vrpn_Tracker To_Room";
+/// A client asks where the sensors are on what is tracked.
+pub const REQUEST_UNIT_TO_SENSOR: &str = "vrpn_Tracker Request_Unit_To_Sensor";
+/// The answer, one for each sensor: [`unit_to_sensor`].
+pub const UNIT_TO_SENSOR: &str = "vrpn_Tracker Unit_To_Sensor";
+
+/// Neither moved nor turned: position, then quaternion x y z w.
+const NOT_MOVED: [f64; 7] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+
+/// The payload of [`TO_ROOM`] of a tracker whose poses are those of the room: position and rotation, 56 bytes.
+#[must_use]
+pub fn to_room() -> Vec<u8> {
+    let bytes = NOT_MOVED.iter().flat_map(|number| number.to_be_bytes());
+    bytes.collect()
+}
+
+/// The payload of [`UNIT_TO_SENSOR`] of a sensor that is itself what is tracked: as a [`PoseReport`].
+#[must_use]
+pub fn unit_to_sensor(sensor: i32) -> Vec<u8> {
+    encoded(sensor, NOT_MOVED.iter(), PoseReport::BYTES)
+}
+
 /// Where a sensor is, in the tracker's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseReport {

@@ -104,6 +104,7 @@ pub(crate) async fn connect_with(
         Inbound::new(opener, options.role),
         GroupEnd::new(welcome.epoch, welcome.session),
         path,
+        options.priority,
     ));
     hot.clone().start()?;
     tokio::spawn(told::listen(hot.clone(), recv, options.rate_hz == 0));

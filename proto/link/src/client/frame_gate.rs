@@ -1,6 +1,7 @@
 //! What a render node's drawing thread does with the barrier: take a frame, draw it, say so, wait, show it.
 
 use super::{frames::Part, hot::Hot};
+use crate::realtime::{Raised, raise};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -12,6 +13,8 @@ use taut_proto::{
 
 /// The last of the way to a planned swap is waited for without sleep, because no timer is that sharp.
 const SPIN: Duration = Duration::from_micros(80);
+/// A session time that is known worse than this is not told, and no swap is planned by it, ns: half a round trip says how well it is known.
+const WORST_CLOCK_NS: u64 = 1_000_000;
 /// A planned swap that is further away is an error of a clock: the frame is shown at once.
 const FARTHEST_SWAP: Duration = Duration::from_millis(100);
 
@@ -22,6 +25,9 @@ const FARTHEST_SWAP: Duration = Duration::from_millis(100);
 pub struct FrameGate {
     hot: Arc<Hot>,
     drawing: Option<Drawing>,
+    /// Real-time priority of the wait, until the system refuses it.
+    priority: Option<u8>,
+    raised: Option<Raised>,
 }
 
 /// What is drawn and not shown yet.
@@ -90,7 +96,12 @@ impl FrameGate {
         let now_ns = hot.inbound.local_ns(Instant::now());
         let part = Part::new(session, period_us, silence_ns, now_ns);
         hot.inbound.frames.take_part(part);
-        FrameGate { hot, drawing: None }
+        FrameGate {
+            priority: hot.priority,
+            hot,
+            drawing: None,
+            raised: None,
+        }
     }
 
     /// What to draw now; the barrier hears from this node meanwhile. Does not wait.
@@ -150,6 +161,13 @@ impl FrameGate {
             part.node.message(now_ns)
         });
         self.send(message.flatten());
+        // Drawing may take long and is not for the real-time class; from here on every microsecond is one between the screens.
+        if self.raised.is_none()
+            && let Some(priority) = self.priority
+        {
+            self.raised = raise(priority);
+            self.priority = self.raised.as_ref().map(|_| priority);
+        }
     }
 
     /// Waits until the drawn frame is to be shown, and tells the master again and again until then. Show it at once, and call
@@ -192,11 +210,14 @@ impl FrameGate {
 
     /// The frame's swap was called at `swap`.
     pub fn swapped(&mut self, swap: Instant) {
+        // Other nodes of this machine may be waiting for the processor to show theirs, too.
+        std::thread::yield_now();
         let swapped_ns = self.session_ns(swap);
         self.hot
             .inbound
             .frames
             .with(|part| part.node.swapped(swapped_ns));
+        self.raised = None;
     }
 
     /// How the node stands.
@@ -215,10 +236,11 @@ impl FrameGate {
         status.flatten().unwrap_or_default()
     }
 
-    /// Session time, ns; 0 while it is not known.
+    /// Session time, ns; 0 while it is not known well enough.
     fn session_ns(&self, moment: Instant) -> u64 {
         let time = self.hot.inbound.session_at(moment);
-        time.map_or(0, |time| time.ns)
+        time.filter(|time| time.uncertainty_ns <= WORST_CLOCK_NS)
+            .map_or(0, |time| time.ns)
     }
 
     fn send(&self, message: Option<Arrive>) {
@@ -230,6 +252,9 @@ impl FrameGate {
     /// Sleeps, then spins, until a session time, and tells it on this machine's clock; at once where it is 0, over, not known or implausible.
     fn sleep_until(&self, swap_ns: u64) -> Instant {
         let now = Instant::now();
+        if swap_ns == 0 {
+            return now;
+        }
         let left = match self.session_ns(now) {
             0 => Duration::ZERO,
             now_ns => Duration::from_nanos(swap_ns.saturating_sub(now_ns)),

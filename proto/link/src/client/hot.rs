@@ -2,7 +2,7 @@
 //! clock alive with time requests: 16 quick ones at join, then twenty per second.
 
 use super::{group::GroupEnd, inbound::Inbound, multicast};
-use crate::{LinkError, framing::CLOSE_STOPPING};
+use crate::{LinkError, framing::CLOSE_STOPPING, realtime::raise};
 use quinn::{Connection, ConnectionError};
 use std::{
     io,
@@ -19,7 +19,7 @@ use taut_proto::{
     events::EventAck,
     group::{SERVER_SENDER, is_grouped},
     header::MAX_DATAGRAM_BYTES,
-    seal::Sealer,
+    seal::{DatagramBuffer, Sealer},
     time::TimeRequest,
 };
 
@@ -52,6 +52,10 @@ pub(crate) struct Hot {
     pub(crate) inbound: Inbound,
     pub(crate) group: GroupEnd,
     pub(crate) connection: Connection,
+    /// Why the connection ended, once it has. Asked of QUIC itself it would take a lock that threads of another class hold while they work.
+    ended: OnceLock<ConnectionError>,
+    /// Real-time priority of the threads of frames.
+    pub(crate) priority: Option<u8>,
     sealer: Sealer,
     path: Path,
     /// To the control stream.
@@ -87,11 +91,14 @@ impl Hot {
         inbound: Inbound,
         group: GroupEnd,
         path: Path,
+        priority: Option<u8>,
     ) -> Hot {
         Hot {
+            priority,
             inbound,
             group,
             connection,
+            ended: OnceLock::new(),
             sealer,
             path,
             outbox: OnceLock::new(),
@@ -123,15 +130,27 @@ impl Hot {
 
     /// Sends `payload` to a member under the group key, or counts the failure; `false` where that is not possible. No allocation.
     pub(crate) fn send_to_member(&self, member: u16, payload: &Payload) -> bool {
+        let mut buffer = [0; MAX_DATAGRAM_BYTES];
+        self.seal_for_members(payload, &mut buffer)
+            .is_some_and(|datagram| self.send_sealed(member, datagram))
+    }
+
+    /// Seals `payload` under the group key, for any members; `None` where that is not possible.
+    pub(crate) fn seal_for_members<'a>(
+        &self,
+        payload: &Payload,
+        buffer: &'a mut DatagramBuffer,
+    ) -> Option<&'a [u8]> {
+        let now_ns = self.inbound.local_ns(Instant::now());
+        self.group.seal(payload, now_ns, buffer)
+    }
+
+    /// Sends what is sealed to a member, or counts the failure; `false` where there is no way to it.
+    pub(crate) fn send_sealed(&self, member: u16, datagram: &[u8]) -> bool {
         let Path::Udp { socket, .. } = &self.path else {
             return false;
         };
         let Some(address) = self.group.address(member) else {
-            return false;
-        };
-        let mut buffer = [0; MAX_DATAGRAM_BYTES];
-        let now_ns = self.inbound.local_ns(Instant::now());
-        let Some(datagram) = self.group.seal(payload, now_ns, &mut buffer) else {
             return false;
         };
         let sent = socket.send_to(datagram, address).is_ok();
@@ -219,6 +238,11 @@ impl Hot {
 
     /// Starts receiving; ends by itself with the session.
     pub(crate) fn start(self: Arc<Hot>) -> Result<(), LinkError> {
+        let (hot, connection) = (self.clone(), self.connection.clone());
+        tokio::spawn(async move {
+            let reason = connection.closed().await;
+            let _ = hot.ended.set(reason); // it ends once
+        });
         match self.path {
             Path::Udp { .. } => {
                 std::thread::Builder::new()
@@ -246,14 +270,14 @@ impl Hot {
     pub(crate) fn is_over(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
             || self
-                .connection
-                .close_reason()
-                .is_some_and(|reason| !self.outlives(&reason))
+                .ended
+                .get()
+                .is_some_and(|reason| !self.outlives(reason))
     }
 
     /// Whether the server's own planes are closed.
     pub(crate) fn is_orphaned(&self) -> bool {
-        self.connection.close_reason().is_some()
+        self.ended.get().is_some()
     }
 
     /// Whether the frames go on after an end of the connection like this.
@@ -277,6 +301,7 @@ impl Hot {
         let Path::Udp { socket, .. } = &self.path else {
             return;
         };
+        let _raised = self.priority.and_then(raise);
         let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
         let mut rhythm = Rhythm::start(Instant::now());
         let mut wait = None;

@@ -31,10 +31,13 @@ pub struct ClientOptions {
     pub idle_timeout: Duration,
     /// Where meshes are kept on disk; `None`: nowhere.
     pub mesh_cache: Option<Arc<MeshCache>>,
+    /// Real-time priority, 1 to 99, of the thread that receives, of the one that leads frames, and of the one that draws while it waits for its frame.
+    /// Where the system does not grant it, and with `None`, they have the class of the thread that made them.
+    pub priority: Option<u8>,
 }
 
 impl ClientOptions {
-    /// UDP, every state, 3 s to connect, silences as the server has them, no meshes on disk.
+    /// UDP, every state, 3 s to connect, silences as the server has them, no meshes on disk, no real-time class.
     pub fn new(
         server: impl Into<String>,
         key: impl Into<JoinKey>,
@@ -51,6 +54,7 @@ impl ClientOptions {
             connect_timeout: Duration::from_secs(3),
             idle_timeout: LONGEST_IDLE,
             mesh_cache: None,
+            priority: None,
         }
     }
 }

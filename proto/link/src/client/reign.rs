@@ -7,6 +7,7 @@ use super::{
     frames::{Led, ToMember},
     hot::Hot,
 };
+use crate::realtime::raise;
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -15,6 +16,7 @@ use taut_proto::{
     Payload, Role,
     barrier::{Arrive, REPEAT_NS, SIGN_NS},
     group::SERVER_SENDER,
+    header::MAX_DATAGRAM_BYTES,
     seal::Opened,
 };
 
@@ -103,6 +105,7 @@ impl Hot {
 
     /// Body of the thread of the node that leads: releases frames until there is a better master. Never waits for a node.
     fn lead(&self) {
+        let _raised = self.priority.and_then(raise);
         let frames = &self.inbound.frames;
         let clock = || self.inbound.local_ns(Instant::now());
         // When the second copy of the newest RELEASE is due, and when the next sign of life.
@@ -135,14 +138,20 @@ impl Hot {
         }
     }
 
-    /// To every render node: also to those that follow somebody else, who are to learn of this reign.
+    /// To every render node, one right after the other: also to those that follow somebody else, who are to learn of this reign. One datagram is
+    /// sealed for all, since all have the same key of this sender.
     fn send_to_screens(&self, payload: &Payload) {
-        let Some(roster) = self.group.roster() else {
+        let mut buffer = [0; MAX_DATAGRAM_BYTES];
+        let Some((roster, datagram)) = self
+            .group
+            .roster()
+            .zip(self.seal_for_members(payload, &mut buffer))
+        else {
             return;
         };
         for member in &roster.members {
             if member.role == Role::Render && member.sender != self.group.own() {
-                self.send_to_member(member.sender, payload);
+                self.send_sealed(member.sender, datagram);
             }
         }
     }

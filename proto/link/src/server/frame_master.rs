@@ -10,10 +10,11 @@ use std::{
     time::Duration,
 };
 use taut_proto::{
-    Kind,
-    barrier::{FrameSkew, NodeState, REPEAT_NS},
+    Kind, Transport,
+    barrier::{FrameSkew, MAX_MEMBERS, NodeState, REPEAT_NS},
     codec::encode_into,
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
+    seal::DatagramBuffer,
 };
 
 /// Longest sleep of the frames thread: how soon it notices that it is to end.
@@ -28,7 +29,8 @@ pub struct FrameMaster {
     generation: u64,
     payload: [u8; MAX_PAYLOAD_BYTES],
     length: usize,
-    buffer: [u8; MAX_DATAGRAM_BYTES],
+    /// One for each member: all are sealed before the first is sent.
+    sealed: Box<[DatagramBuffer; MAX_MEMBERS]>,
     /// Frames that were told of, on their way from the master's lock to the recorder.
     shown: Vec<FrameSkew>,
     /// When the second copy of the newest RELEASE is due: session time, ns.
@@ -43,7 +45,7 @@ impl FrameMaster {
             generation: u64::MAX,
             payload: [0; MAX_PAYLOAD_BYTES],
             length: 0,
-            buffer: [0; MAX_DATAGRAM_BYTES],
+            sealed: Box::new([[0; MAX_DATAGRAM_BYTES]; MAX_MEMBERS]),
             shown: Vec::with_capacity(64),
             again_ns: None,
         }
@@ -153,17 +155,31 @@ impl FrameMaster {
         let Some(frames) = &self.shared.frames else {
             return;
         };
-        let mut members = [0; taut_proto::barrier::MAX_MEMBERS];
+        let mut members = [0; MAX_MEMBERS];
         let mut count = 0;
         for member in lock(&frames.master).master.members() {
             members[count] = member.session;
             count += 1;
         }
-        for session in self.sessions.iter() {
-            if members[..count].contains(&session.number) {
-                // What the system does not take is counted; the node's next ARRIVE brings it another.
-                let payload = &self.payload[..length];
-                let _ = session.send_bytes(Kind::Release, payload, &mut self.buffer, &self.shared);
+        let payload = &self.payload[..length];
+        let is_member = |session: &&Arc<Session>| members[..count].contains(&session.number);
+        // What comes between the first and the last datagram is between the screens: nothing but sending.
+        let mut ready = [None; MAX_MEMBERS];
+        let places = self.sealed.iter_mut().zip(&mut ready);
+        for (session, (buffer, ready)) in self.sessions.iter().filter(is_member).zip(places) {
+            *ready = session.seal_for_udp(Kind::Release, payload, buffer);
+        }
+        let sealed = self.sealed.iter().zip(&ready);
+        for (session, (buffer, ready)) in self.sessions.iter().filter(is_member).zip(sealed) {
+            // What the system does not take is counted; the node's next ARRIVE brings it another.
+            if let Some((address, bytes)) = *ready {
+                let _ = session.send_sealed(&buffer[..bytes], address, &self.shared);
+            }
+        }
+        for session in self.sessions.iter().filter(is_member) {
+            if session.transport == Transport::QuicDatagram {
+                let buffer = &mut self.sealed[0];
+                let _ = session.send_bytes(Kind::Release, payload, buffer, &self.shared);
             }
         }
     }

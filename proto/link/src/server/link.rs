@@ -253,15 +253,17 @@ impl ServerLink {
                 tracing::error!("the state thread panicked");
             }
         }
-        let address = self.quic_address;
+        let addresses = [self.quic_addr(), self.udp_addr()];
         drop(self);
-        if timeout(STOP_TIMEOUT, freed(address)).await.is_err() {
-            tracing::debug!("{address} is not free yet");
+        for address in addresses {
+            if timeout(STOP_TIMEOUT, freed(address)).await.is_err() {
+                tracing::debug!("{address} is not free yet");
+            }
         }
     }
 }
 
-/// Waits until nobody listens at `address`: the tasks of QUIC hold its socket a moment longer than the endpoint lives.
+/// Waits until nobody listens at `address`: tasks hold both sockets a moment longer than the endpoint lives.
 async fn freed(address: SocketAddr) {
     let taken =
         || UdpSocket::bind(address).is_err_and(|error| error.kind() == io::ErrorKind::AddrInUse);

@@ -147,37 +147,56 @@ impl Session {
         buffer: &mut DatagramBuffer,
         shared: &Shared,
     ) -> Sent {
-        let address = match self.transport {
-            Transport::QuicDatagram => None,
-            Transport::Udp => match *lock(&self.udp_address) {
-                Some(address) => Some(address),
-                None => return Sent::NoPath,
-            },
-        };
-        let sent = match self.sealer.seal_bytes(kind, payload, buffer) {
-            Err(_) => None,
-            Ok(datagram) => match address {
-                Some(address) => match shared.udp.send_to(datagram, address) {
-                    Ok(bytes) => Some(bytes),
-                    Err(error) => {
-                        if is_full(&error) {
-                            self.note_full(shared);
-                        }
-                        None
-                    }
-                },
-                None => {
-                    // QUIC takes it all the same, and drops the oldest for it.
-                    if self.connection.datagram_send_buffer_space() < datagram.len() {
-                        self.note_full(shared);
-                    }
-                    self.connection
-                        .send_datagram(datagram.to_vec().into())
-                        .ok()
-                        .map(|()| datagram.len())
-                }
-            },
-        };
+        if self.transport == Transport::Udp {
+            let Some(address) = self.udp_address() else {
+                return Sent::NoPath;
+            };
+            let sealed = self.sealer.seal_bytes(kind, payload, buffer).ok();
+            return match sealed {
+                Some(datagram) => self.send_sealed(datagram, address, shared),
+                None => self.count(None, shared),
+            };
+        }
+        let sealed = self.sealer.seal_bytes(kind, payload, buffer).ok();
+        let sent = sealed.and_then(|datagram| {
+            // QUIC takes it all the same, and drops the oldest for it.
+            if self.connection.datagram_send_buffer_space() < datagram.len() {
+                self.note_full(shared);
+            }
+            let given = self.connection.send_datagram(datagram.to_vec().into());
+            given.ok().map(|()| datagram.len())
+        });
+        self.count(sent, shared)
+    }
+
+    /// Seals an encoded payload, to be sent by [`Session::send_sealed`]: where it goes, and its bytes. `None` where there is no such way (yet).
+    pub(crate) fn seal_for_udp(
+        &self,
+        kind: Kind,
+        payload: &[u8],
+        buffer: &mut DatagramBuffer,
+    ) -> Option<(SocketAddr, usize)> {
+        let address = self.udp_address()?; // none over QUIC
+        let sealed = self.sealer.seal_bytes(kind, payload, buffer).ok()?;
+        Some((address, sealed.len()))
+    }
+
+    /// Sends what is sealed at once, or counts the failure. Never waits for the network.
+    pub(crate) fn send_sealed(
+        &self,
+        datagram: &[u8],
+        address: SocketAddr,
+        shared: &Shared,
+    ) -> Sent {
+        let sent = shared.udp.send_to(datagram, address);
+        if sent.as_ref().is_err_and(is_full) {
+            self.note_full(shared);
+        }
+        self.count(sent.ok(), shared)
+    }
+
+    /// Counts a datagram of so many bytes, or that none was sent.
+    fn count(&self, sent: Option<usize>, shared: &Shared) -> Sent {
         match sent {
             Some(bytes) => {
                 for (packets, sizes) in [

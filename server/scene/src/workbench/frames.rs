@@ -9,9 +9,9 @@ const MAX_FRAME_RATE: f64 = 1000.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrameSwap {
     /// On all nodes as soon as all have drawn it.
-    #[default]
     Immediate,
-    /// The same at a time that is told ahead: sharper where the nodes' clocks agree, 0.3 ms later.
+    /// The same at a time that is told ahead: sharper, 0.3 ms later; as soon as all have drawn it while a node's clock is not known well.
+    #[default]
     Scheduled,
     /// On each node by itself.
     Off,
@@ -29,7 +29,7 @@ pub struct Frames {
 impl Default for Frames {
     fn default() -> Self {
         Self {
-            swap: FrameSwap::Immediate,
+            swap: FrameSwap::Scheduled,
             rate: 60.0,
         }
     }

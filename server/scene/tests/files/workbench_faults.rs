@@ -90,7 +90,7 @@ fn every_fault_names_file_line_and_key() {
             "`bind` in [network] is \"here\", which is no address; write one such as \"0.0.0.0\"",
         ),
         (
-            "swap = \"immediate\"",
+            "swap = \"scheduled\"",
             "swap = \"imediate\"",
             "\"imediate\"",
             "`swap` in [frames] is \"imediate\", but must be \"immediate\", \"scheduled\" or \"off\"; did you mean `immediate`?",

@@ -8,12 +8,13 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
 use taut_link::{ClientOptions, ClusterKey, Role, ServerOptions, serve};
 use taut_proto::barrier::{FRAMES_LEFT_OUT, Swap};
 
 use super::screen::{Screen, Swapped, longest_gap_ms, together};
 use super::skew::{Leading, settings};
-use super::{BenchError, Quantiles, request_fifo, small_content, wait_until};
+use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, small_content, wait_until};
 
 /// Frames per second.
 pub const RATE: u64 = 60;
@@ -66,21 +67,26 @@ pub fn measure(this: &Path, node_timeout: Duration) -> Result<Failover, BenchErr
 }
 
 fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
-    let fifo = request_fifo(PRIORITY);
     let directory = tempfile::tempdir()?;
     let path = directory.path().join("cluster.key");
     let key: ClusterKey = taut_link::create_key_file(&path)?;
+    // Before this thread is of the real-time class: looking for a server that is gone is not, nor is it in `taut render`.
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()?;
+    let fifo = request_fifo(PRIORITY);
+    let _awake = keep_cores_awake(); // as `taut render` does
     let any = "127.0.0.1:0";
     let server = LeaderProcess::start(this, &path, (any, any), node_timeout)?;
     let (quic, udp) = (server.quic.clone(), server.udp.clone());
     let mut screens = Vec::new();
     for number in 0..NODES {
         let name = format!("node{number}");
-        let options = ClientOptions::new(quic.clone(), key.clone(), Role::Render, name);
+        let options = ClientOptions {
+            priority: Some(PRIORITY),
+            ..ClientOptions::new(quic.clone(), key.clone(), Role::Render, name)
+        };
         screens.push(Screen::start(&runtime, options, number as u64)?);
     }
     wait_until("frames", || {
@@ -140,14 +146,19 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
 }
 
 /// A server that broadcasts and leads frames, as a process that is killed when dropped.
-struct LeaderProcess {
+#[derive(Debug)]
+pub struct LeaderProcess {
     child: Child,
     quic: String,
     udp: String,
 }
 
 impl LeaderProcess {
-    fn start(
+    /// Starts it as `this` program's `--lead`, with the cluster key of a file, at the addresses of both planes.
+    ///
+    /// # Errors
+    /// No server started.
+    pub fn start(
         this: &Path,
         key: &Path,
         (quic, udp): (&str, &str),
@@ -174,6 +185,21 @@ impl LeaderProcess {
         };
         (started.quic, started.udp) = (quic.to_owned(), udp.to_owned());
         Ok(started)
+    }
+
+    /// Address of its control plane.
+    #[must_use]
+    pub fn quic(&self) -> &str {
+        &self.quic
+    }
+
+    /// Stops it as it stands, or lets it go on.
+    ///
+    /// # Errors
+    /// It is gone.
+    pub fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+        kill_process(Pid::from_child(&self.child), signal).map_err(std::io::Error::from)?;
+        Ok(())
     }
 }
 
@@ -202,6 +228,7 @@ pub fn lead(quic: &str, udp: &str, key: &Path, node_timeout: Duration) -> Result
         quic: address(quic)?,
         udp: address(udp)?,
         node_timeout,
+        idle_timeout: 2 * node_timeout, // as `taut serve`: QUIC gives nobody up before
         frames: Some(settings(Swap::Immediate, RATE)),
         ..ServerOptions::loopback(taut_link::read_key_file(key)?)
     };

@@ -39,6 +39,10 @@ pub struct Latency {
     pub opening_us: f64,
     /// Datagrams sent each way, warm-up excluded.
     pub sent: u64,
+    /// Of these, not sent to the QUIC client, because its way had been full: the lowered rate of a quarter of a second.
+    pub left_out: u64,
+    /// Times that QUIC's queue was full, so that its oldest datagram gave way to a newer one.
+    pub gave_way: u64,
     /// Whether the run was of the real-time class.
     pub fifo: bool,
 }
@@ -87,6 +91,7 @@ fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, B
 
     let rounds = (duration.as_secs_f64() * 1e3) as u64 + WARM_UP;
     let mut received = [Vec::new(), Vec::new()];
+    let (mut left_out, mut full_before) = (0, 0);
     let mut ticker = Ticker::new(STEP);
     let since = |moment: Instant| moment.saturating_duration_since(zero).as_nanos() as u64;
     for round in 0..rounds {
@@ -95,11 +100,19 @@ fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, B
         datagram[8..16].copy_from_slice(&round.to_le_bytes());
         datagram[..8].copy_from_slice(&since(Instant::now()).to_le_bytes());
         out.send(&datagram[..bytes])?;
-        for ((broadcaster, _, client), states) in servers.iter_mut().zip(&mut received) {
+        if round == WARM_UP {
+            full_before = servers[1].1.counters().congested;
+        }
+        for (way, ((broadcaster, _, client), states)) in
+            servers.iter_mut().zip(&mut received).enumerate()
+        {
             ticker.wait();
             let mut state = state(round, 0, full);
             state.sample_time_ns = since(Instant::now());
-            let _ = broadcaster.send(&state);
+            let report = broadcaster.send(&state);
+            if way == 1 && round >= WARM_UP {
+                left_out += report.skipped as u64;
+            }
             client.drain_states(states); // off the way: what came earlier
         }
     }
@@ -116,6 +129,8 @@ fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, B
         quic,
         opening_us,
         sent: rounds - WARM_UP,
+        left_out,
+        gave_way: servers[1].1.counters().congested - full_before,
         fifo,
     })
 }

@@ -21,7 +21,7 @@ pub mod soak;
 
 pub use memory::resident_bytes;
 pub use quantiles::Quantiles;
-pub use realtime::{Ticker, request_fifo};
+pub use realtime::{Ticker, keep_cores_awake, request_fifo};
 pub use session::{
     BenchError, client_options, content_with, server_options, small_content, state, wait_until,
 };

@@ -1,5 +1,7 @@
 //! Deadlines and the real-time class, so that what is measured is the network and not who else wants the processor.
 
+use std::fs::{File, OpenOptions};
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 /// Asks for the first-in-first-out class at this priority for this thread and those that it will make; whether it was granted.
@@ -12,6 +14,17 @@ pub fn request_fifo(priority: u8) -> bool {
     // SAFETY: `parameters` is valid through the call, which changes nothing but this thread's class.
     let answer = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) };
     answer == 0
+}
+
+/// Keeps idle processors from sleeping deeply while it is held, as `taut serve` does; `None` where the system refuses it.
+#[must_use]
+pub fn keep_cores_awake() -> Option<File> {
+    let mut held = OpenOptions::new()
+        .write(true)
+        .open("/dev/cpu_dma_latency")
+        .ok()?;
+    held.write_all(&0_i32.to_ne_bytes()).ok()?;
+    Some(held)
 }
 
 /// Deadlines one period apart. One that is missed is skipped, not caught up.

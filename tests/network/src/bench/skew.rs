@@ -13,7 +13,10 @@ use taut_link::{ClusterKey, Role, ServerLink, ServerOptions, serve};
 use taut_proto::barrier::{MasterSettings, Swap};
 
 use super::screen::{Screen, Swapped, together};
-use super::{BenchError, Quantiles, Ticker, client_options, request_fifo, small_content, state};
+use super::{
+    BenchError, Quantiles, Ticker, client_options, keep_cores_awake, request_fifo, small_content,
+    state,
+};
 
 /// Frames at the start do not count: clocks lock, nodes fall in step.
 const WARM_UP: Duration = Duration::from_secs(2);
@@ -40,6 +43,8 @@ pub struct Plan {
 pub struct Skew {
     /// Whether the run was of the real-time class.
     pub fifo: bool,
+    /// Whether idle processors were kept awake.
+    pub awake: bool,
     /// Last swap call of a frame less first, us.
     pub skew_us: Quantiles,
     /// The same of the control.
@@ -54,6 +59,56 @@ pub struct Skew {
     pub compared: u64,
     /// Of these, and of the frames compared here, other ones: must be 0.
     pub different: u64,
+}
+
+/// What came of several runs of one plan, one after the other.
+#[derive(Clone, Debug)]
+pub struct Turns(pub Vec<Skew>);
+
+/// One figure over turns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OverTurns {
+    /// The median of the turns' figures: of an even number, the larger of the two in the middle.
+    pub median: f64,
+    /// The largest.
+    pub worst: f64,
+    /// Each turn's, in order.
+    pub each: Vec<f64>,
+}
+
+impl Turns {
+    /// A figure of each turn. NaN, a turn without frames, is the largest of all.
+    pub fn over(&self, figure: impl Fn(&Skew) -> f64) -> OverTurns {
+        OverTurns::of(self.0.iter().map(figure).collect())
+    }
+
+    /// The sum of a count.
+    pub fn sum(&self, count: impl Fn(&Skew) -> u64) -> u64 {
+        self.0.iter().map(count).sum()
+    }
+}
+
+impl OverTurns {
+    /// Of each turn's figure.
+    #[must_use]
+    pub fn of(each: Vec<f64>) -> OverTurns {
+        let mut sorted = each.clone();
+        sorted.sort_by(f64::total_cmp);
+        OverTurns {
+            median: sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN),
+            worst: sorted.last().copied().unwrap_or(f64::NAN),
+            each,
+        }
+    }
+}
+
+/// Runs a plan so many times.
+///
+/// # Errors
+/// A session does not come about.
+pub fn measure_turns(plan: Plan, turns: usize) -> Result<Turns, BenchError> {
+    let runs: Result<Vec<_>, _> = (0..turns).map(|_| measure(plan)).collect();
+    Ok(Turns(runs?))
 }
 
 /// Runs it.
@@ -73,6 +128,7 @@ pub fn measure(plan: Plan) -> Result<Skew, BenchError> {
 }
 
 fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
+    let awake = keep_cores_awake();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
@@ -110,6 +166,7 @@ fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
     let ages = shown.iter().flatten().filter(|swapped| counts(swapped));
     Ok(Skew {
         fifo,
+        awake: awake.is_some(),
         skew_us: Quantiles::of(found.skew_us),
         control_us: Quantiles::of(control(plan)?),
         age_ms: Quantiles::of(ages.map(age).collect()),
@@ -220,4 +277,43 @@ fn control(plan: Plan) -> Result<Vec<f64>, BenchError> {
         at().fold(f64::MIN, f64::max) - at().fold(f64::MAX, f64::min)
     };
     Ok((0..rounds).map(skew).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turn(p99: f64) -> Skew {
+        Skew {
+            fifo: true,
+            awake: true,
+            skew_us: Quantiles {
+                p99,
+                ..Quantiles::default()
+            },
+            control_us: Quantiles::default(),
+            age_ms: Quantiles::default(),
+            overhead_us: (0.0, 0.0),
+            lapses: 2,
+            compared: 0,
+            different: 0,
+        }
+    }
+
+    #[test]
+    fn turns_tell_their_median_their_worst_and_all_of_them() {
+        let of = |turns: &[f64]| {
+            let turns = Turns(turns.iter().map(|p99| turn(*p99)).collect());
+            (
+                turns.over(|turn| turn.skew_us.p99),
+                turns.sum(|turn| turn.lapses),
+            )
+        };
+        let (over, lapses) = of(&[40.0, 900.0, 30.0]);
+        assert_eq!((over.median, over.worst, lapses), (40.0, 900.0, 6));
+        assert_eq!(over.each, [40.0, 900.0, 30.0]);
+        assert_eq!(of(&[2.0, 1.0]).0.median, 2.0);
+        assert!(of(&[1.0, f64::NAN]).0.worst.is_nan());
+        assert!(of(&[]).0.median.is_nan());
+    }
 }

@@ -6,86 +6,115 @@ use taut_proto::barrier::Swap;
 
 use super::row::{Row, brief};
 use super::sections::Extent;
-use crate::bench::skew::{self, Plan};
+use crate::bench::skew::{self, OverTurns, Plan, Skew, Turns};
 use crate::bench::{BenchError, Quantiles, failover};
 
 /// Swap-call skew of a quiet machine: p50 and p99, us.
 const SKEW_US: (f64, f64) = (20.0, 100.0);
+/// A turn lasts this part of a latency run.
+const SKEW_SHARE: f64 = 5.0;
 /// Age of the state at the swap, p99 in ms, by frames per second.
 const AGE_MS: [(u64, f64); 2] = [(60, 23.0), (120, 14.0)];
 
 /// Longest that nodes may stand still when whoever leads them dies, ms: 150 of silence, and 100 for a frame, the way, and a machine that is not idle.
 const FAILOVER_MS: f64 = 250.0;
 
-fn quantiles(of: &Quantiles) -> String {
-    format!(
-        "p50/p99/p99.9 {}/{}/{}",
-        brief(of.p50),
-        brief(of.p99),
-        brief(of.p999)
-    )
-}
-
 fn class(fifo: bool) -> &'static str {
     if fifo { "FIFO" } else { "default class" }
 }
 
-/// Two and four nodes at 60 and 120 Hz, immediate and scheduled.
+/// The turns' figures in order.
+fn each(of: &OverTurns) -> String {
+    let texts: Vec<_> = of.each.iter().map(|value| brief(*value)).collect();
+    texts.join(" ")
+}
+
+/// p50 and p99 of a plan: a row's figure is the median of its turns' figures, and all of them stand beside it, with those of the control.
+fn skew_of(plan: Plan, run: &Turns) -> [Row; 2] {
+    let measure = format!(
+        "swap-call skew, {} nodes, {} Hz, {}",
+        plan.nodes,
+        plan.rate,
+        name_of(plan.swap)
+    );
+    let row = |name: &str, limit, of: fn(&Quantiles) -> f64, more: &str| {
+        let own = run.over(|turn| of(&turn.skew_us));
+        let control = run.over(|turn| of(&turn.control_us));
+        Row::at_most_beside(
+            format!("{measure}: {name}, median of {} turns", own.each.len()),
+            own.median,
+            limit,
+            "us",
+            (name, control.median),
+            format!(
+                "turns {}, worst {}; control of bare datagrams {}, median {}{more}",
+                each(&own),
+                brief(own.worst),
+                each(&control),
+                brief(control.median)
+            ),
+        )
+    };
+    let all = |of: fn(&Skew) -> bool| run.0.iter().all(of);
+    let awake = if all(|turn| turn.awake) { "" } else { "not " };
+    let more = format!(
+        "; {} frames in all, {}, processors {awake}kept awake; overhead {} us; {} lapses",
+        run.sum(|turn| turn.skew_us.count as u64),
+        class(all(|turn| turn.fifo)),
+        brief(run.over(|turn| turn.overhead_us.0).median),
+        run.sum(|turn| turn.lapses)
+    );
+    let (p50, p99) = SKEW_US;
+    [
+        row("p50", p50, |of| of.p50, &more),
+        row("p99", p99, |of| of.p99, ""),
+    ]
+}
+
+fn name_of(swap: Swap) -> &'static str {
+    match swap {
+        Swap::Immediate => "immediate",
+        Swap::Scheduled => "scheduled",
+    }
+}
+
+/// Skew, age and equality of frames.
 pub(super) fn skew_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let (mut rows, mut ages) = (Vec::new(), Vec::new());
     let (mut compared, mut different, mut frames) = (0, 0, 0);
     for &nodes in extent.screens {
         for (rate, age_ms) in AGE_MS {
-            let mut worst: Option<(f64, String)> = None;
+            let (mut largest, mut texts) = (f64::MIN, Vec::new());
             for swap in [Swap::Immediate, Swap::Scheduled] {
-                let run = skew::measure(Plan {
+                let plan = Plan {
                     nodes,
                     rate,
                     swap,
-                    duration: Duration::from_secs_f64(extent.seconds / 2.0),
-                })?;
-                let name = format!("{swap:?}").to_lowercase();
-                let beside = format!(
-                    "{} frames, {}; {} us; control of bare datagrams {} us; overhead p50/p99 {}/{} us; {} lapses",
-                    run.skew_us.count,
-                    class(run.fifo),
-                    quantiles(&run.skew_us),
-                    quantiles(&run.control_us),
-                    brief(run.overhead_us.0),
-                    brief(run.overhead_us.1),
-                    run.lapses
-                );
-                let measure = format!("swap-call skew, {nodes} nodes, {rate} Hz, {name}");
-                let (p50, p99) = SKEW_US;
-                rows.push(Row::at_most(
-                    format!("{measure}: p50"),
-                    run.skew_us.p50,
-                    p50,
-                    "us",
-                    beside,
-                ));
-                let control = format!("control {} us", brief(run.control_us.p99));
-                rows.push(Row::at_most(
-                    format!("{measure}: p99"),
-                    run.skew_us.p99,
-                    p99,
-                    "us",
-                    control,
-                ));
-                let text = format!("{name}: {} ms", quantiles(&run.age_ms));
+                    duration: Duration::from_secs_f64(extent.seconds / SKEW_SHARE),
+                };
+                let run = skew::measure_turns(plan, extent.skew_turns)?;
+                rows.extend(skew_of(plan, &run));
+                let age = run.over(|turn| turn.age_ms.p99);
                 // NaN is larger than any.
-                let larger = |(before, _): &(f64, String)| run.age_ms.p99.total_cmp(before).is_gt();
-                if worst.as_ref().is_none_or(larger) {
-                    worst = Some((run.age_ms.p99, text));
+                if age.median.total_cmp(&largest).is_gt() {
+                    largest = age.median;
                 }
-                frames += run.skew_us.count as u64;
-                compared += run.compared;
-                different += run.different;
+                texts.push(format!("{}: turns {}", name_of(swap), each(&age)));
+                frames += run.sum(|turn| turn.skew_us.count as u64);
+                compared += run.sum(|turn| turn.compared);
+                different += run.sum(|turn| turn.different);
             }
-            let (p99, text) = worst.unwrap_or((f64::NAN, String::new()));
-            let measure =
-                format!("pose age at swap, {nodes} nodes, {rate} Hz: p99, larger of both swaps");
-            ages.push(Row::at_most(measure, p99, age_ms, "ms", text));
+            let measure = format!(
+                "pose age at swap, {nodes} nodes, {rate} Hz: p99, median of {} turns, larger of both swaps",
+                extent.skew_turns
+            );
+            ages.push(Row::at_most(
+                measure,
+                largest,
+                age_ms,
+                "ms",
+                texts.join("; "),
+            ));
         }
     }
     rows.extend(ages);
@@ -108,6 +137,11 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         let values = runs.iter().map(of);
         values.max_by(f64::total_cmp).unwrap_or(f64::NAN)
     };
+    let over = |of: fn(&failover::Failover) -> f64| OverTurns::of(runs.iter().map(of).collect());
+    let (led, by_server) = (
+        over(|run| run.skew_us.p99),
+        over(|run| run.server_skew_us.p99),
+    );
     let fifo = runs.iter().all(|run| run.fifo);
     let setting = format!(
         "largest of {}, {} nodes at {} Hz, {}",
@@ -134,16 +168,21 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
             FAILOVER_MS,
             "ms",
         ),
-        Row::at_most(
-            "fail-over: swap-call skew while a node leads: p99",
-            worst(|run| run.skew_us.p99),
+        Row::at_most_beside(
+            format!(
+                "fail-over: swap-call skew while a node leads: p99, median of {} runs",
+                led.each.len()
+            ),
+            led.median,
             SKEW_US.1,
             "us",
+            ("p99 while the server leads", by_server.median),
             format!(
-                "p50 {} us; while the server led {}/{} us; {setting}",
-                brief(worst(|run| run.skew_us.p50)),
-                brief(worst(|run| run.server_skew_us.p50)),
-                brief(worst(|run| run.server_skew_us.p99)),
+                "runs {}; p50 {} us; while the server led {}, median {}; {setting}",
+                each(&led),
+                brief(over(|run| run.skew_us.p50).median),
+                each(&by_server),
+                brief(by_server.median),
             ),
         ),
         row(

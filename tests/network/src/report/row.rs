@@ -9,6 +9,11 @@ pub enum Verdict {
     Met,
     /// It is not.
     Missed,
+    /// It is not, but the control of the same run is not either: the machine cannot tell.
+    Noisy {
+        /// The control in the unit of the row, as text.
+        control: String,
+    },
     /// Nothing was measured; why.
     Unknown(String),
 }
@@ -45,6 +50,25 @@ impl Row {
             verdict: verdict(value <= limit),
             invariant: false,
         }
+    }
+
+    /// The same, with a control of the same run: where both are above the limit, nothing is said of the target but that the machine is noisier than it.
+    #[must_use]
+    pub fn at_most_beside(
+        measure: impl fmt::Display,
+        value: f64,
+        limit: f64,
+        unit: &str,
+        (what, control): (&str, f64),
+        beside: impl fmt::Display,
+    ) -> Row {
+        let mut row = Row::at_most(measure, value, limit, unit, beside);
+        if row.verdict == Verdict::Missed && value > limit && control > limit {
+            row.verdict = Verdict::Noisy {
+                control: format!("{what} {} {unit}", brief(control)),
+            };
+        }
+        row
     }
 
     /// Something that must be so on every machine.
@@ -90,6 +114,9 @@ impl fmt::Display for Verdict {
         match self {
             Verdict::Met => f.write_str("met"),
             Verdict::Missed => f.write_str("NOT MET"),
+            Verdict::Noisy { control } => {
+                write!(f, "machine noisier than the target: control {control}")
+            }
             Verdict::Unknown(why) => write!(f, "not measured: {why}"),
         }
     }
@@ -145,6 +172,20 @@ mod tests {
         assert_eq!(row(1.0), Verdict::Met);
         assert_eq!(row(1.1), Verdict::Missed);
         assert_eq!(row(f64::NAN), Verdict::Missed);
+    }
+
+    #[test]
+    fn a_figure_above_its_limit_is_missed_unless_the_control_is_above_it_too() {
+        let row =
+            |value, control| Row::at_most_beside("a", value, 1.0, "us", ("p99", control), "b");
+        assert_eq!(row(1.0, 5.0).verdict, Verdict::Met);
+        assert_eq!(row(1.1, 0.9).verdict, Verdict::Missed);
+        assert_eq!(row(f64::NAN, 5.0).verdict, Verdict::Missed);
+        let noisy = row(1.1, 2.0).verdict.to_string();
+        assert_eq!(
+            noisy,
+            "machine noisier than the target: control p99 2.000 us"
+        );
     }
 
     #[test]

@@ -1,0 +1,104 @@
+//! The server's process stands still while nodes draw in step, one of them leads meanwhile, and the server takes the frames back from it: over real
+//! sockets, with the sessions, keys and clocks that were there before.
+//!
+//! Nothing here measures: the report's section `failover` does.
+
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use rustix::process::Signal;
+use taut_link::{ClientOptions, Role};
+use taut_network_tests::bench::failover::LeaderProcess;
+use taut_network_tests::bench::screen::{Screen, Swapped, longest_gap_ms};
+use taut_network_tests::bench::wait_until;
+use taut_proto::barrier::FRAMES_LEFT_OUT;
+
+/// Silence after which nodes and server give each other up; a node leads after three tenths of it, so that there are seven seconds for its reign and
+/// the return, on a busy machine, too.
+const SILENCE: Duration = Duration::from_secs(10);
+/// Longest time without a frame: three seconds of silence, three turns of a second, and a machine that has other things to do.
+const LONGEST_GAP_MS: f64 = 9_000.0;
+/// Frames that each leader leads at least.
+const REIGN: u64 = 30;
+const NODES: u64 = 3;
+
+type Failure = Box<dyn std::error::Error>;
+
+#[test]
+fn a_server_that_stood_still_takes_the_frames_back_from_the_node_that_led() -> Result<(), Failure> {
+    let directory = tempfile::tempdir()?;
+    let path = directory.path().join("cluster.key");
+    let key = taut_link::create_key_file(&path)?;
+    let this = Path::new(env!("CARGO_BIN_EXE_taut-network-tests"));
+    let any = "127.0.0.1:0";
+    let server = LeaderProcess::start(this, &path, (any, any), SILENCE)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()?;
+    let mut screens = Vec::new();
+    for number in 0..NODES {
+        let name = format!("node{number}");
+        let options = ClientOptions::new(server.quic(), key.clone(), Role::Render, name);
+        screens.push(Screen::start(&runtime, options, number)?);
+    }
+    let all_above = |frame: u64| screens.iter().all(|screen| screen.frame() > frame);
+    wait_until("frames of the server", || all_above(2 * REIGN))?;
+
+    server.signal(Signal::STOP)?;
+    let stopped = Instant::now();
+    let before = screens.iter().map(Screen::frame).max().unwrap_or(0);
+    let of_node = before + FRAMES_LEFT_OUT / 2;
+    wait_until("frames of a node", || {
+        all_above(before + FRAMES_LEFT_OUT + REIGN)
+    })?;
+    server.signal(Signal::CONT)?;
+    let of_server = before + FRAMES_LEFT_OUT * 3 / 2;
+    wait_until("frames of the server again", || {
+        all_above(before + 2 * FRAMES_LEFT_OUT + 2 * REIGN)
+    })?;
+    let end = Instant::now();
+
+    let shown: Vec<Vec<Swapped>> = screens
+        .into_iter()
+        .map(Screen::end)
+        .collect::<Result<_, _>>()?;
+    drop(server);
+    let mut frames: HashMap<u64, Vec<Swapped>> = HashMap::new();
+    for node in &shown {
+        for pair in node.windows(2) {
+            assert!(
+                pair[0].frame < pair[1].frame,
+                "a number comes once: {pair:?}"
+            );
+        }
+        // Nobody joined anew: the sessions are those that the server had before.
+        assert!(node.iter().all(|swapped| swapped.sessions == 1));
+        let gap = longest_gap_ms(node, stopped, end);
+        assert!(gap < LONGEST_GAP_MS, "{gap} ms without a frame");
+        for swapped in node {
+            frames.entry(swapped.frame).or_default().push(*swapped);
+        }
+    }
+    let mut states = [HashSet::new(), HashSet::new()];
+    let mut whole = [0, 0];
+    for (frame, swaps) in &frames {
+        let hashes: HashSet<_> = swaps.iter().map(|swap| swap.state_hash).collect();
+        assert_eq!(hashes.len(), 1, "frame {frame} is one picture: {swaps:?}");
+        if *frame > of_node {
+            let reign = usize::from(*frame > of_server);
+            states[reign].extend(hashes);
+            whole[reign] += u64::from(swaps.len() as u64 == NODES);
+        }
+    }
+    // The node leads with the state that was held; the server with its own, each frame a new one.
+    assert_eq!(states[0].len(), 1);
+    assert!(
+        states[1].len() as u64 >= REIGN,
+        "{} states",
+        states[1].len()
+    );
+    assert!(whole.iter().all(|frames| *frames >= REIGN / 2), "{whole:?}");
+    Ok(())
+}
