@@ -62,6 +62,7 @@ impl Frame {
         let ([left, right], [bottom, top]) = (self.costs, self.errors);
         let mut chart = ChartBuilder::on(area)
             .margin(10)
+            .margin_right(26) // half of the last label
             .caption(&self.title, ("sans-serif", 17))
             .x_label_area_size(34)
             .y_label_area_size(58)

@@ -165,7 +165,7 @@ pub(super) fn foretold(page: &mut String, results: &Results) -> std::fmt::Result
                 (value - mean).abs() <= WITHIN * mean,
             ),
             Figure::Above(least) => (
-                format!("worst above {} {unit}", brief(least)),
+                format!("worst above {}", readable(least, &unit)),
                 value > least,
             ),
         };
