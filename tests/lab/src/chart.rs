@@ -91,6 +91,7 @@ pub(crate) fn panel(
             colour: colour(outcome.method),
             size: SIZES[size.unwrap_or(0)],
             passes: passes(outcome, rows),
+            label: String::new(),
         }
     });
     (frame, marks.collect())

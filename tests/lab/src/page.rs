@@ -25,7 +25,7 @@ h3{font-size:15px;margin:16px 0 4px}table{border-collapse:collapse;margin:6px 0}
 td,th{border:1px solid #ddd;padding:3px 8px;text-align:left;vertical-align:top}th{background:#f5f5f5;font-weight:600}
 .pass{background:#e3f4e5}.fail{background:#fbdfdc}.open{background:#fdf0cf}.shown,.scope{background:#f6f6f6;color:#777}
 .row{display:flex;flex-wrap:wrap;gap:16px;align-items:flex-start}.row svg{flex:none;max-width:100%;height:auto}
-.case{flex-wrap:nowrap}.case table{flex:0 1 auto;min-width:0}.key{white-space:nowrap}
+.trace{width:460px}.case{flex-wrap:nowrap}.case table{flex:0 1 auto;min-width:0}.key{white-space:nowrap}
 small{color:#777}.dot{display:inline-block;border-radius:50%;margin:0 5px 0 14px}
 nav a{display:inline-block;margin-right:10px}p{margin:6px 0;max-width:1200px}summary{cursor:pointer}
 ";
@@ -378,13 +378,13 @@ fn maps_section(page: &mut String, results: &Results) -> Result<(), Box<dyn Erro
     page.push_str(
         "<h2 id=maps>Stiffest wall that is stable, method by method</h2>\n<p>A device of 0.2 kg and 1 N s/m that nobody holds, 1 kHz, a tick of delay, where \
          the axis does not say otherwise. Points are lines of <a href=\"stability-methods.csv\">stability-methods.csv</a>; those of one place are \
-         drawn side by side.",
+         drawn side by side. The search ends at 20 and at 100,000 N/m: a point there says no more than that.",
     );
     for method in maps::METHODS {
         page.push_str(&key(chart::colour(method), 10, method.name()));
     }
     for (colour, text) in maps::COLOURS {
-        page.push_str(&key(colour, 4, text));
+        page.push_str(&key(colour, 7, text));
     }
     page.push_str("</p>\n<div class=row>");
     for panel in maps::panels(&results.maps)? {
@@ -401,8 +401,15 @@ fn sweep_section(page: &mut String, sweep: &Sweep, points: &[Point]) -> Result<(
         "<h2 id=\"sweep-{name}\">Sweep of {name}: {}</h2>\n<p>Points are lines of <a href=\"sweep-{name}.csv\">sweep-{name}.csv</a>.",
         escaped(sweep.about)
     )?;
-    for (setting, colour) in sweeps::legend(points) {
-        page.push_str(&key(colour, 10, setting));
+    let legend = sweeps::legend(points);
+    for (name, colour) in &legend {
+        page.push_str(&key(*colour, 10, name));
+    }
+    if points
+        .iter()
+        .any(|p| !legend.iter().any(|(name, _)| *name == p.setting))
+    {
+        page.push_str("<small>The number beside a point is its setting.</small>");
     }
     page.push_str("</p>\n<div class=row>");
     for (frame, marks) in sweeps::panels(sweep, points) {

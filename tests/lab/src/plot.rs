@@ -9,7 +9,7 @@ use plotters::prelude::*;
 pub(crate) const PANEL: (u32, u32) = (460, 340);
 
 /// One point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Mark {
     /// Cost and error.
     pub(crate) place: (f64, f64),
@@ -18,6 +18,8 @@ pub(crate) struct Mark {
     pub(crate) size: i32,
     /// A dot; else a cross.
     pub(crate) passes: bool,
+    /// Beside it; empty where its colour says enough.
+    pub(crate) label: String,
 }
 
 /// Axes of a panel. What lies beyond is drawn at the border.
@@ -60,6 +62,7 @@ impl Frame {
         let ([left, right], [bottom, top]) = (self.costs, self.errors);
         let mut chart = ChartBuilder::on(area)
             .margin(10)
+            .margin_right(26) // half of the last label
             .caption(&self.title, ("sans-serif", 17))
             .x_label_area_size(34)
             .y_label_area_size(58)
@@ -93,6 +96,12 @@ impl Frame {
             } else {
                 let ink = mark.colour.stroke_width(2);
                 chart.draw_series([Cross::new(place, mark.size, ink)])?;
+            }
+            if !mark.label.is_empty() {
+                let style = ("sans-serif", 11).into_font().color(&mark.colour);
+                let beside = EmptyElement::at(place)
+                    + Text::new(mark.label.clone(), (mark.size + 2, -6), style);
+                chart.draw_series([beside])?;
             }
         }
         Ok(())

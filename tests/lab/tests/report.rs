@@ -121,10 +121,12 @@ fn a_trace_shows_the_fall_through_the_plate() {
         .expect("files are written");
     let traces = text(&folder.path().join("traces.csv"));
     let last = |method: &str| -> f64 {
-        let its = traces
+        let mut its = traces
             .lines()
             .filter(|line| line.contains(&format!(",{method},")));
-        let line = its.last().unwrap_or_else(|| panic!("no trace of {method}"));
+        let line = its
+            .next_back()
+            .unwrap_or_else(|| panic!("no trace of {method}"));
         let value = line.rsplit(',').next().expect("a last column");
         value.parse().expect("a number")
     };

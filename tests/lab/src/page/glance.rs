@@ -54,7 +54,7 @@ fn matrix(page: &mut String, results: &Results, rate: u32) -> std::fmt::Result {
                 0 => "fail",
                 _ => "open",
             };
-            write!(page, "<td class={outcome}>")?;
+            write!(page, "<td class=\"{outcome} key\">")?;
             if run > 0 {
                 write!(page, "{passed}/{run}")?;
             }
@@ -161,17 +161,17 @@ pub(super) fn foretold(page: &mut String, results: &Results) -> std::fmt::Result
         };
         let (expected, seen) = match foretold.figure {
             Figure::Mean(mean) => (
-                format!("mean {} {unit}, within 10 %", brief(mean)),
+                format!("mean {}, within 10 %", readable(mean, &unit)),
                 (value - mean).abs() <= WITHIN * mean,
             ),
             Figure::Above(least) => (
-                format!("worst above {} {unit}", brief(least)),
+                format!("worst above {}", readable(least, &unit)),
                 value > least,
             ),
         };
         writeln!(
             page,
-            "<tr><td><a href=\"#{0}\">{0}</a><td>{1}<td>{2}<td class=key>{3} Hz<td>{4}<td>{5}<td class={6}>{7} {unit}<td>{8}<td>{9}",
+            "<tr><td><a href=\"#{0}\">{0}</a><td>{1}<td>{2}<td class=key>{3} Hz<td>{4}<td>{5}<td class=\"{6} key\">{7}<td>{8}<td>{9}",
             foretold.recipe,
             escaped(foretold.case),
             foretold.method.name(),
@@ -179,13 +179,22 @@ pub(super) fn foretold(page: &mut String, results: &Results) -> std::fmt::Result
             foretold.measure,
             escaped(&expected),
             if seen { "pass" } else { "fail" },
-            brief(value),
+            readable(value, &unit),
             place,
             foretold.why
         )?;
     }
     page.push_str("</table>\n");
     Ok(())
+}
+
+/// With its unit; lengths in millimetres.
+fn readable(value: f64, unit: &str) -> String {
+    if unit == "m" {
+        format!("{} mm", brief(1e3 * value))
+    } else {
+        format!("{} {unit}", brief(value)).trim_end().to_owned()
+    }
 }
 
 /// Value, unit, and where it stands.

@@ -194,7 +194,7 @@ pub(super) fn section(page: &mut String, traces: &[Trace]) -> Result<(), Box<dyn
         if !its.is_empty() {
             write!(
                 page,
-                "<div><small><a href=\"#{0}\">{0}</a>, {1}, {2} Hz: the hand {3} (start phase {4}: {5})</small><br>",
+                "<div class=trace><small><a href=\"#{0}\">{0}</a>, {1}, {2} Hz: the hand {3} (start phase {4}: {5})</small><br>",
                 window.recipe,
                 escaped(window.case),
                 window.rate,

@@ -10,7 +10,7 @@ use super::{Cost, Point, SHOWN, Sweep};
 use crate::plot::{Frame, Mark, PANEL, front};
 use crate::report::quoted;
 
-/// Colours of settings, in their order; more begin again.
+/// Colours of settings, or of kinds of settings, in their order.
 const COLOURS: [RGBColor; 12] = [
     RGBColor(0, 90, 170),
     RGBColor(200, 90, 0),
@@ -40,18 +40,40 @@ impl Sweep {
     }
 }
 
-/// Settings and their colours.
+/// A colour each, and names: of settings, or of their kinds where there are more settings than colours.
 pub(crate) fn legend(points: &[Point]) -> Vec<(&str, RGBColor)> {
-    let mut settings: Vec<&str> = Vec::new();
-    for point in points {
-        if !settings.contains(&point.setting.as_str()) {
-            settings.push(&point.setting);
+    let all = |name: fn(&str) -> &str| {
+        let mut names: Vec<&str> = Vec::new();
+        for point in points {
+            let name = name(&point.setting);
+            if !names.contains(&name) {
+                names.push(name);
+            }
         }
-    }
-    settings
-        .into_iter()
-        .zip(COLOURS.into_iter().cycle())
-        .collect()
+        names
+    };
+    let settings = all(|setting| setting);
+    let names = if settings.len() <= COLOURS.len() {
+        settings
+    } else {
+        all(|setting| kind(setting).0)
+    };
+    names.into_iter().zip(COLOURS.into_iter().cycle()).collect()
+}
+
+/// A setting's kind and value: its last word is the value.
+fn kind(setting: &str) -> (&str, &str) {
+    setting.rsplit_once(' ').unwrap_or((setting, ""))
+}
+
+/// Of the points of a setting: its colour, and what is written beside them where the colour is that of its kind.
+fn look(legend: &[(&str, RGBColor)], setting: &str) -> (RGBColor, String) {
+    let named = |name: &str| legend.iter().find(|(of, _)| *of == name).map(|(_, c)| *c);
+    let (of_kind, value) = kind(setting);
+    named(setting).map_or_else(
+        || (named(of_kind).unwrap_or(BLACK), value.to_owned()),
+        |colour| (colour, String::new()),
+    )
 }
 
 /// One panel for each recipe and case.
@@ -85,18 +107,23 @@ pub(crate) fn panels(sweep: &Sweep, points: &[Point]) -> Vec<(Frame, Vec<Mark>)>
                 cost: sweep.cost.label(),
                 cost_line,
                 errors,
-                unit: sweep.error,
+                unit: if sweep.is_felt() {
+                    "error felt, J"
+                } else {
+                    sweep.error
+                },
                 error_line: sweep.is_felt().then_some(1.0),
             };
             let drawn = panel.iter().filter(|point| !point.error.is_nan());
-            let marks = drawn.map(|point| Mark {
-                place: (point.cost, point.error),
-                colour: legend
-                    .iter()
-                    .find(|(setting, _)| *setting == point.setting)
-                    .map_or(BLACK, |(_, colour)| *colour),
-                size: RADIUS,
-                passes: true,
+            let marks = drawn.map(|point| {
+                let (colour, label) = look(&legend, &point.setting);
+                Mark {
+                    place: (point.cost, point.error),
+                    colour,
+                    size: RADIUS,
+                    passes: true,
+                    label,
+                }
             });
             (frame, marks.collect())
         })
@@ -175,4 +202,37 @@ pub fn write(sweep: &Sweep, points: &[Point], directory: &Path) -> Result<(), Bo
     }
     root.present()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(setting: &str) -> Point {
+        Point {
+            recipe: "R38",
+            case: String::new(),
+            setting: setting.to_owned(),
+            rate: None,
+            error: 1.0,
+            cost: 1.0,
+            measures: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn no_two_names_of_a_legend_have_one_colour() {
+        let few: Vec<Point> = ["off", "10 ms"].map(point).into();
+        assert_eq!(look(&legend(&few), "10 ms"), (COLOURS[1], String::new()));
+        let many: Vec<Point> = ["one way", "other way"]
+            .iter()
+            .flat_map(|kind| (0..8).map(move |value| point(&format!("{kind} {value}"))))
+            .collect();
+        let of_kinds = legend(&many);
+        assert_eq!(
+            of_kinds,
+            [("one way", COLOURS[0]), ("other way", COLOURS[1])]
+        );
+        assert_eq!(look(&of_kinds, "other way 3"), (COLOURS[1], "3".to_owned()));
+    }
 }
