@@ -15,8 +15,8 @@
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where a pair that
-//! touches is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid off its
-//! features, those of what it became.
+//! holds the body is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid
+//! off its features, those of what it became.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
@@ -314,18 +314,11 @@ impl RowReduction {
         }
     }
 
-    /// Adds the pairs that those turn into which touch after the motion, where it violates them by more than the tolerance; whether there are any.
+    /// Adds the pairs that those of active rows turn into, where the motion violates them by more than the tolerance; whether there are any.
     fn add_neighbours(&mut self, at: &At, projection: &Projection, work: &mut Work) -> bool {
         let before = self.known.len();
-        let motion = &projection.acceleration;
-        for k in 0..before {
-            let known = &self.known[k];
-            let clearance = known.contact.gap + known.jacobian.dot(motion);
-            let touches = clearance <= TOUCHING_REST_DISTANCES * at.rest_distance; // false for NaN
-            if !touches {
-                continue;
-            }
-            let pair = known.contact.features;
+        for row in &projection.active {
+            let pair = self.known[row.row as usize].contact.features;
             let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
             for_neighbours(
                 &at.world.body.mesh,
@@ -340,7 +333,8 @@ impl RowReduction {
                         return;
                     };
                     let row = jacobian(&contact, &at.center());
-                    let violation = at.rest_distance - contact.gap - row.dot(motion);
+                    let violation =
+                        at.rest_distance - contact.gap - row.dot(&projection.acceleration);
                     if violation > at.tolerance {
                         self.add(at, &contact);
                         if let Some(row) = self.known.last_mut() {
