@@ -286,26 +286,6 @@ fn a_hand_at_rest_has_the_same_rows_in_every_set_and_runs_repeat() {
     assert_eq!(rows, run());
 }
 
-/// A wall behind a corner is known before a foot is over it: motions do not run into it and back.
-#[test]
-fn a_peg_that_is_turned_does_not_go_to_and_fro_at_the_corners_of_its_hole() {
-    let mut god_object =
-        GodObject::new(peg_in_hole(), settings(0.05), hole_pose()).expect("a free start");
-    let (mut substeps, mut many) = (0, 0);
-    for k in 0..STEPS {
-        let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (3e-3 * k as f64));
-        let device = hole_pose() * Pose::from_parts(Vector3::new(1.5e-3, 0.0, 0.0).into(), turned);
-        let report = god_object.step(&device, None);
-        substeps += report.substeps;
-        many += u32::from(report.substeps > 3);
-    }
-    println!("{substeps} {many}");
-    assert!(
-        many <= 3,
-        "{many} updates of more than three sub-steps, {substeps} in all"
-    );
-}
-
 #[test]
 fn choosing_rows_does_not_allocate() {
     let world = peg_in_hole();

@@ -14,8 +14,9 @@
 //!
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
-//! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Rows of pairs that an active one turns into
-//! across a corner of the hollow are added likewise, though they do not face yet; and those that a pair has turned into which slid off its features.
+//! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where a pair that
+//! holds the body is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid
+//! off its features, those of what it became.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
