@@ -5,9 +5,7 @@ use std::sync::Arc;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::Work;
-use crate::constraint::{
-    At, Contact, NonPenetrationConstraint, Purpose, RowReduction, Separation, collect_bounded,
-};
+use crate::constraint::{At, NonPenetrationConstraint, Purpose, RowReduction, Separation};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::world::World;
@@ -17,12 +15,6 @@ const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
-
-/// A collection that is given up may be blind where surfaces are to touch: flat faces are cut into long triangles, which lie over each other
-/// in their thousands. While no row holds the body, what is nearer than this many rest distances is looked for with more work, since a
-/// body that lands unforeseen costs still more: it is stopped below the rest distance, where volumes in single precision tell nothing apart.
-const NEAR_REST_DISTANCES: f64 = 4.0;
-const LANDING_FACTOR: u64 = 64;
 
 impl GodObject {
     /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
@@ -66,68 +58,6 @@ impl GodObject {
         self.reduction = Some(reduction);
         self.write_set();
         true
-    }
-
-    /// The facing pairs within `distance`, m, nearest first, as far as the work allows: every obstacle has its share of it.
-    fn collect_candidates(
-        &mut self,
-        reduction: &mut RowReduction,
-        at: &At,
-        distance: f64,
-        work: &mut Work,
-    ) {
-        reduction.begin(at, distance);
-        self.set.gap_min = f64::INFINITY;
-        let mut pairs = self.settings.look_ahead_pairs;
-        let mut obstacles_left = at.world.obstacles.len() as u64;
-        let near = distance.min(NEAR_REST_DISTANCES * at.rest_distance);
-        let lands = !reduction.holds(at.rest_distance);
-        for (index, obstacle) in at.world.obstacles.iter().enumerate() {
-            let share = (pairs / obstacles_left).max(1);
-            let mut collect_within = |reach: f64, pairs: u64, contacts: &mut Vec<Contact>| {
-                collect_bounded(
-                    (&at.world.body.mesh, &at.pose),
-                    (&obstacle.mesh, &obstacle.pose),
-                    u16::try_from(index).unwrap_or(u16::MAX),
-                    reach,
-                    pairs,
-                    &mut self.collision,
-                    contacts,
-                    work,
-                )
-            };
-            self.contacts.clear();
-            let mut reach = reduction.reach(index, distance);
-            let mut collected = collect_within(reach, share, &mut self.contacts);
-            // That was little: there is work left for the rest.
-            let done = collected.looked_at;
-            if reach < distance && collected.complete_within >= reach && done < share / 2 {
-                reach = distance;
-                self.contacts.clear();
-                collected = collect_within(reach, share - done, &mut self.contacts);
-                collected.looked_at += done;
-            }
-            reduction.reached(at, index, [reach, distance], collected.complete_within);
-            if lands && collected.complete_within < near {
-                // What was found farther away stays.
-                self.contacts.retain(|contact| contact.gap > near);
-                let found = collected.gap_min;
-                let most = LANDING_FACTOR * self.settings.look_ahead_pairs;
-                collected = collect_within(near, most, &mut self.contacts);
-                collected.gap_min = collected.gap_min.min(found);
-                self.contacts.sort_unstable_by(|a, b| {
-                    a.gap.total_cmp(&b.gap).then(a.features.cmp(&b.features))
-                });
-            }
-            pairs = pairs.saturating_sub(collected.looked_at);
-            obstacles_left -= 1;
-            self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            reduction.offer(at, &self.contacts, &collected);
-        }
-        let looked_at = self.settings.look_ahead_pairs - pairs;
-        self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));
-        // Known rows may be nearer than what a collection that was given up has found.
-        self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
     }
 
     /// Finds the rows that the projection of `unconstrained` needs.

@@ -25,6 +25,7 @@
 //! | `obstacles.rs`  | obstacles that move, and the body out of their way                                |
 //! | `report.rs`     | what one update did                                                               |
 
+mod candidates;
 mod collection;
 mod free_motion;
 mod generation;
