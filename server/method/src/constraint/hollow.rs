@@ -71,7 +71,9 @@ fn height_over(
         over.cross(b).dot(&normal) / squared,
         a.cross(&over).dot(&normal) / squared,
     ];
-    let inside = shares.iter().all(|share| *share >= -RIM_SHARE) && shares[0] + shares[1] <= 1.0;
+    let off_the_rim = RIM_SHARE * shares[0].abs().max(shares[1].abs());
+    let inside =
+        shares.iter().all(|share| *share >= -off_the_rim) && shares[0] + shares[1] <= 1.0;
     inside.then_some(height)
 }
 

@@ -222,9 +222,10 @@ impl RowReduction {
             .any(|c| c.gap <= TOUCHING_REST_DISTANCES * rest_distance)
     }
 
-    /// Smallest gap of the rows and candidates, m; that of candidates to first order. Infinite when there are none.
+    /// Smallest gap of the rows that face and of the candidates, m; that of candidates to first order. Infinite when there are none.
     pub(crate) fn gap_min(&self) -> f64 {
-        let known = self.known.iter().map(|row| row.contact.gap);
+        let facing = self.known.iter().filter(|row| !row.implied);
+        let known = facing.map(|row| row.contact.gap);
         let carried = self.candidates.gap.iter().map(|gap| gap.max(0.0));
         known.chain(carried).fold(f64::INFINITY, f64::min)
     }
