@@ -20,8 +20,6 @@ const MAX_FACES: usize = 32;
 const MAX_STEPS: usize = 4;
 /// A face seen at a flatter angle than that of this sine does not lie over anything.
 const GRAZING: f64 = 0.05;
-/// A way along the rim of a face runs by the face, though vertices are off by this share of it: the rim's next edge is not quite in line.
-const RIM_SHARE: f64 = 0.01;
 
 /// Whether the surface at vertex `v` lies above the straight way that goes on from there, all the way: `way` ends within the faces at `v`, and the one
 /// that it goes under rises from it towards `outward`. Both in the mesh's frame.
@@ -71,9 +69,7 @@ fn height_over(
         over.cross(b).dot(&normal) / squared,
         a.cross(&over).dot(&normal) / squared,
     ];
-    let off_the_rim = RIM_SHARE * shares[0].abs().max(shares[1].abs());
-    let inside =
-        shares.iter().all(|share| *share >= -off_the_rim) && shares[0] + shares[1] <= 1.0;
+    let inside = shares.iter().all(|share| *share >= 0.0) && shares[0] + shares[1] <= 1.0;
     inside.then_some(height)
 }
 
