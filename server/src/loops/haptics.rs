@@ -217,7 +217,8 @@ fn follow(state: &mut DeviceState, reading: &Reading, now: Duration) {
     state.sequence += 1;
     state.read = now;
     state.faulty = reading.fault.is_some();
-    state.time = reading.sample.time;
+    // The clock of a bridge is corrected while it runs, by less than the port allows: what is published does not run back by that.
+    state.time = state.time.max(reading.sample.time);
     state.pose = reading.sample.pose;
     state.velocity = reading.sample.velocity;
     state.buttons = reading.sample.buttons;
@@ -269,6 +270,28 @@ mod tests {
         fn computing_time(&self) -> Option<Duration> {
             Some(TENSIONS)
         }
+    }
+
+    #[test]
+    fn time_as_published_does_not_run_back_with_a_bridge_whose_clock_is_corrected() {
+        let mut state = DeviceState::at_start(&Pose::identity());
+        let mut times = Vec::new();
+        for ms in [10, 12, 11, 13] {
+            let reading = Reading {
+                sample: DeviceSample {
+                    time: Duration::from_millis(ms),
+                    pose: Pose::identity(),
+                    velocity: Vector6::zeros(),
+                    buttons: 0,
+                },
+                fault: None,
+                felt: None,
+            };
+            follow(&mut state, &reading, Duration::from_millis(20));
+            times.push(state.time.as_millis());
+        }
+        assert_eq!(times, [10, 12, 12, 13]);
+        assert_eq!(state.sequence, 4);
     }
 
     #[test]
