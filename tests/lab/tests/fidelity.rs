@@ -8,6 +8,9 @@ use taut_lab::fidelity::sweep::{Swept, sweep};
 
 /// Most cost of a choice over the cheapest setting within the budget: two steps of the grid of rates.
 const DEAREST: f64 = 2.2;
+/// Cost over the cheapest that is the least for all that a count of work can say, and in how many scenes it is to be.
+const LEAST: f64 = 1.01;
+const SCENES_AT_LEAST_COST: usize = 5;
 
 fn swept() -> Vec<Swept> {
     let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("fidelity");
@@ -30,6 +33,12 @@ fn a_choice_is_within_the_budget_and_not_far_from_the_cheapest_that_is() {
             table(&swept)
         );
     }
+    let cheapest = swept.iter().filter(|scene| scene.ratio() <= Some(LEAST));
+    assert!(
+        cheapest.count() >= SCENES_AT_LEAST_COST,
+        "{}",
+        table(&swept)
+    );
     // A time that is said to be kept is: the prediction orders settings, and is no less than what they take.
     for timed in swept.iter().flat_map(|scene| &scene.timed) {
         let said = timed.plan.predicted_update_us <= timed.time_us;

@@ -77,7 +77,7 @@ impl Parts {
     #[must_use]
     pub fn of(need: &SceneNeed, rate: f64, tolerance: f64, rounds: u32, meshes: &[f64]) -> Self {
         let lag = errors::longest_lag(need.k_s, rate);
-        let curvature = need.curvature();
+        let curvature = errors::parallel(need.curvature(), need.depth());
         let way = need.speed * lag;
         let felt = |distance: f64| errors::force_jnd(need.stiffness * distance, need.force);
         let moved = errors::obstacle_lag(need.obstacle_speed(), rate);
@@ -93,7 +93,13 @@ impl Parts {
         let between = need.speed / rate;
         let (turn, own) = need.stair(between, meshes);
         let (stiffness, force) = (need.stiffness, need.force);
-        let step = errors::set_step(stiffness, need.k_s, force, turn, own, between);
+        let step = errors::set_step(
+            stiffness,
+            need.k_s,
+            force,
+            [turn, own],
+            [between, need.speed * errors::TICK],
+        );
         Self {
             direction: errors::direction_jnd(errors::normal_turn(curvature, way)),
             sagitta: felt(errors::sagitta(curvature, way)),

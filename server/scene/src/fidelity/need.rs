@@ -63,10 +63,11 @@ impl BodyNeed {
         }
     }
 
-    /// A mesh: the curvature that the edges of its smooth convex parts stand for, their angle over a third of the heights of
-    /// the two faces beside them (the distance of centroids in a regular mesh).
+    /// A mesh: the curvature that the edges of its smooth convex parts stand for, their angle over the way across them. On a face whose edges all
+    /// bend that is a third of its height (to its centroid in a regular mesh), on one that bends at one edge alone, as on a cylinder, half of it.
     #[must_use]
     pub fn of_mesh(name: &str, mesh: &Mesh) -> Self {
+        let bending = bending_edges(mesh);
         let (mut bends, mut total, mut sharp, mut hollow) = (Vec::new(), 0.0, false, 0.0);
         for edge in mesh.edges() {
             let [a, b] = edge.vertices.map(|v| mesh.vertices()[v as usize]);
@@ -75,7 +76,15 @@ impl BodyNeed {
                 let [p, q, r] = mesh.corners(face);
                 (q - p).cross(&(r - p)).norm()
             });
-            let across = (doubled[0] + doubled[1]) / (3.0 * length);
+            let heights = [0, 1].map(|side| {
+                let among = if bending[edge.faces[side] as usize] == 1 {
+                    2.0
+                } else {
+                    3.0
+                };
+                doubled[side] / (among * length)
+            });
+            let across = heights[0] + heights[1];
             total += length * across;
             if edge.convexity > CREASE {
                 sharp = true;
@@ -112,6 +121,19 @@ impl BodyNeed {
             speed: 0.0,
         }
     }
+}
+
+/// For each face: its edges that neither are an edge of the body nor join two parts of one plane.
+fn bending_edges(mesh: &Mesh) -> Vec<u8> {
+    let mut bending = vec![0; mesh.triangles().len()];
+    for edge in mesh.edges() {
+        if (FLAT..=CREASE).contains(&edge.convexity.abs()) {
+            for face in edge.faces {
+                bending[face as usize] += 1;
+            }
+        }
+    }
+    bending
 }
 
 /// The largest angle between two faces at a corner without a hollow, rad: what slides over the corner goes from one to the other at once.
@@ -176,6 +198,12 @@ pub struct SceneNeed {
 }
 
 impl SceneNeed {
+    /// How deep the device goes with the usual force, m.
+    #[must_use]
+    pub fn depth(&self) -> f64 {
+        self.force / self.stiffness
+    }
+
     /// How fast a contact's normal turns along the way, 1/m: two convex bodies of curvature a and b turn about each other like
     /// ab / (a + b); an edge of the body slides over an obstacle and turns by its curvature. An edge of an obstacle is passed and not stayed
     /// on: it counts for nothing here.
@@ -195,23 +223,23 @@ impl SceneNeed {
             return (0.0, 0.0);
         }
         let error = |index: usize| mesh_errors.get(index).copied().unwrap_or(0.0);
-        let facet = |body: &BodyNeed, error: f64| {
-            let coarser = errors::facet_angle(error, body.curvature);
-            body.largest_facet_angle.max(coarser)
-        };
         let of_pair = |(index, o): (usize, &BodyNeed)| {
             let a = &self.body;
             let curvature = turning(a, o).into_iter().fold(0.0, f64::max);
-            let rounding = |body: &BodyNeed| {
-                if body.sharp {
-                    f64::INFINITY
-                } else {
-                    body.curvature
-                }
+            let rounding = if a.sharp { f64::INFINITY } else { a.curvature };
+            // Convex contacts as the device sees them; in a hollow it goes outside the contact, where normals turn no faster.
+            let deep = |curvature| errors::parallel(curvature, self.depth());
+            // Facets of a simplified mesh may meet in hollow edges, where the normal turns at once however round the other body is.
+            let stair = |body: &BodyNeed, error: f64, round: f64| {
+                let coarser = errors::facet_angle(error, body.curvature);
+                let largest = body.largest_facet_angle.max(coarser);
+                let hollow = if error > 0.0 { coarser } else { 0.0 };
+                let turned = |facet, round| errors::stair_turn(deep(curvature), facet, round, way);
+                turned(largest, deep(round)).max(turned(hollow, f64::INFINITY))
             };
             let stairs = [
-                errors::stair_turn(curvature, facet(o, error(index + 1)), rounding(a), way),
-                errors::stair_turn(curvature, facet(a, error(0)), o.curvature, way),
+                stair(o, error(index + 1), rounding),
+                stair(a, error(0), o.curvature),
                 errors::normal_turn(if o.hollow { a.curvature } else { 0.0 }, way),
                 errors::normal_turn(if a.hollow { o.curvature } else { 0.0 }, way),
             ];
@@ -260,6 +288,16 @@ mod tests {
             let found = BodyNeed::of_mesh("a", &mesh(shapes::sphere(0.02, subdivisions)));
             assert!((found.curvature * 0.02 - 1.0).abs() < 0.3, "{found:?}");
             assert!(!found.sharp);
+        }
+    }
+
+    #[test]
+    fn a_tessellated_cylinder_is_as_curved_as_the_cylinder() {
+        for facets in [24, 60] {
+            let raw = shapes::cylinder(0.01, 0.03, facets, shapes::Axis::Z);
+            let found = BodyNeed::of_mesh("a", &mesh(raw));
+            assert!((found.curvature * 0.01 - 1.0).abs() < 0.02, "{found:?}");
+            assert!(found.sharp);
         }
     }
 

@@ -1,9 +1,10 @@
 //! `fidelity = "auto"`: chosen by the scene, overridden key by key, and nothing at all without the key.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use taut_scene::fidelity::Origin;
-use taut_scene::{FidelityPlan, Scene, SceneError, check, shapes, write_ply};
+use taut_scene::{FidelityPlan, RawMesh, Scene, SceneError, check, shapes, write_ply};
 
 const BODY: &str = "name = \"s\"\n[god_object]\nshape = { sphere = { radius = 0.02 } }\nmass = 1.0\npose = { position = [0.0, 0.0, 0.05] }\n";
 const BALL: &str = "[[obstacle]]\nname = \"a\"\nshape = { sphere = { radius = 0.02 } }\n";
@@ -85,11 +86,32 @@ fn rates_and_contacts_can_be_set_and_a_time_bounds_the_work() {
     assert_eq!((plan.budget_j, plan.update_limit_us()), (0.3, 150.0));
 }
 
+/// Every triangle cut into four at the middles of its edges, `times` times.
+fn quartered(mut raw: RawMesh, times: u32) -> RawMesh {
+    for _ in 0..times {
+        let mut middles = HashMap::new();
+        let mut triangles = Vec::new();
+        for [a, b, c] in std::mem::take(&mut raw.triangles) {
+            let mut middle = |p: u32, q: u32| {
+                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
+                    let (p, q) = (raw.vertices[p as usize], raw.vertices[q as usize]);
+                    raw.vertices.push(nalgebra::center(&p, &q));
+                    raw.vertices.len() as u32 - 1
+                })
+            };
+            let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+            triangles.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+        }
+        raw.triangles = triangles;
+    }
+    raw
+}
+
 #[test]
 fn a_mesh_is_simplified_as_far_as_the_budget_allows() {
     let folder = tempfile::tempdir().unwrap();
     // Far finer than anyone feels: flat parts cut into many triangles.
-    let raw = shapes::sphere(0.03, 5);
+    let raw = quartered(shapes::cuboid([0.03, 0.03, 0.01]), 4);
     std::fs::write(folder.path().join("a.ply"), write_ply(&raw)).unwrap();
     let mesh = "[[obstacle]]\nname = \"a\"\nshape = { mesh = \"a.ply\" }\npose = { position = [0.0, 0.0, -0.01] }\n";
     let text = |head: &str| format!("{head}{BODY}{mesh}[coupling]\nk_h = 400.0\n");
@@ -100,8 +122,8 @@ fn a_mesh_is_simplified_as_far_as_the_budget_allows() {
     };
     let (auto, plain) = (of("fidelity = \"auto\"\n"), of(""));
     let triangles = |built: &taut_scene::BuiltScene| built.bodies[1].mesh.triangles.len();
-    // Whether a candidate is near enough is the simplifier's to say; the limit is the choice's.
-    assert!(triangles(&auto) <= triangles(&plain));
+    assert_eq!(triangles(&plain), 12 * 4_usize.pow(4));
+    assert!(triangles(&auto) < triangles(&plain) / 10);
     assert!(auto.simplified[0].max_error > 0.0);
     assert!(plain.simplified.is_empty());
     assert_eq!(auto.simplified.len(), 1);

@@ -29,9 +29,14 @@ const SMALL_BALL: f64 = 0.01;
 const SLIDE: f64 = 0.1;
 const FAST: f64 = 1.0;
 const PLATE: f64 = 5e-3;
+/// Where the fast hand stops, and how high the hand waits for the plate, m.
+const ARRIVED: f64 = SMALL_BALL - 0.012;
+const ABOVE: f64 = 1e-4;
 /// Turns of the rod, rad/s, and half its length, m.
 const TURN: f64 = 2.0;
 const ROD: f64 = 0.04;
+/// Most force on the rod in the reference run, N.
+const ROD_FORCE: f64 = 4.15;
 /// Time to come down and press before anything else, s.
 const PRESS: f64 = 0.2;
 
@@ -78,12 +83,12 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
     ])
 }
 
-/// A scene file: body, its start, obstacle, and how fast the hand is.
-fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn]: [f64; 2]) -> String {
+/// A scene file: body, its start, obstacle, and what is known of its use: how fast the hand goes, m/s, and turns, rad/s, and how hard it presses, N.
+fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn, force]: [f64; 3]) -> String {
     let [x, y, z] = start;
     format!(
         "name = \"fidelity\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [{x:?}, {y:?}, {z:?}] }}\n\
-         [coupling]\nk_s = 0.5\nk_h = 2000.0\nadaptation = false\n[fidelity]\nmode = \"auto\"\nspeed = {speed:?}\nturn_rate = {turn:?}\n\
+         [coupling]\nk_s = 0.5\nk_h = 2000.0\nadaptation = false\n[fidelity]\nmode = \"auto\"\nspeed = {speed:?}\nturn_rate = {turn:?}\nforce = {force:?}\n\
          [[obstacle]]\nname = \"a\"\n{obstacle}\n"
     )
 }
@@ -117,7 +122,7 @@ fn box_on_plane() -> FidelityScene {
             "box = { half_extents = [0.01, 0.01, 0.01] }",
             [0.0, 0.0, 0.0101],
             PLANE,
-            [SLIDE, 0.0],
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
         ),
         device,
         duration: 0.6,
@@ -146,7 +151,7 @@ fn sphere_on_sphere() -> FidelityScene {
             "sphere = { radius = 0.02 }",
             [0.0, 0.0, 0.0401],
             "shape = { sphere = { radius = 0.02 } }",
-            [SLIDE, 0.0],
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
         ),
         device: |time| around(time, 2.0 * BALL),
         duration: 0.6,
@@ -161,7 +166,7 @@ fn curved_mesh() -> FidelityScene {
             "sphere = { radius = 0.01 }",
             [0.0, 0.0, 0.0401],
             "shape = { mesh = \"ball.ply\"{simplify} }",
-            [SLIDE, 0.0],
+            [SLIDE, 0.0, STIFFNESS * DEPTH],
         ),
         device: |time| around(time, MESH_BALL + SMALL_BALL),
         duration: 0.6,
@@ -176,7 +181,7 @@ fn peg_in_hole() -> FidelityScene {
             "cylinder = { radius = 0.01, half_length = 0.03, facets = 24, axis = \"z\" }",
             [0.0, 0.0, 0.0],
             "shape = { box_with_hole = { half_extents = [0.03, 0.03, 0.03], radius = 0.0105, facets = 24, axis = \"z\" } }",
-            [0.05, 0.5],
+            [0.05, 0.5, STIFFNESS * DEPTH],
         ),
         // Against the wall, along it, and leaned.
         device: |time| {
@@ -204,7 +209,7 @@ fn thin_plate() -> FidelityScene {
             "sphere = { radius = 0.01 }",
             [0.0, 0.0, 0.1],
             "shape = { box = { half_extents = [0.1, 0.1, 0.0005] } }\npose = { position = [0.0, 0.0, -0.0005] }",
-            [FAST, 0.0],
+            [FAST, 0.0, STIFFNESS * (SMALL_BALL - ARRIVED)],
         ),
         device: |time| Pose::translation(0.0, 0.0, arrival(time)),
         duration: 0.4,
@@ -217,7 +222,7 @@ fn thin_plate() -> FidelityScene {
 
 /// Height of a hand that comes at full speed and stops with the body's middle beneath the plate, m.
 fn arrival(time: f64) -> f64 {
-    (0.1 - FAST * time).max(SMALL_BALL - 0.012)
+    (0.1 - FAST * time).max(ARRIVED)
 }
 
 fn moving_plate(rise: f64) -> FidelityScene {
@@ -227,14 +232,13 @@ fn moving_plate(rise: f64) -> FidelityScene {
             "box = { half_extents = [0.01, 0.01, 0.01] }",
             [0.0, 0.0, 0.0101],
             "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }",
-            [0.01, 0.0],
-        )
-        .replace("[fidelity]", "[fidelity]\nforce = 4.0"),
-        device: |_| Pose::translation(0.0, 0.0, SMALL_BALL + 1e-4),
+            [0.01, 0.0, STIFFNESS * (DEPTH - ABOVE)],
+        ),
+        device: |_| Pose::translation(0.0, 0.0, SMALL_BALL + ABOVE),
         duration: rise + 0.1,
         ideal: Some(|time| {
             let height = (PLATE * time - DEPTH).min(DEPTH);
-            force(Vector3::z() * (STIFFNESS * (height - 1e-4).max(0.0)))
+            force(Vector3::z() * (STIFFNESS * (height - ABOVE).max(0.0)))
         }),
     }
 }
@@ -246,7 +250,7 @@ fn rod_on_plane() -> FidelityScene {
             "box = { half_extents = [0.04, 0.005, 0.005] }",
             [0.0, 0.0, 0.0051],
             PLANE,
-            [0.05, TURN],
+            [0.05, TURN, ROD_FORCE],
         ),
         // Its end goes down and up again while its middle stays.
         device: |time| {
