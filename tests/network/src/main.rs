@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use taut_link::Transport;
-use taut_network_tests::bench::{failover, isolation, node};
+use taut_network_tests::bench::{client_process, leader_process, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
 
 struct Arguments {
@@ -28,7 +28,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         let [server, node, transport, key] = &words[..] else {
             return Err("--client takes SERVER NODE TRANSPORT KEY".into());
         };
-        isolation::client(server, node, transport, key.as_ref())?;
+        client_process::client(server, node, transport, key.as_ref())?;
         return Ok(ExitCode::SUCCESS);
     }
     // The server of the fail-over run, which is killed.
@@ -38,7 +38,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             return Err("--lead takes QUIC UDP KEY MILLISECONDS".into());
         };
         let node_timeout = Duration::from_millis(timeout_ms.parse()?);
-        failover::lead(quic, udp, key.as_ref(), node_timeout)?;
+        leader_process::lead(quic, udp, key.as_ref(), node_timeout)?;
         return Ok(ExitCode::SUCCESS);
     }
     // One node of a network of namespaces or machines.
