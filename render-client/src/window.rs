@@ -62,9 +62,7 @@ pub(crate) fn run(
     plan: Plan,
     hand: Option<Hand>,
 ) -> Result<(Ended, DrawnWith), RenderError> {
-    let no_display = |error: winit::error::EventLoopError| RenderError::NoDisplay {
-        reason: error.to_string(),
-    };
+    let no_display = |error: winit::error::EventLoopError| display::missing(&error);
     let events = EventLoop::new().map_err(no_display)?;
     let mut app = App {
         session,

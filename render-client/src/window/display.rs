@@ -48,9 +48,6 @@ impl Display {
         } else {
             String::new()
         };
-        let no_display = |error: &dyn std::fmt::Display| RenderError::NoDisplay {
-            reason: error.to_string(),
-        };
         let instance = new_instance(Some(events.owned_display_handle()));
         let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
         let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
@@ -74,11 +71,11 @@ impl Display {
                 below += height;
                 let window = events
                     .create_window(attributes)
-                    .map_err(|error| no_display(&error))?;
+                    .map_err(|error| missing(&error))?;
                 let window = Arc::new(window);
                 let surface = instance
                     .create_surface(Arc::clone(&window))
-                    .map_err(|error| no_display(&error))?;
+                    .map_err(|error| missing(&error))?;
                 opened.push((index, picture, window, surface));
             }
         }
@@ -167,6 +164,24 @@ impl Pane {
     }
 }
 
+/// No window, by what the window system said.
+pub(super) fn missing(error: &dyn std::fmt::Display) -> RenderError {
+    RenderError::NoDisplay {
+        reason: without_place(&error.to_string()).to_owned(),
+    }
+}
+
+/// An error's text without the place in winit's source that it may begin with, `os error at FILE.rs:LINE: `, and without its full stop.
+fn without_place(text: &str) -> &str {
+    let after =
+        |(_, rest): (&str, &str)| rest.find(": ").map(|at| at + 2 + text.len() - rest.len());
+    let begins = text
+        .strip_prefix("os error at ")
+        .and_then(|place| place.split_once(".rs:"))
+        .and_then(after);
+    text[begins.unwrap_or(0)..].trim_end_matches('.')
+}
+
 /// How to show pictures on a surface, and the sRGB format to draw them in.
 fn configuration(
     gpu: &Gpu,
@@ -190,4 +205,16 @@ fn configuration(
     config.present_mode = present_mode;
     config.desired_maximum_frame_latency = 1; // the least age that double buffering allows
     Ok((config, drawn))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_window_system_says_is_told_without_a_place_in_its_source() {
+        let told = "os error at /home/a/winit-0.30.13/src/mod.rs:765: neither DISPLAY nor another: is set.";
+        assert_eq!(without_place(told), "neither DISPLAY nor another: is set");
+        assert_eq!(without_place("it is gone"), "it is gone");
+    }
 }
