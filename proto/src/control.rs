@@ -39,7 +39,7 @@ pub const MAX_NODE_NAME_BYTES: usize = 64;
 /// How states reach a client.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Transport {
-    /// Plain UDP, sealed: the fast way on a wired network.
+    /// Sealed UDP: the fast way on a wired network.
     #[default]
     Udp,
     /// QUIC datagrams: one port, through firewalls and across sites.

@@ -38,7 +38,7 @@ const ANY_NODE_LABEL: &[u8] = b"join any node";
 pub enum KeyError {
     /// Not 64 hexadecimal digits.
     #[error(
-        "a cluster key is 64 hexadecimal digits, this has {found} usable ones: copy the server's key file again"
+        "a cluster key is 64 hexadecimal digits, this has {found} usable ones: make one with `taut keys`, or a credential of the one in use"
     )]
     Malformed {
         /// Hexadecimal digits before the first other character.

@@ -113,7 +113,7 @@ pub struct RenderArgs {
 /// How states travel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TransportArg {
-    /// Plain UDP, sealed: the fast way on a wired network.
+    /// Sealed UDP: the fast way on a wired network.
     Udp,
     /// QUIC datagrams: one port, through firewalls.
     Quic,

@@ -4,16 +4,15 @@
 //! the monitor, G, C, V and H show or hide the device ghost, the contacts, the force and the HUD. A window that
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
-use std::sync::Arc;
+mod display;
+
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use winit::application::ApplicationHandler;
-use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{KeyCode, PhysicalKey};
-use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use crate::canvas::eyes_of;
@@ -22,16 +21,15 @@ use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::headless::shown;
 use crate::hud::Overlay;
-use crate::monitor;
-use crate::mouse::{self, Mouse, Pointed};
+use crate::mouse::{Mouse, Pointed};
 use crate::pacing::Pacer;
-use crate::renderer::{Gpu, GpuChoice, PictureTarget, Renderer, new_instance};
+use crate::renderer::{Gpu, GpuChoice};
 use crate::session::{Session, Turn};
 use crate::stage::{Show, Stage};
 use crate::statistics::{Ended, Statistics};
-use crate::stereo::Picture;
 use crate::timeline::Timeline;
 use crate::view::Eyes;
+use display::Display;
 
 /// Nothing to draw yet: how soon to look again.
 const MOMENT: Duration = Duration::from_millis(2);
@@ -64,9 +62,7 @@ pub(crate) fn run(
     plan: Plan,
     hand: Option<Hand>,
 ) -> Result<(Ended, DrawnWith), RenderError> {
-    let no_display = |error: winit::error::EventLoopError| RenderError::NoDisplay {
-        reason: error.to_string(),
-    };
+    let no_display = |error: winit::error::EventLoopError| display::missing(&error);
     let events = EventLoop::new().map_err(no_display)?;
     let mut app = App {
         session,
@@ -119,26 +115,6 @@ struct App<'a> {
     pacer: Option<Pacer>,
     last_drawn: Option<(u64, bool, Option<u64>)>,
     result: Option<Result<Ended, RenderError>>,
-}
-
-/// The windows and what draws in them.
-struct Display {
-    gpu: Gpu,
-    renderer: Renderer,
-    panes: Vec<Pane>,
-}
-
-/// One window.
-struct Pane {
-    window: Arc<Window>,
-    surface: wgpu::Surface<'static>,
-    config: wgpu::SurfaceConfiguration,
-    /// The format that is drawn: that of the surface, with sRGB encoding.
-    format: wgpu::TextureFormat,
-    picture: Picture,
-    target: PictureTarget,
-    /// Place of the screen in the stage.
-    screen: usize,
 }
 
 impl ApplicationHandler for App<'_> {
@@ -388,161 +364,6 @@ impl App<'_> {
             .is_some_and(|frames| self.statistics.frames >= frames);
         Ok(enough.then_some(Ended::Frames))
     }
-}
-
-impl Display {
-    fn open(
-        events: &ActiveEventLoop,
-        stage: &Stage,
-        plan: &Plan,
-        holds: bool,
-    ) -> Result<Self, RenderError> {
-        let help = if holds {
-            format!(" ({})", mouse::HELP)
-        } else {
-            String::new()
-        };
-        let no_display = |error: &dyn std::fmt::Display| RenderError::NoDisplay {
-            reason: error.to_string(),
-        };
-        let instance = new_instance(Some(events.owned_display_handle()));
-        let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
-        let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
-        let mut opened = Vec::new();
-        let mut below = 0;
-        for (index, screen) in stage.screens.iter().enumerate() {
-            for picture in screen.stereo.pictures() {
-                let (width, height) = screen.pixels;
-                // On one monitor the windows stand in a column, the first screen above.
-                let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
-                let monitor = place.and_then(|place| monitors.get(place).cloned());
-                // A monitor that was asked for is where the window opens, even if it does not cover it.
-                let named = monitor.as_ref().filter(|_| !plan.monitors.is_empty());
-                let corner = named.map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
-                let cover = || Fullscreen::Borderless(monitor.clone());
-                let attributes = Window::default_attributes()
-                    .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
-                    .with_inner_size(PhysicalSize::new(width, height))
-                    .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
-                    .with_fullscreen(plan.fullscreen.then(cover));
-                below += height;
-                let window = events
-                    .create_window(attributes)
-                    .map_err(|error| no_display(&error))?;
-                let window = Arc::new(window);
-                let surface = instance
-                    .create_surface(Arc::clone(&window))
-                    .map_err(|error| no_display(&error))?;
-                opened.push((index, picture, window, surface));
-            }
-        }
-        let gpu = Gpu::open_for(
-            instance,
-            opened.first().map(|(.., surface)| surface),
-            &plan.gpu,
-        )?;
-        let mut renderer: Option<Renderer> = None;
-        let mut panes = Vec::new();
-        for (screen, picture, window, surface) in opened {
-            // One window waits for the monitor; the others would make it wait twice.
-            let present_mode = if panes.is_empty() {
-                wgpu::PresentMode::AutoVsync
-            } else {
-                wgpu::PresentMode::AutoNoVsync
-            };
-            let size = window.inner_size();
-            let (config, format) = configuration(&gpu, &surface, size, present_mode)?;
-            surface.configure(&gpu.device, &config);
-            let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
-            let target = renderer.picture(&gpu, &picture, (config.width, config.height));
-            panes.push(Pane {
-                window,
-                surface,
-                config,
-                format,
-                picture,
-                target,
-                screen,
-            });
-        }
-        let renderer = renderer.ok_or_else(|| RenderError::BadScene {
-            what: "this node draws no screen".to_owned(),
-        })?;
-        Ok(Self {
-            gpu,
-            renderer,
-            panes,
-        })
-    }
-
-    fn restage(&mut self, stage: &Stage) {
-        let Some(format) = self.panes.first().map(|pane| pane.format) else {
-            return;
-        };
-        self.renderer = Renderer::new(&self.gpu, stage, format);
-        for pane in &mut self.panes {
-            let size = (pane.config.width, pane.config.height);
-            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size);
-        }
-    }
-
-    fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {
-        let hidden = size.width == 0 || size.height == 0;
-        let pane = self
-            .panes
-            .iter_mut()
-            .find(|pane| pane.window.id() == id && !hidden);
-        if let Some(pane) = pane {
-            (pane.config.width, pane.config.height) = (size.width, size.height);
-            pane.surface.configure(&self.gpu.device, &pane.config);
-            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size.into());
-        }
-    }
-}
-
-impl Pane {
-    /// What to draw to next; `None` while the window is hidden or changes.
-    fn texture(&self, gpu: &Gpu) -> Result<Option<wgpu::SurfaceTexture>, RenderError> {
-        match self.surface.get_current_texture() {
-            wgpu::CurrentSurfaceTexture::Success(texture) => Ok(Some(texture)),
-            wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Ok(Some(texture)),
-            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
-                Ok(None)
-            }
-            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
-                self.surface.configure(&gpu.device, &self.config);
-                Ok(None)
-            }
-            wgpu::CurrentSurfaceTexture::Validation => {
-                Err(gpu.broken(&"the window's surface is invalid"))
-            }
-        }
-    }
-}
-
-/// How to show pictures on a surface, and the sRGB format to draw them in.
-fn configuration(
-    gpu: &Gpu,
-    surface: &wgpu::Surface<'_>,
-    size: PhysicalSize<u32>,
-    present_mode: wgpu::PresentMode,
-) -> Result<(wgpu::SurfaceConfiguration, wgpu::TextureFormat), RenderError> {
-    let (width, height) = (size.width.max(1), size.height.max(1));
-    let mut config = surface
-        .get_default_config(&gpu.adapter, width, height)
-        .ok_or_else(|| gpu.broken(&"it cannot show pictures in this window"))?;
-    let formats = surface.get_capabilities(&gpu.adapter).formats;
-    config.format = formats
-        .into_iter()
-        .find(wgpu::TextureFormat::is_srgb)
-        .unwrap_or(config.format);
-    let drawn = config.format.add_srgb_suffix();
-    if drawn != config.format {
-        config.view_formats.push(drawn);
-    }
-    config.present_mode = present_mode;
-    config.desired_maximum_frame_latency = 1; // the least age that double buffering allows
-    Ok((config, drawn))
 }
 
 fn toggle_fullscreen(window: &Window) {

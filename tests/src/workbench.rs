@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use taut_link::{ClusterKey, create_key_file, read_key_file};
+use taut_scene::Scene;
 use tempfile::TempDir;
 use toml::{Table, Value};
 
@@ -124,6 +125,28 @@ impl TestWorkbench {
     pub fn start(&self, name: &str, arguments: &[&str]) -> Process {
         let (program, directory) = (&self.program, self.directory());
         Process::start_logging(name, program, arguments, directory, self.log)
+    }
+
+    /// A server whose device is behind a bridge, and that bridge, started with `more` arguments: in its hand the body of a shipped scene goes the
+    /// scene's own way, firmly, again and again.
+    ///
+    /// # Panics
+    /// When the scene has no hand.
+    pub fn serve_with_bridge(&mut self, scene: &str, more: &[&str]) -> (Server, Process) {
+        self.set("scene", scene);
+        self.set(
+            "device",
+            Table::from_iter([("kind".to_owned(), Value::from("remote"))]),
+        );
+        let server = self.serve(&[]);
+        let hand = Scene::named_or_file(scene)
+            .and_then(|scene| scene.hand_path())
+            .unwrap_or_else(|error| panic!("{error}"));
+        let path = self.write("hand.csv", hand.expect("the scene has a hand").to_csv());
+        let path = path.display().to_string();
+        let always = ["--json", "--hand", "firm", "--path", &path, "--loop"];
+        let bridge = self.join("bridge", "bridge", &server, &[&always, more].concat());
+        (server, bridge)
     }
 
     /// Runs the program under test to its end.

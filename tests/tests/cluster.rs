@@ -15,7 +15,6 @@ use taut_proto::control::RefusalCode;
 use taut_proto::state::RunState;
 use taut_scene::Scene;
 use taut_tests::patience::wait_for;
-use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
 use tokio::runtime::Runtime;
 
@@ -31,39 +30,6 @@ const TOLD_FRAMES: u64 = 10;
 const UNDISTURBED: Duration = Duration::from_millis(500);
 /// By how much a silence may be longer than the longest of the same run before anything happened: what a machine does that is starved by others.
 const AS_BEFORE: u32 = 3;
-
-/// A server whose device is behind a bridge, and that bridge, in whose hand the sphere goes round on the plane.
-fn workbench_with_bridge(workbench: &mut TestWorkbench) -> (Server, Process) {
-    workbench.set("scene", SCENE);
-    workbench.set(
-        "device",
-        toml::Table::from_iter([("kind".to_owned(), toml::Value::from("remote"))]),
-    );
-    let server = workbench.serve(&[]);
-    let hand = Scene::named_or_file(SCENE)
-        .and_then(|scene| scene.hand_path())
-        .unwrap_or_else(|error| panic!("{error}"));
-    let path = workbench
-        .write("hand.csv", hand.expect("the scene has a hand").to_csv())
-        .display()
-        .to_string();
-    let bridge = workbench.join(
-        "bridge",
-        "bridge",
-        &server,
-        &[
-            "--json",
-            "--hand",
-            "firm",
-            "--path",
-            &path,
-            "--loop",
-            "--give-up",
-            "1",
-        ],
-    );
-    (server, bridge)
-}
 
 /// A client in this process: takes every state until it is told to stop.
 struct Client {
@@ -167,7 +133,7 @@ fn longest_silence(states: &[ReceivedState], wanted: impl Fn(Instant) -> bool) -
 fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
     let mut workbench = TestWorkbench::new(PROGRAM);
     let adapter = workbench.adapter();
-    let (mut server, bridge) = workbench_with_bridge(&mut workbench);
+    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--give-up", "1"]);
     let runtime = Runtime::new().expect("a runtime");
     let early = Client::join(
         &runtime,
@@ -453,7 +419,7 @@ fn when_the_server_dies_the_bridge_and_the_render_node_say_so_and_end_when_they_
     let mut workbench = TestWorkbench::new(PROGRAM);
     workbench.log = Some("warn,taut=info");
     let adapter = workbench.adapter();
-    let (mut server, bridge) = workbench_with_bridge(&mut workbench);
+    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &["--give-up", "1"]);
     let drawing = adapter.is_ok().then(|| {
         workbench.join(
             "render",

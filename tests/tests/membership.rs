@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use taut_link::{ClientOptions, Role, connect};
 use taut_proto::{InputSample, PoseF64};
-use taut_scene::Scene;
 use taut_tests::patience::wait_for;
 use taut_tests::process::Process;
 use taut_tests::workbench::{END_LIMIT, Server, TestWorkbench};
@@ -164,26 +163,6 @@ fn a_node_that_is_killed_or_stopped_is_evicted_and_comes_back_while_another_goes
     assert_eq!(frames["mismatches"], 0, "{frames}");
 }
 
-/// A server whose device is behind a bridge, and that bridge, in whose hand the sphere goes round on the plane.
-fn workbench_with_bridge(workbench: &mut TestWorkbench, more: &[&str]) -> (Server, Process) {
-    workbench.set("scene", SCENE);
-    workbench.set(
-        "device",
-        toml::Table::from_iter([("kind".to_owned(), toml::Value::from("remote"))]),
-    );
-    let server = workbench.serve(&[]);
-    let hand = Scene::named_or_file(SCENE)
-        .and_then(|scene| scene.hand_path())
-        .unwrap_or_else(|error| panic!("{error}"));
-    let path = workbench
-        .write("hand.csv", hand.expect("the scene has a hand").to_csv())
-        .display()
-        .to_string();
-    let always = ["--json", "--hand", "firm", "--path", &path, "--loop"];
-    let bridge = workbench.join("bridge", "bridge", &server, &[&always, more].concat());
-    (server, bridge)
-}
-
 /// Waits until a state says that the hand feels more than a newton.
 fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server, node: &str) {
     let options = ClientOptions::new(server.quic.clone(), workbench.key(), Role::Observer, node);
@@ -205,7 +184,7 @@ fn wait_for_force(runtime: &Runtime, workbench: &TestWorkbench, server: &Server,
 fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_next_one() {
     let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
-    let (mut server, bridge) = workbench_with_bridge(&mut workbench, &[]);
+    let (mut server, bridge) = workbench.serve_with_bridge(SCENE, &[]);
     let front = drawing.then(|| node(&workbench, "front", &server, &[]));
     let runtime = Runtime::new().expect("a runtime");
     wait_for_force(&runtime, &workbench, &server, "watcher");
@@ -290,7 +269,7 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
 fn a_server_that_stops_ends_its_nodes_unless_they_are_to_stay() {
     let mut workbench = telling_workbench();
     let drawing = draws(&workbench);
-    let (server, bridge) = workbench_with_bridge(&mut workbench, &["--stay"]);
+    let (server, bridge) = workbench.serve_with_bridge(SCENE, &["--stay"]);
     let mut server = server;
     told(&mut server, ["bridge joined", ""], 1);
     let nodes = drawing.then(|| {

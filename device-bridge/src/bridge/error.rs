@@ -85,7 +85,9 @@ pub enum BridgeError {
         cause: std::io::Error,
     },
     /// The end was asked for before there was a server.
-    #[error("no server was there at {server} until the end")]
+    #[error(
+        "no server was there at {server} until the end: check that it runs, the address, and that the firewall lets UDP through"
+    )]
     NeverJoined {
         /// As given.
         server: String,

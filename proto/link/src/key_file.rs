@@ -3,7 +3,7 @@
 use crate::LinkError;
 use std::{
     fs,
-    io::Write,
+    io::{Error, ErrorKind, Write},
     path::{Path, PathBuf},
 };
 use taut_proto::{ClusterKey, Credential, JoinKey, credential::MAX_KEY_TEXT_BYTES};
@@ -32,12 +32,15 @@ pub fn read_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
 /// Refused, as ssh does, if others may read it or anybody but its owner may write it.
 pub fn read_join_key(path: &Path) -> Result<JoinKey, LinkError> {
     let refuse = |reason: String| key_file(path, reason);
-    let metadata =
-        fs::metadata(path).map_err(|error| refuse(format!("{error}; copy it from the server")))?;
+    let unreadable = |error: Error| refuse(format!("{error}; {}", remedy_to_read(error.kind())));
+    let metadata = fs::metadata(path).map_err(unreadable)?;
+    if metadata.is_dir() {
+        return Err(refuse("it is a directory; name a file in it".to_owned()));
+    }
     let length = metadata.len();
     if length > MAX_KEY_TEXT_BYTES as u64 {
         return Err(refuse(format!(
-            "it has {length} bytes, no key has so many; copy it from the server"
+            "it has {length} bytes, no key has so many; name a file that `taut keys` made"
         )));
     }
     #[cfg(unix)]
@@ -51,8 +54,7 @@ pub fn read_join_key(path: &Path) -> Result<JoinKey, LinkError> {
             )));
         }
     }
-    let text = fs::read_to_string(path)
-        .map_err(|error| refuse(format!("{error}; copy it from the server")))?;
+    let text = fs::read_to_string(path).map_err(unreadable)?;
     JoinKey::parse(&text).map_err(|error| refuse(error.to_string()))
 }
 
@@ -78,9 +80,30 @@ fn write_secret(path: &Path, text: &str) -> Result<(), LinkError> {
     }
     let mut file = options
         .open(path)
-        .map_err(|error| key_file(path, format!("{error}; choose another path")))?;
+        .map_err(|error| key_file(path, format!("{error}; {}", remedy_to_make(error.kind()))))?;
     file.write_all(text.as_bytes())
         .map_err(|error| key_file(path, format!("{error}; free some space")))
+}
+
+/// What to do about a key file that cannot be read.
+fn remedy_to_read(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => "check the path; `taut keys`, on the haptic PC, makes key files",
+        ErrorKind::PermissionDenied => "run as the account that owns it, or change its owner",
+        ErrorKind::InvalidData => "name a file that `taut keys` made",
+        _ => "check the path and the disk",
+    }
+}
+
+/// What to do about a key file that cannot be made.
+fn remedy_to_make(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => "make its directory first, or choose another path",
+        ErrorKind::AlreadyExists => {
+            "a key in use is never overwritten: choose another path, or move that file away"
+        }
+        _ => "choose another path",
+    }
 }
 
 fn key_file(path: &Path, reason: String) -> LinkError {

@@ -134,9 +134,8 @@ async fn a_bad_network_costs_states_but_never_order_or_truth() {
     );
 }
 
-/// A client that dies without a word: its runtime goes first, so that nothing can be sent any more.
-fn murdered_client(server: &ServerLink, node: &str) {
-    let options = options(server, Role::Render, node);
+/// A client that dies without a word after `life`: its runtime goes first, so that nothing can be sent any more.
+fn murdered_client(options: taut_link::ClientOptions, life: Duration) {
     let died = std::thread::Builder::new()
         .name("victim".to_owned())
         .spawn(move || {
@@ -148,7 +147,7 @@ fn murdered_client(server: &ServerLink, node: &str) {
             let link = runtime
                 .block_on(taut_link::connect(options))
                 .unwrap_or_else(|error| panic!("{error}"));
-            std::thread::sleep(Duration::from_millis(100));
+            std::thread::sleep(life);
             runtime.shutdown_background();
             drop(link);
         });
@@ -165,7 +164,8 @@ async fn a_killed_client_disturbs_nobody_and_its_name_is_free_again() {
     .await;
     let survivor = client(&server, Role::Render, "right").await;
     let tick = take_states(&server, &survivor, 1, 20).await;
-    tokio::task::block_in_place(|| murdered_client(&server, "left"));
+    let victim = options(&server, Role::Render, "left");
+    tokio::task::block_in_place(|| murdered_client(victim, Duration::from_millis(100)));
 
     // The survivor goes on while the server finds out.
     let mut states = Vec::new();
@@ -203,23 +203,7 @@ async fn a_restarted_node_takes_the_place_of_its_silent_self() {
         ..options(&server, Role::Render, "left")
     };
     let first = options.clone();
-    let died = std::thread::Builder::new()
-        .name("victim".to_owned())
-        .spawn(move || {
-            let runtime = tokio::runtime::Builder::new_multi_thread()
-                .worker_threads(1)
-                .enable_all()
-                .build()
-                .unwrap_or_else(|error| panic!("{error}"));
-            let link = runtime
-                .block_on(taut_link::connect(first))
-                .unwrap_or_else(|error| panic!("{error}"));
-            std::thread::sleep(Duration::from_millis(200));
-            runtime.shutdown_background();
-            drop(link);
-        });
-    let died = died.unwrap_or_else(|error| panic!("{error}"));
-    tokio::task::block_in_place(|| assert!(died.join().is_ok()));
+    tokio::task::block_in_place(|| murdered_client(first, Duration::from_millis(200)));
     tokio::time::sleep(Duration::from_millis(600)).await; // silent for longer than the server forgives
     let again = taut_link::connect(options)
         .await

@@ -257,10 +257,13 @@ fn a_key_file_is_made_once_private_and_read_again() {
     let path = folder.path().join("cluster.key");
     let made = taut_link::create_key_file(&path).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(taut_link::read_key_file(&path).ok(), Some(made));
+    let again = taut_link::create_key_file(&path);
     assert!(matches!(
-        taut_link::create_key_file(&path),
-        Err(LinkError::KeyFile { .. })
+        &again,
+        Err(error @ LinkError::KeyFile { .. }) if error.to_string().contains("never overwritten")
     ));
+    let nowhere = taut_link::create_key_file(&folder.path().join("none").join("cluster.key"));
+    assert!(nowhere.is_err_and(|error| error.to_string().contains("make its directory")));
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -275,11 +278,16 @@ fn a_key_file_is_made_once_private_and_read_again() {
         let private = std::fs::Permissions::from_mode(0o600);
         assert!(std::fs::set_permissions(&short, private).is_ok());
     }
-    for bad in [short, folder.path().join("missing.key")] {
+    for (bad, remedy) in [
+        (short, "`taut keys`"),
+        (folder.path().join("missing.key"), "`taut keys`"),
+        (folder.path().to_owned(), "name a file in it"),
+    ] {
         let error = taut_link::read_key_file(&bad)
             .err()
             .map(|error| error.to_string())
             .unwrap_or_default();
         assert!(error.contains(&bad.display().to_string()), "{error}");
+        assert!(error.contains(remedy), "{error}");
     }
 }

@@ -7,38 +7,22 @@
     reason = "an example may read the clock"
 )]
 
+#[path = "../tests/support/box_shape.rs"]
+mod box_shape;
+
 use std::sync::Arc;
 use std::time::Instant;
 
+use box_shape::box_mesh;
 use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use god_object::{
-    Body, Coupling, ForceShading, GodObject, HeightMap, HeightMapTexture, Mesh, Obstacle, Pose,
-    Settings, SineTexture, Surface, Texture, World,
+    Body, Coupling, ForceShading, GodObject, HeightMap, HeightMapTexture, Obstacle, Pose, Settings,
+    SineTexture, Surface, Texture, World,
 };
 
 /// Device samples in one pass, and passes of which the fastest counts.
 const SAMPLES: u32 = 4000;
 const PASSES: u32 = 15;
-
-fn box_mesh(half: Vector3<f64>) -> Result<Mesh, god_object::geometry::MeshError> {
-    let corner = |i: u32| {
-        let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
-        Point3::new(sign(1) * half.x, sign(2) * half.y, sign(4) * half.z)
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-        .collect();
-    Mesh::new((0..8).map(corner).collect(), triangles)
-}
 
 /// Fastest pass over a slide of a box on a table, ns for one coupling step.
 fn cost(surface: Surface, passive: bool) -> Result<f64, Box<dyn std::error::Error>> {
@@ -46,7 +30,7 @@ fn cost(surface: Surface, passive: bool) -> Result<f64, Box<dyn std::error::Erro
     let world = Arc::new(World {
         body: Body {
             primitive: None,
-            mesh: box_mesh(half)?,
+            mesh: box_mesh(half),
             mass: 1.0,
             inertia: Matrix3::from_diagonal(&Vector3::new(1.7e-4, 1.7e-4, 2.7e-4)),
             reference_point: Point3::origin(),
@@ -54,7 +38,7 @@ fn cost(surface: Surface, passive: bool) -> Result<f64, Box<dyn std::error::Erro
         obstacles: vec![Obstacle {
             primitive: None,
             name: "table".into(),
-            mesh: box_mesh(Vector3::new(0.5, 0.5, 0.05))?,
+            mesh: box_mesh(Vector3::new(0.5, 0.5, 0.05)),
             pose: Pose::translation(0.0, 0.0, -0.05),
             surface,
         }],

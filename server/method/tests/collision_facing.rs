@@ -1,44 +1,17 @@
 //! Time of impact of spiky, hollow, thin and far meshes: what does not face is left out, and nothing is missed by it.
 
 mod geometry_shapes;
+mod mesh_impact;
 
 use geometry_shapes::{cuboid, grid_box, icosphere, mesh, peg, torus};
 use god_object::collision::{
-    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, distance,
-    meshes_intersect, time_of_impact,
+    CollisionWorkspace, Motion, TimeOfImpact, Work, distance, meshes_intersect, time_of_impact,
 };
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
-use god_object::spatial::{Pose, Vector6, from_reference_point, six};
+use god_object::spatial::{Pose, from_reference_point, six};
+use mesh_impact::{SETTINGS, search, straight, vector};
 use proptest::prelude::*;
-
-const SETTINGS: AdvancementSettings = AdvancementSettings {
-    minimum_gap: 1e-6,
-    gap_tolerance: 1e-7,
-    max_iterations: 200,
-    interval_edges: 0.5,
-    max_intervals: 64,
-};
-
-fn search(body: &Mesh, motion: &Motion, obstacle: &Mesh, obstacle_pose: &Pose) -> TimeOfImpact {
-    time_of_impact(
-        body,
-        motion,
-        obstacle,
-        obstacle_pose,
-        &SETTINGS,
-        &mut CollisionWorkspace::new(),
-        &mut Work::default(),
-    )
-}
-
-fn straight(start: Pose, displacement: Vector6) -> Motion {
-    Motion {
-        start,
-        displacement,
-        reference_point: Point3::origin(),
-    }
-}
 
 /// A sphere whose vertices stand out or in by up to `spikes` of the radius: saddles, hollows and needles.
 fn spiky(radius: f64, spikes: f64, seed: u64) -> Mesh {
@@ -55,10 +28,6 @@ fn spiky(radius: f64, spikes: f64, seed: u64) -> Mesh {
         .map(|v| v * (1.0 + spikes * (2.0 * random() - 1.0)))
         .collect();
     Mesh::new(vertices, triangles).expect("a star-shaped surface is closed")
-}
-
-fn vector(range: f64) -> impl Strategy<Value = Vector3<f64>> {
-    [-range..range, -range..range, -range..range].prop_map(Vector3::from)
 }
 
 /// No distance below the gap before the time found, and that gap at it: by a distance that knows no cones.

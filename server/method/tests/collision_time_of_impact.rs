@@ -1,6 +1,7 @@
 //! Time of impact: never late, hardly early, free where the motion is free.
 
 mod geometry_shapes;
+mod mesh_impact;
 
 use geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
 use god_object::collision::{
@@ -10,35 +11,8 @@ use god_object::collision::{
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, from_reference_point, six};
+use mesh_impact::{SETTINGS, search, straight, vector};
 use proptest::prelude::*;
-
-const SETTINGS: AdvancementSettings = AdvancementSettings {
-    minimum_gap: 1e-6,
-    gap_tolerance: 1e-7,
-    max_iterations: 200,
-    interval_edges: 0.5,
-    max_intervals: 64,
-};
-
-fn search(body: &Mesh, motion: &Motion, obstacle: &Mesh, obstacle_pose: &Pose) -> TimeOfImpact {
-    time_of_impact(
-        body,
-        motion,
-        obstacle,
-        obstacle_pose,
-        &SETTINGS,
-        &mut CollisionWorkspace::new(),
-        &mut Work::default(),
-    )
-}
-
-fn straight(start: Pose, displacement: Vector6) -> Motion {
-    Motion {
-        start,
-        displacement,
-        reference_point: Point3::origin(),
-    }
-}
 
 fn translation(x: f64, y: f64, z: f64) -> Vector6 {
     six(&Vector3::new(x, y, z), &Vector3::zeros())
@@ -271,10 +245,6 @@ fn parry_intersects(a: &Mesh, a_pose: &Pose, b: &Mesh, b_pose: &Pose) -> bool {
                     .intersecting
         })
     })
-}
-
-fn vector(range: f64) -> impl Strategy<Value = Vector3<f64>> {
-    [-range..range, -range..range, -range..range].prop_map(Vector3::from)
 }
 
 proptest! {

@@ -3,6 +3,7 @@
 //! The reference is the pose at which the body would come to rest, `min |x_h - x|_M^2` over poses that touch, found by one-
 //! or three-dimensional search on the true geometry; its force is `k_h k_s M (x - x_h)`.
 
+mod geometry_shapes;
 mod support;
 
 use std::sync::Arc;
@@ -248,26 +249,9 @@ fn box_on_a_cylinder_and_box_in_a_groove_come_nearer_to_the_force_at_rest() {
 
 /// A prism about the y axis.
 fn prism(radius: f64, half_length: f64, sides: u32) -> god_object::Mesh {
-    use god_object::nalgebra::Point3;
-    let mut vertices = Vec::new();
-    let mut triangles = Vec::new();
-    for end in [-half_length, half_length] {
-        vertices.push(Point3::new(0.0, end, 0.0));
-    }
-    for i in 0..sides {
-        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(sides);
-        for end in [-half_length, half_length] {
-            vertices.push(Point3::new(radius * angle.sin(), end, radius * angle.cos()));
-        }
-        let (a, b) = (2 + 2 * i, 2 + 2 * ((i + 1) % sides));
-        triangles.extend([
-            [0, b, a],
-            [1, a + 1, b + 1],
-            [a, b, b + 1],
-            [a, b + 1, a + 1],
-        ]);
-    }
-    god_object::Mesh::new(vertices, triangles).expect("a closed prism")
+    let (vertices, triangles) = geometry_shapes::peg(radius, half_length, sides);
+    let about_y = vertices.iter().map(|v| v.coords.yzx().into()).collect();
+    geometry_shapes::mesh((about_y, triangles))
 }
 
 #[test]

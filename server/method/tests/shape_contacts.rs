@@ -9,7 +9,7 @@ use god_object::shape;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use shape_support::{Form, oracle_distance, turned};
+use shape_support::{Form, forms, obstacles, oracle_distance, turned, vectors};
 use std::f64::consts::FRAC_PI_2;
 
 /// The closed forms hold to this, m and as components of normals.
@@ -270,23 +270,6 @@ fn stacked_cylinders_hold_each_other_by_their_caps() {
         assert!(reach(-Vector3::x()) > 0.98 * (0.02 - shift) - 1e-4);
         assert!(reach(Vector3::z()) > 0.98 * tip && reach(-Vector3::z()) > 0.98 * tip);
     }
-}
-
-fn forms() -> impl Strategy<Value = Form> {
-    prop_oneof![
-        (0.005..0.02f64).prop_map(Form::Sphere),
-        (0.005..0.02f64, 0.01..0.03f64).prop_map(|(r, h)| Form::Capsule(r, h)),
-        (0.005..0.02f64, 0.005..0.03f64).prop_map(|(r, h)| Form::Cylinder(r, h)),
-        (0.005..0.02f64).prop_map(Form::Cube),
-    ]
-}
-
-fn obstacles() -> impl Strategy<Value = Form> {
-    prop_oneof![forms(), Just(Form::Plane), Just(Form::Hole(0.015, 24))]
-}
-
-fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
-    prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }
 
 proptest! {

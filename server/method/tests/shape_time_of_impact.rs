@@ -9,7 +9,7 @@ use god_object::spatial::six;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use shape_support::{Form, oracle_distance};
+use shape_support::{Form, forms, obstacles, oracle_distance, vectors};
 
 const SETTINGS: AdvancementSettings = AdvancementSettings {
     minimum_gap: 1e-5,
@@ -21,23 +21,6 @@ const SETTINGS: AdvancementSettings = AdvancementSettings {
 /// parry's own error at these sizes, m.
 const ORACLE_ERROR: f64 = 2e-7;
 const SAMPLES: u32 = 200;
-
-fn movers() -> impl Strategy<Value = Form> {
-    prop_oneof![
-        (0.005..0.02f64).prop_map(Form::Sphere),
-        (0.005..0.02f64, 0.01..0.03f64).prop_map(|(r, h)| Form::Capsule(r, h)),
-        (0.005..0.02f64, 0.005..0.03f64).prop_map(|(r, h)| Form::Cylinder(r, h)),
-        (0.005..0.02f64).prop_map(Form::Cube),
-    ]
-}
-
-fn obstacles() -> impl Strategy<Value = Form> {
-    prop_oneof![movers(), Just(Form::Plane), Just(Form::Hole(0.015, 24))]
-}
-
-fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
-    prop::array::uniform3(-size..size).prop_map(Vector3::from)
-}
 
 fn search(
     form: Form,
@@ -67,7 +50,7 @@ proptest! {
 
     #[test]
     fn the_search_is_never_late_and_hardly_early(
-        form in movers(),
+        form in forms(),
         obstacle in obstacles(),
         offset in vectors(0.08),
         turn in vectors(3.0),

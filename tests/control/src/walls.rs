@@ -1,47 +1,13 @@
 //! Constraint sets made by hand, and a body to hold against them: the coupling without collision detection.
 
 use god_object::constraint::{Feature, FeaturePair, Separation};
-use god_object::geometry::mass_properties;
-use god_object::{
-    Body, ConstraintSet, Mesh, NonPenetrationConstraint, Obstacle, Pose, Settings, Surface, World,
-};
+use god_object::{ConstraintSet, NonPenetrationConstraint, Settings, World};
 use nalgebra::{Point3, Vector3};
-use taut_scene::RawMesh;
+use taut_method_tests::solids::{body, mesh};
 use taut_scene::shapes::cuboid;
 
 /// Half of the longest side of [`body`], m.
 pub const HALF_LENGTH: f64 = 0.05;
-
-/// A mesh of a generated shape, which is closed.
-#[must_use]
-pub fn mesh(raw: RawMesh) -> Mesh {
-    Mesh::new(raw.vertices, raw.triangles).unwrap_or_else(|error| panic!("{error}"))
-}
-
-/// A homogeneous body of 1 kg; forces act at its centre of mass.
-#[must_use]
-pub fn body(mesh: Mesh) -> Body {
-    let solid = mass_properties(&mesh);
-    Body {
-        primitive: None,
-        mass: 1.0,
-        inertia: solid.inertia_per_density / solid.volume,
-        reference_point: solid.centroid,
-        mesh,
-    }
-}
-
-/// An obstacle without surface properties.
-#[must_use]
-pub fn obstacle(name: &str, raw: RawMesh, pose: Pose) -> Obstacle {
-    Obstacle {
-        primitive: None,
-        name: name.into(),
-        mesh: mesh(raw),
-        pose,
-        surface: Surface::default(),
-    }
-}
 
 /// A cube of 1 kg alone.
 #[must_use]

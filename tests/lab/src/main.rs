@@ -4,7 +4,7 @@
 //! Prints the table and writes it, the CSV files and the charts. `report` (or `--report`) adds all sweeps and writes `report.html`, a page
 //! of everything. `--maps` runs the stability maps. `--threads` is the number of cores unless it is given. `--sweep NAME` runs that sweep, and recipes only where they are named. Results that are finished are kept in `done`
 //! beside the files, and not run again; `--fresh` runs everything. Exit code 1 where this project's own method fails at 1 kHz, or a study or
-//! a reference answer does.
+//! a reference answer does, 2 where the arguments are wrong or a file cannot be written.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -29,7 +29,21 @@ struct Arguments {
     fresh: bool,
 }
 
-fn main() -> Result<ExitCode, Box<dyn Error>> {
+fn main() -> ExitCode {
+    run().unwrap_or_else(|error| {
+        eprintln!("taut-lab: {error}");
+        ExitCode::from(2)
+    })
+}
+
+fn run() -> Result<ExitCode, Box<dyn Error>> {
+    if std::env::args()
+        .skip(1)
+        .any(|argument| argument == "--help")
+    {
+        print!("{}", help());
+        return Ok(ExitCode::SUCCESS);
+    }
     if std::env::args().nth(1).as_deref() == Some("fidelity") {
         return taut_lab::fidelity::command::run(std::env::args().skip(2));
     }
@@ -54,6 +68,33 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     }
     let failed = results.rows.iter().any(own_failure);
     Ok(ExitCode::from(u8::from(failed)))
+}
+
+fn help() -> String {
+    format!(
+        "\
+Runs the recipes for every method and rate; prints the table, and writes it with CSV files and charts.
+
+taut-lab [report] [OPTION...] [RECIPE...]
+taut-lab fidelity [--quick] [--out DIRECTORY]
+
+  report           adds all sweeps and maps, and writes report.html, a page of everything
+  fidelity         what the choice of a scene's settings costs, beside every setting
+  --quick          a part of the cases
+  --out DIRECTORY  where files go (default: {DIRECTORY})
+  --threads N      how many at once (default: one for each core)
+  --method NAME    this method only; may be repeated: {}
+  --sweep NAME     this sweep; may be repeated: {}
+  --maps           the stability maps
+  --fresh          runs what is finished, too
+
+Recipes are named as in the table (R01, R09, ...); all of them run unless some recipes, sweeps or the maps are named.
+Exit code 1: this project's own method fails at 1 kHz, or a study or a reference answer does. 2: the arguments are wrong, or a file cannot be written.
+Example: taut-lab report --quick R01 R09
+",
+        Method::ALL.map(Method::name).join(", "),
+        SWEEPS.map(|sweep| sweep.name).join(", ")
+    )
 }
 
 fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, String> {
@@ -90,7 +131,7 @@ fn arguments(mut given: impl Iterator<Item = String>) -> Result<Arguments, Strin
                 })?);
             }
             option if option.starts_with('-') => {
-                return Err(format!("there is no option `{option}`"));
+                return Err(format!("there is no option `{option}`; --help lists them"));
             }
             _ => names.push(argument),
         }

@@ -3,7 +3,7 @@
 //!
 //! `-- --node SERVER NAME udp|quic KEY SECONDS` is one node of a network of namespaces or machines, see `scripts/netns-cluster`.
 //!
-//! Exit code 1 where a measured target is not met, 2 where something could not be measured at all.
+//! Exit code 1 where a measured target is not met, 2 where something could not be measured at all or the arguments are wrong.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use taut_link::Transport;
-use taut_network_tests::bench::{failover, isolation, node};
+use taut_network_tests::bench::{client_process, leader_process, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
 
 struct Arguments {
@@ -20,7 +20,14 @@ struct Arguments {
     sections: Vec<Section>,
 }
 
-fn main() -> Result<ExitCode, Box<dyn Error>> {
+fn main() -> ExitCode {
+    run().unwrap_or_else(|error| {
+        eprintln!("taut-network-tests: {error}");
+        ExitCode::from(2)
+    })
+}
+
+fn run() -> Result<ExitCode, Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1).peekable();
     // A process of the isolation run: a client that can be stopped.
     if arguments.next_if(|first| first == "--client").is_some() {
@@ -28,7 +35,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         let [server, node, transport, key] = &words[..] else {
             return Err("--client takes SERVER NODE TRANSPORT KEY".into());
         };
-        isolation::client(server, node, transport, key.as_ref())?;
+        client_process::client(server, node, transport, key.as_ref())?;
         return Ok(ExitCode::SUCCESS);
     }
     // The server of the fail-over run, which is killed.
@@ -38,7 +45,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
             return Err("--lead takes QUIC UDP KEY MILLISECONDS".into());
         };
         let node_timeout = Duration::from_millis(timeout_ms.parse()?);
-        failover::lead(quic, udp, key.as_ref(), node_timeout)?;
+        leader_process::lead(quic, udp, key.as_ref(), node_timeout)?;
         return Ok(ExitCode::SUCCESS);
     }
     // One node of a network of namespaces or machines.
@@ -118,7 +125,7 @@ taut-network-tests [OPTION...] [SECTION...]
 
 Sections, all of them unless some are named:
 {}
-Exit code 1: a target is missed. 2: something could not be measured.
+Exit code 1: a target is missed. 2: something could not be measured, or the arguments are wrong.
 Example: taut-network-tests --taut target/release/taut skew screens
 ",
         sections.collect::<String>()
@@ -143,6 +150,9 @@ fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dy
             // Some of those that run it do so from a folder of their own.
             "--taut" => extent.program = program(&value()?)?,
             "--csv" => csv = Some(value()?.into()),
+            option if option.starts_with('-') => {
+                return Err(format!("there is no option `{option}`; --help lists them").into());
+            }
             name => {
                 let known = SECTIONS.iter().find(|section| section.name == name);
                 let names: Vec<_> = SECTIONS.iter().map(|section| section.name).collect();

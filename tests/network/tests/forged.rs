@@ -4,12 +4,12 @@ use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
 use taut_link::{ClientOptions, ClusterKey, Role, serve};
-use taut_network_tests::bench::{server_options, small_content};
+use taut_network_tests::bench::{reading, server_options, small_content};
 use taut_network_tests::forge::{
     Attack, FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, attack, payload_of_every_kind,
 };
 use taut_network_tests::relay::{Direction, Treatment, Waiting};
-use taut_proto::{DecodeError, Header, InputSample, PoseF64, limits::Rate};
+use taut_proto::{DecodeError, Header, limits::Rate};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -99,16 +99,7 @@ fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket(
         .block_on(taut_link::connect(options))
         .unwrap_or_else(|error| panic!("{error}"));
     for index in 1..=50 {
-        bridge.send_input(&InputSample {
-            sample_time_ns: 0,
-            index,
-            pose: PoseF64::IDENTITY,
-            velocity: [0.0; 6],
-            buttons: 0,
-            flags: 0,
-            rendered: [0.0; 6],
-            set_sequence: 0,
-        });
+        bridge.send_input(&reading(index));
     }
     wait_until("the inputs", || {
         let counters = server.counters();

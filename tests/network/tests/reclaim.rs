@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use taut_link::{ClientOptions, Role};
-use taut_network_tests::bench::failover::LeaderProcess;
+use taut_network_tests::bench::leader_process::LeaderProcess;
 use taut_network_tests::bench::screen::{Screen, Swapped, longest_gap_ms};
 use taut_network_tests::bench::wait_until;
 use taut_proto::barrier::FRAMES_LEFT_OUT;

@@ -1,11 +1,17 @@
 //! Shapes with an independent distance oracle for the tests of primitives: parry's shapes and queries.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+#[path = "../support/box_shape.rs"]
+mod box_shape;
+
 use god_object::nalgebra::{Matrix3, Point3, Unit, UnitQuaternion, Vector3};
 use god_object::{Body, Mesh, Obstacle, Pose, Primitive, Surface};
 use parry3d_f64::math;
 use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Cylinder, HalfSpace, Segment, Shape, TriMesh};
+use proptest::prelude::*;
+
+use box_shape::box_mesh;
 
 /// Forms about the origin, axis y, in metres.
 #[derive(Clone, Copy, Debug)]
@@ -167,26 +173,6 @@ pub(crate) fn oracle_distance(a: &Oracle, pose_a: &Pose, b: &Oracle, pose_b: &Po
     cores.distance - a.round - b.round
 }
 
-pub(crate) fn box_mesh(half: Vector3<f64>) -> Mesh {
-    let corner = |i: u32| {
-        let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
-        Point3::new(sign(1) * half.x, sign(2) * half.y, sign(4) * half.z)
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-        .collect();
-    Mesh::new((0..8).map(corner).collect(), triangles).expect("a box is closed")
-}
-
 /// A prism with vertices on the cylinder, axis y.
 pub(crate) fn prism(radius: f64, half: f64, facets: u32) -> Mesh {
     let mut vertices = Vec::new();
@@ -236,4 +222,24 @@ pub(crate) fn hole_mesh(apothem: f64, facets: usize) -> Mesh {
 
 pub(crate) fn turned(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Unit::new_normalize(axis), angle)
+}
+
+/// Forms that may move.
+pub(crate) fn forms() -> impl Strategy<Value = Form> {
+    prop_oneof![
+        (0.005..0.02f64).prop_map(Form::Sphere),
+        (0.005..0.02f64, 0.01..0.03f64).prop_map(|(r, h)| Form::Capsule(r, h)),
+        (0.005..0.02f64, 0.005..0.03f64).prop_map(|(r, h)| Form::Cylinder(r, h)),
+        (0.005..0.02f64).prop_map(Form::Cube),
+    ]
+}
+
+/// Forms that may stand in the way.
+pub(crate) fn obstacles() -> impl Strategy<Value = Form> {
+    prop_oneof![forms(), Just(Form::Plane), Just(Form::Hole(0.015, 24))]
+}
+
+/// Vectors whose components are less than `size`.
+pub(crate) fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }

@@ -1,6 +1,8 @@
 //! Meshes, worlds and an independent intersection check for the tests of the method.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+mod box_shape;
+
 use std::sync::Arc;
 
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
@@ -9,26 +11,7 @@ use parry3d_f64::math;
 use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::Triangle;
 
-/// A box with the given half extents, 12 triangles, outward.
-pub(crate) fn box_mesh(half: Vector3<f64>) -> Mesh {
-    let corner = |i: u32| {
-        let sign = |bit: u32| if i & bit == 0 { -1.0 } else { 1.0 };
-        Point3::new(sign(1) * half.x, sign(2) * half.y, sign(4) * half.z)
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]])
-        .collect();
-    Mesh::new((0..8).map(corner).collect(), triangles).expect("a box is closed")
-}
+pub(crate) use box_shape::box_mesh;
 
 /// A box of 1 kg with its centre of mass in the middle.
 pub(crate) fn box_body(half: Vector3<f64>) -> Body {

@@ -11,8 +11,12 @@ const TRIANGLE_BYTES: usize = 50;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     let mut cursor = Cursor::new(bytes);
-    let reader = stl_io::create_stl_reader(&mut cursor)
-        .map_err(|e| Fault::new(format!("is no STL file ({e}); export it again")))?;
+    let reader = stl_io::create_stl_reader(&mut cursor).map_err(|e| {
+        Fault::new(format!(
+            "is no STL file ({}); export it again",
+            no_header(&e)
+        ))
+    })?;
     let mut mesh = RawMesh::default();
     for (number, triangle) in reader.enumerate() {
         let triangle = triangle.map_err(|e| Fault::new(broken_triangle(number, bytes, &e)))?;
@@ -29,6 +33,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh.welded())
+}
+
+/// Why a file does not begin as STL files do.
+fn no_header(error: &std::io::Error) -> String {
+    if error.kind() == std::io::ErrorKind::UnexpectedEof {
+        return format!(
+            "it ends within the {HEADER_BYTES} bytes that a binary one begins with, and is no text of `solid` either"
+        );
+    }
+    error.to_string()
 }
 
 fn broken_triangle(number: usize, bytes: &[u8], error: &std::io::Error) -> String {
@@ -80,6 +94,15 @@ mod tests {
     fn text_files_are_read_too() {
         let text = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
         assert_eq!(parse(text).unwrap().triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn a_file_too_short_for_a_header_is_said_to_be_so() {
+        let text = parse(b"solid").unwrap_err().text;
+        assert!(
+            text.starts_with("is no STL file (it ends within the 84 bytes"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -14,12 +14,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Coupling, GodObject, Pose, Settings, World};
+use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_plant::{Grip, Hand, MinJerkPath, Motors, Plant, ViaPoint};
 use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
 use crate::Row;
 use crate::closed_loop::PERIOD;
-use crate::walls::{body, mesh, obstacle};
 
 /// Radius of the peg's vertices, half its length and half the box's side, m.
 const PEG: (f64, f64) = (0.010, 0.030);
@@ -73,7 +73,7 @@ fn world() -> World {
     let hole = box_with_hole([PEG.1; 3], PEG.0 + CLEARANCE, FACETS, Axis::Y);
     World {
         body: body(mesh(peg)),
-        obstacles: vec![obstacle("box", hole, Pose::identity())],
+        obstacles: vec![obstacle("box", mesh(hole), Pose::identity())],
     }
 }
 

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use god_object::spatial::rotation_vector;
 use god_object::{Coupling, GodObject, Pose, Settings, World};
 use nalgebra::Vector3;
+use taut_method_tests::solids::{body, mesh, obstacle};
 use taut_scene::shapes::cuboid;
 
 use crate::Row;
 use crate::closed_loop::PERIOD;
-use crate::walls::{body, mesh, obstacle};
 
 /// Half extents of the bar, m.
 const BAR: [f64; 3] = [0.05, 0.005, 0.005];
@@ -63,8 +63,13 @@ struct Seen {
 
 fn world() -> World {
     let y = BAR[1] + CLEARANCE + WALL[1];
-    let wall =
-        |name: &str, side: f64| obstacle(name, cuboid(WALL), Pose::translation(0.0, side * y, 0.0));
+    let wall = |name: &str, side: f64| {
+        obstacle(
+            name,
+            mesh(cuboid(WALL)),
+            Pose::translation(0.0, side * y, 0.0),
+        )
+    };
     World {
         body: body(mesh(cuboid(BAR))),
         obstacles: vec![wall("left", 1.0), wall("right", -1.0)],

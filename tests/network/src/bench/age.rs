@@ -6,13 +6,14 @@
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientLink, ClusterKey, ReceivedState, Role, SessionClock, connect, serve};
+use taut_link::{ClientLink, ClusterKey, ReceivedState, Role, SessionClock, connect};
 
+use super::threads::{on_own_thread, runtime};
 use super::{
-    BenchError, Quantiles, Ticker, client_options, request_fifo, server_options, small_content,
+    BenchError, Quantiles, Ticker, client_options, request_fifo, serve_behind, server_options,
     state, wait_until,
 };
-use crate::relay::{Direction, Impairment, RelayCounts, Treatment, Waiting};
+use crate::relay::{Direction, Impairment, RelayCounts, Treatment};
 
 /// Time between two states.
 const PERIOD: Duration = Duration::from_millis(1);
@@ -50,18 +51,9 @@ pub struct Age {
 /// # Errors
 /// The session does not come about.
 pub fn measure(duration: Duration, impairment: &Impairment, seed: u64) -> Result<Age, BenchError> {
-    // Threads inherit the class of the one that makes them: link and relay get it, too.
-    let impairment = impairment.clone();
-    let run = std::thread::Builder::new()
-        .name("age".to_owned())
-        .spawn(move || {
-            let fifo = request_fifo(PRIORITY);
-            measure_here(duration, impairment, seed, fifo)
-        })?;
-    run.join().unwrap_or_else(|_| {
-        Err(BenchError::Missing(
-            "the measuring thread panicked".to_owned(),
-        ))
+    on_own_thread("age", || {
+        let fifo = request_fifo(PRIORITY);
+        measure_here(duration, impairment.clone(), seed, fifo)
     })
 }
 
@@ -71,21 +63,15 @@ fn measure_here(
     seed: u64,
     fifo: bool,
 ) -> Result<Age, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
-    let key = ClusterKey::generate().map_err(|error| BenchError::Missing(error.to_string()))?;
-    let waiting = Waiting::bind()?;
-    let mut options = server_options(&key);
-    options.announced_udp_port = Some(waiting.address().port());
-    let clock = options.clock;
-    let server = runtime.block_on(serve(options, small_content()))?;
+    let runtime = runtime(2)?;
+    let key = ClusterKey::generate()?;
     let bad = Treatment {
         down: impairment,
         ..Treatment::default()
     };
-    let relay = waiting.start(server.udp_addr(), vec![Treatment::default(), bad], seed)?;
+    let treatments = vec![Treatment::default(), bad];
+    let (server, relay) = serve_behind(&runtime, server_options(&key), treatments, seed)?;
+    let clock = server.clock();
     let mut clients: Vec<ClientLink> = Vec::new();
     for node in ["control", "impaired"] {
         let options = client_options(&server, &key, Role::Render, node);

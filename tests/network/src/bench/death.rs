@@ -1,16 +1,15 @@
 //! A node's process is killed or stopped: how soon the server lets it go, what the others notice, how soon it is back under its name.
 
 use std::path::Path;
-use std::process::Child;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
-use taut_link::{ClusterKey, LinkEvent, Role, ServerLink, ServerOptions, connect, serve};
+use rustix::process::Signal;
+use taut_link::{ClusterKey, LinkEvent, Role, ServerOptions, connect, serve};
 
-use super::isolation::start_client;
-use super::{BenchError, Ticker, client_options, request_fifo, small_content, state, wait_until};
+use super::client_process::start_client;
+use super::state_stream::StateStream;
+use super::threads::{on_own_thread, runtime};
+use super::{BenchError, client_options, request_fifo, small_content, wait_until};
 
 /// Real-time priority of server and witness, where the system grants it.
 const PRIORITY: u8 = 70;
@@ -44,15 +43,7 @@ pub struct Aftermath {
 /// # Errors
 /// The session does not come about, or the node is never let go.
 pub fn measure(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
-    let this = this.to_path_buf();
-    let run = std::thread::Builder::new()
-        .name("death".to_owned())
-        .spawn(move || measure_here(&this, death))?;
-    run.join().unwrap_or_else(|_| {
-        Err(BenchError::Missing(
-            "the measuring thread panicked".to_owned(),
-        ))
-    })
+    on_own_thread("death", || measure_here(this, death))
 }
 
 fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
@@ -61,10 +52,7 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
     let key: ClusterKey = taut_link::create_key_file(&path)?;
     // The victim is an ordinary process: only what comes now is of the real-time class.
     let _ = request_fifo(PRIORITY);
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
+    let runtime = runtime(2)?;
     let server = runtime.block_on(serve(ServerOptions::loopback(key.clone()), small_content()))?;
     let witness = runtime.block_on(connect(client_options(
         &server,
@@ -73,7 +61,7 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
         "witness",
     )))?;
     let address = server.quic_addr().to_string();
-    let mut victim = Owned(start_client(this, &address, &path, VICTIM, "udp")?);
+    let victim = start_client(this, &address, &path, VICTIM, "udp")?;
     wait_until("both paths", || {
         server
             .clients()
@@ -82,8 +70,7 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
             .count()
             == 2
     })?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let sender = send_states(&server, &stop)?;
+    let stream = StateStream::start(&server)?;
     std::thread::sleep(Duration::from_millis(500));
     while server.try_event().is_some() {}
     let (mut states, before) = (Vec::new(), witness.counters().lost);
@@ -96,7 +83,7 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
         Signal::STOP
     };
     let died = Instant::now();
-    kill_process(Pid::from_child(&victim.0), signal).map_err(std::io::Error::from)?;
+    victim.signal(signal)?;
     let mut let_go = None;
     wait_until("the server to let the node go", || {
         witness.drain_states(&mut states);
@@ -108,51 +95,19 @@ fn measure_here(this: &Path, death: Death) -> Result<Aftermath, BenchError> {
         let_go.is_some()
     })?;
     let again = Instant::now();
-    let back = Owned(start_client(this, &address, &path, VICTIM, "udp")?);
+    let back = start_client(this, &address, &path, VICTIM, "udp")?;
     let back_s = again.elapsed().as_secs_f64();
     witness.drain_states(&mut states);
     let gaps = states
         .windows(2)
         .map(|two| two[1].received - two[0].received);
     let longest = gaps.max().unwrap_or(Duration::MAX);
-    stop.store(true, Ordering::Relaxed);
-    let ended = sender.join();
-    ended.map_err(|_| BenchError::Missing("the sending thread panicked".to_owned()))?;
-    let _ = victim.0.kill();
-    drop(back);
+    stream.end()?;
+    drop((victim, back));
     Ok(Aftermath {
         let_go_s: let_go.unwrap_or(Duration::MAX).as_secs_f64(),
         longest_gap_ms: longest.as_secs_f64() * 1e3,
         back_s,
         missed: witness.counters().lost - before,
     })
-}
-
-/// A process that does not outlive its owner.
-struct Owned(Child);
-
-impl Drop for Owned {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A state per millisecond, on a thread of its own.
-fn send_states(
-    server: &ServerLink,
-    stop: &Arc<AtomicBool>,
-) -> Result<std::thread::JoinHandle<()>, BenchError> {
-    let (stopped, mut broadcaster, clock) = (stop.clone(), server.broadcaster(), server.clock());
-    let run = move || {
-        let (mut tick, mut ticker) = (0, Ticker::new(Duration::from_millis(1)));
-        while !stopped.load(Ordering::Relaxed) {
-            ticker.wait();
-            tick += 1;
-            let _ = broadcaster.send(&state(tick, clock.now_ns(), false));
-        }
-    };
-    Ok(std::thread::Builder::new()
-        .name("states".to_owned())
-        .spawn(run)?)
 }

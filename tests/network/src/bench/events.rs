@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use taut_link::{ClusterKey, Role, connect, serve};
+use taut_link::{ClusterKey, Role, connect};
 use taut_proto::state::EventRecord;
 
-use super::{BenchError, Ticker, client_options, server_options, small_content, state, wait_until};
-use crate::relay::{Direction, Impairment, RelayCounts, Treatment, Waiting};
+use super::threads::runtime;
+use super::{BenchError, Ticker, client_options, serve_behind, server_options, state, wait_until};
+use crate::relay::{Direction, Impairment, RelayCounts, Treatment};
 
 /// Time between two states; every fifth has an event.
 const PERIOD: Duration = Duration::from_millis(1);
@@ -36,18 +37,11 @@ pub fn measure(
     impairment: &Impairment,
     seed: u64,
 ) -> Result<Events, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
-    let key = ClusterKey::generate().map_err(|error| BenchError::Missing(error.to_string()))?;
-    let waiting = Waiting::bind()?;
-    let mut options = server_options(&key);
-    options.announced_udp_port = Some(waiting.address().port());
-    let clock = options.clock;
-    let server = runtime.block_on(serve(options, small_content()))?;
+    let runtime = runtime(2)?;
+    let key = ClusterKey::generate()?;
     let bad = Treatment::both_ways(impairment.clone());
-    let relay = waiting.start(server.udp_addr(), vec![bad], seed)?;
+    let (server, relay) = serve_behind(&runtime, server_options(&key), vec![bad], seed)?;
+    let clock = server.clock();
     let options = client_options(&server, &key, Role::Render, "node");
     let client = runtime.block_on(connect(options))?;
     let mut broadcaster = server.broadcaster();

@@ -3,25 +3,19 @@
 //!
 //! The server is a process of its own, of this program; the nodes are threads here, so that one clock sees all of them.
 
-use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
-use taut_link::{ClientOptions, ClusterKey, Role, ServerOptions, serve};
-use taut_proto::barrier::{FRAMES_LEFT_OUT, Swap};
+use taut_link::{ClientOptions, ClusterKey, Role};
+use taut_proto::barrier::FRAMES_LEFT_OUT;
 
+use super::leader_process::{LeaderProcess, PRIORITY, RATE};
 use super::screen::{Screen, Swapped, longest_gap_ms, together};
-use super::skew::{Leading, settings};
-use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, small_content, wait_until};
+use super::threads::{on_own_thread, runtime};
+use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, wait_until};
 
-/// Frames per second.
-pub const RATE: u64 = 60;
 /// Nodes.
 pub const NODES: usize = 3;
-/// Real-time priority of all threads, where the system grants it.
-const PRIORITY: u8 = 60;
 /// Time for clocks to lock and nodes to fall in step.
 const WARM_UP: Duration = Duration::from_secs(3);
 /// Time that each leader leads.
@@ -55,15 +49,7 @@ pub struct Failover {
 /// # Errors
 /// The session does not come about, or nobody comes back.
 pub fn measure(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
-    let this = this.to_path_buf();
-    let run = std::thread::Builder::new()
-        .name("fail-over".to_owned())
-        .spawn(move || measure_here(&this, node_timeout))?;
-    run.join().unwrap_or_else(|_| {
-        Err(BenchError::Missing(
-            "the measuring thread panicked".to_owned(),
-        ))
-    })
+    on_own_thread("fail-over", || measure_here(this, node_timeout))
 }
 
 fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchError> {
@@ -71,15 +57,12 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
     let path = directory.path().join("cluster.key");
     let key: ClusterKey = taut_link::create_key_file(&path)?;
     // Before this thread is of the real-time class: looking for a server that is gone is not, nor is it in `taut render`.
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
+    let runtime = runtime(2)?;
     let fifo = request_fifo(PRIORITY);
     let _awake = keep_cores_awake(); // as `taut render` does
     let any = "127.0.0.1:0";
     let server = LeaderProcess::start(this, &path, (any, any), node_timeout)?;
-    let (quic, udp) = (server.quic.clone(), server.udp.clone());
+    let (quic, udp) = (server.quic().to_owned(), server.udp().to_owned());
     let mut screens = Vec::new();
     for number in 0..NODES {
         let name = format!("node{number}");
@@ -143,101 +126,4 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
         different: by_all.different + by_two.different,
         back_s,
     })
-}
-
-/// A server that broadcasts and leads frames, as a process that is killed when dropped.
-#[derive(Debug)]
-pub struct LeaderProcess {
-    child: Child,
-    quic: String,
-    udp: String,
-}
-
-impl LeaderProcess {
-    /// Starts it as `this` program's `--lead`, with the cluster key of a file, at the addresses of both planes.
-    ///
-    /// # Errors
-    /// No server started.
-    pub fn start(
-        this: &Path,
-        key: &Path,
-        (quic, udp): (&str, &str),
-        node_timeout: Duration,
-    ) -> Result<LeaderProcess, BenchError> {
-        let mut child = Command::new(this)
-            .args(["--lead", quic, udp])
-            .arg(key)
-            .arg(node_timeout.as_millis().to_string())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
-        let mut line = String::new();
-        if let Some(out) = child.stdout.take() {
-            BufReader::new(out).read_line(&mut line)?;
-        }
-        let mut started = LeaderProcess {
-            child,
-            quic: String::new(),
-            udp: String::new(),
-        };
-        let Some((quic, udp)) = line.trim().split_once(' ') else {
-            return Err(BenchError::Missing(format!("no server started: {line}")));
-        };
-        (started.quic, started.udp) = (quic.to_owned(), udp.to_owned());
-        Ok(started)
-    }
-
-    /// Address of its control plane.
-    #[must_use]
-    pub fn quic(&self) -> &str {
-        &self.quic
-    }
-
-    /// Stops it as it stands, or lets it go on.
-    ///
-    /// # Errors
-    /// It is gone.
-    pub fn signal(&self, signal: Signal) -> Result<(), BenchError> {
-        kill_process(Pid::from_child(&self.child), signal).map_err(std::io::Error::from)?;
-        Ok(())
-    }
-}
-
-impl Drop for LeaderProcess {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// What the server's process does: says where it serves, broadcasts, and leads frames until its standard input ends.
-///
-/// # Errors
-/// It cannot serve there.
-pub fn lead(quic: &str, udp: &str, key: &Path, node_timeout: Duration) -> Result<(), BenchError> {
-    let _ = request_fifo(PRIORITY);
-    let address = |text: &str| {
-        let parsed = text.parse();
-        parsed.map_err(|_| BenchError::Missing(format!("`{text}` is no address")))
-    };
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()?;
-    let options = ServerOptions {
-        quic: address(quic)?,
-        udp: address(udp)?,
-        node_timeout,
-        idle_timeout: 2 * node_timeout, // as `taut serve`: QUIC gives nobody up before
-        frames: Some(settings(Swap::Immediate, RATE)),
-        ..ServerOptions::loopback(taut_link::read_key_file(key)?)
-    };
-    let server = runtime.block_on(serve(options, small_content()))?;
-    let leading = Leading::start(&server)?;
-    let mut out = std::io::stdout();
-    writeln!(out, "{} {}", server.quic_addr(), server.udp_addr())?;
-    out.flush()?;
-    let mut ignored = Vec::new();
-    std::io::stdin().read_to_end(&mut ignored)?;
-    leading.end()
 }

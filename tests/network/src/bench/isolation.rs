@@ -4,24 +4,22 @@
 //! process is stopped most of the time, so that nothing is read and buffers fill, and two that flood: one as a member, with device readings that are
 //! not its to send, one from outside, with datagrams that look like taut's.
 
-use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, ClusterKey, Role, Transport, connect};
-use taut_proto::{InputSample, PoseF64, version::MAGIC};
+use taut_link::Transport;
+use taut_proto::version::MAGIC;
 use tokio::runtime::Runtime;
 
+use super::client_process::{member, start_client};
+use super::process::Process;
 use super::program::{Served, Workbench, set};
-use super::{BenchError, request_fifo};
+use super::{BenchError, reading, request_fifo};
 
-/// Longest wait for the program to serve or to end.
-const PATIENCE: Duration = Duration::from_secs(60);
-/// Time that the clients have to come before the period counts: the loop's report covers the whole run, so they come early.
+/// Time that a stalled client stands still, again and again.
 const STALL: Duration = Duration::from_millis(700);
 /// Silence that the program forgives a node, s.
 const NODE_TIMEOUT_S: f64 = 5.0;
@@ -201,16 +199,7 @@ impl Crowd {
         let mut index = 0;
         let from_inside = move || {
             index += 1;
-            flooder.send_input(&InputSample {
-                sample_time_ns: 0,
-                index,
-                pose: PoseF64::IDENTITY,
-                velocity: [0.0; 6],
-                buttons: 0,
-                flags: 0,
-                rendered: [0.0; 6],
-                set_sequence: 0,
-            });
+            flooder.send_input(&reading(index));
         };
         let socket = UdpSocket::bind("127.0.0.1:0")?;
         socket.connect(&served.udp)?;
@@ -258,21 +247,6 @@ impl Crowd {
     }
 }
 
-fn member(
-    runtime: &Runtime,
-    server: &str,
-    key: &ClusterKey,
-    node: &str,
-    transport: Transport,
-) -> Result<taut_link::ClientLink, BenchError> {
-    let options = ClientOptions {
-        transport,
-        connect_timeout: PATIENCE,
-        ..ClientOptions::new(server, key.clone(), Role::Render, node)
-    };
-    Ok(runtime.block_on(connect(options))?)
-}
-
 /// Sends [`FLOOD_HZ`] times per second until told to stop.
 fn flood(
     name: &str,
@@ -300,37 +274,10 @@ fn flood(
 
 /// A client process that is stopped most of the time.
 struct Stalled {
-    child: Child,
+    /// Held: killed when this is dropped, after the thread that signals it has ended.
+    _process: Process,
     stop: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
-}
-
-/// Starts a client as a process of its own, and waits until it has joined.
-pub(super) fn start_client(
-    this: &Path,
-    server: &str,
-    key: &Path,
-    node: &str,
-    transport: &str,
-) -> Result<Child, BenchError> {
-    let mut child = Command::new(this)
-        .args(["--client", server, node, transport])
-        .arg(key)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()?;
-    let mut line = String::new();
-    if let Some(out) = child.stdout.take() {
-        BufReader::new(out).read_line(&mut line)?;
-    }
-    if line.trim() == "joined" {
-        return Ok(child);
-    }
-    let _ = child.kill();
-    let _ = child.wait();
-    Err(BenchError::Missing(format!(
-        "a client did not join: {line}"
-    )))
 }
 
 impl Stalled {
@@ -341,8 +288,8 @@ impl Stalled {
         node: &str,
         transport: &str,
     ) -> Result<Stalled, BenchError> {
-        let child = start_client(this, server, key, node, transport)?;
-        let id = rustix::process::Pid::from_child(&child);
+        let process = start_client(this, server, key, node, transport)?;
+        let id = process.id();
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
         let run = move || {
@@ -358,7 +305,7 @@ impl Stalled {
             .name("stall".to_owned())
             .spawn(run)?;
         Ok(Stalled {
-            child,
+            _process: process,
             stop,
             thread: Some(thread),
         })
@@ -371,26 +318,5 @@ impl Drop for Stalled {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
-}
-
-/// What the stalled client's process does: joins, says so, and takes states until its standard input ends.
-///
-/// # Errors
-/// It does not get in.
-pub fn client(server: &str, node: &str, transport: &str, key: &Path) -> Result<(), BenchError> {
-    let runtime = Runtime::new()?;
-    let key = taut_link::read_key_file(key)?;
-    let transport = match transport {
-        "quic" => Transport::QuicDatagram,
-        _ => Transport::Udp,
-    };
-    let link = member(&runtime, server, &key, node, transport)?;
-    println!("joined");
-    let mut ignored = Vec::new();
-    std::io::stdin().read_to_end(&mut ignored)?;
-    drop(link);
-    Ok(())
 }

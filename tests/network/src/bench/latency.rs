@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use taut_link::{ClusterKey, ReceivedState, Role, Transport, connect, serve};
 use taut_proto::{Payload, header::MAX_DATAGRAM_BYTES};
 
+use super::threads::{on_own_thread, runtime};
 use super::{
     BenchError, Quantiles, Ticker, client_options, request_fifo, server_options, small_content,
     state, wait_until,
@@ -52,26 +53,15 @@ pub struct Latency {
 /// # Errors
 /// The session does not come about.
 pub fn measure(duration: Duration, full: bool) -> Result<Latency, BenchError> {
-    // Threads inherit the class of the one that makes them, so the link's own ones get it, too.
-    let run = std::thread::Builder::new()
-        .name("latency".to_owned())
-        .spawn(move || {
-            let fifo = request_fifo(PRIORITY);
-            measure_here(duration, full, fifo)
-        })?;
-    run.join().unwrap_or_else(|_| {
-        Err(BenchError::Missing(
-            "the measuring thread panicked".to_owned(),
-        ))
+    on_own_thread("latency", || {
+        let fifo = request_fifo(PRIORITY);
+        measure_here(duration, full, fifo)
     })
 }
 
 fn measure_here(duration: Duration, full: bool, fifo: bool) -> Result<Latency, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
-    let key = ClusterKey::generate().map_err(|error| BenchError::Missing(error.to_string()))?;
+    let runtime = runtime(2)?;
+    let key = ClusterKey::generate()?;
     let zero = Instant::now();
     let mut servers = Vec::new();
     for transport in [Transport::Udp, Transport::QuicDatagram] {

@@ -1,14 +1,17 @@
 //! What is measured of the network, on loopback, each figure beside a control of the same run.
 
 pub mod age;
+pub mod client_process;
 pub mod death;
 pub mod events;
 pub mod failover;
 pub mod isolation;
 pub mod join;
 pub mod latency;
+pub mod leader_process;
 mod memory;
 pub mod node;
+mod process;
 mod program;
 mod quantiles;
 mod realtime;
@@ -18,10 +21,13 @@ pub mod server_kill;
 mod session;
 pub mod skew;
 pub mod soak;
+mod state_stream;
+mod threads;
 
 pub use memory::resident_bytes;
 pub use quantiles::Quantiles;
 pub use realtime::{Ticker, keep_cores_awake, request_fifo};
 pub use session::{
-    BenchError, client_options, content_with, server_options, small_content, state, wait_until,
+    BenchError, client_options, content_with, reading, serve_behind, server_options, small_content,
+    state, wait_until,
 };

@@ -1,15 +1,15 @@
 //! The program `taut` in a directory of its own: a workbench file, a cluster key, processes that end with their owner.
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{ChildStderr, Command, Stdio};
 
-use rustix::process::{Pid, Signal, kill_process};
 use taut_link::{ClusterKey, create_key_file};
 use tempfile::TempDir;
 use toml::{Table, Value};
 
 use super::BenchError;
+use super::process::Process;
 
 /// The workbench file that is shipped.
 const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
@@ -71,12 +71,10 @@ impl Workbench {
             command.args(["--quic", quic, "--udp", udp]);
         }
         let mut process = Process::start(command.stderr(Stdio::piped()))?;
-        let errors = process.child.stderr.take();
-        let errors = errors
-            .ok_or_else(|| BenchError::Missing("the program has no standard error".to_owned()))?;
+        let lines = process.errors()?;
         let mut served = Served {
             process,
-            lines: BufReader::new(errors),
+            lines,
             quic: String::new(),
             udp: String::new(),
         };
@@ -126,50 +124,6 @@ pub(super) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Resul
 
 fn broken() -> BenchError {
     BenchError::Missing("the shipped workbench file is not as it was".to_owned())
-}
-
-/// A process that does not outlive its owner: killed when dropped.
-pub(super) struct Process {
-    child: Child,
-}
-
-impl Process {
-    fn start(command: &mut Command) -> Result<Process, BenchError> {
-        let child = command.spawn()?;
-        Ok(Process { child })
-    }
-
-    /// Sends it a signal.
-    pub(super) fn signal(&self, signal: Signal) -> Result<(), BenchError> {
-        let id = Pid::from_child(&self.child);
-        Ok(kill_process(id, signal).map_err(std::io::Error::from)?)
-    }
-
-    /// Ends it as Ctrl-C does; what it wrote to standard output.
-    pub(super) fn end(mut self) -> Result<String, BenchError> {
-        self.signal(Signal::INT)?;
-        let mut text = String::new();
-        if let Some(mut out) = self.child.stdout.take() {
-            out.read_to_string(&mut text)?;
-        }
-        self.child.wait()?;
-        Ok(text)
-    }
-
-    /// The same; its report.
-    pub(super) fn report(self) -> Result<serde_json::Value, BenchError> {
-        let text = self.end()?;
-        serde_json::from_str(&text).map_err(|error| {
-            BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))
-        })
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.child.kill(); // it has ended where all went well
-        let _ = self.child.wait();
-    }
 }
 
 /// A running `taut serve`; killed when dropped.

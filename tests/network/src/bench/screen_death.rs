@@ -11,8 +11,10 @@ use taut_link::{ClientLink, ClientOptions, Role};
 use tokio::runtime::Runtime;
 
 use super::death::Death;
-use super::program::{Process, Workbench, set};
+use super::process::Process;
+use super::program::{Workbench, set};
 use super::screen::{Screen, longest_gap_ms};
+use super::threads::{on_own_thread, runtime};
 use super::{BenchError, request_fifo, wait_until};
 
 /// Frames per second of the drawing processes: what two processors draw without a graphics card.
@@ -125,20 +127,11 @@ pub fn measure(program: &Path, death: Death) -> Result<ScreenDeath, BenchError> 
 /// The node that sees every swap, with the runtime that it lives on: of the real-time class where the system grants it, as the threads of the processes that
 /// draw are not, and the processes that are started later.
 fn start_witness(options: ClientOptions) -> Result<(Screen, Runtime), BenchError> {
-    let start = move || -> Result<(Screen, Runtime), BenchError> {
+    on_own_thread("witness", || {
         let _ = request_fifo(PRIORITY);
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .worker_threads(1)
-            .enable_all()
-            .build()?;
+        let runtime = runtime(1)?;
         Ok((Screen::start(&runtime, options, 1)?, runtime))
-    };
-    let started = std::thread::Builder::new()
-        .name("witness".to_owned())
-        .spawn(start)?;
-    started
-        .join()
-        .unwrap_or_else(|_| Err(BenchError::Missing("the witness panicked".to_owned())))
+    })
 }
 
 /// Session number of a node, if it is in.

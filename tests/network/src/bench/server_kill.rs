@@ -10,6 +10,7 @@ use toml::{Table, Value};
 
 use super::program::{SCENE, Workbench};
 use super::screen::Screen;
+use super::threads::runtime;
 use super::{BenchError, wait_until};
 
 /// Nodes beside the bridge.
@@ -54,10 +55,7 @@ pub fn measure(program: &Path) -> Result<ServerKill, BenchError> {
     let arguments = ["--json", "--hand", "firm", "--path", &path, "--loop"];
     let bridge = workbench.join("bridge", "bridge", &quic, &arguments)?;
 
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
+    let runtime = runtime(2)?;
     let key = workbench.key()?;
     let mut screens = Vec::new();
     for number in 0..NODES {

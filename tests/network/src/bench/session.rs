@@ -2,13 +2,18 @@
 
 use std::time::{Duration, Instant};
 
-use taut_link::{ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink, ServerOptions};
+use taut_link::{
+    ClientOptions, ClusterKey, Content, LinkError, Role, ServerLink, ServerOptions, serve,
+};
 use taut_proto::{
-    HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
+    HotState, InputSample, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription,
     mesh_blob::Positions,
     scene::BodyDescription,
     state::{BodyState, ContactState, MAX_BODIES, MAX_CONTACTS, RunState, ToolState},
 };
+use tokio::runtime::Runtime;
+
+use crate::relay::{Relay, Treatment, Waiting};
 
 /// Silence and joining time that a busy machine is forgiven.
 const FORGIVING: Duration = Duration::from_secs(10);
@@ -19,6 +24,9 @@ pub enum BenchError {
     /// The link failed.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The system gives no random bytes for a key.
+    #[error(transparent)]
+    Key(#[from] taut_proto::key::KeyError),
     /// The relay failed.
     #[error(transparent)]
     Relay(#[from] crate::relay::RelayError),
@@ -52,6 +60,38 @@ pub fn client_options(
         idle_timeout: FORGIVING,
         connect_timeout: FORGIVING,
         ..ClientOptions::new(server.quic_addr().to_string(), key.clone(), role, node)
+    }
+}
+
+/// A server of one triangle behind a relay: clients are told to send their datagrams to the relay.
+///
+/// # Errors
+/// Either does not start.
+pub fn serve_behind(
+    runtime: &Runtime,
+    mut options: ServerOptions,
+    treatments: Vec<Treatment>,
+    seed: u64,
+) -> Result<(ServerLink, Relay), BenchError> {
+    let waiting = Waiting::bind()?;
+    options.announced_udp_port = Some(waiting.address().port());
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let relay = waiting.start(server.udp_addr(), treatments, seed)?;
+    Ok((server, relay))
+}
+
+/// A device's reading of this number, at rest and without force.
+#[must_use]
+pub fn reading(index: u64) -> InputSample {
+    InputSample {
+        sample_time_ns: 0,
+        index,
+        pose: PoseF64::IDENTITY,
+        velocity: [0.0; 6],
+        buttons: 0,
+        flags: 0,
+        rendered: [0.0; 6],
+        set_sequence: 0,
     }
 }
 

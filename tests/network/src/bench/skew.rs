@@ -13,9 +13,10 @@ use taut_link::{ClusterKey, Role, ServerLink, ServerOptions, serve};
 use taut_proto::barrier::{MasterSettings, Swap};
 
 use super::screen::{Screen, Swapped, together};
+use super::state_stream::StateStream;
+use super::threads::{on_own_thread, runtime};
 use super::{
     BenchError, Quantiles, Ticker, client_options, keep_cores_awake, request_fifo, small_content,
-    state,
 };
 
 /// Frames at the start do not count: clocks lock, nodes fall in step.
@@ -116,24 +117,13 @@ pub fn measure_turns(plan: Plan, turns: usize) -> Result<Turns, BenchError> {
 /// # Errors
 /// The session does not come about.
 pub fn measure(plan: Plan) -> Result<Skew, BenchError> {
-    // Threads inherit the class of the one that makes them.
-    let run = std::thread::Builder::new()
-        .name("skew".to_owned())
-        .spawn(move || measure_here(plan, request_fifo(PRIORITY)))?;
-    run.join().unwrap_or_else(|_| {
-        Err(BenchError::Missing(
-            "the measuring thread panicked".to_owned(),
-        ))
-    })
+    on_own_thread("skew", || measure_here(plan, request_fifo(PRIORITY)))
 }
 
 fn measure_here(plan: Plan, fifo: bool) -> Result<Skew, BenchError> {
     let awake = keep_cores_awake();
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
-    let key = ClusterKey::generate().map_err(|error| BenchError::Missing(error.to_string()))?;
+    let runtime = runtime(2)?;
+    let key = ClusterKey::generate()?;
     let options = ServerOptions {
         frames: Some(settings(plan.swap, plan.rate)),
         ..ServerOptions::loopback(key.clone())
@@ -186,10 +176,11 @@ pub fn settings(swap: Swap, rate: u64) -> MasterSettings {
     }
 }
 
-/// The threads of a server that broadcasts a state per millisecond and leads frames.
+/// A server's stream of states, and its thread that leads frames.
 pub struct Leading {
+    states: StateStream,
     stop: Arc<AtomicBool>,
-    threads: Vec<std::thread::JoinHandle<()>>,
+    frames: std::thread::JoinHandle<()>,
 }
 
 impl Leading {
@@ -198,28 +189,19 @@ impl Leading {
     /// # Errors
     /// The server leads no frames, or the system has no thread.
     pub fn start(server: &ServerLink) -> Result<Leading, BenchError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let (over, mut broadcaster, clock) = (stop.clone(), server.broadcaster(), server.clock());
-        let states = move || {
-            let (mut tick, mut ticker) = (0, Ticker::new(Duration::from_millis(1)));
-            while !over.load(Ordering::Relaxed) {
-                ticker.wait();
-                tick += 1;
-                let _ = broadcaster.send(&state(tick, clock.now_ns(), false));
-            }
-        };
         let mut master = server
             .frame_master()
             .ok_or_else(|| BenchError::Missing("the server leads no frames".to_owned()))?;
+        let stop = Arc::new(AtomicBool::new(false));
         let over = stop.clone();
-        let frames = move || master.run(&|| over.load(Ordering::Relaxed));
-        let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        let states = StateStream::start(server)?;
+        let frames = std::thread::Builder::new()
+            .name("frames".to_owned())
+            .spawn(move || master.run(&|| over.load(Ordering::Relaxed)))?;
         Ok(Leading {
+            states,
             stop,
-            threads: vec![
-                named("states").spawn(states)?,
-                named("frames").spawn(frames)?,
-            ],
+            frames,
         })
     }
 
@@ -229,11 +211,9 @@ impl Leading {
     /// One panicked.
     pub fn end(self) -> Result<(), BenchError> {
         self.stop.store(true, Ordering::Relaxed);
-        for thread in self.threads {
-            let ended = thread.join();
-            ended.map_err(|_| BenchError::Missing("a thread panicked".to_owned()))?;
-        }
-        Ok(())
+        self.states.end()?;
+        let ended = self.frames.join();
+        ended.map_err(|_| BenchError::Missing("the leading thread panicked".to_owned()))
     }
 }
 

@@ -10,13 +10,14 @@ use std::time::{Duration, Instant};
 
 use taut_link::{
     Broadcaster, ClientLink, ClientOptions, ClusterKey, Counters, Role, ServerOptions,
-    SessionClock, Transport, connect, serve,
+    SessionClock, Transport, connect,
 };
 
-use super::{BenchError, Ticker, resident_bytes, server_options, small_content, state};
+use super::threads::runtime;
+use super::{BenchError, Ticker, resident_bytes, serve_behind, server_options, state};
 use crate::forge::{FORGERIES, Forger, MAX_FORGED_BYTES, Seen, payload_of_every_kind};
 use crate::random::Random;
-use crate::relay::{Burst, Direction, Impairment, RelayCounts, Treatment, Waiting};
+use crate::relay::{Burst, Direction, Impairment, RelayCounts, Treatment};
 
 /// Most clients at a time.
 const MAX_MEMBERS: usize = 6;
@@ -68,23 +69,16 @@ struct Member {
 /// # Errors
 /// The server does not come about, or counters do not settle.
 pub fn run(duration: Duration, seed: u64) -> Result<Soak, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
-    let missing = |error: taut_proto::key::KeyError| BenchError::Missing(error.to_string());
-    let key = ClusterKey::generate().map_err(missing)?;
-    let other_key = ClusterKey::generate().map_err(missing)?;
-    let waiting = Waiting::bind()?;
+    let runtime = runtime(2)?;
+    let key = ClusterKey::generate()?;
+    let other_key = ClusterKey::generate()?;
     let options = ServerOptions {
         idle_timeout: IDLE,
         node_timeout: IDLE,
-        announced_udp_port: Some(waiting.address().port()),
         ..server_options(&key)
     };
-    let clock = options.clock;
-    let server = runtime.block_on(serve(options, small_content()))?;
-    let relay = waiting.start(server.udp_addr(), vec![bad_network()], seed)?;
+    let (server, relay) = serve_behind(&runtime, options, vec![bad_network()], seed)?;
+    let clock = server.clock();
     let options = |key: &ClusterKey, node: String, transport| ClientOptions {
         transport,
         idle_timeout: IDLE,
@@ -224,10 +218,7 @@ fn bad_network() -> Treatment {
 
 /// Joins and dies without a word: its network tasks are gone before it could say one. Whether it had joined.
 fn vanish(options: ClientOptions) -> Result<bool, BenchError> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()?;
+    let runtime = runtime(1)?;
     let joined = runtime.block_on(connect(options));
     runtime.shutdown_background();
     Ok(joined.is_ok())

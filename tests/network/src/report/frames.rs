@@ -7,7 +7,7 @@ use taut_proto::barrier::Swap;
 use super::row::{Row, brief};
 use super::sections::Extent;
 use crate::bench::skew::{self, OverTurns, Plan, Skew, Turns};
-use crate::bench::{BenchError, Quantiles, failover};
+use crate::bench::{BenchError, Quantiles, failover, leader_process};
 
 /// Swap-call skew of a quiet machine: p50 and p99, us.
 const SKEW_US: (f64, f64) = (20.0, 100.0);
@@ -147,7 +147,7 @@ pub(super) fn failover_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         "largest of {}, {} nodes at {} Hz, {}",
         runs.len(),
         failover::NODES,
-        failover::RATE,
+        leader_process::RATE,
         class(fifo)
     );
     let row = |what: &str, value, limit, unit| {

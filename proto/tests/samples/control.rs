@@ -1,0 +1,115 @@
+//! Every control message.
+
+use taut_proto::{
+    ClientStats, ControlMessage, CouplingOffer, EventsTold, MeshHash, Refusal, Role, Transport,
+    control::{
+        ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, StatesBy,
+        Welcome,
+    },
+    proof::Grant,
+    stats::DrawnState,
+};
+
+use super::coupling::coupling;
+use super::group::group;
+use super::hot::hot;
+use super::scene::scene;
+
+pub fn messages() -> Vec<(&'static str, ControlMessage)> {
+    let refusal = Refusal {
+        code: RefusalCode::NameTaken,
+        version: 1,
+        text: "taken".to_owned(),
+    };
+    let hello = Hello {
+        node: "left".to_owned(),
+        role: Role::Render,
+        transport: Transport::QuicDatagram,
+        rate_hz: 1000,
+        proof: [3; 32],
+        grant: Grant::Master,
+    };
+    let granted = Hello {
+        role: Role::Tracker,
+        grant: Grant::Node { issue: 2 },
+        ..hello.clone()
+    };
+    let welcome = Welcome {
+        proof: [4; 32],
+        session: 2,
+        epoch: 0xdead_beef,
+        udp_port: 4858,
+        session_time_ns: 1_000_000_000,
+        node_timeout_ms: 500,
+    };
+    let stats = ClientStats {
+        frames: 600,
+        fps: 59.5,
+        pose_age_ms_p50: 4.0,
+        pose_age_ms_p99: 8.0,
+        pose_age_ms_max: 16.0,
+        drawn_age_ms_p50: 12.0,
+        drawn_age_ms_p99: 24.0,
+        drawn_age_ms_max: 32.0,
+        swap_skew_ms_p50: 0.5,
+        swap_skew_ms_max: 1.5,
+        packets_lost: 1,
+        packets_received: 10_000,
+        clock_uncertainty_ns: 25_000,
+        drawn: vec![DrawnState {
+            tick: 1000,
+            state_hash: 0x0123_4567_89ab_cdef,
+        }],
+    };
+    let hash = MeshHash { bytes: [1; 32] };
+    let log = LogEvent {
+        level: LogLevel::Warning,
+        text: "software rendering".to_owned(),
+    };
+    vec![
+        ("refused", ControlMessage::Refused(refusal)),
+        ("hello", ControlMessage::Hello(hello)),
+        ("welcome", ControlMessage::Welcome(welcome)),
+        ("scene", ControlMessage::Scene(scene())),
+        (
+            "mesh_request",
+            ControlMessage::MeshRequest(MeshRequest { hash }),
+        ),
+        (
+            "mesh_header",
+            ControlMessage::MeshHeader(MeshHeader { hash, length: 4096 }),
+        ),
+        ("stats", ControlMessage::Stats(stats)),
+        ("log", ControlMessage::Log(log)),
+        (
+            "coupling_at_edge",
+            ControlMessage::Coupling(CouplingOffer::AtEdge(coupling())),
+        ),
+        (
+            "coupling_at_server",
+            ControlMessage::Coupling(CouplingOffer::AtServer {
+                reason: "a height map".to_owned(),
+            }),
+        ),
+        (
+            "bye",
+            ControlMessage::Bye(Bye {
+                reason: "done".to_owned(),
+            }),
+        ),
+        ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
+        ("group", ControlMessage::Group(group())),
+        ("hello_granted", ControlMessage::Hello(granted)),
+        (
+            "events",
+            ControlMessage::Events(EventsTold {
+                after: 16,
+                records: hot().events.to_vec(),
+            }),
+        ),
+        (
+            "states_by",
+            ControlMessage::StatesBy(StatesBy { multicast: true }),
+        ),
+    ]
+}

@@ -1,0 +1,121 @@
+//! Every datagram payload.
+
+use proptest::prelude::*;
+use taut_proto::{
+    HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
+    events::EventAck,
+    time::{TimeRequest, TimeResponse},
+};
+
+use super::barrier::{any_arrive, any_release, arrive, release};
+use super::constraints::{any_part, part};
+use super::hot::{any_hot, hot};
+use super::values::{finite64, pose64};
+
+pub fn datagrams() -> Vec<(&'static str, Payload)> {
+    let input = InputSample {
+        sample_time_ns: 1_000_000_000,
+        index: 41,
+        pose: PoseF64 {
+            position: [0.5, 0.25, -0.125],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+        },
+        velocity: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        buttons: 1,
+        flags: 2,
+        rendered: [0.0, 0.0, 1.5, 0.0, 0.25, 0.0],
+        set_sequence: 40,
+    };
+    let wrench = WrenchCommand {
+        time_ns: 1_000_000_500,
+        input_index: 41,
+        wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
+        flags: 0,
+    };
+    let head = HeadSample {
+        sample_time_ns: 1_000_000_000,
+        index: 43,
+        pose: PoseF64 {
+            position: [0.0, -1.25, 0.875],
+            rotation: [0.5, 0.5, 0.5, 0.5],
+        },
+    };
+    let response = TimeResponse {
+        client_sent: 17,
+        server_received: 1017,
+        server_sent: 1020,
+    };
+    vec![
+        ("hot", Payload::Hot(hot())),
+        (
+            "time_request",
+            Payload::TimeRequest(TimeRequest { client_sent: 17 }),
+        ),
+        ("time_response", Payload::TimeResponse(response)),
+        ("heartbeat", Payload::Heartbeat),
+        ("input", Payload::Input(input)),
+        ("wrench", Payload::Wrench(wrench)),
+        ("constraints", Payload::Constraints(part())),
+        ("head", Payload::Head(head)),
+        ("arrive", Payload::Arrive(arrive())),
+        ("release", Payload::Release(release())),
+        ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
+    ]
+}
+
+pub fn any_payload() -> impl Strategy<Value = Payload> {
+    let six = || {
+        prop::collection::vec(finite64(), 6)
+            .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
+    };
+    let input = (any::<(u64, u64, u16, u16, u64)>(), pose64(), six(), six()).prop_map(
+        |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
+            Payload::Input(InputSample {
+                sample_time_ns,
+                index,
+                pose,
+                velocity,
+                buttons,
+                flags,
+                rendered,
+                set_sequence,
+            })
+        },
+    );
+    let wrench =
+        (any::<(u64, u64, u16)>(), six()).prop_map(|((time_ns, input_index, flags), wrench)| {
+            Payload::Wrench(WrenchCommand {
+                time_ns,
+                input_index,
+                wrench,
+                flags,
+            })
+        });
+    let response =
+        any::<(u64, u64, u64)>().prop_map(|(client_sent, server_received, server_sent)| {
+            Payload::TimeResponse(TimeResponse {
+                client_sent,
+                server_received,
+                server_sent,
+            })
+        });
+    let head = (any::<(u64, u64)>(), pose64()).prop_map(|((sample_time_ns, index), pose)| {
+        Payload::Head(HeadSample {
+            sample_time_ns,
+            index,
+            pose,
+        })
+    });
+    prop_oneof![
+        any_hot().prop_map(Payload::Hot),
+        any::<u64>().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
+        response,
+        Just(Payload::Heartbeat),
+        input,
+        wrench,
+        any_part().prop_map(Payload::Constraints),
+        head,
+        any_arrive().prop_map(Payload::Arrive),
+        any_release().prop_map(Payload::Release),
+    ]
+}

@@ -1,0 +1,162 @@
+//! What a render node is told of the scene.
+
+use proptest::prelude::*;
+use taut_proto::{
+    MeshHash, PoseF64, SceneDescription,
+    scene::{
+        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+    },
+};
+
+use super::values::{finite32, finite64, pose64};
+
+pub fn scene() -> SceneDescription {
+    let body = |name: &str, byte: u8| BodyDescription {
+        name: name.to_owned(),
+        mesh: MeshHash { bytes: [byte; 32] },
+        pose: PoseF64::IDENTITY,
+        colour: [1.0, 0.5, 0.25, 1.0],
+    };
+    SceneDescription {
+        name: "peg".to_owned(),
+        revision: 7,
+        god_object: body("peg", 1),
+        obstacles: vec![body("box", 2)],
+        reference_point: [0.0, 0.0, 0.5],
+        scene_origin: PoseF64::IDENTITY,
+        display_scale: 2.0,
+        screens: vec![ScreenDescription {
+            name: "front".to_owned(),
+            lower_left: [-1.0, 1.0, 0.0],
+            lower_right: [1.0, 1.0, 0.0],
+            upper_left: [-1.0, 1.0, 1.0],
+        }],
+        nodes: vec![NodeDescription {
+            name: "left".to_owned(),
+            screens: vec!["front".to_owned()],
+            stereo: Stereo::SideBySide,
+            window: WindowDescription {
+                width: 640,
+                height: 480,
+                fullscreen: true,
+            },
+            monitors: vec!["DP-1".to_owned(), "1".to_owned()],
+        }],
+        viewer: PoseF64::IDENTITY,
+        eye_separation: 0.0625,
+        near: 0.125,
+        far: 8.0,
+        separation_scale: 0.75,
+        nearest_disparity: 0.0625,
+        show: ShowOptions {
+            ghost: true,
+            contacts: false,
+            force: true,
+            hud: true,
+        },
+    }
+}
+
+pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
+    let body = || {
+        (
+            ".{0,20}",
+            any::<[u8; 32]>(),
+            pose64(),
+            prop::array::uniform4(finite32()),
+        )
+            .prop_map(|(name, bytes, pose, colour)| BodyDescription {
+                name,
+                mesh: MeshHash { bytes },
+                pose,
+                colour,
+            })
+    };
+    let corner = || prop::array::uniform3(finite64());
+    let screen = (".{0,20}", corner(), corner(), corner()).prop_map(
+        |(name, lower_left, lower_right, upper_left)| ScreenDescription {
+            name,
+            lower_left,
+            lower_right,
+            upper_left,
+        },
+    );
+    let stereo = prop::sample::select(vec![
+        Stereo::Mono,
+        Stereo::SideBySide,
+        Stereo::TopBottom,
+        Stereo::Anaglyph,
+        Stereo::TwoWindows,
+    ]);
+    let node = (
+        ".{0,20}",
+        prop::collection::vec(".{0,9}", 0..4),
+        stereo,
+        any::<(u32, u32, bool)>(),
+        prop::collection::vec(".{0,9}", 0..3),
+    )
+        .prop_map(
+            |(name, screens, stereo, (width, height, fullscreen), monitors)| NodeDescription {
+                name,
+                screens,
+                stereo,
+                window: WindowDescription {
+                    width,
+                    height,
+                    fullscreen,
+                },
+                monitors,
+            },
+        );
+    let lists = (
+        prop::collection::vec(body(), 0..5),
+        prop::collection::vec(screen, 0..4),
+        prop::collection::vec(node, 0..4),
+    );
+    let numbers = (
+        prop::array::uniform6(finite64()),
+        prop::array::uniform3(finite64()),
+        any::<(u32, bool, bool, bool, bool)>(),
+    );
+    (".{0,40}", body(), lists, (pose64(), pose64()), numbers).prop_map(
+        |(
+            name,
+            god_object,
+            (obstacles, screens, nodes),
+            (scene_origin, viewer),
+            (scalars, reference_point, (revision, ghost, contacts, force, hud)),
+        )| {
+            let [
+                display_scale,
+                eye_separation,
+                near,
+                far,
+                separation_scale,
+                nearest_disparity,
+            ] = scalars;
+            SceneDescription {
+                name,
+                revision,
+                god_object,
+                obstacles,
+                reference_point,
+                scene_origin,
+                display_scale,
+                screens,
+                nodes,
+                viewer,
+                eye_separation,
+                near,
+                far,
+                separation_scale,
+                nearest_disparity,
+                show: ShowOptions {
+                    ghost,
+                    contacts,
+                    force,
+                    hud,
+                },
+            }
+        },
+    )
+}

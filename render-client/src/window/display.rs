@@ -1,0 +1,220 @@
+//! The windows of a node, one for each picture of each of its screens, and what draws in them.
+
+use std::sync::Arc;
+
+use winit::dpi::{PhysicalPosition, PhysicalSize};
+use winit::event_loop::ActiveEventLoop;
+use winit::monitor::MonitorHandle;
+use winit::window::{Fullscreen, Window, WindowId};
+
+use super::Plan;
+use crate::error::RenderError;
+use crate::monitor;
+use crate::mouse;
+use crate::renderer::{Gpu, PictureTarget, Renderer, new_instance};
+use crate::stage::Stage;
+use crate::stereo::Picture;
+
+/// The windows and what draws in them.
+pub(super) struct Display {
+    pub(super) gpu: Gpu,
+    pub(super) renderer: Renderer,
+    pub(super) panes: Vec<Pane>,
+}
+
+/// One window.
+pub(super) struct Pane {
+    pub(super) window: Arc<Window>,
+    pub(super) surface: wgpu::Surface<'static>,
+    pub(super) config: wgpu::SurfaceConfiguration,
+    /// The format that is drawn: that of the surface, with sRGB encoding.
+    pub(super) format: wgpu::TextureFormat,
+    pub(super) picture: Picture,
+    pub(super) target: PictureTarget,
+    /// Place of the screen in the stage.
+    pub(super) screen: usize,
+}
+
+impl Display {
+    /// Opens the windows of the stage where the plan wants them.
+    pub(super) fn open(
+        events: &ActiveEventLoop,
+        stage: &Stage,
+        plan: &Plan,
+        holds: bool,
+    ) -> Result<Self, RenderError> {
+        let help = if holds {
+            format!(" ({})", mouse::HELP)
+        } else {
+            String::new()
+        };
+        let instance = new_instance(Some(events.owned_display_handle()));
+        let monitors: Vec<MonitorHandle> = events.available_monitors().collect();
+        let names: Vec<Option<String>> = monitors.iter().map(MonitorHandle::name).collect();
+        let mut opened = Vec::new();
+        let mut below = 0;
+        for (index, screen) in stage.screens.iter().enumerate() {
+            for picture in screen.stereo.pictures() {
+                let (width, height) = screen.pixels;
+                // On one monitor the windows stand in a column, the first screen above.
+                let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
+                let monitor = place.and_then(|place| monitors.get(place).cloned());
+                // A monitor that was asked for is where the window opens, even if it does not cover it.
+                let named = monitor.as_ref().filter(|_| !plan.monitors.is_empty());
+                let corner = named.map_or(PhysicalPosition::new(0, 0), MonitorHandle::position);
+                let cover = || Fullscreen::Borderless(monitor.clone());
+                let attributes = Window::default_attributes()
+                    .with_title(format!("taut: {}{}{help}", screen.name, picture.suffix))
+                    .with_inner_size(PhysicalSize::new(width, height))
+                    .with_position(PhysicalPosition::new(corner.x, corner.y + below as i32))
+                    .with_fullscreen(plan.fullscreen.then(cover));
+                below += height;
+                let window = events
+                    .create_window(attributes)
+                    .map_err(|error| missing(&error))?;
+                let window = Arc::new(window);
+                let surface = instance
+                    .create_surface(Arc::clone(&window))
+                    .map_err(|error| missing(&error))?;
+                opened.push((index, picture, window, surface));
+            }
+        }
+        let gpu = Gpu::open_for(
+            instance,
+            opened.first().map(|(.., surface)| surface),
+            &plan.gpu,
+        )?;
+        let mut renderer: Option<Renderer> = None;
+        let mut panes = Vec::new();
+        for (screen, picture, window, surface) in opened {
+            // One window waits for the monitor; the others would make it wait twice.
+            let present_mode = if panes.is_empty() {
+                wgpu::PresentMode::AutoVsync
+            } else {
+                wgpu::PresentMode::AutoNoVsync
+            };
+            let size = window.inner_size();
+            let (config, format) = configuration(&gpu, &surface, size, present_mode)?;
+            surface.configure(&gpu.device, &config);
+            let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
+            let target = renderer.picture(&gpu, &picture, (config.width, config.height));
+            panes.push(Pane {
+                window,
+                surface,
+                config,
+                format,
+                picture,
+                target,
+                screen,
+            });
+        }
+        let renderer = renderer.ok_or_else(|| RenderError::BadScene {
+            what: "this node draws no screen".to_owned(),
+        })?;
+        Ok(Self {
+            gpu,
+            renderer,
+            panes,
+        })
+    }
+
+    /// Draws another stage in the same windows.
+    pub(super) fn restage(&mut self, stage: &Stage) {
+        let Some(format) = self.panes.first().map(|pane| pane.format) else {
+            return;
+        };
+        self.renderer = Renderer::new(&self.gpu, stage, format);
+        for pane in &mut self.panes {
+            let size = (pane.config.width, pane.config.height);
+            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size);
+        }
+    }
+
+    pub(super) fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {
+        let hidden = size.width == 0 || size.height == 0;
+        let pane = self
+            .panes
+            .iter_mut()
+            .find(|pane| pane.window.id() == id && !hidden);
+        if let Some(pane) = pane {
+            (pane.config.width, pane.config.height) = (size.width, size.height);
+            pane.surface.configure(&self.gpu.device, &pane.config);
+            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size.into());
+        }
+    }
+}
+
+impl Pane {
+    /// What to draw to next; `None` while the window is hidden or changes.
+    pub(super) fn texture(&self, gpu: &Gpu) -> Result<Option<wgpu::SurfaceTexture>, RenderError> {
+        match self.surface.get_current_texture() {
+            wgpu::CurrentSurfaceTexture::Success(texture) => Ok(Some(texture)),
+            wgpu::CurrentSurfaceTexture::Suboptimal(texture) => Ok(Some(texture)),
+            wgpu::CurrentSurfaceTexture::Timeout | wgpu::CurrentSurfaceTexture::Occluded => {
+                Ok(None)
+            }
+            wgpu::CurrentSurfaceTexture::Outdated | wgpu::CurrentSurfaceTexture::Lost => {
+                self.surface.configure(&gpu.device, &self.config);
+                Ok(None)
+            }
+            wgpu::CurrentSurfaceTexture::Validation => {
+                Err(gpu.broken(&"the window's surface is invalid"))
+            }
+        }
+    }
+}
+
+/// No window, by what the window system said.
+pub(super) fn missing(error: &dyn std::fmt::Display) -> RenderError {
+    RenderError::NoDisplay {
+        reason: without_place(&error.to_string()).to_owned(),
+    }
+}
+
+/// An error's text without the place in winit's source that it may begin with, `os error at FILE.rs:LINE: `, and without its full stop.
+fn without_place(text: &str) -> &str {
+    let after =
+        |(_, rest): (&str, &str)| rest.find(": ").map(|at| at + 2 + text.len() - rest.len());
+    let begins = text
+        .strip_prefix("os error at ")
+        .and_then(|place| place.split_once(".rs:"))
+        .and_then(after);
+    text[begins.unwrap_or(0)..].trim_end_matches('.')
+}
+
+/// How to show pictures on a surface, and the sRGB format to draw them in.
+fn configuration(
+    gpu: &Gpu,
+    surface: &wgpu::Surface<'_>,
+    size: PhysicalSize<u32>,
+    present_mode: wgpu::PresentMode,
+) -> Result<(wgpu::SurfaceConfiguration, wgpu::TextureFormat), RenderError> {
+    let (width, height) = (size.width.max(1), size.height.max(1));
+    let mut config = surface
+        .get_default_config(&gpu.adapter, width, height)
+        .ok_or_else(|| gpu.broken(&"it cannot show pictures in this window"))?;
+    let formats = surface.get_capabilities(&gpu.adapter).formats;
+    config.format = formats
+        .into_iter()
+        .find(wgpu::TextureFormat::is_srgb)
+        .unwrap_or(config.format);
+    let drawn = config.format.add_srgb_suffix();
+    if drawn != config.format {
+        config.view_formats.push(drawn);
+    }
+    config.present_mode = present_mode;
+    config.desired_maximum_frame_latency = 1; // the least age that double buffering allows
+    Ok((config, drawn))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_window_system_says_is_told_without_a_place_in_its_source() {
+        let told = "os error at /home/a/winit-0.30.13/src/mod.rs:765: neither DISPLAY nor another: is set.";
+        assert_eq!(without_place(told), "neither DISPLAY nor another: is set");
+        assert_eq!(without_place("it is gone"), "it is gone");
+    }
+}

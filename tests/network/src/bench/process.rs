@@ -1,0 +1,74 @@
+//! Processes that end with their owner.
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use super::BenchError;
+
+/// A process that does not outlive its owner: killed when dropped.
+#[derive(Debug)]
+pub(super) struct Process {
+    child: Child,
+}
+
+impl Process {
+    pub(super) fn start(command: &mut Command) -> Result<Process, BenchError> {
+        let child = command.spawn()?;
+        Ok(Process { child })
+    }
+
+    /// The first line that it writes to standard output, which is not read after that; empty where it ends before.
+    pub(super) fn first_line(&mut self) -> Result<String, BenchError> {
+        let mut line = String::new();
+        if let Some(out) = self.child.stdout.take() {
+            BufReader::new(out).read_line(&mut line)?;
+        }
+        Ok(line)
+    }
+
+    /// Its standard error.
+    pub(super) fn errors(&mut self) -> Result<BufReader<std::process::ChildStderr>, BenchError> {
+        let errors = self.child.stderr.take();
+        errors
+            .map(BufReader::new)
+            .ok_or_else(|| BenchError::Missing("the program has no standard error".to_owned()))
+    }
+
+    /// For signals from another thread, while it is not dropped.
+    pub(super) fn id(&self) -> Pid {
+        Pid::from_child(&self.child)
+    }
+
+    /// Sends it a signal.
+    pub(super) fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+        Ok(kill_process(self.id(), signal).map_err(std::io::Error::from)?)
+    }
+
+    /// Ends it as Ctrl-C does; what it wrote to standard output.
+    pub(super) fn end(mut self) -> Result<String, BenchError> {
+        self.signal(Signal::INT)?;
+        let mut text = String::new();
+        if let Some(mut out) = self.child.stdout.take() {
+            out.read_to_string(&mut text)?;
+        }
+        self.child.wait()?;
+        Ok(text)
+    }
+
+    /// The same; its report.
+    pub(super) fn report(self) -> Result<serde_json::Value, BenchError> {
+        let text = self.end()?;
+        serde_json::from_str(&text).map_err(|error| {
+            BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))
+        })
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // it has ended where all went well
+        let _ = self.child.wait();
+    }
+}
