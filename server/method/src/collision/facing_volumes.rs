@@ -32,14 +32,13 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
-use super::single::{apply, norm, product, sum};
 use super::turned::TurnedNodes;
 use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
 const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
 /// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
-const LENGTH_ROUNDING: f64 = 128.0 * HALF_UNIT;
+const LENGTH_ROUNDING: f64 = 160.0 * HALF_UNIT;
 pub(super) const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
 pub(super) const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
 /// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
@@ -61,8 +60,8 @@ pub(crate) struct FacingVolumes {
     pub(super) serial: u32,
     frames: [Frame; 2],
     moves: bool,
-    /// Bound on half the path of any point of the body, m.
-    longest_half_sweep: f32,
+    /// By how much the path of any point of the body is curved in half the interval at most, m.
+    curved: f32,
     /// What volumes stray by, all over the body, and rounding, m: without the margin and with it.
     pub(super) bare_stray: f32,
     pub(super) stray: f32,
@@ -145,7 +144,8 @@ impl FacingVolumes {
         let path = half_path + half_turn.cross(&(origin - placement.center));
         let arm = (origin - placement.center).norm() + body.reach;
         let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
-        let bare_stray = 0.5 * angle * angle * arm + LENGTH_ROUNDING * reach;
+        let curved = 0.5 * angle * angle * arm;
+        let bare_stray = curved + LENGTH_ROUNDING * reach;
         let turn = (angle + widening).min(std::f64::consts::PI);
         let to_body = |v: &Vector3<f64>| vector(&rotation.tr_mul(v));
         let of_body = Frame {
@@ -172,7 +172,7 @@ impl FacingVolumes {
             serial: turned.next_serial(),
             frames: [of_body, of_obstacle],
             moves: false,
-            longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
+            curved: curved as f32,
             bare_stray: bare_stray as f32,
             stray: (bare_stray + margin) as f32,
             margin: margin as f32,
@@ -198,15 +198,11 @@ impl FacingVolumes {
         (&body.own_half_path, &body.own_half_turn, body.angle)
     }
 
-    /// Whether a volume of the body moves by more than `length` (m) in half the interval, to first order.
+    /// Whether points of a volume of the body leave the straight path of its centre by more than `length` (m) in half the interval.
     #[inline]
-    pub(crate) fn sweeps_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
-        self.longest_half_sweep > length && {
-            let frame = self.frame(Side::Body);
-            let arm = apply(&frame.rotation, tree.center(child));
-            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
-            norm(&sweep) + frame.angle * tree.radius(child) > length
-        }
+    pub(crate) fn strays_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
+        let angle = self.frame(Side::Body).angle;
+        angle.mul_add(tree.radius(child), self.curved) > length
     }
 
     /// Cosine and sine of a cone that is widened by the rotation; a cone of all directions stays one.

@@ -3,6 +3,7 @@
 use super::facing_volumes::FacingVolumes;
 use super::motion::{Placement, RelativeMotion};
 use super::turned::TurnedNodes;
+use super::windows::Window;
 use crate::geometry::wide_tree::WideTree;
 
 /// Most halvings of a motion.
@@ -18,6 +19,21 @@ pub(super) struct Interval {
     /// The body at `from`.
     pub(super) start: Placement,
     pub(super) volumes: FacingVolumes,
+}
+
+impl Interval {
+    /// When a window of it begins and ends.
+    #[inline]
+    pub(super) fn times(&self, window: Window) -> [f64; 2] {
+        let (middle, half) = (0.5 * (self.from + self.to), 0.5 * (self.to - self.from));
+        let time = |share: f32| middle + half * f64::from(share);
+        let whole_from = window.enter <= -1.0;
+        let whole_to = window.leave >= 1.0;
+        [
+            if whole_from { self.from } else { time(window.enter) },
+            if whole_to { self.to } else { time(window.leave) },
+        ]
+    }
 }
 
 /// The intervals of one search.
@@ -47,12 +63,6 @@ impl Intervals {
             self.made[number as usize] = None;
         }
         (self.end, self.margin) = (end, margin);
-    }
-
-    /// The time at which interval `number` is cut.
-    #[inline]
-    pub(super) fn middle(&self, number: u32) -> f64 {
-        ends(2 * number, self.end)[1]
     }
 
     /// Interval `number`, at most `MAX_HALVINGS` deep.

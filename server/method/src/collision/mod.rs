@@ -16,6 +16,7 @@ mod single;
 mod still_box;
 mod time_of_impact;
 mod turned;
+mod windows;
 mod work;
 mod workspace;
 

@@ -36,3 +36,9 @@ pub(super) fn norm(v: &[f32; 3]) -> f32 {
 pub(super) fn larger(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
+
+/// The smaller of two; the second if the first is NaN.
+#[inline(always)]
+pub(super) fn smaller(x: f32, y: f32) -> f32 {
+    if x < y { x } else { y }
+}

@@ -22,13 +22,14 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
-use super::descent::{for_facing_triangle_pairs, open_pair};
+use super::descent::{for_facing_triangle_pairs, open_moving_pair};
 use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
 use super::motion::{Motion, RelativeMotion};
+use super::windows::Window;
 use super::work::Work;
-use super::workspace::CollisionWorkspace;
+use super::workspace::{CollisionWorkspace, Waiting};
 use crate::geometry::Mesh;
 use crate::geometry::distance::triangles_intersect;
 use crate::geometry::wide_tree::{Below, ROOT};
@@ -229,7 +230,7 @@ impl Problem<'_> {
         {
             let pair = self.pair(a, b);
             let interval = [0.0, first.time];
-            if !search.is_free(&pair, &start, interval, &first.lately) {
+            if !search.is_free(&pair, &start, [0.0, 0.0, first.time], &first.lately) {
                 let outcome = search.follow(&pair, &start, interval, &mut first.lately, work);
                 first.take(outcome, (a, b), 0.0);
             }
@@ -267,14 +268,47 @@ impl Problem<'_> {
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
         stack.clear();
-        stack.push((ROOT, ROOT, WHOLE));
-        while let Some((a, b, mut index)) = stack.pop() {
-            // The half in which nothing more is looked for is left out.
-            while index.ilog2() < cuts && intervals.middle(index) >= first.time {
-                index *= 2;
-            }
-            let interval = intervals.get(index, self.relative, trees, turned);
-            let [from, to] = [interval.from, interval.to.min(first.time)];
+        stack.push(Waiting {
+            pair: (ROOT, ROOT),
+            interval: WHOLE,
+            window: Window::WHOLE,
+        });
+        while let Some(Waiting {
+            pair: (a, b),
+            interval: mut index,
+            mut window,
+        }) = stack.pop()
+        {
+            let size = trees.0.radius(a).max(trees.1.radius(b));
+            let interval = loop {
+                let interval = intervals.get(index, self.relative, trees, turned);
+                if index.ilog2() >= cuts
+                    || !interval
+                        .volumes
+                        .strays_more_than(longest * size, trees.0, a)
+                {
+                    break interval;
+                }
+                work.node_pairs += 1;
+                // The later half below the earlier one.
+                if window.leave < 0.0 {
+                    window = window.in_first_half();
+                    index *= 2;
+                } else if window.enter > 0.0 {
+                    window = window.in_second_half();
+                    index = 2 * index + 1;
+                } else {
+                    stack.push(Waiting {
+                        pair: (a, b),
+                        interval: 2 * index + 1,
+                        window: window.in_second_half(),
+                    });
+                    window = window.in_first_half();
+                    index *= 2;
+                }
+            };
+            let [from, to] = interval.times(window);
+            let to = to.min(first.time);
             let later = from >= first.time || (first.is_near() && from > 0.0);
             if (later && from > 0.0) || first.overlapping {
                 continue;
@@ -282,29 +316,26 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
+                let times = [interval.from, from, to];
+                if !search.is_free(&pair, &interval.start, times, &first.lately)
                     && !hints.contains(&(t, s))
                 {
+                    let start = if from > interval.from { self.relative.at(from) } else { interval.start };
                     let outcome =
-                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
+                        search.follow(&pair, &start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
                 }
                 continue;
             }
             work.node_pairs += 1;
-            let size = trees.0.radius(a).max(trees.1.radius(b));
-            if index.ilog2() < cuts
-                && interval
-                    .volumes
-                    .sweeps_more_than(longest * size, trees.0, a)
-            {
-                // Later half below the earlier one.
-                stack.push((a, b, 2 * index + 1));
-                stack.push((a, b, 2 * index));
-                continue;
-            }
-            open_pair::<true>(trees, &interval.volumes, turned, (a, b), |(a, b), _| {
-                stack.push((a, b, index));
+            let bottom = stack.len();
+            open_moving_pair(trees, &interval.volumes, turned, (a, b), window, |pair, window| {
+                // The earliest on top.
+                let place = stack[bottom..]
+                    .iter()
+                    .rposition(|w| w.window.enter >= window.enter)
+                    .map_or(bottom, |k| bottom + k + 1);
+                stack.insert(place, Waiting { pair, interval: index, window });
             });
         }
     }
