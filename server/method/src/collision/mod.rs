@@ -1,6 +1,7 @@
 //! Continuous collision detection: how far a body may move, and whether it is in penetration where it is.
 
 mod advancement;
+mod agenda;
 mod bands;
 mod beyond;
 mod descent;

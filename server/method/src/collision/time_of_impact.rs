@@ -21,6 +21,7 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
+use super::agenda::Waiting;
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::descent::{for_facing_triangle_pairs, open_moving_pair};
 use super::facing_volumes::FacingVolumes;
@@ -29,7 +30,7 @@ use super::intervals::{WHOLE, halvings};
 use super::motion::{Motion, RelativeMotion};
 use super::windows::Window;
 use super::work::Work;
-use super::workspace::{CollisionWorkspace, Waiting};
+use super::workspace::CollisionWorkspace;
 use crate::geometry::Mesh;
 use crate::geometry::distance::triangles_intersect;
 use crate::geometry::wide_tree::{Below, ROOT};
@@ -258,6 +259,7 @@ impl Problem<'_> {
     ) {
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
         let CollisionWorkspace {
+            agenda,
             stack,
             hints,
             intervals,
@@ -268,17 +270,19 @@ impl Problem<'_> {
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
         stack.clear();
+        agenda.restart(first.time);
         stack.push(Waiting {
             pair: (ROOT, ROOT),
             interval: WHOLE,
             window: Window::WHOLE,
         });
-        while let Some(Waiting {
-            pair: (a, b),
-            interval: mut index,
-            mut window,
-        }) = stack.pop()
-        {
+        while let Some(next) = stack.pop().or_else(|| agenda.pop(first.time)) {
+            let Waiting {
+                pair: (a, b),
+                interval: mut index,
+                mut window,
+            } = next;
+            let crowded = !stack.is_empty();
             let size = trees.0.radius(a).max(trees.1.radius(b));
             let interval = loop {
                 let interval = intervals.get(index, self.relative, trees, turned);
@@ -298,11 +302,15 @@ impl Problem<'_> {
                     window = window.in_second_half();
                     index = 2 * index + 1;
                 } else {
-                    stack.push(Waiting {
+                    let later = Waiting {
                         pair: (a, b),
                         interval: 2 * index + 1,
                         window: window.in_second_half(),
-                    });
+                    };
+                    let middle = 0.5 * (interval.from + interval.to);
+                    if crowded || !agenda.push(middle, later) {
+                        stack.push(later);
+                    }
                     window = window.in_first_half();
                     index *= 2;
                 }
@@ -328,15 +336,27 @@ impl Problem<'_> {
                 continue;
             }
             work.node_pairs += 1;
-            let bottom = stack.len();
-            open_moving_pair(trees, &interval.volumes, turned, (a, b), window, |pair, window| {
-                // The earliest on top.
-                let place = stack[bottom..]
-                    .iter()
-                    .rposition(|w| w.window.enter >= window.enter)
-                    .map_or(bottom, |k| bottom + k + 1);
-                stack.insert(place, Waiting { pair, interval: index, window });
-            });
+            open_moving_pair(
+                trees,
+                &interval.volumes,
+                turned,
+                (a, b),
+                window,
+                |pair, window| {
+                    let [from, _] = interval.times(window);
+                    if from >= first.time && from > 0.0 {
+                        return;
+                    }
+                    let next = Waiting {
+                        pair,
+                        interval: index,
+                        window,
+                    };
+                    if crowded || !agenda.push(from, next) {
+                        stack.push(next);
+                    }
+                },
+            );
         }
     }
 

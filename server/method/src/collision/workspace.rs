@@ -2,28 +2,19 @@
 
 use arrayvec::ArrayVec;
 
+use super::agenda::{Agenda, Waiting};
 use super::bands::Bands;
 use super::descent::WIDE_STACK_CAPACITY;
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
 use super::still_box::STACK_CAPACITY;
 use super::turned::TurnedNodes;
-use super::windows::Window;
 use crate::constraint::Contact;
-use crate::geometry::wide_tree::Child;
 
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
 pub(crate) const MAX_CANDIDATES: usize = 8192;
 /// Triangle pairs kept from one search to the next.
 pub(crate) const MAX_HINTS: usize = 64;
-
-/// A pair of volumes, (body, obstacle), that a search is to look at in a window of an interval.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Waiting {
-    pub(super) pair: (Child, Child),
-    pub(super) interval: u32,
-    pub(super) window: Window,
-}
 
 /// Buffers that the searches reuse, and the nearest triangle pairs of the last ones.
 ///
@@ -33,6 +24,8 @@ pub(super) struct Waiting {
 pub struct CollisionWorkspace {
     pub(crate) pairs: Vec<(u32, u32)>,
     pub(crate) bands: Bands,
+    pub(super) agenda: Agenda,
+    /// Pairs that found no room on the agenda, and what lies below them.
     pub(super) stack: Vec<Waiting>,
     pub(super) intervals: Intervals,
     pub(super) apart: KnownApart,
@@ -53,6 +46,7 @@ impl CollisionWorkspace {
         Self {
             pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
             bands: Bands::new(),
+            agenda: Agenda::new(),
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),
