@@ -1,15 +1,15 @@
 //! Pairs of volumes in the order of the times at which they come near: earliest first, to a share of the search.
 //!
-//! A pair's children come near no earlier than it does. So what is looked at last is what would have to be looked at in any case: everything that
-//! comes near before the first impact.
+//! A pair's children come near no earlier than it does. So a search that takes the earliest pair first, and ends at the first impact, looks at
+//! hardly more than it must: at what comes near before that. Any order is safe; this one is short.
 
 use super::windows::Window;
 use crate::geometry::wide_tree::Child;
 
-/// Equal parts of the time that is searched: pairs of one part come last in, first out.
+/// Equal parts of the time that is searched: pairs of one part come out last in, first out.
 const PARTS: usize = 1024;
-/// Pairs that wait at a time. The descent does one that finds no room at once.
-const CAPACITY: usize = 1 << 14;
+/// Pairs that wait at a time. One that finds no room is looked at at once.
+const CAPACITY: usize = 1 << 13;
 /// Marks the end of a list.
 const NONE: u32 = u32::MAX;
 
@@ -26,43 +26,43 @@ pub(super) struct Waiting {
 pub(crate) struct Agenda {
     /// First of each list; without meaning where the part is empty.
     heads: [u32; PARTS],
-    /// Which parts are not empty, a bit each.
+    /// Which parts are not empty, a bit each; none before word `first`.
     filled: [u64; PARTS / 64],
+    first: usize,
     waiting: Vec<(Waiting, u32)>,
     free: u32,
-    parts_per_time: f64,
 }
 
 impl Agenda {
     pub(super) fn new() -> Self {
+        let unused = Waiting {
+            pair: (NONE, NONE),
+            interval: NONE,
+            window: Window::WHOLE,
+        };
+        // Written to, so that no search is the first to touch its pages.
+        let mut waiting = vec![(unused, NONE); CAPACITY];
+        waiting.clear();
         Self {
             heads: [NONE; PARTS],
             filled: [0; PARTS / 64],
-            waiting: Vec::with_capacity(CAPACITY),
+            first: 0,
+            waiting,
             free: NONE,
-            parts_per_time: 0.0,
         }
     }
 
-    /// Forgets all, for a search over `[0, end]`.
-    pub(super) fn restart(&mut self, end: f64) {
+    pub(super) fn clear(&mut self) {
         self.filled = [0; PARTS / 64];
+        self.first = 0;
         self.waiting.clear();
         self.free = NONE;
-        self.parts_per_time = PARTS as f64 / end;
-    }
-
-    /// Later times have no earlier parts, rounded as they are.
-    #[inline]
-    fn part(&self, time: f64) -> usize {
-        // A cast keeps to the range and makes 0 of NaN.
-        ((time * self.parts_per_time) as usize).min(PARTS - 1)
     }
 
     /// False when there is no room.
     #[inline]
-    pub(super) fn push(&mut self, time: f64, waiting: Waiting) -> bool {
-        let part = self.part(time);
+    pub(super) fn push(&mut self, part: Part, waiting: Waiting) -> bool {
+        let part = part.0 as usize % PARTS;
         let (word, bit) = (part / 64, 1 << (part % 64));
         let next = if self.filled[word] & bit == 0 {
             NONE
@@ -82,20 +82,20 @@ impl Agenda {
         };
         self.heads[part] = place;
         self.filled[word] |= bit;
+        self.first = self.first.min(word);
         true
     }
 
-    /// The next pair; none when all that wait come near after `end`.
+    /// One of the earliest pairs and its part; none when all that wait come later than in part `last`.
     #[inline]
-    pub(super) fn pop(&mut self, end: f64) -> Option<Waiting> {
-        let (word, bits) = self
-            .filled
-            .iter()
-            .enumerate()
-            .find(|(_, bits)| **bits != 0)?;
-        let bit = bits.trailing_zeros();
+    pub(super) fn pop(&mut self, last: Part) -> Option<(Part, Waiting)> {
+        while self.filled.get(self.first)? == &0 {
+            self.first += 1;
+        }
+        let word = self.first;
+        let bit = self.filled[word].trailing_zeros();
         let part = 64 * word + bit as usize;
-        if part > self.part(end) {
+        if part as u32 > last.0 {
             return None;
         }
         let place = self.heads[part];
@@ -106,6 +106,70 @@ impl Agenda {
         }
         self.waiting[place as usize].1 = self.free;
         self.free = place;
-        Some(waiting)
+        Some((Part(part as u32), waiting))
+    }
+}
+
+/// A part of the time that is searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Part(u32);
+
+impl Part {
+    pub(super) const FIRST: Self = Self(0);
+
+    /// The part in which a share of the search lies; what is outside counts as the first or the last, NaN as the first.
+    #[inline(always)]
+    pub(super) fn of(share: f32) -> Self {
+        // A cast keeps to the range.
+        Self(((share * PARTS as f32) as i32).clamp(0, PARTS as i32 - 1) as u32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbered(number: u32) -> Waiting {
+        Waiting {
+            pair: (number, number),
+            interval: 1,
+            window: Window::WHOLE,
+        }
+    }
+
+    #[test]
+    fn what_waits_comes_out_by_part_and_places_are_used_again() {
+        let mut agenda = Agenda::new();
+        for _ in 0..3 {
+            agenda.clear();
+            let part = |k: usize| Part((k * 7919 % PARTS) as u32);
+            for k in 0..CAPACITY {
+                assert!(agenda.push(part(k), numbered(k as u32)));
+            }
+            assert!(!agenda.push(Part::FIRST, numbered(0)), "full");
+            let mut seen = vec![false; CAPACITY];
+            let mut before = Part::FIRST;
+            for k in 0..CAPACITY {
+                let (now, next) = agenda.pop(part(0).max(Part::of(1.0))).expect("one more");
+                assert!(now >= before && now == part(next.pair.0 as usize), "{k}");
+                assert!(!std::mem::replace(&mut seen[next.pair.0 as usize], true));
+                before = now;
+            }
+            assert!(agenda.pop(Part::of(1.0)).is_none());
+            // An earlier one than the last that came out.
+            assert!(agenda.push(Part::FIRST, numbered(5)));
+            assert_eq!(agenda.pop(Part::FIRST).map(|(_, w)| w.pair.0), Some(5));
+            assert!(agenda.push(Part::of(0.5), numbered(6)));
+            assert!(agenda.pop(Part::of(0.4)).is_none());
+        }
+    }
+
+    #[test]
+    fn later_shares_have_no_earlier_parts() {
+        assert_eq!(Part::of(-0.1), Part::FIRST);
+        assert_eq!(Part::of(f32::NAN), Part::FIRST);
+        assert_eq!(Part::of(2.0), Part::of(1.0));
+        let parts = (0..5000).map(|k| Part::of(k as f32 / 5000.0));
+        assert!(parts.is_sorted());
     }
 }

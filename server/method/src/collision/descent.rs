@@ -56,14 +56,20 @@ pub(super) fn open_pair(
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
             let beyond = beyond(volumes, one, b as usize % LANES, body.node(node));
             for_each_lane(near(&beyond), |lane| {
-                found((node * LANES as u32 + lane, b), beyond.0[lane as usize % LANES]);
+                found(
+                    (node * LANES as u32 + lane, b),
+                    beyond.0[lane as usize % LANES],
+                );
             });
         }
         Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
             let beyond = beyond(volumes, one, a as usize % LANES, obstacle.node(node));
             for_each_lane(near(&beyond), |lane| {
-                found((a, node * LANES as u32 + lane), beyond.0[lane as usize % LANES]);
+                found(
+                    (a, node * LANES as u32 + lane),
+                    beyond.0[lane as usize % LANES],
+                );
             });
         }
         None => found((a, b), 0.0),
@@ -72,7 +78,7 @@ pub(super) fn open_pair(
 
 /// The same of volumes in motion: hands on the children that come near the other in a window of their interval, and when they do.
 #[inline]
-pub(super) fn open_moving_pair(
+pub(super) fn open_moving_pair<const TIMED: bool>(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     turned: &mut TurnedNodes,
@@ -80,25 +86,21 @@ pub(super) fn open_moving_pair(
     window: Window,
     mut found: impl FnMut((Child, Child), Window),
 ) {
-    let at = |[enters, leaves]: &[Lanes; 2], lane: u32| Window {
-        enter: enters.0[lane as usize % LANES],
-        leave: leaves.0[lane as usize % LANES],
-    };
     match opened((body, obstacle), (a, b)) {
         Some((Side::Body, node)) => {
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
             let lane = b as usize % LANES;
-            let met = windows::<false>(volumes, one, lane, body.node(node), window);
-            for_each_lane(meeting(&met), |lane| {
-                found((node * LANES as u32 + lane, b), at(&met, lane));
+            let met = windows::<false, TIMED>(volumes, one, lane, body.node(node), window);
+            for_each_lane(met.meeting(), |lane| {
+                found((node * LANES as u32 + lane, b), met.of(lane));
             });
         }
         Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
             let lane = a as usize % LANES;
-            let met = windows::<true>(volumes, one, lane, obstacle.node(node), window);
-            for_each_lane(meeting(&met), |lane| {
-                found((a, node * LANES as u32 + lane), at(&met, lane));
+            let met = windows::<true, TIMED>(volumes, one, lane, obstacle.node(node), window);
+            for_each_lane(met.meeting(), |lane| {
+                found((a, node * LANES as u32 + lane), met.of(lane));
             });
         }
         None => found((a, b), window),
@@ -107,10 +109,7 @@ pub(super) fn open_moving_pair(
 
 /// Which of two volumes is to be opened, and the node below it; `None` for two triangles.
 #[inline(always)]
-fn opened(
-    (body, obstacle): (&WideTree, &WideTree),
-    (a, b): (Child, Child),
-) -> Option<(Side, u32)> {
+fn opened((body, obstacle): (&WideTree, &WideTree), (a, b): (Child, Child)) -> Option<(Side, u32)> {
     match (body.below(a), obstacle.below(b)) {
         (Below::Node(node), Below::Triangle(_)) => Some((Side::Body, node)),
         (Below::Node(node), _) if body.thickness(a) > obstacle.thickness(b) => {
@@ -127,17 +126,6 @@ fn for_each_lane(mut mask: u32, mut each: impl FnMut(u32)) {
         each(mask.trailing_zeros());
         mask &= mask - 1;
     }
-}
-
-/// Which lanes meet: a bit each.
-#[inline(always)]
-fn meeting([enters, leaves]: &[Lanes; 2]) -> u32 {
-    let mut bits = [0_u32; LANES];
-    for (k, bit) in bits.iter_mut().enumerate() {
-        let apart = enters.0[k] > leaves.0[k]; // false for NaN
-        *bit = if apart { 0 } else { 1 << k };
-    }
-    bits.iter().fold(0, |mask, bit| mask | bit)
 }
 
 /// Which lanes are not beyond the margin: a bit each.

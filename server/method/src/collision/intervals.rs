@@ -1,5 +1,6 @@
 //! Intervals of a motion, halved and halved again: made when they are asked for.
 
+use super::agenda::Part;
 use super::facing_volumes::FacingVolumes;
 use super::motion::{Placement, RelativeMotion};
 use super::turned::TurnedNodes;
@@ -19,9 +20,18 @@ pub(super) struct Interval {
     /// The body at `from`.
     pub(super) start: Placement,
     pub(super) volumes: FacingVolumes,
+    /// Its middle and half of it, as shares of the search.
+    middle_share: f32,
+    half_share: f32,
 }
 
 impl Interval {
+    /// The part of the search in which a time of the interval lies, `share` of its half from the middle.
+    #[inline(always)]
+    pub(super) fn part(&self, share: f32) -> Part {
+        Part::of(share.mul_add(self.half_share, self.middle_share))
+    }
+
     /// When a window of it begins and ends.
     #[inline]
     pub(super) fn times(&self, window: Window) -> [f64; 2] {
@@ -30,8 +40,16 @@ impl Interval {
         let whole_from = window.enter <= -1.0;
         let whole_to = window.leave >= 1.0;
         [
-            if whole_from { self.from } else { time(window.enter) },
-            if whole_to { self.to } else { time(window.leave) },
+            if whole_from {
+                self.from
+            } else {
+                time(window.enter)
+            },
+            if whole_to {
+                self.to
+            } else {
+                time(window.leave)
+            },
         ]
     }
 }
@@ -93,7 +111,11 @@ fn make(
     turned: &mut TurnedNodes,
 ) -> Interval {
     let [from, to] = ends(number, end);
+    let half_share = 0.5 / (1_u32 << number.ilog2()) as f32;
+    let place = number - (1 << number.ilog2());
     Interval {
+        middle_share: (2 * place + 1) as f32 * half_share,
+        half_share,
         from,
         to,
         start: motion.at(from),

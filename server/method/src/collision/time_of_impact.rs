@@ -1,7 +1,9 @@
 //! Time of impact of a moving body with an obstacle.
 //!
-//! Both trees are descended together; a pair of volumes that moves by more than its size in an interval of time is looked at in
-//! both halves of it, the earlier one first. A pair of triangles is followed by conservative advancement.
+//! Both trees are descended together. A pair of volumes is looked at in the window of time in which it may be near; pairs come in the order of
+//! their windows ([`agenda`](super::agenda)), so that hardly any is looked at that comes near after the first impact. Where the path of a
+//! volume is too curved for a straight one in an interval of time, the pair is looked at in both halves of it. A pair of
+//! triangles is followed by conservative advancement in its window: before that, it is farther apart than the gap.
 //!
 //! **Only what faces.** Let the surfaces start farther apart than the gap g, and let t be the first time at which their distance is
 //! g, between points x of the body and y of the obstacle. No other points are nearer, so x is a local minimum of the distance to
@@ -21,8 +23,8 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
-use super::agenda::Waiting;
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
+use super::agenda::{Part, Waiting};
 use super::descent::{for_facing_triangle_pairs, open_moving_pair};
 use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
@@ -40,6 +42,12 @@ use crate::spatial::Pose;
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 /// Searches of one motion: with the full gap; with that of the nearest hint; with that of the nearest pair; and one for rounding.
 const MAX_SEARCHES: u32 = 4;
+
+/// Lengths, m, and turns, rad, from here on do not fit single precision with their squares: no motion is searched that far.
+const LONGEST: f64 = 1e15;
+/// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
+/// they count as near in all of the window of what they are in, which is the cheaper test.
+const TIMED_SHARE: f32 = 0.125;
 
 /// What the search found. A failure is a value, never a panic: the caller is a real-time loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,8 +79,8 @@ pub struct AdvancementSettings {
     pub gap_tolerance: f64,
     /// Most evaluations of the closest points of one pair of triangles in one interval. Bounds the worst-case time of the loop.
     pub max_iterations: u32,
-    /// A pair of volumes, down to single triangles, is looked at in intervals in which it moves by less than this share of
-    /// the larger one's diameter, as far as `max_intervals` allows.
+    /// A pair of volumes, down to single triangles, is looked at in intervals in which no point of the body's strays from the straight path of its
+    /// centre by more than this share of the larger one's radius, as far as `max_intervals` allows.
     pub interval_edges: f64,
     /// Most intervals of a motion: the next lower power of two, up to 256.
     pub max_intervals: u32,
@@ -94,7 +102,7 @@ impl Default for AdvancementSettings {
 /// Finds a time up to which the body may move: the gap is at least `minimum_gap` all the way and there.
 ///
 /// Never late; early by at most what `gap_tolerance` leaves. Motions that slide or leave are free even at the minimum gap.
-/// A motion with NaN stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
+/// A motion with NaN, or over 1e15 m or rad, stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
 pub fn time_of_impact(
     body: &Mesh,
     motion: &Motion,
@@ -107,6 +115,7 @@ pub fn time_of_impact(
     let relative = RelativeMotion::new(motion, obstacle_pose);
     let radius = body.radius_bound_about(&motion.reference_point);
     let finite = relative.is_finite()
+        && relative.reach(radius) + relative.length(radius) + relative.rate < LONGEST
         && settings.minimum_gap.is_finite()
         && settings.gap_tolerance.is_finite();
     if !finite {
@@ -270,19 +279,25 @@ impl Problem<'_> {
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
         stack.clear();
-        agenda.restart(first.time);
+        agenda.clear();
+        // Parts of the time that is searched: the one looked at, and that of the first impact.
+        let (mut now, mut last) = (Part::FIRST, Part::of(1.0));
+        let end = first.time;
         stack.push(Waiting {
             pair: (ROOT, ROOT),
             interval: WHOLE,
             window: Window::WHOLE,
         });
-        while let Some(next) = stack.pop().or_else(|| agenda.pop(first.time)) {
+        while let Some(next) = stack.pop().or_else(|| {
+            let (part, next) = agenda.pop(last)?;
+            now = part;
+            Some(next)
+        }) {
             let Waiting {
                 pair: (a, b),
                 interval: mut index,
                 mut window,
             } = next;
-            let crowded = !stack.is_empty();
             let size = trees.0.radius(a).max(trees.1.radius(b));
             let interval = loop {
                 let interval = intervals.get(index, self.relative, trees, turned);
@@ -294,7 +309,7 @@ impl Problem<'_> {
                     break interval;
                 }
                 work.node_pairs += 1;
-                // The later half below the earlier one.
+                // The half without a part of the window is left out; of two, the later one waits.
                 if window.leave < 0.0 {
                     window = window.in_first_half();
                     index *= 2;
@@ -307,8 +322,8 @@ impl Problem<'_> {
                         interval: 2 * index + 1,
                         window: window.in_second_half(),
                     };
-                    let middle = 0.5 * (interval.from + interval.to);
-                    if crowded || !agenda.push(middle, later) {
+                    let part = interval.part(0.0);
+                    if part <= now || !agenda.push(part, later) {
                         stack.push(later);
                     }
                     window = window.in_first_half();
@@ -328,35 +343,35 @@ impl Problem<'_> {
                 if !search.is_free(&pair, &interval.start, times, &first.lately)
                     && !hints.contains(&(t, s))
                 {
-                    let start = if from > interval.from { self.relative.at(from) } else { interval.start };
-                    let outcome =
-                        search.follow(&pair, &start, [from, to], &mut first.lately, work);
+                    let start = if from > interval.from {
+                        self.relative.at(from)
+                    } else {
+                        interval.start
+                    };
+                    let outcome = search.follow(&pair, &start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
+                    last = Part::of((first.time / end) as f32);
                 }
                 continue;
             }
             work.node_pairs += 1;
-            open_moving_pair(
-                trees,
-                &interval.volumes,
-                turned,
-                (a, b),
-                window,
-                |pair, window| {
-                    let [from, _] = interval.times(window);
-                    if from >= first.time && from > 0.0 {
-                        return;
-                    }
-                    let next = Waiting {
-                        pair,
-                        interval: index,
-                        window,
-                    };
-                    if crowded || !agenda.push(from, next) {
-                        stack.push(next);
-                    }
-                },
-            );
+            let found = |pair, window: Window| {
+                let part = interval.part(window.enter);
+                let next = Waiting {
+                    pair,
+                    interval: index,
+                    window,
+                };
+                if part <= now || !agenda.push(part, next) {
+                    stack.push(next);
+                }
+            };
+            let volumes = &interval.volumes;
+            if volumes.sweeps_more_than(TIMED_SHARE * size) {
+                open_moving_pair::<true>(trees, volumes, turned, (a, b), window, found);
+            } else {
+                open_moving_pair::<false>(trees, volumes, turned, (a, b), window, found);
+            }
         }
     }
 

@@ -43,18 +43,46 @@ impl Window {
     }
 }
 
-/// When each of the eight in `node` comes near volume `lane` of `turned` in a window, and when it leaves: it does not where it enters after it leaves.
-/// `THE_ONE_MOVES` says whose the body's volumes are: the one, or the eight. NaN is passed over: what has no other bound is near all the time.
+/// What comes of eight pairs of volumes in a window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Windows {
+    enters: Lanes,
+    leaves: Lanes,
+    /// A bit for each that meets.
+    bits: [u32; LANES],
+}
+
+impl Windows {
+    /// Those that meet, a bit each.
+    #[inline(always)]
+    pub(super) fn meeting(&self) -> u32 {
+        self.bits.iter().fold(0, |mask, bit| mask | bit)
+    }
+
+    /// When that of a lane meets.
+    #[inline(always)]
+    pub(super) fn of(&self, lane: u32) -> Window {
+        let lane = lane as usize % LANES;
+        Window {
+            enter: self.enters.0[lane],
+            leave: self.leaves.0[lane],
+        }
+    }
+}
+
+/// When each of the eight in `node` comes near volume `lane` of `turned` in a window, and when it leaves. `THE_ONE_MOVES` says whose the body's
+/// volumes are: the one, or the eight. Without `TIMED` only whether they may come near in the interval: then they do in all of the window.
+/// NaN is passed over: what has no other bound is near all the time.
 ///
 /// One loop over the lanes, without branches: the compiler makes vectors of it.
 #[inline]
-pub(super) fn windows<const THE_ONE_MOVES: bool>(
+pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
     volumes: &FacingVolumes,
     turned: &Turned,
     lane: usize,
     node: &WideNode,
     window: Window,
-) -> [Lanes; 2] {
+) -> Windows {
     let lane = lane % LANES;
     let one = |x: &Lanes| x.0[lane];
     let three = |v: &[Lanes; 3]| [one(&v[0]), one(&v[1]), one(&v[2])];
@@ -77,8 +105,11 @@ pub(super) fn windows<const THE_ONE_MOVES: bool>(
     let stray = volumes.stray;
 
     let n = node;
-    let mut enters = Lanes::splat(window.enter);
-    let mut leaves = Lanes::splat(window.leave);
+    let mut found = Windows {
+        enters: Lanes::splat(0.0),
+        leaves: Lanes::splat(0.0),
+        bits: [0; LANES],
+    };
     for k in 0..LANES {
         let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
         let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
@@ -107,7 +138,12 @@ pub(super) fn windows<const THE_ONE_MOVES: bool>(
         let mut within = [window.enter, window.leave];
         // Along the sides of the boxes.
         for i in 0..3 {
-            meet(&mut within, d[i], s[i], n.half[i].0[k] + q_reach[i] + turning);
+            meet::<TIMED>(
+                &mut within,
+                d[i],
+                s[i],
+                n.half[i].0[k] + q_reach[i] + turning,
+            );
         }
         // Along the axes of the eight, and along that of the one.
         let slant = cosine.abs();
@@ -118,7 +154,7 @@ pub(super) fn windows<const THE_ONE_MOVES: bool>(
                 .abs()
                 .mul_add(side_v, slant.mul_add(q_slab, slab)),
         );
-        meet(&mut within, height, dot(&a, &s), extent + stray_a);
+        meet::<TIMED>(&mut within, height, dot(&a, &s), extent + stray_a);
         let height = dot(&q_axis, &d) + cosine.mul_add(-middle, q_middle);
         let extent = dot(&q_axis, &t).abs().mul_add(
             along,
@@ -126,23 +162,92 @@ pub(super) fn windows<const THE_ONE_MOVES: bool>(
                 .abs()
                 .mul_add(across, slant.mul_add(slab, q_slab)),
         );
-        meet(&mut within, height, dot(&q_axis, &s), extent + stray_a);
+        meet::<TIMED>(&mut within, height, dot(&q_axis, &s), extent + stray_a);
         // Cones: the sum of two angles is above pi where its sine is not above zero.
         let (cos, sin) = (n.cosine.0[k], n.sine.0[k]);
         let narrow = sin.mul_add(q_cosine, cos * q_sine) > 0.0;
         let away = cosine < cos.mul_add(q_cosine, -(sin * q_sine)) - COSINE_ROUNDING;
-        enters.0[k] = if narrow & away { f32::INFINITY } else { within[0] };
-        leaves.0[k] = within[1];
+        let apart = (narrow & away) | (within[0] > within[1]); // false for NaN
+        found.enters.0[k] = within[0];
+        found.leaves.0[k] = within[1];
+        found.bits[k] = if apart { 0 } else { 1 << k };
     }
-    [enters, leaves]
+    found
 }
 
 /// Cuts a window down to when a point at `offset` from another, which moves by `speed` in half an interval, is within `reach`, m; NaN leaves it.
 #[inline(always)]
-fn meet(within: &mut [f32; 2], offset: f32, speed: f32, reach: f32) {
-    let slow = speed.abs() < LEAST_SPEED; // false for NaN
-    let inverse = 1.0 / if slow { LEAST_SPEED } else { speed };
-    let (middle, half) = (offset * inverse, reach * inverse.abs());
-    within[0] = larger(-middle - half, within[0]);
-    within[1] = smaller(half - middle, within[1]);
+fn meet<const TIMED: bool>(within: &mut [f32; 2], offset: f32, speed: f32, reach: f32) {
+    if TIMED {
+        let slow = speed.abs() < LEAST_SPEED; // false for NaN
+        let inverse = 1.0 / if slow { LEAST_SPEED } else { speed };
+        let (middle, half) = (offset * inverse, reach * inverse.abs());
+        within[0] = larger(-middle - half, within[0]);
+        within[1] = smaller(half - middle, within[1]);
+    } else {
+        let off = offset.abs() - (reach + speed.abs());
+        within[0] = if off > 0.0 { f32::INFINITY } else { within[0] };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WHOLE: [f32; 2] = [-1.0, 1.0];
+
+    #[test]
+    fn a_point_is_near_between_the_ends_of_its_window_and_nowhere_else() {
+        for k in 0..2000 {
+            let u = k as f32;
+            let (offset, speed, reach) = (
+                2.0 * (1.3 * u).sin(),
+                3.0 * (0.7 * u).sin(),
+                (0.4 * u).sin().abs(),
+            );
+            let mut within = WHOLE;
+            meet::<true>(&mut within, offset, speed, reach);
+            let mut swept = WHOLE;
+            meet::<false>(&mut swept, offset, speed, reach);
+            for i in 0..=200 {
+                let time = i as f32 / 100.0 - 1.0;
+                let off = (offset + speed * time).abs() - reach;
+                let inside = within[0] <= time && time <= within[1];
+                assert!(inside == (off <= 0.0) || off.abs() < 1e-5, "{k} {time}");
+                assert!(off > 0.0 || swept[0] <= swept[1]);
+            }
+        }
+    }
+
+    #[test]
+    fn what_rests_is_near_always_or_never_and_nan_is_near() {
+        for (offset, speed, reach, near) in [
+            (1.0, 0.0, 0.5, false),
+            (1.0, 0.0, 1.5, true),
+            (-1.0, -0.0, 0.5, false),
+            (0.0, 1.0, f32::NEG_INFINITY, false),
+            (f32::NAN, 1.0, 1.0, true),
+            (1.0, f32::NAN, 1.0, true),
+            (1.0, 1.0, f32::NAN, true),
+            (1.0, 1e-38, f32::INFINITY, true),
+        ] {
+            let (mut timed, mut swept) = (WHOLE, WHOLE);
+            meet::<true>(&mut timed, offset, speed, reach);
+            meet::<false>(&mut swept, offset, speed, reach);
+            assert_eq!(timed[0] <= timed[1], near, "{offset} {speed} {reach}");
+            assert_eq!(swept[0] <= swept[1], near, "{offset} {speed} {reach}");
+            assert!(!near || timed == WHOLE);
+        }
+    }
+
+    #[test]
+    fn halves_of_an_interval_share_their_middle() {
+        let window = Window {
+            enter: -0.25,
+            leave: 0.5,
+        };
+        let (first, second) = (window.in_first_half(), window.in_second_half());
+        assert_eq!([first.enter, first.leave], [0.5, 1.0]);
+        assert_eq!([second.enter, second.leave], [-1.0, 0.0]);
+    }
 }
