@@ -64,16 +64,16 @@ pub(super) struct TrianglePair {
 impl PairSearch<'_> {
     /// Whether some direction shows at once that the pair is free over `[from, to]`: those of the two faces, and those along
     /// which pairs were followed `lately`, which serve their neighbours. It settles most pairs, without closest points.
-    /// `placement` is the body at `from`.
+    /// `placement` is the body at `start`, not after `from`.
     #[inline]
     pub(super) fn is_free(
         &self,
         pair: &TrianglePair,
         placement: &Placement,
-        [from, to]: [f64; 2],
+        [start, from, to]: [f64; 3],
         lately: &Directions,
     ) -> bool {
-        let path = Path::new(self, pair, placement, to - from);
+        let path = Path::new(self, pair, placement, [from - start, to - start]);
         path.is_free_along(&pair.obstacle_normal, pair)
             || path.is_free_along(&-(placement.rotation * pair.body_normal), pair)
             || lately.newest.iter().any(|n| path.is_free_along(n, pair))
@@ -149,7 +149,8 @@ struct Path<'a> {
     motion: &'a RelativeMotion,
     corners: [Vector3<f64>; 3],
     turns: [Vector3<f64>; 3],
-    left: f64,
+    /// The part of time looked at, from `placement`'s on.
+    part: [f64; 2],
     /// Bound on the cubic term over the square of time, m.
     cubic: f64,
     kept: f64,
@@ -157,7 +158,12 @@ struct Path<'a> {
 
 impl<'a> Path<'a> {
     #[inline(always)]
-    fn new(search: &PairSearch<'a>, pair: &TrianglePair, placement: &Placement, left: f64) -> Self {
+    fn new(
+        search: &PairSearch<'a>,
+        pair: &TrianglePair,
+        placement: &Placement,
+        part: [f64; 2],
+    ) -> Self {
         let corner = |p: &Point3<f64>| placement.point(p).coords;
         let [p, q, r] = &pair.on_body;
         let corners = [corner(p), corner(q), corner(r)];
@@ -166,8 +172,8 @@ impl<'a> Path<'a> {
             motion: search.motion,
             turns: [turn(&corners[0]), turn(&corners[1]), turn(&corners[2])],
             corners,
-            left,
-            cubic: search.cubic * left,
+            part,
+            cubic: search.cubic * part[1],
             kept: search.gaps.stop,
         }
     }
@@ -188,8 +194,11 @@ impl<'a> Path<'a> {
         for (corner, turn) in self.corners.iter().zip(&self.turns) {
             let above = n.dot(corner) - support - self.kept;
             let bend = (self.cubic - sideways.dot(turn)).max(0.0);
-            let at_end = above + self.left * (speed + n.dot(turn) - bend * self.left);
-            free &= above >= 0.0 && at_end >= 0.0; // false for NaN
+            let speed = speed + n.dot(turn);
+            for h in self.part {
+                let at_end = above + h * (speed - bend * h);
+                free &= at_end >= 0.0; // false for NaN
+            }
         }
         free
     }

@@ -133,7 +133,7 @@ pub(crate) fn for_nearest_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair::<false>(trees, volumes, turned, (a, b), |(a, b), beyond| {
+        open_pair(trees, volumes, turned, (a, b), |(a, b), beyond| {
             if wanted(body.owned(a), obstacle.owned(b)) {
                 let own = band_of(1.0 + beyond * scale);
                 room &= bands.push(own.clamp(band, BANDS - 1), (a, b));

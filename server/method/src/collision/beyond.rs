@@ -1,24 +1,17 @@
 //! One volume against eight of the other tree: by how much are they apart, beyond the margin? Why and how exactly: [`facing_volumes`](super::facing_volumes).
 
-use super::facing_volumes::{CHORD_ROUNDING, COSINE_ROUNDING, FacingVolumes};
-use super::single::{dot, larger, product, sum};
+use super::facing_volumes::{COSINE_ROUNDING, FacingVolumes};
+use super::single::{dot, larger, product};
 use super::turned::{Turned, aside};
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::WideNode;
-
-/// What moves in an interval.
-pub(super) const NOTHING: u8 = 0;
-/// The one volume, which is the body's.
-pub(super) const THE_ONE: u8 = 1;
-/// The eight.
-pub(super) const THE_EIGHT: u8 = 2;
 
 /// By how much more than the margin each of the eight in `node` is apart from volume `lane` of `turned` at least, m: infinite where they do not
 /// face, not above zero where they may come near. NaN is passed over: what has no other bound is near.
 ///
 /// One loop over the lanes, without branches: the compiler makes vectors of it.
 #[inline]
-pub(super) fn beyond<const MOVES: u8>(
+pub(super) fn beyond(
     volumes: &FacingVolumes,
     turned: &Turned,
     lane: usize,
@@ -40,14 +33,6 @@ pub(super) fn beyond<const MOVES: u8>(
     let q_narrow = q_cosine > 0.0;
     let (stray, bare_stray, margin) = (volumes.stray, volumes.bare_stray, volumes.margin);
     let [cos_w, sin_w] = volumes.turn;
-    // The eight are the body's, seen in its own axes; or the one is.
-    let (path, spin, angle) = volumes.path_in_body_axes();
-    let (q_sweep, q_stray_axis, q_turning) = (
-        three(&turned.sweep),
-        one(&turned.stray_along_axis),
-        one(&turned.turning),
-    );
-
     let n = node;
     let mut beyond = Lanes::splat(0.0);
     for k in 0..LANES {
@@ -59,24 +44,8 @@ pub(super) fn beyond<const MOVES: u8>(
         let (along, across) = (n.along.0[k], n.across.0[k]);
         let d = [q_center[0] - c[0], q_center[1] - c[1], q_center[2] - c[2]];
         let cosine = dot(&a, &q_axis);
-        let (mut s, mut turning, mut stray_a) = ([0.0; 3], 0.0, stray);
-        if MOVES != NOTHING {
-            // Seen along an axis, points stray by what the axes' own turn lets them; the axes differ by a chord.
-            let chord = ((2.0 - 2.0 * cosine).max(0.0) + CHORD_ROUNDING).sqrt();
-            if MOVES == THE_ONE {
-                s = q_sweep;
-                stray_a += chord.mul_add(q_turning, q_stray_axis);
-            } else {
-                s = sum(path, &product(spin, &c));
-                turning = angle * n.radius.0[k];
-                let along_axis = dot(spin, &b)
-                    .abs()
-                    .mul_add(along, dot(spin, &t).abs() * across);
-                stray_a += chord.mul_add(turning, along_axis);
-            }
-        }
         // Along the sides of the boxes.
-        let off = |i: usize| d[i].abs() - (n.half[i].0[k] + q_reach[i] + s[i].abs() + turning);
+        let off = |i: usize| d[i].abs() - (n.half[i].0[k] + q_reach[i]);
         let boxes = larger(off(0), larger(off(1), off(2)));
         // Along the axes of the eight, and along that of the one.
         let slant = cosine.abs();
@@ -86,12 +55,7 @@ pub(super) fn beyond<const MOVES: u8>(
             side_u,
             on_v.abs().mul_add(side_v, slant.mul_add(q_slab, slab)),
         );
-        let extent = if MOVES == NOTHING {
-            extent
-        } else {
-            extent + dot(&a, &s).abs()
-        };
-        let off_a = height.abs() - extent - stray_a;
+        let off_a = height.abs() - extent - stray;
         let behind_a = -height - extent - bare_stray;
         let (up_t, up_b) = (dot(&q_axis, &t), dot(&q_axis, &b));
         let height = dot(&q_axis, &d) + cosine.mul_add(-middle, q_middle);
@@ -99,12 +63,7 @@ pub(super) fn beyond<const MOVES: u8>(
             along,
             up_b.abs().mul_add(across, slant.mul_add(slab, q_slab)),
         );
-        let extent = if MOVES == NOTHING {
-            extent
-        } else {
-            extent + dot(&q_axis, &s).abs()
-        };
-        let off_b = height.abs() - extent - stray_a;
+        let off_b = height.abs() - extent - stray;
         let behind_b = -height - extent - bare_stray;
         // Cones: the sum of two angles is above pi where its sine is not above zero.
         let (cos, sin) = (n.cosine.0[k], n.sine.0[k]);
@@ -112,38 +71,36 @@ pub(super) fn beyond<const MOVES: u8>(
         let away = cosine < cos.mul_add(q_cosine, -(sin * q_sine)) - COSINE_ROUNDING;
         let mut off = larger(boxes, larger(off_a, off_b));
         let mut apart = narrow & away;
-        if MOVES == NOTHING {
-            // What faces lies along a normal: in front, and as little aside as the cone is narrow.
-            let (cos, sin) = (
-                cos.mul_add(cos_w, -(sin * sin_w)),
-                sin.mul_add(cos_w, cos * sin_w),
-            );
-            let narrow_a = (cos > 0.0) & (sin >= 0.0);
-            apart |= (narrow_a & (behind_a > 0.0)) | (q_narrow & (behind_b > 0.0));
-            let margin_a = margin * if narrow_a { aside(sin) } else { 1.0 };
-            let (tu, tv) = (dot(&t, &u).abs(), dot(&t, &v).abs());
-            let (bu, bv) = (dot(&b, &u).abs(), dot(&b, &v).abs());
-            let aside_t = up_t.mul_add(q_middle, dot(&t, &d)).abs()
-                - up_t
-                    .abs()
-                    .mul_add(q_slab, tu.mul_add(side_u, tv.mul_add(side_v, along)));
-            let aside_b = up_b.mul_add(q_middle, dot(&b, &d)).abs()
-                - up_b
-                    .abs()
-                    .mul_add(q_slab, bu.mul_add(side_u, bv.mul_add(side_v, across)));
-            let aside_u = on_u.mul_add(-middle, dot(&u, &d)).abs()
-                - on_u
-                    .abs()
-                    .mul_add(slab, tu.mul_add(along, bu.mul_add(across, side_u)));
-            let aside_v = on_v.mul_add(-middle, dot(&v, &d)).abs()
-                - on_v
-                    .abs()
-                    .mul_add(slab, tv.mul_add(along, bv.mul_add(across, side_v)));
-            let of_a = larger(aside_t, aside_b) - bare_stray;
-            let of_b = larger(aside_u, aside_v) - bare_stray;
-            apart |= (of_a > margin_a) | (of_b > q_margin_aside);
-            off = larger(off, larger(of_a, of_b) - margin);
-        }
+        // What faces lies along a normal: in front, and as little aside as the cone is narrow.
+        let (cos, sin) = (
+            cos.mul_add(cos_w, -(sin * sin_w)),
+            sin.mul_add(cos_w, cos * sin_w),
+        );
+        let narrow_a = (cos > 0.0) & (sin >= 0.0);
+        apart |= (narrow_a & (behind_a > 0.0)) | (q_narrow & (behind_b > 0.0));
+        let margin_a = margin * if narrow_a { aside(sin) } else { 1.0 };
+        let (tu, tv) = (dot(&t, &u).abs(), dot(&t, &v).abs());
+        let (bu, bv) = (dot(&b, &u).abs(), dot(&b, &v).abs());
+        let aside_t = up_t.mul_add(q_middle, dot(&t, &d)).abs()
+            - up_t
+                .abs()
+                .mul_add(q_slab, tu.mul_add(side_u, tv.mul_add(side_v, along)));
+        let aside_b = up_b.mul_add(q_middle, dot(&b, &d)).abs()
+            - up_b
+                .abs()
+                .mul_add(q_slab, bu.mul_add(side_u, bv.mul_add(side_v, across)));
+        let aside_u = on_u.mul_add(-middle, dot(&u, &d)).abs()
+            - on_u
+                .abs()
+                .mul_add(slab, tu.mul_add(along, bu.mul_add(across, side_u)));
+        let aside_v = on_v.mul_add(-middle, dot(&v, &d)).abs()
+            - on_v
+                .abs()
+                .mul_add(slab, tv.mul_add(along, bv.mul_add(across, side_v)));
+        let of_a = larger(aside_t, aside_b) - bare_stray;
+        let of_b = larger(aside_u, aside_v) - bare_stray;
+        apart |= (of_a > margin_a) | (of_b > q_margin_aside);
+        off = larger(off, larger(of_a, of_b) - margin);
         beyond.0[k] = if apart { f32::INFINITY } else { off };
     }
     beyond

@@ -1,8 +1,9 @@
 //! Descent of two wide trees together: the thicker of two volumes is opened, and those of its eight that may come near go on.
 
-use super::beyond::{NOTHING, THE_EIGHT, THE_ONE, beyond};
+use super::beyond::beyond;
 use super::facing_volumes::{FacingVolumes, Side};
 use super::turned::TurnedNodes;
+use super::windows::{Window, windows};
 use super::work::Work;
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
@@ -32,7 +33,7 @@ pub(crate) fn for_facing_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair::<false>(trees, volumes, turned, (a, b), |(a, b), _| {
+        open_pair(trees, volumes, turned, (a, b), |(a, b), _| {
             if wanted(body.owned(a), obstacle.owned(b)) {
                 stack.push((a, b));
             }
@@ -40,49 +41,89 @@ pub(crate) fn for_facing_triangle_pairs(
     }
 }
 
-/// Opens the thicker of two volumes that are not both triangles, and hands on its children that face the other: with how much farther
+/// Opens the thicker of two volumes at rest that are not both triangles, and hands on its children that face the other: with how much farther
 /// than the margin they are apart at least, m, not above zero.
 #[inline]
-pub(super) fn open_pair<const MOVES: bool>(
+pub(super) fn open_pair(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     turned: &mut TurnedNodes,
     (a, b): (Child, Child),
     mut found: impl FnMut((Child, Child), f32),
 ) {
-    match (body.below(a), obstacle.below(b)) {
-        (Below::Node(node), below)
-            if matches!(below, Below::Triangle(_)) || body.thickness(a) > obstacle.thickness(b) =>
-        {
+    match opened((body, obstacle), (a, b)) {
+        Some((Side::Body, node)) => {
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
-            let (lane, eight) = (b as usize % LANES, body.node(node));
-            let beyond = if MOVES {
-                beyond::<THE_EIGHT>(volumes, one, lane, eight)
-            } else {
-                beyond::<NOTHING>(volumes, one, lane, eight)
-            };
-            for_each_child(node, &beyond, |child, beyond| found((child, b), beyond));
+            let beyond = beyond(volumes, one, b as usize % LANES, body.node(node));
+            for_each_lane(near(&beyond), |lane| {
+                found(
+                    (node * LANES as u32 + lane, b),
+                    beyond.0[lane as usize % LANES],
+                );
+            });
         }
-        (_, Below::Node(node)) => {
+        Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
-            let (lane, eight) = (a as usize % LANES, obstacle.node(node));
-            let beyond = if MOVES {
-                beyond::<THE_ONE>(volumes, one, lane, eight)
-            } else {
-                beyond::<NOTHING>(volumes, one, lane, eight)
-            };
-            for_each_child(node, &beyond, |child, beyond| found((a, child), beyond));
+            let beyond = beyond(volumes, one, a as usize % LANES, obstacle.node(node));
+            for_each_lane(near(&beyond), |lane| {
+                found(
+                    (a, node * LANES as u32 + lane),
+                    beyond.0[lane as usize % LANES],
+                );
+            });
         }
-        (_, Below::Triangle(_)) => found((a, b), 0.0),
+        None => found((a, b), 0.0),
+    }
+}
+
+/// The same of volumes in motion: hands on the children that come near the other in a window of their interval, and when they do.
+#[inline]
+pub(super) fn open_moving_pair<const TIMED: bool>(
+    (body, obstacle): (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    turned: &mut TurnedNodes,
+    (a, b): (Child, Child),
+    window: Window,
+    mut found: impl FnMut((Child, Child), Window),
+) {
+    match opened((body, obstacle), (a, b)) {
+        Some((Side::Body, node)) => {
+            let one = turned.of(volumes, Side::Obstacle, obstacle, b);
+            let lane = b as usize % LANES;
+            let met = windows::<false, TIMED>(volumes, one, lane, body.node(node), window);
+            for_each_lane(met.meeting(), |lane| {
+                found((node * LANES as u32 + lane, b), met.of(lane));
+            });
+        }
+        Some((Side::Obstacle, node)) => {
+            let one = turned.of(volumes, Side::Body, body, a);
+            let lane = a as usize % LANES;
+            let met = windows::<true, TIMED>(volumes, one, lane, obstacle.node(node), window);
+            for_each_lane(met.meeting(), |lane| {
+                found((a, node * LANES as u32 + lane), met.of(lane));
+            });
+        }
+        None => found((a, b), window),
+    }
+}
+
+/// Which of two volumes is to be opened, and the node below it; `None` for two triangles.
+#[inline(always)]
+fn opened((body, obstacle): (&WideTree, &WideTree), (a, b): (Child, Child)) -> Option<(Side, u32)> {
+    match (body.below(a), obstacle.below(b)) {
+        (Below::Node(node), Below::Triangle(_)) => Some((Side::Body, node)),
+        (Below::Node(node), _) if body.thickness(a) > obstacle.thickness(b) => {
+            Some((Side::Body, node))
+        }
+        (_, Below::Node(node)) => Some((Side::Obstacle, node)),
+        (Below::Triangle(_), Below::Triangle(_)) => None,
     }
 }
 
 #[inline(always)]
-fn for_each_child(node: u32, beyond: &Lanes, mut each: impl FnMut(Child, f32)) {
-    let mut mask = near(beyond);
+fn for_each_lane(mut mask: u32, mut each: impl FnMut(u32)) {
     while mask != 0 {
-        let lane = mask.trailing_zeros();
-        each(node * LANES as u32 + lane, beyond.0[lane as usize % LANES]);
+        each(mask.trailing_zeros());
         mask &= mask - 1;
     }
 }

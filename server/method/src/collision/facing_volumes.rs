@@ -8,11 +8,12 @@
 //! | a, a'  | `axis`         | –    | axes of the slabs; a' is turned round, so that a.a' is 1 where they face each other |
 //! | u      |                | –    | half a unit in the last place of 1 in single precision, 2^-24                   |
 //!
-//! At the middle of the interval the body's volume is at its place; at other times of the interval it strays from there
-//! by `s`, by at most `theta rho` more because the arms of its points differ, and by at most `theta^2 |r| / 2` because
-//! the path is curved. Seen along its own axis a, with sides t and b = a x t of half lengths d and e, the arms make less: with the turn w,
-//! `|w.b| d + |w.t| e`, and along any other axis by `theta rho` times the chord between the two more. The volumes do not come
-//! within the margin when that and their extents leave them apart along a side of the boxes or along the axis of a slab; and no
+//! In tau, halves of the interval from its middle, the body's volume is at its place there and `s tau` from it at other times, but for at
+//! most `theta rho` because the arms of its points differ, and at most `theta^2 |r| / 2` because the path is curved. Seen along
+//! its own axis a, with sides t and b = a x t of half lengths d and e, the arms make less: with the turn w,
+//! `|w.b| d + |w.t| e`, and along any other axis by `theta rho` times the chord between the two more. Along each side of the boxes and each axis of
+//! a slab, the volumes are within the margin only while `|n.(d + s tau)|` is within that and their extents: a window of tau. They come within the
+//! margin only while all windows are open ([`windows`](super::windows)); and no
 //! features inside them face each other when no normal of the one, turned by at most theta, is opposite to one of the other:
 //! when the angle between a and a' exceeds the sum of the cones.
 //!
@@ -23,8 +24,9 @@
 //! **Rounding.** Let L be the reach of both meshes about their origins, the distance of the origins and the path together. A
 //! coordinate of d comes with at most 10 u L (the rotation's rounding, its product and three sums), its product with a
 //! unit axis with 27 u L, the extents with 13 (cosine of the slabs), 26 (sides), 6 (axes and tangents that are unit and square
-//! only to rounding), 19 (sweep), 5 (what arms make of it) and 13 u L (the other middle), sums with 9 u L: less than 128 u L,
-//! which the margin is widened by. Cosines come with less than 24 u, squares of chords with twice that.
+//! only to rounding), 19 (sweep), 5 (what arms make of it) and 13 u L (the other middle), sums with 9 u L: less than 128 u L. The ends of
+//! a window come with 4 u of the distances and extents that they are quotients of, at most 5 L together, and with u of the path for each
+//! halving of the interval, at most 8: 160 u L in all, which the margin is widened by. Cosines come with less than 24 u, squares of chords with twice that.
 //!
 //! Source: Gottschalk, Lin, Manocha 1996 (separating axes); Larsson and Akenine-Moller 2009 (slab along a direction); the
 //! facing of cones as in normal-cone hierarchies, Johnson and Cohen 2001.
@@ -32,16 +34,17 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::motion::{Placement, RelativeMotion};
-use super::single::{apply, norm, product, sum};
 use super::turned::TurnedNodes;
 use crate::geometry::wide_tree::{Child, WideTree};
 
 /// Half a unit in the last place of 1 in single precision.
 const HALF_UNIT: f64 = 0.5 * f32::EPSILON as f64;
 /// Rounding of a separation relative to the reach L, and of a cosine: see the file's head.
-const LENGTH_ROUNDING: f64 = 128.0 * HALF_UNIT;
+const LENGTH_ROUNDING: f64 = 160.0 * HALF_UNIT;
 pub(super) const COSINE_ROUNDING: f32 = 24.0 * HALF_UNIT as f32;
 pub(super) const CHORD_ROUNDING: f32 = 2.0 * COSINE_ROUNDING;
+/// More than any length that a search may meet, m; squares of such lengths are finite in single precision.
+const MOST_STRAY: f64 = 1e18;
 /// Cones are widened by this, rad: the rounding of normals on their way to a direction, far below it.
 const CONE_WIDENING: f64 = 1e-6;
 
@@ -61,6 +64,8 @@ pub(crate) struct FacingVolumes {
     pub(super) serial: u32,
     frames: [Frame; 2],
     moves: bool,
+    /// By how much the path of any point of the body is curved in half the interval at most, m.
+    curved: f32,
     /// Bound on half the path of any point of the body, m.
     longest_half_sweep: f32,
     /// What volumes stray by, all over the body, and rounding, m: without the margin and with it.
@@ -145,7 +150,8 @@ impl FacingVolumes {
         let path = half_path + half_turn.cross(&(origin - placement.center));
         let arm = (origin - placement.center).norm() + body.reach;
         let reach = body.reach + obstacle.reach + offset.norm() + path.norm() + angle * body.reach;
-        let bare_stray = 0.5 * angle * angle * arm + LENGTH_ROUNDING * reach;
+        let curved = 0.5 * angle * angle * arm;
+        let bare_stray = curved + LENGTH_ROUNDING * reach;
         let turn = (angle + widening).min(std::f64::consts::PI);
         let to_body = |v: &Vector3<f64>| vector(&rotation.tr_mul(v));
         let of_body = Frame {
@@ -168,10 +174,13 @@ impl FacingVolumes {
             own_half_path: [0.0; 3],
             own_half_turn: [0.0; 3],
         };
+        // Infinite, it would make lanes without a child NaN, and so near.
+        let bare_stray = bare_stray.min(MOST_STRAY);
         Self {
             serial: turned.next_serial(),
             frames: [of_body, of_obstacle],
             moves: false,
+            curved: curved as f32,
             longest_half_sweep: (path.norm() + 2.0 * angle * body.reach) as f32,
             bare_stray: bare_stray as f32,
             stray: (bare_stray + margin) as f32,
@@ -198,15 +207,17 @@ impl FacingVolumes {
         (&body.own_half_path, &body.own_half_turn, body.angle)
     }
 
-    /// Whether a volume of the body moves by more than `length` (m) in half the interval, to first order.
+    /// Whether points of the body may move by more than `length` (m) in half the interval.
     #[inline]
-    pub(crate) fn sweeps_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
-        self.longest_half_sweep > length && {
-            let frame = self.frame(Side::Body);
-            let arm = apply(&frame.rotation, tree.center(child));
-            let sweep = sum(&frame.half_path, &product(&frame.half_turn, &arm));
-            norm(&sweep) + frame.angle * tree.radius(child) > length
-        }
+    pub(crate) fn sweeps_more_than(&self, length: f32) -> bool {
+        self.longest_half_sweep > length
+    }
+
+    /// Whether points of a volume of the body leave the straight path of its centre by more than `length` (m) in half the interval.
+    #[inline]
+    pub(crate) fn strays_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
+        let angle = self.frame(Side::Body).angle;
+        angle.mul_add(tree.radius(child), self.curved) > length
     }
 
     /// Cosine and sine of a cone that is widened by the rotation; a cone of all directions stays one.

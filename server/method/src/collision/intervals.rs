@@ -1,8 +1,10 @@
 //! Intervals of a motion, halved and halved again: made when they are asked for.
 
+use super::agenda::Part;
 use super::facing_volumes::FacingVolumes;
 use super::motion::{Placement, RelativeMotion};
 use super::turned::TurnedNodes;
+use super::windows::Window;
 use crate::geometry::wide_tree::WideTree;
 
 /// Most halvings of a motion.
@@ -18,6 +20,38 @@ pub(super) struct Interval {
     /// The body at `from`.
     pub(super) start: Placement,
     pub(super) volumes: FacingVolumes,
+    /// Its middle and half of it, as shares of the search.
+    middle_share: f32,
+    half_share: f32,
+}
+
+impl Interval {
+    /// The part of the search in which a time of the interval lies, `share` of its half from the middle.
+    #[inline(always)]
+    pub(super) fn part(&self, share: f32) -> Part {
+        Part::of(share.mul_add(self.half_share, self.middle_share))
+    }
+
+    /// When a window of it begins and ends.
+    #[inline]
+    pub(super) fn times(&self, window: Window) -> [f64; 2] {
+        let (middle, half) = (0.5 * (self.from + self.to), 0.5 * (self.to - self.from));
+        let time = |share: f32| middle + half * f64::from(share);
+        let whole_from = window.enter <= -1.0;
+        let whole_to = window.leave >= 1.0;
+        [
+            if whole_from {
+                self.from
+            } else {
+                time(window.enter)
+            },
+            if whole_to {
+                self.to
+            } else {
+                time(window.leave)
+            },
+        ]
+    }
 }
 
 /// The intervals of one search.
@@ -49,12 +83,6 @@ impl Intervals {
         (self.end, self.margin) = (end, margin);
     }
 
-    /// The time at which interval `number` is cut.
-    #[inline]
-    pub(super) fn middle(&self, number: u32) -> f64 {
-        ends(2 * number, self.end)[1]
-    }
-
     /// Interval `number`, at most `MAX_HALVINGS` deep.
     #[inline]
     pub(super) fn get(
@@ -83,7 +111,11 @@ fn make(
     turned: &mut TurnedNodes,
 ) -> Interval {
     let [from, to] = ends(number, end);
+    let half_share = 0.5 / (1_u32 << number.ilog2()) as f32;
+    let place = number - (1 << number.ilog2());
     Interval {
+        middle_share: (2 * place + 1) as f32 * half_share,
+        half_share,
         from,
         to,
         start: motion.at(from),

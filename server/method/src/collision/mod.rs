@@ -1,6 +1,7 @@
 //! Continuous collision detection: how far a body may move, and whether it is in penetration where it is.
 
 mod advancement;
+mod agenda;
 mod bands;
 mod beyond;
 mod descent;
@@ -16,6 +17,7 @@ mod single;
 mod still_box;
 mod time_of_impact;
 mod turned;
+mod windows;
 mod work;
 mod workspace;
 

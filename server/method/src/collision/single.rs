@@ -26,13 +26,14 @@ pub(super) fn dot(v: &[f32; 3], w: &[f32; 3]) -> f32 {
     v[0].mul_add(w[0], v[1].mul_add(w[1], v[2] * w[2]))
 }
 
-#[inline(always)]
-pub(super) fn norm(v: &[f32; 3]) -> f32 {
-    dot(v, v).sqrt()
-}
-
 /// The larger of two; the second if the first is NaN.
 #[inline(always)]
 pub(super) fn larger(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
+}
+
+/// The smaller of two; the second if the first is NaN.
+#[inline(always)]
+pub(super) fn smaller(x: f32, y: f32) -> f32 {
+    if x < y { x } else { y }
 }

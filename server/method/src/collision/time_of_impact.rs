@@ -1,7 +1,9 @@
 //! Time of impact of a moving body with an obstacle.
 //!
-//! Both trees are descended together; a pair of volumes that moves by more than its size in an interval of time is looked at in
-//! both halves of it, the earlier one first. A pair of triangles is followed by conservative advancement.
+//! Both trees are descended together. A pair of volumes is looked at in the window of time in which it may be near; pairs come in the order of
+//! their windows ([`agenda`](super::agenda)), so that hardly any is looked at that comes near after the first impact. Where the path of a
+//! volume is too curved for a straight one in an interval of time, the pair is looked at in both halves of it. A pair of
+//! triangles is followed by conservative advancement in its window: before that, it is farther apart than the gap.
 //!
 //! **Only what faces.** Let the surfaces start farther apart than the gap g, and let t be the first time at which their distance is
 //! g, between points x of the body and y of the obstacle. No other points are nearer, so x is a local minimum of the distance to
@@ -22,11 +24,13 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
-use super::descent::{for_facing_triangle_pairs, open_pair};
+use super::agenda::{Part, Waiting};
+use super::descent::{for_facing_triangle_pairs, open_moving_pair};
 use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
 use super::motion::{Motion, RelativeMotion};
+use super::windows::Window;
 use super::work::Work;
 use super::workspace::CollisionWorkspace;
 use crate::geometry::Mesh;
@@ -38,6 +42,12 @@ use crate::spatial::Pose;
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 /// Searches of one motion: with the full gap; with that of the nearest hint; with that of the nearest pair; and one for rounding.
 const MAX_SEARCHES: u32 = 4;
+
+/// Lengths, m, and turns, rad, from here on do not fit single precision with their squares: no motion is searched that far.
+const LONGEST: f64 = 1e15;
+/// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
+/// they count as near in all of the window of what they are in, which is the cheaper test.
+const TIMED_SHARE: f32 = 0.125;
 
 /// What the search found. A failure is a value, never a panic: the caller is a real-time loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,8 +79,8 @@ pub struct AdvancementSettings {
     pub gap_tolerance: f64,
     /// Most evaluations of the closest points of one pair of triangles in one interval. Bounds the worst-case time of the loop.
     pub max_iterations: u32,
-    /// A pair of volumes, down to single triangles, is looked at in intervals in which it moves by less than this share of
-    /// the larger one's diameter, as far as `max_intervals` allows.
+    /// A pair of volumes, down to single triangles, is looked at in intervals in which no point of the body's strays from the straight path of its
+    /// centre by more than this share of the larger one's radius, as far as `max_intervals` allows.
     pub interval_edges: f64,
     /// Most intervals of a motion: the next lower power of two, up to 256.
     pub max_intervals: u32,
@@ -92,7 +102,7 @@ impl Default for AdvancementSettings {
 /// Finds a time up to which the body may move: the gap is at least `minimum_gap` all the way and there.
 ///
 /// Never late; early by at most what `gap_tolerance` leaves. Motions that slide or leave are free even at the minimum gap.
-/// A motion with NaN stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
+/// A motion with NaN, or over 1e15 m or rad, stops at 0. The solids must be apart at the start; where their surfaces cross, the answer says so. No allocation.
 pub fn time_of_impact(
     body: &Mesh,
     motion: &Motion,
@@ -105,6 +115,7 @@ pub fn time_of_impact(
     let relative = RelativeMotion::new(motion, obstacle_pose);
     let radius = body.radius_bound_about(&motion.reference_point);
     let finite = relative.is_finite()
+        && relative.reach(radius) + relative.length(radius) + relative.rate < LONGEST
         && settings.minimum_gap.is_finite()
         && settings.gap_tolerance.is_finite();
     if !finite {
@@ -229,7 +240,7 @@ impl Problem<'_> {
         {
             let pair = self.pair(a, b);
             let interval = [0.0, first.time];
-            if !search.is_free(&pair, &start, interval, &first.lately) {
+            if !search.is_free(&pair, &start, [0.0, 0.0, first.time], &first.lately) {
                 let outcome = search.follow(&pair, &start, interval, &mut first.lately, work);
                 first.take(outcome, (a, b), 0.0);
             }
@@ -257,6 +268,7 @@ impl Problem<'_> {
     ) {
         let trees = (self.body.wide_tree(), self.obstacle.wide_tree());
         let CollisionWorkspace {
+            agenda,
             stack,
             hints,
             intervals,
@@ -267,14 +279,59 @@ impl Problem<'_> {
         let cuts = halvings(self.settings.max_intervals);
         let longest = self.settings.interval_edges as f32;
         stack.clear();
-        stack.push((ROOT, ROOT, WHOLE));
-        while let Some((a, b, mut index)) = stack.pop() {
-            // The half in which nothing more is looked for is left out.
-            while index.ilog2() < cuts && intervals.middle(index) >= first.time {
-                index *= 2;
-            }
-            let interval = intervals.get(index, self.relative, trees, turned);
-            let [from, to] = [interval.from, interval.to.min(first.time)];
+        agenda.clear();
+        // Parts of the time that is searched: the one looked at, and that of the first impact.
+        let (mut now, mut last) = (Part::FIRST, Part::of(1.0));
+        let end = first.time;
+        stack.push(Waiting {
+            pair: (ROOT, ROOT),
+            interval: WHOLE,
+            window: Window::WHOLE,
+        });
+        while let Some(next) = stack.pop().or_else(|| {
+            let (part, next) = agenda.pop(last)?;
+            now = part;
+            Some(next)
+        }) {
+            let Waiting {
+                pair: (a, b),
+                interval: mut index,
+                mut window,
+            } = next;
+            let size = trees.0.radius(a).max(trees.1.radius(b));
+            let interval = loop {
+                let interval = intervals.get(index, self.relative, trees, turned);
+                if index.ilog2() >= cuts
+                    || !interval
+                        .volumes
+                        .strays_more_than(longest * size, trees.0, a)
+                {
+                    break interval;
+                }
+                work.node_pairs += 1;
+                // The half without a part of the window is left out; of two, the later one waits.
+                if window.leave < 0.0 {
+                    window = window.in_first_half();
+                    index *= 2;
+                } else if window.enter > 0.0 {
+                    window = window.in_second_half();
+                    index = 2 * index + 1;
+                } else {
+                    let later = Waiting {
+                        pair: (a, b),
+                        interval: 2 * index + 1,
+                        window: window.in_second_half(),
+                    };
+                    let part = interval.part(0.0);
+                    if part <= now || !agenda.push(part, later) {
+                        stack.push(later);
+                    }
+                    window = window.in_first_half();
+                    index *= 2;
+                }
+            };
+            let [from, to] = interval.times(window);
+            let to = to.min(first.time);
             let later = from >= first.time || (first.is_near() && from > 0.0);
             if (later && from > 0.0) || first.overlapping {
                 continue;
@@ -282,30 +339,39 @@ impl Problem<'_> {
             if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
                 work.triangle_pairs += 1;
                 let pair = self.pair(t, s);
-                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
+                let times = [interval.from, from, to];
+                if !search.is_free(&pair, &interval.start, times, &first.lately)
                     && !hints.contains(&(t, s))
                 {
-                    let outcome =
-                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
+                    let start = if from > interval.from {
+                        self.relative.at(from)
+                    } else {
+                        interval.start
+                    };
+                    let outcome = search.follow(&pair, &start, [from, to], &mut first.lately, work);
                     first.take(outcome, (t, s), from);
+                    last = Part::of((first.time / end) as f32);
                 }
                 continue;
             }
             work.node_pairs += 1;
-            let size = trees.0.radius(a).max(trees.1.radius(b));
-            if index.ilog2() < cuts
-                && interval
-                    .volumes
-                    .sweeps_more_than(longest * size, trees.0, a)
-            {
-                // Later half below the earlier one.
-                stack.push((a, b, 2 * index + 1));
-                stack.push((a, b, 2 * index));
-                continue;
+            let found = |pair, window: Window| {
+                let part = interval.part(window.enter);
+                let next = Waiting {
+                    pair,
+                    interval: index,
+                    window,
+                };
+                if part <= now || !agenda.push(part, next) {
+                    stack.push(next);
+                }
+            };
+            let volumes = &interval.volumes;
+            if volumes.sweeps_more_than(TIMED_SHARE * size) {
+                open_moving_pair::<true>(trees, volumes, turned, (a, b), window, found);
+            } else {
+                open_moving_pair::<false>(trees, volumes, turned, (a, b), window, found);
             }
-            open_pair::<true>(trees, &interval.volumes, turned, (a, b), |(a, b), _| {
-                stack.push((a, b, index));
-            });
         }
     }
 

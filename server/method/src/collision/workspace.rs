@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use super::agenda::{Agenda, Waiting};
 use super::bands::Bands;
 use super::descent::WIDE_STACK_CAPACITY;
 use super::intervals::{Intervals, MAX_HALVINGS};
@@ -23,8 +24,9 @@ pub(crate) const MAX_HINTS: usize = 64;
 pub struct CollisionWorkspace {
     pub(crate) pairs: Vec<(u32, u32)>,
     pub(crate) bands: Bands,
-    /// Pairs of volumes and an interval.
-    pub(super) stack: Vec<(u32, u32, u32)>,
+    pub(super) agenda: Agenda,
+    /// Pairs that found no room on the agenda, and what lies below them.
+    pub(super) stack: Vec<Waiting>,
     pub(super) intervals: Intervals,
     pub(super) apart: KnownApart,
     pub(crate) turned: TurnedNodes,
@@ -44,6 +46,7 @@ impl CollisionWorkspace {
         Self {
             pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
             bands: Bands::new(),
+            agenda: Agenda::new(),
             stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),

@@ -36,11 +36,10 @@ pub(crate) struct WideNode {
     pub(crate) sine: Lanes,
 }
 
-/// What a descent asks of a child before it opens it: half a cache line.
+/// What a descent asks of a child before it opens it: a quarter of a cache line.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(align(32))]
+#[repr(align(16))]
 struct Entry {
-    center: [f32; 3],
     radius: f32,
     thickness: f32,
     below: u32,
@@ -137,7 +136,6 @@ impl WideTree {
     fn set(&mut self, child: Child, volume: Volume) {
         self.nodes[child as usize / LANES].set(child as usize % LANES, &volume);
         self.entries[child as usize] = Entry {
-            center: volume.center,
             radius: volume.radius,
             thickness: volume.slab + THICKNESS_PER_RADIUS * volume.radius,
             below: 0,
@@ -149,12 +147,6 @@ impl WideTree {
     #[inline]
     pub(crate) fn node(&self, index: u32) -> &WideNode {
         &self.nodes[index as usize]
-    }
-
-    /// Centre of a child's ball, from the tree's `origin`, m.
-    #[inline]
-    pub(crate) fn center(&self, child: Child) -> &[f32; 3] {
-        &self.entries[child as usize].center
     }
 
     /// Radius of a child's ball, m.
