@@ -22,7 +22,7 @@
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
-use super::descent::{for_facing_triangle_pairs, open_pair};
+use super::descent::{AT_ONCE, Opened, at_once, for_facing_triangle_pairs, open};
 use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
@@ -268,44 +268,53 @@ impl Problem<'_> {
         let longest = self.settings.interval_edges as f32;
         stack.clear();
         stack.push((ROOT, ROOT, WHOLE));
-        while let Some((a, b, mut index)) = stack.pop() {
-            // The half in which nothing more is looked for is left out.
-            while index.ilog2() < cuts && intervals.middle(index) >= first.time {
-                index *= 2;
-            }
-            let interval = intervals.get(index, self.relative, trees, turned);
-            let [from, to] = [interval.from, interval.to.min(first.time)];
-            let later = from >= first.time || (first.is_near() && from > 0.0);
-            if (later && from > 0.0) || first.overlapping {
-                continue;
-            }
-            if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
-                work.triangle_pairs += 1;
-                let pair = self.pair(t, s);
-                if !search.is_free(&pair, &interval.start, [from, to], &first.lately)
-                    && !hints.contains(&(t, s))
-                {
-                    let outcome =
-                        search.follow(&pair, &interval.start, [from, to], &mut first.lately, work);
-                    first.take(outcome, (t, s), from);
-                }
-                continue;
-            }
-            work.node_pairs += 1;
-            let size = trees.0.radius(a).max(trees.1.radius(b));
-            if index.ilog2() < cuts
-                && interval
-                    .volumes
-                    .sweeps_more_than(longest * size, trees.0, a)
+        let mut opened = [(Opened::NONE, WHOLE); AT_ONCE];
+        while !stack.is_empty() {
+            let (most, mut count) = (at_once(stack.len()), 0);
+            while count < most
+                && let Some((a, b, mut index)) = stack.pop()
             {
-                // Later half below the earlier one.
-                stack.push((a, b, 2 * index + 1));
-                stack.push((a, b, 2 * index));
-                continue;
+                // The half in which nothing more is looked for is left out.
+                while index.ilog2() < cuts && intervals.middle(index) >= first.time {
+                    index *= 2;
+                }
+                let interval = intervals.get(index, self.relative, trees, turned);
+                let [from, to] = [interval.from, interval.to.min(first.time)];
+                let later = from >= first.time || (first.is_near() && from > 0.0);
+                if (later && from > 0.0) || first.overlapping {
+                    continue;
+                }
+                if let (Below::Triangle(t), Below::Triangle(s)) =
+                    (trees.0.below(a), trees.1.below(b))
+                {
+                    work.triangle_pairs += 1;
+                    let pair = self.pair(t, s);
+                    let start = &interval.start;
+                    if !search.is_free(&pair, start, [from, to], &first.lately)
+                        && !hints.contains(&(t, s))
+                    {
+                        let outcome =
+                            search.follow(&pair, start, [from, to], &mut first.lately, work);
+                        first.take(outcome, (t, s), from);
+                    }
+                    continue;
+                }
+                work.node_pairs += 1;
+                let size = trees.0.radius(a).max(trees.1.radius(b));
+                let volumes = &interval.volumes;
+                if index.ilog2() < cuts && volumes.sweeps_more_than(longest * size, trees.0, a) {
+                    // Later half below the earlier one.
+                    stack.push((a, b, 2 * index + 1));
+                    stack.push((a, b, 2 * index));
+                    continue;
+                }
+                opened[count] = (open::<true>(trees, volumes, turned, (a, b)), index);
+                count += 1;
             }
-            open_pair::<true>(trees, &interval.volumes, turned, (a, b), |(a, b), _| {
-                stack.push((a, b, index));
-            });
+            // What waited last goes on first.
+            for (pair, index) in opened[..count].iter().rev() {
+                pair.for_each(|(a, b), _| stack.push((a, b, *index)));
+            }
         }
     }
 
