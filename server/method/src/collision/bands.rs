@@ -9,7 +9,7 @@
 //! A search that is given up has then looked at every pair of triangles nearer than the lower edge of its band. What lies below a
 //! volume is no nearer than the volume: it goes into its band or a later one.
 
-use super::descent::{AT_ONCE, Opened, open};
+use super::descent::open;
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
@@ -120,34 +120,25 @@ pub(crate) fn for_nearest_triangle_pairs(
     bands.clear();
     let mut room = bands.push(0, (ROOT, ROOT));
     let mut band = 0;
-    let mut opened = [Opened::NONE; AT_ONCE];
     while band < BANDS {
-        let mut count = 0;
-        while count < AT_ONCE
-            && let Some((a, b)) = bands.pop(band)
-        {
-            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-                work.triangle_pairs += 1;
-                if !visit(t, s, work) {
-                    return edge(band, margin);
-                }
-                continue;
-            }
-            work.node_pairs += 1;
-            opened[count] = open::<false>(trees, volumes, turned, (a, b));
-            count += 1;
-        }
-        if count == 0 {
+        let Some((a, b)) = bands.pop(band) else {
             band += 1;
+            continue;
+        };
+        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+            work.triangle_pairs += 1;
+            if !visit(t, s, work) {
+                return edge(band, margin);
+            }
+            continue;
         }
-        for pair in &opened[..count] {
-            pair.for_each(|(a, b), beyond| {
-                if wanted(body.owned(a), obstacle.owned(b)) {
-                    let own = band_of(1.0 + beyond * scale);
-                    room &= bands.push(own.clamp(band, BANDS - 1), (a, b));
-                }
-            });
-        }
+        work.node_pairs += 1;
+        open::<false>(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
+            if wanted(body.owned(a), obstacle.owned(b)) {
+                let own = band_of(1.0 + beyond * scale);
+                room &= bands.push(own.clamp(band, BANDS - 1), (a, b));
+            }
+        });
         if !room {
             return edge(band, margin);
         }
