@@ -9,7 +9,7 @@
 //! A search that is given up has then looked at every pair of triangles nearer than the lower edge of its band. What lies below a
 //! volume is no nearer than the volume: it goes into its band or a later one.
 
-use super::descent::open_pair;
+use super::descent::open;
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
@@ -133,7 +133,7 @@ pub(crate) fn for_nearest_triangle_pairs(
             continue;
         }
         work.node_pairs += 1;
-        open_pair(trees, volumes, turned, (a, b), |(a, b), beyond| {
+        open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
             if wanted(body.owned(a), obstacle.owned(b)) {
                 let own = band_of(1.0 + beyond * scale);
                 room &= bands.push(own.clamp(band, BANDS - 1), (a, b));

@@ -6,8 +6,25 @@ use super::turned::{Turned, aside};
 use crate::geometry::lanes::{LANES, Lanes};
 use crate::geometry::wide_tree::WideNode;
 
-/// By how much more than the margin each of the eight in `node` is apart from volume `lane` of `turned` at least, m: infinite where they do not
-/// face, not above zero where they may come near. NaN is passed over: what has no other bound is near.
+/// How far one volume and each of eight are apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beyond {
+    /// By how much more than the margin at least, m: infinite where they do not face, not above zero where they may come near.
+    pub(super) by: Lanes,
+    /// A bit for each of the eight that may come near, the lowest for the first. Gathered where they are compared: as the sum of a
+    /// loop of vectors, not number by number.
+    pub(super) near: u32,
+}
+
+impl Beyond {
+    /// Nothing is near.
+    pub(super) const NONE: Self = Self {
+        by: Lanes::splat(f32::INFINITY),
+        near: 0,
+    };
+}
+
+/// Volume `lane` of `turned` against each of the eight in `node`. NaN is passed over: what has no other bound is near.
 ///
 /// One loop over the lanes, without branches: the compiler makes vectors of it.
 #[inline]
@@ -16,7 +33,7 @@ pub(super) fn beyond(
     turned: &Turned,
     lane: usize,
     node: &WideNode,
-) -> Lanes {
+) -> Beyond {
     let lane = lane % LANES;
     let one = |x: &Lanes| x.0[lane];
     let three = |v: &[Lanes; 3]| [one(&v[0]), one(&v[1]), one(&v[2])];
@@ -34,7 +51,7 @@ pub(super) fn beyond(
     let (stray, bare_stray, margin) = (volumes.stray, volumes.bare_stray, volumes.margin);
     let [cos_w, sin_w] = volumes.turn;
     let n = node;
-    let mut beyond = Lanes::splat(0.0);
+    let (mut by, mut near) = (Lanes::splat(0.0), 0);
     for k in 0..LANES {
         let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
         let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];
@@ -101,7 +118,9 @@ pub(super) fn beyond(
         let of_b = larger(aside_u, aside_v) - bare_stray;
         apart |= (of_a > margin_a) | (of_b > q_margin_aside);
         off = larger(off, larger(of_a, of_b) - margin);
-        beyond.0[k] = if apart { f32::INFINITY } else { off };
+        let off = if apart { f32::INFINITY } else { off };
+        by.0[k] = off;
+        near |= if off > 0.0 { 0 } else { 1 << k }; // near for NaN
     }
-    beyond
+    Beyond { by, near }
 }

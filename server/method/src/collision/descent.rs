@@ -1,15 +1,20 @@
 //! Descent of two wide trees together: the thicker of two volumes is opened, and those of its eight that may come near go on.
 
-use super::beyond::beyond;
+use super::beyond::{Beyond, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::turned::TurnedNodes;
 use super::windows::{Window, windows};
 use super::work::Work;
-use crate::geometry::lanes::{LANES, Lanes};
+use crate::geometry::lanes::LANES;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
-/// Pairs that a descent holds: each level of either tree adds seven, and there are fewer levels than in the binary trees.
-pub(crate) const WIDE_STACK_CAPACITY: usize = 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
+/// Pairs that are opened together, before what comes of any is handed on: each then need not wait for the one before. Twice as many gain nothing.
+const AT_ONCE: usize = 8;
+/// A descent that holds more pairs than this opens one at a time.
+const FEW_WAIT: usize = 1024;
+/// Pairs that a descent holds: one at a time, each level of either tree adds seven, and there are fewer levels than in the binary trees.
+pub(crate) const WIDE_STACK_CAPACITY: usize =
+    FEW_WAIT + AT_ONCE * LANES + 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
 
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
 /// down; stops when it returns false. Pairs of volumes that own features `wanted` refuses, (body, obstacle), are not opened.
@@ -24,59 +29,99 @@ pub(crate) fn for_facing_triangle_pairs(
     let (body, obstacle) = trees;
     stack.clear();
     stack.push((ROOT, ROOT));
-    while let Some((a, b)) = stack.pop() {
-        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-            work.triangle_pairs += 1;
-            if !visit(t, s, work) {
-                return;
+    let mut opened = [Opened::NONE; AT_ONCE];
+    while !stack.is_empty() {
+        let most = if stack.len() <= FEW_WAIT { AT_ONCE } else { 1 };
+        let mut count = 0;
+        while count < most
+            && let Some((a, b)) = stack.pop()
+        {
+            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+                work.triangle_pairs += 1;
+                if !visit(t, s, work) {
+                    return;
+                }
+                continue;
             }
-            continue;
+            work.node_pairs += 1;
+            opened[count] = open(trees, volumes, turned, (a, b));
+            count += 1;
         }
-        work.node_pairs += 1;
-        open_pair(trees, volumes, turned, (a, b), |(a, b), _| {
-            if wanted(body.owned(a), obstacle.owned(b)) {
-                stack.push((a, b));
-            }
+        for pair in opened[..count].iter().rev() {
+            pair.for_each(|(a, b), _| {
+                if wanted(body.owned(a), obstacle.owned(b)) {
+                    stack.push((a, b));
+                }
+            });
+        }
+    }
+}
+
+/// A pair of volumes at rest of which one was opened.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Opened {
+    /// The first child below the one that was opened.
+    first: Child,
+    other: Child,
+    /// Whose volume was opened.
+    side: Side,
+    beyond: Beyond,
+}
+
+impl Opened {
+    const NONE: Self = Self {
+        first: 0,
+        other: 0,
+        side: Side::Body,
+        beyond: Beyond::NONE,
+    };
+
+    /// Hands on the pairs that may come near, facing each other: with how much farther than the margin they are apart at least, m, not above zero.
+    #[inline(always)]
+    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), f32)) {
+        for_each_lane(self.beyond.near, |lane| {
+            let child = self.first + lane;
+            let pair = match self.side {
+                Side::Body => (child, self.other),
+                Side::Obstacle => (self.other, child),
+            };
+            each(pair, self.beyond.by.0[lane as usize % LANES]);
         });
     }
 }
 
-/// Opens the thicker of two volumes at rest that are not both triangles, and hands on its children that face the other: with how much farther
-/// than the margin they are apart at least, m, not above zero.
-#[inline]
-pub(super) fn open_pair(
+/// Opens the thicker of two volumes at rest that are not both triangles.
+#[inline(always)]
+pub(super) fn open(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     turned: &mut TurnedNodes,
     (a, b): (Child, Child),
-    mut found: impl FnMut((Child, Child), f32),
-) {
+) -> Opened {
     match opened((body, obstacle), (a, b)) {
         Some((Side::Body, node)) => {
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
-            let beyond = beyond(volumes, one, b as usize % LANES, body.node(node));
-            for_each_lane(near(&beyond), |lane| {
-                found(
-                    (node * LANES as u32 + lane, b),
-                    beyond.0[lane as usize % LANES],
-                );
-            });
+            Opened {
+                first: node * LANES as u32,
+                other: b,
+                side: Side::Body,
+                beyond: beyond(volumes, one, b as usize % LANES, body.node(node)),
+            }
         }
         Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
-            let beyond = beyond(volumes, one, a as usize % LANES, obstacle.node(node));
-            for_each_lane(near(&beyond), |lane| {
-                found(
-                    (a, node * LANES as u32 + lane),
-                    beyond.0[lane as usize % LANES],
-                );
-            });
+            Opened {
+                first: node * LANES as u32,
+                other: a,
+                side: Side::Obstacle,
+                beyond: beyond(volumes, one, a as usize % LANES, obstacle.node(node)),
+            }
         }
-        None => found((a, b), 0.0),
+        None => Opened::NONE,
     }
 }
 
-/// The same of volumes in motion: hands on the children that come near the other in a window of their interval, and when they do.
+/// Opens the thicker of two volumes in motion that are not both triangles, and hands on the children that come near the other in a window of their interval, and when they do.
 #[inline]
 pub(super) fn open_moving_pair<const TIMED: bool>(
     (body, obstacle): (&WideTree, &WideTree),
@@ -126,15 +171,4 @@ fn for_each_lane(mut mask: u32, mut each: impl FnMut(u32)) {
         each(mask.trailing_zeros());
         mask &= mask - 1;
     }
-}
-
-/// Which lanes are not beyond the margin: a bit each.
-#[inline(always)]
-fn near(beyond: &Lanes) -> u32 {
-    let mut bits = [0_u32; LANES];
-    for (k, (bit, lane)) in bits.iter_mut().zip(&beyond.0).enumerate() {
-        let off = *lane > 0.0; // false for NaN
-        *bit = if off { 0 } else { 1 << k };
-    }
-    bits.iter().fold(0, |mask, bit| mask | bit)
 }

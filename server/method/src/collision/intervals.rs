@@ -12,6 +12,17 @@ pub(super) const MAX_HALVINGS: u32 = 8;
 /// Number of the whole motion; the halves of interval i are `2 i` and `2 i + 1`.
 pub(crate) const WHOLE: u32 = 1;
 
+/// What the halvings leave of a motion, down to the middles of the shortest intervals: exact, and without a division.
+const SHARES: [f64; MAX_HALVINGS as usize + 2] = {
+    let mut shares = [1.0; MAX_HALVINGS as usize + 2];
+    let mut k = 1;
+    while k < shares.len() {
+        shares[k] = 0.5 * shares[k - 1];
+        k += 1;
+    }
+    shares
+};
+
 /// One interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
@@ -127,10 +138,10 @@ fn make(
 #[inline]
 fn ends(number: u32, end: f64) -> [f64; 2] {
     let halvings = number.ilog2();
-    let (k, count) = (number - (1 << halvings), f64::from(1_u32 << halvings));
+    let (k, share) = (number - (1 << halvings), SHARES[halvings as usize]);
     [
-        end * (f64::from(k) / count),
-        end * (f64::from(k + 1) / count),
+        end * (f64::from(k) * share),
+        end * (f64::from(k + 1) * share),
     ]
 }
 

@@ -185,10 +185,10 @@ pub(super) fn for_contacts(
 /// Calls `each` with the places of the bits that are set, lowest first; those of three.
 #[inline(always)]
 pub(super) fn for_bits(mask: u8, mut each: impl FnMut(usize)) {
-    for k in 0..3 {
-        if mask & (1 << k) != 0 {
-            each(k);
-        }
+    let mut left = mask & 7;
+    while left != 0 {
+        each(left.trailing_zeros() as usize);
+        left &= left - 1;
     }
 }
 
