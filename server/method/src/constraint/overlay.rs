@@ -353,3 +353,110 @@ fn across(mesh: &Mesh, edge: u32, face: u32) -> u32 {
     let [left, right] = mesh.edges()[edge as usize].faces;
     if left == face { right } else { left }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::{CollisionWorkspace, Placement};
+    use crate::constraint::{collect_contacts, in_world};
+    use crate::spatial::Pose;
+
+    const CELL: f64 = 5e-4;
+    const ROUGH: f64 = 1e-6;
+    const NEAR: f64 = 2e-5;
+
+    /// A rough square of `cells` x `cells` about the z axis, on a point below.
+    fn rough(cells: u32, cell: f64, seed: u64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+        let mut state = seed;
+        let mut height = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005) + 1;
+            ROUGH * (state >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let at = |i: u32, j: u32| i * (cells + 1) + j;
+        let place = |i: u32| cell * (f64::from(i) - 0.5 * f64::from(cells));
+        let mut vertices: Vec<Point3<f64>> = (0..=cells)
+            .flat_map(|i| (0..=cells).map(move |j| [i, j]))
+            .map(|[i, j]| Point3::new(place(i), place(j), height()))
+            .collect();
+        let mut triangles = Vec::new();
+        for (i, j) in (0..cells).flat_map(|i| (0..cells).map(move |j| (i, j))) {
+            let q = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            triangles.extend([[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+        }
+        let apex = vertices.len() as u32;
+        vertices.push(Point3::new(0.0, 0.0, -cell * f64::from(cells)));
+        for k in 0..cells {
+            let rim = [
+                [at(k, 0), at(k + 1, 0)],
+                [at(cells, k), at(cells, k + 1)],
+                [at(k + 1, cells), at(k, cells)],
+                [at(0, k + 1), at(0, k)],
+            ];
+            triangles.extend(rim.map(|[a, b]| [b, a, apex]));
+        }
+        (vertices, triangles)
+    }
+
+    fn names(mut found: Vec<FeaturePair>) -> Vec<FeaturePair> {
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// What the trees find of what a walk is to find.
+    fn by_trees(body: &Mesh, pose: &Pose, obstacle: &Mesh, index: u16) -> Vec<Contact> {
+        let mut contacts = Vec::with_capacity(1 << 14);
+        let collected = collect_contacts(
+            body,
+            pose,
+            obstacle,
+            &Pose::identity(),
+            index,
+            NEAR,
+            &mut CollisionWorkspace::with_candidates(1 << 15),
+            &mut contacts,
+            &mut Work::default(),
+        );
+        assert!(!collected.truncated);
+        contacts.retain(|c| !matches!(c.features.on_obstacle, Feature::Vertex(_)));
+        contacts
+    }
+
+    #[test]
+    fn a_walk_finds_what_the_trees_find_on_rough_surfaces_from_one_pair_and_from_where_it_was_before()
+     {
+        let (mut vertices, mut triangles) = rough(14, 1.1 * CELL, 3);
+        vertices.iter_mut().for_each(|p| p.z = -p.z);
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let body = Mesh::new(vertices, triangles).expect("a closed block");
+        let (vertices, triangles) = rough(24, CELL, 7);
+        let obstacle = Mesh::new(vertices, triangles).expect("a closed block");
+        let mut overlay = Overlay::new(&body);
+        for (x, seeded) in [(1.3e-4, true), (5.1e-4, false)] {
+            let pose = Pose::new(Vector3::new(x, 0.7e-4, 6e-6), Vector3::z() * 0.2);
+            overlay.begin();
+            // Two obstacles at one place: what was looked at for one is not for the other.
+            for index in [0, 1] {
+                let facing = Facing {
+                    body: &body,
+                    obstacle: &obstacle,
+                    placement: &Placement::of(&pose, &Pose::identity()),
+                    obstacle_index: index,
+                    activation_distance: NEAR,
+                    past_hollows: false,
+                };
+                let expected = by_trees(&body, &pose, &obstacle, index);
+                let seeds = &expected[..usize::from(seeded)];
+                let mut found = Vec::new();
+                overlay.begin_at(&facing, seeds.iter());
+                let looked_at = overlay.walk(&facing, &mut Work::default(), |contact| {
+                    found.push(in_world(&contact, &Pose::identity()).features);
+                });
+                let expected = names(expected.iter().map(|c| c.features).collect());
+                assert!(expected.len() > 150, "{}", expected.len());
+                assert_eq!(names(found), expected, "obstacle {index} at {x}");
+                assert!(looked_at >= 15 * 15, "{looked_at}");
+            }
+        }
+    }
+}
