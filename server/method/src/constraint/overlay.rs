@@ -238,10 +238,6 @@ fn look_at_vertex(
     let Some(i) = corners.iter().position(|w| *w == v) else {
         return;
     };
-    // One that does not stand out cannot touch.
-    if facing.body.owned_features(a) & (1 << i) == 0 {
-        return;
-    }
     let pair = Pair {
         a,
         b: foot.face,
