@@ -14,7 +14,7 @@ mod geometry_shapes;
 
 use std::sync::Arc;
 
-use geometry_shapes::{Soup, data_dir, mesh, read_ply};
+use geometry_shapes::{Soup, data_dir, mesh, read_ply, roughened};
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{Contact, collect_contacts, contact_jacobian};
 use god_object::geometry::mass_properties;
@@ -53,8 +53,8 @@ fn main() {
             }
             let obstacle_pose =
                 Pose::new(Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.7, -0.4, 1.1));
-            let peg = mesh(perturbed(fine_peg(), noise, 1));
-            let hole = mesh(perturbed(fine_hole(RADIUS + clearance), noise, 2));
+            let peg = mesh(roughened(fine_peg(), noise, 1));
+            let hole = mesh(roughened(fine_hole(RADIUS + clearance), noise, 2));
             let path: Vec<Pose> = (0..2200 / pace)
                 .map(|k| obstacle_pose * hand(f64::from(k * pace) * 1e-3))
                 .collect();
@@ -162,22 +162,6 @@ fn fine_hole(inner: f64) -> Soup {
         quad([at(i, low), at(i, 0), at(i + 1, 0), at(i + 1, low)]);
     }
     (vertices, triangles)
-}
-
-/// Moves every vertex by up to `noise` (m) along each axis.
-fn perturbed((vertices, triangles): Soup, noise: f64, seed: u64) -> Soup {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut signed = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
-    let moved = vertices
-        .iter()
-        .map(|p| p + Vector3::new(signed(), signed(), signed()) * noise)
-        .collect();
-    (moved, triangles)
 }
 
 /// Every tenth row of the nut's trace.

@@ -5,7 +5,7 @@ mod geometry_shapes;
 use std::sync::Arc;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use geometry_shapes::{Soup, cuboid, grid_box, hole, mesh, peg};
+use geometry_shapes::{Soup, cuboid, fine_hole, fine_peg, grid_box, hole, mesh, peg, roughened};
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{FeaturePair, collect_contacts, contact_jacobian};
 use god_object::geometry::mass_properties;
@@ -182,6 +182,51 @@ fn few_rows_give_the_force_of_all_that_are_within_reach() {
     }
     assert!(bounded > 20, "{bounded}");
     assert!(compared > 30 && most_rows <= 150, "{compared} {most_rows}");
+}
+
+#[test]
+fn rough_walls_are_felt_as_by_all_rows_however_fast_the_peg_slides() {
+    let peg = roughened(fine_peg(10e-3, 30e-3, 120, 112), 1e-6, 1);
+    let hole = roughened(fine_hole(10.1e-3, 30e-3, 25e-3, 120, 109), 1e-6, 2);
+    let world = world(peg, hole, hole_pose());
+    let settings = settings(0.06);
+    let mut god_object =
+        GodObject::new(Arc::clone(&world), settings, hole_pose()).expect("a free start");
+    let mut coupling = Coupling::new(&world, &settings);
+    let radius = world.body.mesh.radius_about(&Point3::origin());
+    // Pressed to the side by 2 mm, and along the hole at 0.35 m/s at most.
+    let hand = |k: usize| {
+        let t = k as f64 * 1e-3;
+        let (push, z) = (2e-3 * (50.0 * t).min(1.0), 0.01 * (35.0 * t).sin());
+        let at = Vector3::new(push * (0.4 + t).cos(), push * (0.4 + t).sin(), z);
+        hole_pose() * Pose::translation(at.x, at.y, at.z)
+    };
+    let mut compared = 0;
+    for k in 0..100 {
+        god_object.step(&hand(k), None);
+        let device = hand(k + 1);
+        let felt = coupling.step(k as f64 * 1e-3, &device, god_object.constraint_set());
+        if k % 5 != 4 || k < 20 {
+            continue;
+        }
+        let difference = pose_difference(&device, god_object.pose(), &Vector3::zeros());
+        let reach = linear(&difference).norm()
+            + radius * angular(&difference).norm()
+            + 2.0 * settings.rest_distance;
+        let rows = every_row(&world, god_object.pose(), reach, settings.rest_distance);
+        let a_c = projected(&world, &god_object, &rows, &difference);
+        let expected = (linear(&a_c) - linear(&difference)) * settings.stiffness(1.0);
+        let error = (linear(&felt.wrench) - expected).norm();
+        assert!(expected.norm() > 1.0, "step {k}: {} N", expected.norm());
+        assert!(
+            error <= 0.01 * expected.norm(),
+            "step {k}: off by {error} N of {} N, {} rows",
+            expected.norm(),
+            rows.len()
+        );
+        compared += 1;
+    }
+    assert_eq!(compared, 16);
 }
 
 #[test]

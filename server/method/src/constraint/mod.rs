@@ -6,6 +6,7 @@ mod contact;
 mod facing;
 mod feature;
 mod hollow;
+mod overlay;
 mod reduction;
 mod separation;
 mod set;

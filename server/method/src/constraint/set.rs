@@ -50,8 +50,8 @@ pub struct ConstraintSet {
     pub truncated: bool,
     /// Every facing pair nearer than this was looked at, m: rows of pairs farther apart may be missing. Infinite without an obstacle.
     pub complete_within: f64,
-    /// Most by which a facing pair without a row, of those nearer than `complete_within`, is violated by a motion that the rows were chosen for, m;
-    /// zero for a full set. Those motions are the projected ways to the device's pose at the update, and to poses that lie off it by
+    /// Most by which a facing pair without a row, of those nearer than `complete_within` and of those found along surfaces that conform, is
+    /// violated by a motion that the rows were chosen for, m; zero for a full set. Those motions are the projected ways to the device's pose at the update, and to poses that lie off it by
     /// the activation distance and the device's last path, along and about each axis. The way to a pose that is a metric distance d off one
     /// of these violates pair k by at most `|J_k| d` more, in the inverse metric: projections bring nothing farther apart.
     pub reduction_error: f64,

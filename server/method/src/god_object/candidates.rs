@@ -11,6 +11,9 @@ const NEAR_REST_DISTANCES: f64 = 4.0;
 /// How much more work that is.
 const LANDING_FACTOR: u64 = 64;
 
+/// Trees look at no less than one in so many of the pairs that they may, however many were looked at along the surfaces.
+const LEAST_SHARE: u64 = 16;
+
 /// What is asked of one obstacle.
 struct Asked {
     /// m.
@@ -36,15 +39,26 @@ impl GodObject {
         let obstacles = at.world.obstacles.len();
         let mut pairs = self.settings.look_ahead_pairs;
         for index in 0..obstacles {
+            let share = (pairs / (obstacles - index) as u64).max(1);
+            // Where trees have failed, what touches is found along the surfaces, and they are to find what is new.
+            let conforms = reduction.conforms(at, index);
+            let walked = if conforms {
+                reduction.offer_along(at, index, work)
+            } else {
+                0
+            };
             let asked = Asked {
                 distance,
-                pairs: (pairs / (obstacles - index) as u64).max(1),
+                pairs: share.saturating_sub(walked).max(share / LEAST_SHARE).max(1),
                 lands,
             };
             let collected = self.candidates_of(index, reduction, at, &asked, work);
-            pairs = pairs.saturating_sub(collected.looked_at);
+            pairs = pairs.saturating_sub(walked + collected.looked_at);
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, &self.contacts, &collected);
+            if !conforms && reduction.conforms(at, index) {
+                reduction.offer_along(at, index, work);
+            }
         }
         let looked_at = self.settings.look_ahead_pairs - pairs;
         self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));

@@ -25,12 +25,8 @@ impl GodObject {
         let linear = settings.implicit_rounds == 0;
         let exact =
             world.body.primitive.is_some() || world.obstacles.iter().any(|o| o.primitive.is_some());
-        (settings.look_ahead && linear && !shaded && !rough && !exact).then(|| {
-            Box::new(RowReduction::with_capacity(
-                settings.max_constraints,
-                world.obstacles.len(),
-            ))
-        })
+        (settings.look_ahead && linear && !shaded && !rough && !exact)
+            .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints, world)))
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were

@@ -1,6 +1,6 @@
 //! A peg and a hole cut finely along their length: conforming contact of dense meshes.
 
-use god_object::nalgebra::Point3;
+use god_object::nalgebra::{Point3, Vector3};
 
 use super::Soup;
 
@@ -66,4 +66,20 @@ pub(crate) fn fine_hole(inner: f64, outer: f64, half_length: f64, around: u32, a
         );
     }
     (vertices, triangles)
+}
+
+/// Moves every vertex by up to `noise` (m) along each axis.
+pub(crate) fn roughened((vertices, triangles): Soup, noise: f64, seed: u64) -> Soup {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut signed = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let moved = vertices
+        .iter()
+        .map(|p| p + Vector3::new(signed(), signed(), signed()) * noise)
+        .collect();
+    (moved, triangles)
 }

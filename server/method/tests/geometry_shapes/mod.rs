@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
 
-pub(crate) use conforming::{fine_hole, fine_peg};
+pub(crate) use conforming::{fine_hole, fine_peg, roughened};
 
 pub(crate) type Soup = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 

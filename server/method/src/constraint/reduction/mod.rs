@@ -14,7 +14,8 @@
 //!
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
-//! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where a pair that
+//! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where that is not even as far as what touches,
+//! as between surfaces that conform, pairs are found along the surfaces instead ([`overlay`](super::overlay)). Where a pair that
 //! holds the body is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid
 //! off its features, those of what it became.
 //!
@@ -30,6 +31,7 @@ use nalgebra::Point3;
 
 use super::collect::{for_contacts, in_world};
 use super::facing::Facing;
+use super::overlay::{MAX_PLACES, Overlay};
 use super::{Collected, Contact, FeaturePair, contact_jacobian};
 use crate::collision::{Placement, Work};
 use crate::geometry::Mesh;
@@ -72,6 +74,12 @@ const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
 const NEAR_REST_DISTANCES: f64 = 4.0;
 
+/// Pairs up to so many rest distances apart are looked for along the surfaces: those that touch, and those that are about to where surfaces are
+/// rough. Farther ones changed no force of a peg in its hole.
+const ALONG_REST_DISTANCES: f64 = 1.5;
+/// Most pairs that are found there, for each vertex.
+const ALONG_PER_PLACE: usize = 2;
+
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const HOPED_WITHIN: f64 = 2.0;
 
@@ -107,6 +115,7 @@ pub(crate) enum Purpose {
 pub(crate) struct RowReduction {
     projector: Projector,
     candidates: Candidates,
+    overlay: Overlay,
     known: Vec<Known>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
@@ -122,18 +131,19 @@ pub(crate) struct RowReduction {
 }
 
 impl RowReduction {
-    /// A reduction of at most `candidates` rows, for so many obstacles. Allocates everything that it will ever need.
-    pub(crate) fn with_capacity(candidates: usize, obstacles: usize) -> Self {
+    /// A reduction of this world, for at most so many rows that trees find at a time. Allocates everything that it will ever need.
+    pub(crate) fn with_capacity(candidates: usize, world: &World) -> Self {
         Self {
             projector: Projector::new(SolverKind::ActiveSet, MAX_ROWS),
-            candidates: Candidates::with_capacity(candidates),
+            candidates: Candidates::with_capacity(candidates + ALONG_PER_PLACE * MAX_PLACES),
+            overlay: Overlay::new(&world.body.mesh),
             known: Vec::with_capacity(MAX_ROWS),
             rows: Vec::with_capacity(MAX_ROWS),
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
             asked: 0.0,
-            hoped: vec![f64::INFINITY; obstacles],
+            hoped: vec![f64::INFINITY; world.obstacles.len()],
             outdated: false,
         }
     }
@@ -236,6 +246,7 @@ impl RowReduction {
         self.truncated = false;
         self.outdated = false;
         self.candidates.clear(&at.reference);
+        self.overlay.begin();
     }
 
     /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
@@ -273,6 +284,35 @@ impl RowReduction {
         let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
+    }
+
+    /// Whether the trees did not find every pair of an obstacle that a walk along the surfaces would, the last time.
+    pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
+        let along = ALONG_REST_DISTANCES * at.rest_distance;
+        self.hoped[obstacle] < HOPED_WITHIN * along
+    }
+
+    /// Adds contacts of the present pose that are found along the surfaces; how many vertices were looked at.
+    pub(crate) fn offer_along(&mut self, at: &At, index: usize, work: &mut Work) -> u64 {
+        let obstacle = &at.world.obstacles[index];
+        let facing = Facing {
+            body: &at.world.body.mesh,
+            obstacle: &obstacle.mesh,
+            placement: &Placement::of(&at.pose, &obstacle.pose),
+            obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
+            activation_distance: ALONG_REST_DISTANCES * at.rest_distance,
+            past_hollows: false,
+        };
+        let (candidates, known) = (&mut self.candidates, &self.known);
+        let near = known.iter().map(|row| &row.contact);
+        self.overlay
+            .begin_at(&facing, near.chain(&candidates.contacts));
+        self.overlay.walk(&facing, work, |contact| {
+            if candidates.room() > 0 {
+                let contact = in_world(&contact, &obstacle.pose);
+                candidates.push(&contact, &jacobian(&contact, &at.center()));
+            }
+        })
     }
 
     /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
