@@ -3,18 +3,24 @@
 use super::beyond::{Beyond, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::turned::TurnedNodes;
-use super::windows::{Window, windows};
+use super::windows::{Window, Windows, windows};
 use super::work::Work;
 use crate::geometry::lanes::LANES;
 use crate::geometry::wide_tree::{Below, Child, ROOT, WideTree};
 
 /// Pairs that are opened together, before what comes of any is handed on: each then need not wait for the one before. Twice as many gain nothing.
-const AT_ONCE: usize = 8;
+pub(super) const AT_ONCE: usize = 8;
 /// A descent that holds more pairs than this opens one at a time.
 const FEW_WAIT: usize = 1024;
 /// Pairs that a descent holds: one at a time, each level of either tree adds seven, and there are fewer levels than in the binary trees.
 pub(crate) const WIDE_STACK_CAPACITY: usize =
     FEW_WAIT + AT_ONCE * LANES + 2 * (LANES - 1) * crate::geometry::MAX_DEPTH + 1;
+
+/// How many pairs to open together while so many wait.
+#[inline(always)]
+pub(super) fn at_once(waiting: usize) -> usize {
+    if waiting <= FEW_WAIT { AT_ONCE } else { 1 }
+}
 
 /// Calls `visit` for every pair of triangles, (body, obstacle), whose volumes may come near and face each other all the way
 /// down; stops when it returns false. Pairs of volumes that own features `wanted` refuses, (body, obstacle), are not opened.
@@ -31,8 +37,7 @@ pub(crate) fn for_facing_triangle_pairs(
     stack.push((ROOT, ROOT));
     let mut opened = [Opened::NONE; AT_ONCE];
     while !stack.is_empty() {
-        let most = if stack.len() <= FEW_WAIT { AT_ONCE } else { 1 };
-        let mut count = 0;
+        let (most, mut count) = (at_once(stack.len()), 0);
         while count < most
             && let Some((a, b)) = stack.pop()
         {
@@ -69,7 +74,7 @@ pub(super) struct Opened {
 }
 
 impl Opened {
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         first: 0,
         other: 0,
         side: Side::Body,
@@ -121,34 +126,68 @@ pub(super) fn open(
     }
 }
 
-/// Opens the thicker of two volumes in motion that are not both triangles, and hands on the children that come near the other in a window of their interval, and when they do.
-#[inline]
-pub(super) fn open_moving_pair<const TIMED: bool>(
+/// A pair of volumes in motion of which one was opened.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OpenedInMotion {
+    first: Child,
+    other: Child,
+    side: Side,
+    windows: Windows,
+}
+
+impl OpenedInMotion {
+    pub(super) const NONE: Self = Self {
+        first: 0,
+        other: 0,
+        side: Side::Body,
+        windows: Windows::NONE,
+    };
+
+    /// Hands on the pairs that come near in a window of their interval, and when they do.
+    #[inline(always)]
+    pub(super) fn for_each(&self, mut each: impl FnMut((Child, Child), Window)) {
+        for_each_lane(self.windows.meeting(), |lane| {
+            let child = self.first + lane;
+            let pair = match self.side {
+                Side::Body => (child, self.other),
+                Side::Obstacle => (self.other, child),
+            };
+            each(pair, self.windows.of(lane));
+        });
+    }
+}
+
+/// Opens the thicker of two volumes in motion that are not both triangles.
+#[inline(always)]
+pub(super) fn open_in_motion<const TIMED: bool>(
     (body, obstacle): (&WideTree, &WideTree),
     volumes: &FacingVolumes,
     turned: &mut TurnedNodes,
     (a, b): (Child, Child),
     window: Window,
-    mut found: impl FnMut((Child, Child), Window),
-) {
+) -> OpenedInMotion {
     match opened((body, obstacle), (a, b)) {
         Some((Side::Body, node)) => {
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
             let lane = b as usize % LANES;
-            let met = windows::<false, TIMED>(volumes, one, lane, body.node(node), window);
-            for_each_lane(met.meeting(), |lane| {
-                found((node * LANES as u32 + lane, b), met.of(lane));
-            });
+            OpenedInMotion {
+                first: node * LANES as u32,
+                other: b,
+                side: Side::Body,
+                windows: windows::<false, TIMED>(volumes, one, lane, body.node(node), window),
+            }
         }
         Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
             let lane = a as usize % LANES;
-            let met = windows::<true, TIMED>(volumes, one, lane, obstacle.node(node), window);
-            for_each_lane(met.meeting(), |lane| {
-                found((a, node * LANES as u32 + lane), met.of(lane));
-            });
+            OpenedInMotion {
+                first: node * LANES as u32,
+                other: a,
+                side: Side::Obstacle,
+                windows: windows::<true, TIMED>(volumes, one, lane, obstacle.node(node), window),
+            }
         }
-        None => found((a, b), window),
+        None => OpenedInMotion::NONE,
     }
 }
 

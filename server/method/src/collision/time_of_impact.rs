@@ -25,7 +25,7 @@
 
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::agenda::{Part, Waiting};
-use super::descent::{for_facing_triangle_pairs, open_moving_pair};
+use super::descent::{AT_ONCE, OpenedInMotion, at_once, for_facing_triangle_pairs, open_in_motion};
 use super::facing_volumes::FacingVolumes;
 use super::gaps::Gaps;
 use super::intervals::{WHOLE, halvings};
@@ -47,7 +47,7 @@ const MAX_SEARCHES: u32 = 4;
 const LONGEST: f64 = 1e15;
 /// When volumes come near is worked out where the body moves by more than this share of the larger one's radius in half an interval. Otherwise
 /// they count as near in all of the window of what they are in, which is the cheaper test.
-const TIMED_SHARE: f32 = 0.125;
+const TIMED_SHARE: f32 = 0.5;
 
 /// What the search found. A failure is a value, never a panic: the caller is a real-time loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -288,89 +288,110 @@ impl Problem<'_> {
             interval: WHOLE,
             window: Window::WHOLE,
         });
-        while let Some(next) = stack.pop().or_else(|| {
-            let (part, next) = agenda.pop(last)?;
-            now = part;
-            Some(next)
-        }) {
-            let Waiting {
-                pair: (a, b),
-                interval: mut index,
-                mut window,
-            } = next;
-            let size = trees.0.radius(a).max(trees.1.radius(b));
-            let interval = loop {
-                let interval = intervals.get(index, self.relative, trees, turned);
-                if index.ilog2() >= cuts
-                    || !interval
-                        .volumes
-                        .strays_more_than(longest * size, trees.0, a)
+        let mut opened = [(OpenedInMotion::NONE, WHOLE); AT_ONCE];
+        loop {
+            let (most, mut count) = (at_once(stack.len()), 0);
+            while count < most {
+                // The agenda has its turn when nothing earlier is under way.
+                let Some(next) = stack.pop().or_else(|| {
+                    let (part, next) = (count == 0).then(|| agenda.pop(last))??;
+                    now = part;
+                    Some(next)
+                }) else {
+                    break;
+                };
+                let Waiting {
+                    pair: (a, b),
+                    interval: mut index,
+                    mut window,
+                } = next;
+                let size = trees.0.radius(a).max(trees.1.radius(b));
+                let interval = loop {
+                    let interval = intervals.get(index, self.relative, trees, turned);
+                    if index.ilog2() >= cuts
+                        || !interval
+                            .volumes
+                            .strays_more_than(longest * size, trees.0, a)
+                    {
+                        break interval;
+                    }
+                    work.node_pairs += 1;
+                    // The half without a part of the window is left out; of two, the later one waits.
+                    if window.leave < 0.0 {
+                        window = window.in_first_half();
+                        index *= 2;
+                    } else if window.enter > 0.0 {
+                        window = window.in_second_half();
+                        index = 2 * index + 1;
+                    } else {
+                        let later = Waiting {
+                            pair: (a, b),
+                            interval: 2 * index + 1,
+                            window: window.in_second_half(),
+                        };
+                        let part = interval.part(0.0);
+                        if part <= now || !agenda.push(part, later) {
+                            stack.push(later);
+                        }
+                        window = window.in_first_half();
+                        index *= 2;
+                    }
+                };
+                let [from, to] = interval.times(window);
+                let to = to.min(first.time);
+                let later = from >= first.time || (first.is_near() && from > 0.0);
+                if (later && from > 0.0) || first.overlapping {
+                    continue;
+                }
+                if let (Below::Triangle(t), Below::Triangle(s)) =
+                    (trees.0.below(a), trees.1.below(b))
                 {
-                    break interval;
+                    work.triangle_pairs += 1;
+                    let pair = self.pair(t, s);
+                    let times = [interval.from, from, to];
+                    if !search.is_free(&pair, &interval.start, times, &first.lately)
+                        && !hints.contains(&(t, s))
+                    {
+                        let start = if from > interval.from {
+                            self.relative.at(from)
+                        } else {
+                            interval.start
+                        };
+                        let outcome =
+                            search.follow(&pair, &start, [from, to], &mut first.lately, work);
+                        first.take(outcome, (t, s), from);
+                        last = Part::of((first.time / end) as f32);
+                    }
+                    continue;
                 }
                 work.node_pairs += 1;
-                // The half without a part of the window is left out; of two, the later one waits.
-                if window.leave < 0.0 {
-                    window = window.in_first_half();
-                    index *= 2;
-                } else if window.enter > 0.0 {
-                    window = window.in_second_half();
-                    index = 2 * index + 1;
+                let volumes = &interval.volumes;
+                opened[count] = if volumes.sweeps_more_than(TIMED_SHARE * size) {
+                    let opened = open_in_motion::<true>(trees, volumes, turned, (a, b), window);
+                    (opened, index)
                 } else {
-                    let later = Waiting {
-                        pair: (a, b),
-                        interval: 2 * index + 1,
-                        window: window.in_second_half(),
-                    };
-                    let part = interval.part(0.0);
-                    if part <= now || !agenda.push(part, later) {
-                        stack.push(later);
-                    }
-                    window = window.in_first_half();
-                    index *= 2;
-                }
-            };
-            let [from, to] = interval.times(window);
-            let to = to.min(first.time);
-            let later = from >= first.time || (first.is_near() && from > 0.0);
-            if (later && from > 0.0) || first.overlapping {
-                continue;
-            }
-            if let (Below::Triangle(t), Below::Triangle(s)) = (trees.0.below(a), trees.1.below(b)) {
-                work.triangle_pairs += 1;
-                let pair = self.pair(t, s);
-                let times = [interval.from, from, to];
-                if !search.is_free(&pair, &interval.start, times, &first.lately)
-                    && !hints.contains(&(t, s))
-                {
-                    let start = if from > interval.from {
-                        self.relative.at(from)
-                    } else {
-                        interval.start
-                    };
-                    let outcome = search.follow(&pair, &start, [from, to], &mut first.lately, work);
-                    first.take(outcome, (t, s), from);
-                    last = Part::of((first.time / end) as f32);
-                }
-                continue;
-            }
-            work.node_pairs += 1;
-            let found = |pair, window: Window| {
-                let part = interval.part(window.enter);
-                let next = Waiting {
-                    pair,
-                    interval: index,
-                    window,
+                    let opened = open_in_motion::<false>(trees, volumes, turned, (a, b), window);
+                    (opened, index)
                 };
-                if part <= now || !agenda.push(part, next) {
-                    stack.push(next);
-                }
-            };
-            let volumes = &interval.volumes;
-            if volumes.sweeps_more_than(TIMED_SHARE * size) {
-                open_moving_pair::<true>(trees, volumes, turned, (a, b), window, found);
-            } else {
-                open_moving_pair::<false>(trees, volumes, turned, (a, b), window, found);
+                count += 1;
+            }
+            if count == 0 {
+                break;
+            }
+            // What waited last goes on first.
+            for (opened, index) in opened[..count].iter().rev() {
+                let interval = intervals.get(*index, self.relative, trees, turned);
+                opened.for_each(|pair, window| {
+                    let part = interval.part(window.enter);
+                    let next = Waiting {
+                        pair,
+                        interval: *index,
+                        window,
+                    };
+                    if part <= now || !agenda.push(part, next) {
+                        stack.push(next);
+                    }
+                });
             }
         }
     }

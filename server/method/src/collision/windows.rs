@@ -53,6 +53,13 @@ pub(super) struct Windows {
 }
 
 impl Windows {
+    /// Nothing meets.
+    pub(super) const NONE: Self = Self {
+        enters: Lanes::splat(0.0),
+        leaves: Lanes::splat(0.0),
+        bits: [0; LANES],
+    };
+
     /// Those that meet, a bit each.
     #[inline(always)]
     pub(super) fn meeting(&self) -> u32 {
@@ -105,11 +112,7 @@ pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
     let stray = volumes.stray;
 
     let n = node;
-    let mut found = Windows {
-        enters: Lanes::splat(0.0),
-        leaves: Lanes::splat(0.0),
-        bits: [0; LANES],
-    };
+    let mut found = Windows::NONE;
     for k in 0..LANES {
         let c = [n.center[0].0[k], n.center[1].0[k], n.center[2].0[k]];
         let a = [n.axis[0].0[k], n.axis[1].0[k], n.axis[2].0[k]];

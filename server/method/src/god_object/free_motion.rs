@@ -4,7 +4,7 @@ use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;
 
-/// Motions of an update are about as long as a triangle: finer cuts cost more than their tighter volumes save.
+/// Motions are cut where they are too curved for a straight path; in finer cuts the volumes save less than they cost.
 const INTERVAL_EDGES: f64 = 0.5;
 
 impl GodObject {
