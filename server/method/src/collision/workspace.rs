@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::agenda::{Agenda, Waiting};
 use super::bands::Bands;
-use super::descent::WIDE_STACK_CAPACITY;
+use super::descent::{AT_ONCE, WIDE_STACK_CAPACITY};
 use super::intervals::{Intervals, MAX_HALVINGS};
 use super::known_apart::KnownApart;
 use super::still_box::STACK_CAPACITY;
@@ -47,7 +47,8 @@ impl CollisionWorkspace {
             pairs: Vec::with_capacity(STACK_CAPACITY.max(WIDE_STACK_CAPACITY)),
             bands: Bands::new(),
             agenda: Agenda::new(),
-            stack: Vec::with_capacity(WIDE_STACK_CAPACITY + MAX_HALVINGS as usize),
+            // Each pair opened may have been cut into its shortest interval before.
+            stack: Vec::with_capacity(WIDE_STACK_CAPACITY + (AT_ONCE + 1) * MAX_HALVINGS as usize),
             intervals: Intervals::new(),
             apart: KnownApart::default(),
             turned: TurnedNodes::new(),
