@@ -447,6 +447,7 @@ proptest! {
         let mut after_fault = false;
         for (fault, ticks, newtons) in sequence {
             let begun = stage.now;
+            let mut jumped = false;
             for tick in 0..ticks {
                 let now = stage.now + TICK;
                 let mut answer = Ok(sample(now));
@@ -474,10 +475,11 @@ proptest! {
                 }
                 let pose = answer.map(|sample| sample.pose).ok();
                 stood = if pose == last_pose { stood + 1 } else { 0 };
-                // A device that has stood somewhere else for long enough is there, and one that stands still after another fault rests.
+                // A device that has stood somewhere else for long enough is there, and one that stands still after another fault rests: where it froze
+                // before, it comes back somewhere else.
                 let stands = match fault {
                     Fault::Origin | Fault::Jump => stood > 100,
-                    Fault::Frozen => after_fault && tick > 100,
+                    Fault::Frozen => (after_fault || jumped) && tick > 100,
                     _ => false,
                 };
                 if stands {
@@ -489,6 +491,7 @@ proptest! {
                 }
                 last_pose = pose;
                 let report = stage.tick(answer, Some(command));
+                jumped |= tick == 0 && stage.port.fault().is_some();
                 if sample_is_good {
                     good_sample = stage.now;
                 }
