@@ -2,6 +2,7 @@
 //!
 //! - [`relay`]: loss, bursts, delay, jitter, swaps, copies, length limits, black holes and wrong bits between client and server.
 //! - [`forge`]: datagrams that must not be accepted, of every sort.
+//! - [`hostile`]: one attack for each promise of the documents.
 //! - [`mod@bench`]: what is measured, each beside its control in the same run.
 //! - [`report`]: the table of targets, and what was measured against them.
 //! - [`random`]: numbers that every machine draws alike.
@@ -10,6 +11,7 @@
 
 pub mod bench;
 pub mod forge;
+pub mod hostile;
 pub mod random;
 pub mod relay;
 pub mod report;

@@ -55,7 +55,7 @@ pub struct Section {
 }
 
 /// All parts, in the order of the table.
-pub const SECTIONS: [Section; 13] = [
+pub const SECTIONS: &[Section] = &[
     Section {
         name: "latency",
         about: "one-way latency, sealed UDP and QUIC datagrams beside raw UDP",
@@ -115,6 +115,11 @@ pub const SECTIONS: [Section; 13] = [
         name: "soak",
         about: "clients that come, go, vanish and are refused behind a bad network",
         run: soak_rows,
+    },
+    Section {
+        name: "hostile",
+        about: "one attack for each promise",
+        run: crate::hostile::rows,
     },
     Section {
         name: "elsewhere",
