@@ -29,7 +29,7 @@ impl Folder {
 fn a_sound_mesh_gets_its_figures() {
     let report = Folder::new().check("box.ply", write_ply(&cuboid([0.1, 0.2, 0.3])));
     assert!(report.is_good(), "{report}");
-    let figures = report.mesh.unwrap();
+    let figures = report.mesh.as_ref().unwrap();
     assert_eq!((figures.triangles, figures.vertices), (12, 8));
     assert!(figures.watertight && figures.oriented);
     assert!((figures.volume_m3 - 0.048).abs() < 1e-12);
@@ -40,6 +40,28 @@ fn a_sound_mesh_gets_its_figures() {
             .contains("12 triangles, 8 vertices, 0.2000 x 0.4000 x 0.6000 m, watertight yes"),
         "{report}"
     );
+}
+
+#[test]
+fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
+    let with_part = |half: f64, x: f64| {
+        let (mut mesh, part) = (cuboid([0.1; 3]), cuboid([half; 3]));
+        let first = mesh.vertices.len() as u32;
+        let moved = part.vertices.iter().map(|p| p + nalgebra::Vector3::x() * x);
+        mesh.vertices.extend(moved);
+        let turned = part.triangles.iter().map(|t| [t[1], t[0], t[2]]);
+        mesh.triangles.extend(turned.map(|t| t.map(|v| v + first)));
+        write_ply(&mesh)
+    };
+    let report = Folder::new().check("inverted.ply", with_part(0.02, 0.3));
+    let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
+    let expected = "the closed part of 12 triangles about (0.3000, 0.0000, 0.0000) m is inside out";
+    assert!(
+        texts.len() == 1 && texts[0].starts_with(expected),
+        "{texts:?}"
+    );
+    let cavity = Folder::new().check("cavity.ply", with_part(0.02, 0.05));
+    assert!(cavity.is_good(), "{cavity}");
 }
 
 #[test]
