@@ -10,6 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
+    confirmation::Trust,
     control::{ControlMessage, StatesBy},
     header::MAX_DATAGRAM_BYTES,
     multicast::{MulticastWatch, StatePath},
@@ -43,6 +44,7 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
     socket.set_read_timeout(Some(LOOK_PERIOD))?;
     let receiver: UdpSocket = socket.try_clone()?.into();
     let mut watch = MulticastWatch::default();
+    let mut generation = None;
     let mut joined = Instant::now();
     let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
     while !hot.is_over() {
@@ -61,6 +63,10 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
             Err(_) => std::thread::sleep(LOOK_PERIOD), // soft, but no reason to spin
         }
         let now = Instant::now();
+        let newest = hot.group.roster().map(|roster| roster.generation);
+        if std::mem::replace(&mut generation, newest) != newest {
+            watch.rekeyed();
+        }
         ask(hot, &mut watch, group, now);
         if now.duration_since(joined) >= REJOIN_PERIOD {
             joined = now;
@@ -72,14 +78,18 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
 
 fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant) {
     let now_ns = hot.inbound.local_ns(now);
+    if let Some(trust) = hot.inbound.take_lost_trust(now_ns) {
+        return leave(hot, watch, group, trust, now_ns);
+    }
     let Some(path) = watch.wish(now_ns, hot.inbound.heard_ns()) else {
         return;
     };
     let multicast = path == StatePath::Multicast;
-    if !hot.post(ControlMessage::StatesBy(StatesBy { multicast })) {
+    if !hot.post(states_by(multicast, false)) {
         return; // the control stream is busy: asked again at the next look
     }
     watch.asked(path, now_ns);
+    hot.inbound.follow_group(multicast);
     match path {
         StatePath::Multicast => tracing::info!(%group, "states come by multicast"),
         StatePath::Unicast => {
@@ -87,6 +97,35 @@ fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant)
             tracing::warn!(%group, "multicast fell silent while the server lives: states come by unicast again");
         }
     }
+}
+
+/// Asks for unicast, because what came by the group is not to be trusted. Its states are not taken any more already.
+fn leave(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, trust: Trust, now_ns: u64) {
+    let counters = &hot.inbound.counters;
+    let forged = matches!(trust, Trust::Forged { .. });
+    match trust {
+        Trust::Kept => return,
+        Trust::Forged { tick } => {
+            counters.states_forged.one();
+            watch.forged();
+            tracing::error!(%group, tick, "a member of the group forges the server's states: states come by unicast until the group's keys change");
+        }
+        Trust::Unconfirmed => {
+            counters.states_unconfirmed.one();
+            tracing::warn!(%group, "the server did not confirm what came by multicast: states come by unicast again");
+        }
+        Trust::Unheard => {
+            counters.multicast_lost.one();
+            tracing::warn!(%group, "multicast brings none of the server's states: states come by unicast again");
+        }
+    }
+    watch.asked(StatePath::Unicast, now_ns);
+    // Who cannot say it now, with a stream that is full, has its link given up before long.
+    let _ = hot.post(states_by(false, forged));
+}
+
+fn states_by(multicast: bool, forged: bool) -> ControlMessage {
+    ControlMessage::StatesBy(StatesBy { multicast, forged })
 }
 
 fn renew(socket: &Socket, group: SocketAddrV4, interface: std::net::Ipv4Addr) {
