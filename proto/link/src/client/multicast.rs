@@ -45,6 +45,7 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
     let receiver: UdpSocket = socket.try_clone()?.into();
     let mut watch = MulticastWatch::default();
     let mut generation = None;
+    let mut unsaid = None;
     let mut joined = Instant::now();
     let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
     while !hot.is_over() {
@@ -67,7 +68,10 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
         if std::mem::replace(&mut generation, newest) != newest {
             watch.rekeyed();
         }
-        ask(hot, &mut watch, group, now);
+        // What a busy stream does not take is said at the next look.
+        unsaid = unsaid
+            .or_else(|| ask(hot, &mut watch, group, now))
+            .filter(|words| !hot.post(ControlMessage::StatesBy(*words)));
         if now.duration_since(joined) >= REJOIN_PERIOD {
             joined = now;
             renew(&socket, group, interface);
@@ -76,18 +80,19 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
     Ok(())
 }
 
-fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant) {
+/// Turns to the way that the watch or the confirmations ask for; what the server is to be told of it.
+fn ask(
+    hot: &Hot,
+    watch: &mut MulticastWatch,
+    group: SocketAddrV4,
+    now: Instant,
+) -> Option<StatesBy> {
     let now_ns = hot.inbound.local_ns(now);
     if let Some(trust) = hot.inbound.take_lost_trust(now_ns) {
         return leave(hot, watch, group, trust, now_ns);
     }
-    let Some(path) = watch.wish(now_ns, hot.inbound.heard_ns()) else {
-        return;
-    };
+    let path = watch.wish(now_ns, hot.inbound.heard_ns())?;
     let multicast = path == StatePath::Multicast;
-    if !hot.post(states_by(multicast, false)) {
-        return; // the control stream is busy: asked again at the next look
-    }
     watch.asked(path, now_ns);
     hot.inbound.follow_group(multicast);
     match path {
@@ -97,14 +102,24 @@ fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant)
             tracing::warn!(%group, "multicast fell silent while the server lives: states come by unicast again");
         }
     }
+    Some(StatesBy {
+        multicast,
+        forged: false,
+    })
 }
 
-/// Asks for unicast, because what came by the group is not to be trusted. Its states are not taken any more already.
-fn leave(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, trust: Trust, now_ns: u64) {
+/// Turns to unicast, because what came by the group is not to be trusted. Its states are not taken any more already.
+fn leave(
+    hot: &Hot,
+    watch: &mut MulticastWatch,
+    group: SocketAddrV4,
+    trust: Trust,
+    now_ns: u64,
+) -> Option<StatesBy> {
     let counters = &hot.inbound.counters;
     let forged = matches!(trust, Trust::Forged { .. });
     match trust {
-        Trust::Kept => return,
+        Trust::Kept => return None,
         Trust::Forged { tick } => {
             counters.states_forged.one();
             watch.forged();
@@ -120,12 +135,10 @@ fn leave(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, trust: Trus
         }
     }
     watch.asked(StatePath::Unicast, now_ns);
-    // Who cannot say it now, with a stream that is full, has its link given up before long.
-    let _ = hot.post(states_by(false, forged));
-}
-
-fn states_by(multicast: bool, forged: bool) -> ControlMessage {
-    ControlMessage::StatesBy(StatesBy { multicast, forged })
+    Some(StatesBy {
+        multicast: false,
+        forged,
+    })
 }
 
 fn renew(socket: &Socket, group: SocketAddrV4, interface: std::net::Ipv4Addr) {
