@@ -16,8 +16,9 @@
 
 use crate::{
     DecodeError, EncodeError, Header, Kind, Payload, Role,
-    codec::{Reader, Wire, Writer, wire_struct},
+    codec::{Reader, Wire, Writer, wire_ranged},
     derive::Root,
+    range::{COUNT_32, SESSION},
     seal::{DatagramBuffer, KEY_MATERIAL_BYTES, OpenError, Opened, Opener, SealError, Sealer},
 };
 use arrayvec::ArrayVec;
@@ -114,7 +115,8 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         | Kind::Input
         | Kind::Head
         | Kind::Wrench
-        | Kind::Constraints => false,
+        | Kind::Constraints
+        | Kind::Confirm => false,
     }
 }
 
@@ -364,14 +366,14 @@ impl Wire for SocketAddr {
     }
 }
 
-wire_struct!(GroupMember {
-    sender,
+wire_ranged!(GroupMember {
+    sender in SESSION,
     node,
     role,
     address
 });
-wire_struct!(Group {
-    generation,
+wire_ranged!(Group {
+    generation in COUNT_32,
     secret,
     members,
     multicast

@@ -2,7 +2,8 @@
 
 use crate::{
     MeshHash, PoseF64,
-    codec::{wire_struct, wire_tag},
+    codec::{wire_ranged, wire_tag},
+    range::{ANGLE, COLOUR, LENGTH, NAME, PIXELS, PUPILS, SCALE, SHARE, SIZE},
 };
 
 /// What a client learns at join, before the first state.
@@ -148,49 +149,49 @@ pub struct ShowOptions {
     pub hud: bool,
 }
 
-wire_struct!(SceneDescription {
+wire_ranged!(SceneDescription {
     name,
-    revision,
+    revision in NAME,
     god_object,
     obstacles,
-    reference_point,
+    reference_point in LENGTH,
     scene_origin,
-    display_scale,
+    display_scale in SCALE,
     screens,
     nodes,
     viewer,
-    eye_separation,
-    near,
-    far,
-    separation_scale,
-    nearest_disparity,
+    eye_separation in PUPILS,
+    near in SIZE,
+    far in SIZE,
+    separation_scale in SHARE,
+    nearest_disparity in ANGLE,
     show,
 });
-wire_struct!(BodyDescription {
+wire_ranged!(BodyDescription {
     name,
     mesh,
     pose,
-    colour
+    colour in COLOUR
 });
-wire_struct!(ScreenDescription {
+wire_ranged!(ScreenDescription {
     name,
-    lower_left,
-    lower_right,
-    upper_left
+    lower_left in LENGTH,
+    lower_right in LENGTH,
+    upper_left in LENGTH
 });
-wire_struct!(NodeDescription {
+wire_ranged!(NodeDescription {
     name,
     screens,
     stereo,
     window,
     monitors
 });
-wire_struct!(WindowDescription {
-    width,
-    height,
+wire_ranged!(WindowDescription {
+    width in PIXELS,
+    height in PIXELS,
     fullscreen
 });
-wire_struct!(ShowOptions {
+wire_ranged!(ShowOptions {
     ghost,
     contacts,
     force,

@@ -31,6 +31,8 @@ pub(crate) struct Session {
     server: String,
     node: String,
     received: Vec<ReceivedState>,
+    /// How often states by multicast were found false, as far as the timeline knows.
+    withdrawn: u64,
     /// States lost and received in earlier sessions.
     earlier: (u64, u64),
     /// When the node began to join.
@@ -118,6 +120,7 @@ impl Session {
             server,
             node,
             received: Vec::new(),
+            withdrawn: 0,
             earlier: (0, 0),
             began,
             stop,
@@ -176,6 +179,10 @@ impl Session {
 
     /// Moves the states that have arrived to the timeline.
     pub(crate) fn take_states(&mut self, timeline: &mut Timeline) {
+        let withdrawn = self.link.states_withdrawn();
+        if std::mem::replace(&mut self.withdrawn, withdrawn) != withdrawn {
+            timeline.clear(); // some of what it holds may be nobody's
+        }
         self.link.drain_states(&mut self.received);
         for state in self
             .received

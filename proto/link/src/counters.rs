@@ -135,6 +135,10 @@ counters! {
         multicast_heard,
         /// Times that the multicast group fell silent and states came by unicast again.
         multicast_lost,
+        /// Times that a member was found to forge the server's states.
+        states_forged,
+        /// Times that the group was left because the server did not confirm what came by it.
+        states_unconfirmed,
         /// Datagrams sent.
         packets_sent,
         /// Datagrams that the system did not take.

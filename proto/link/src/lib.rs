@@ -28,7 +28,8 @@ pub mod transport;
 
 pub use client::{
     ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GaveUp, GroupReceiver,
-    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, ReceivedState, ReceivedWrench,
+    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
+    ServerState,
     RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, SessionEnd, SupervisedLink, connect,
 };
 pub use clock::SessionClock;

@@ -43,6 +43,7 @@ impl Leader {
             frames: swap.map(|swap| MasterSettings {
                 swap,
                 period_ns: PERIOD.as_nanos() as u64,
+                slowest_ns: 1_000_000_000,
             }),
             ..ServerOptions::loopback(key('a'))
         })

@@ -73,6 +73,7 @@ impl Leader {
             frames: Some(MasterSettings {
                 swap: Swap::Immediate,
                 period_ns: PERIOD.as_nanos() as u64,
+                slowest_ns: 1_000_000_000,
             }),
             ..ServerOptions::loopback(key('a'))
         };

@@ -109,7 +109,10 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ),
         (
             "states_by",
-            ControlMessage::StatesBy(StatesBy { multicast: true }),
+            ControlMessage::StatesBy(StatesBy {
+                multicast: true,
+                forged: false,
+            }),
         ),
     ]
 }

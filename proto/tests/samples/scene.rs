@@ -8,7 +8,7 @@ use taut_proto::{
     },
 };
 
-use super::values::{finite32, finite64, pose64};
+use super::values::{finite64, pose64};
 
 pub fn scene() -> SceneDescription {
     let body = |name: &str, byte: u8| BodyDescription {
@@ -63,7 +63,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             ".{0,20}",
             any::<[u8; 32]>(),
             pose64(),
-            prop::array::uniform4(finite32()),
+            prop::array::uniform4(0.0..=1.0_f32),
         )
             .prop_map(|(name, bytes, pose, colour)| BodyDescription {
                 name,
@@ -92,7 +92,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         ".{0,20}",
         prop::collection::vec(".{0,9}", 0..4),
         stereo,
-        any::<(u32, u32, bool)>(),
+        (0..=65_536_u32, 0..=65_536_u32, any::<bool>()),
         prop::collection::vec(".{0,9}", 0..3),
     )
         .prop_map(
@@ -114,7 +114,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         prop::collection::vec(node, 0..4),
     );
     let numbers = (
-        prop::array::uniform6(finite64()),
+        prop::array::uniform6(1e-9..=1.0_f64),
         prop::array::uniform3(finite64()),
         any::<(u32, bool, bool, bool, bool)>(),
     );

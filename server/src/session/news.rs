@@ -119,6 +119,12 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
         LinkEvent::Silent { .. } => Severity::Warning,
+        // The wall is not what it was, and somebody should know.
+        LinkEvent::FreeRunning { free, .. } => match free {
+            true => Severity::Error,
+            false => Severity::Info,
+        },
+        LinkEvent::StatesForged { .. } => Severity::Error,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Forbidden { .. } => Severity::Warning,

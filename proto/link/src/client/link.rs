@@ -119,6 +119,12 @@ impl ClientLink {
         self.hot.inbound.drain_states(out);
     }
 
+    /// How often states that came by the multicast group were found to be forged, or were not confirmed by the server in time: when that grows, whoever
+    /// keeps states forgets those of before. Those that were still waiting to be drained are gone already.
+    pub fn states_withdrawn(&self) -> u64 {
+        self.hot.inbound.states_withdrawn()
+    }
+
     /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {

@@ -326,7 +326,7 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 node: session.node.clone(),
                 arm: request.arm,
             }),
-            ControlMessage::StatesBy(states) => session.take_states_by(states),
+            ControlMessage::StatesBy(states) => session.take_states_by(states, shared),
             ControlMessage::Bye(bye) => return bye.reason,
             other => return broken(session, &format!("a client sent {}", other.name())),
         }

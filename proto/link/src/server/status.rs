@@ -97,6 +97,18 @@ pub enum LinkEvent {
         /// The line.
         event: LogEvent,
     },
+    /// A render node swaps on its own from now on, or in step with the others again: it draws fewer frames than the least rate, or than it says.
+    FreeRunning {
+        /// Its name.
+        node: String,
+        /// On its own, or in step again.
+        free: bool,
+    },
+    /// It says that a member of the group sealed a state in the server's name: it takes states by itself until the group's keys change.
+    StatesForged {
+        /// Its name.
+        node: String,
+    },
     /// An operator wants force at the device, or none.
     Arm {
         /// Its name.
