@@ -21,7 +21,7 @@ pub use crate::role::Role;
 
 use crate::{
     ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
-    PROTOCOL_VERSION, SceneDescription,
+    PROTOCOL_VERSION, SceneDescription, Untrusted,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
     proof::Grant,
     version::MAGIC,
@@ -75,7 +75,7 @@ pub enum RefusalCode {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// Name of the node, unique among the clients.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// How it wants its states.
@@ -113,7 +113,7 @@ pub struct Refusal {
     /// Protocol version of the server.
     pub version: u8,
     /// Why and what to do, for people: one sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// Asks for a mesh.
@@ -149,7 +149,7 @@ pub struct LogEvent {
     /// Weight.
     pub level: LogLevel,
     /// One sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// An operator wants force at the device, or none.
@@ -170,7 +170,7 @@ pub struct StatesBy {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
     /// Why, one sentence.
-    pub reason: String,
+    pub reason: Untrusted,
 }
 
 /// Everything that is said on a control stream.

@@ -15,7 +15,7 @@
 //! take the one before for [`PREVIOUS_NS`] more. Who comes understands the others when that time is over: the generation before is not for it.
 
 use crate::{
-    DecodeError, EncodeError, Header, Kind, Payload, Role,
+    DecodeError, EncodeError, Header, Kind, Payload, Role, Untrusted,
     codec::{Reader, Wire, Writer, wire_struct},
     derive::Root,
     seal::{DatagramBuffer, KEY_MATERIAL_BYTES, OpenError, Opened, Opener, SealError, Sealer},
@@ -59,7 +59,7 @@ pub struct GroupMember {
     /// Session number: `sender` in datagram headers.
     pub sender: u16,
     /// Name of the node.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// Where its hot plane listens, as the server sees it; `None` before its first datagram, and for QUIC datagrams.

@@ -73,7 +73,7 @@ impl ClientLedger {
                 node,
                 text,
                 ..
-            } => Some(if node.is_empty() {
+            } => Some(if node == "" {
                 format!("a client at {address} was refused: {text}")
             } else {
                 format!("{node} at {address} was refused: {text}")

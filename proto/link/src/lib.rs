@@ -42,6 +42,7 @@ pub use server::{
 };
 pub use taut_proto as proto;
 pub use taut_proto::{
+    Printable, Untrusted,
     Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
     Transport,
 };

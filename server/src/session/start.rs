@@ -56,7 +56,7 @@ impl Session {
                 setup.realtime.broadcast_period.as_secs_f64().recip(),
             ),
             DeviceSource::Local(_) => CouplingOffer::AtServer {
-                reason: "its workbench has a device of its own".to_owned(),
+                reason: "its workbench has a device of its own".into(),
             },
         };
         let options = ServerOptions {
@@ -258,7 +258,7 @@ fn opening(setup: &SessionSetup) -> String {
 fn picture(setup: &SessionSetup) -> MonitorPicture {
     let description = &setup.content.description;
     MonitorPicture {
-        name: description.name.clone(),
+        name: description.name.to_string(),
         world: setup.world.clone(),
         moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,

@@ -1,7 +1,7 @@
 //! What the server knows of its clients, and what it tells of them.
 
 use std::{net::SocketAddr, time::Duration};
-use taut_proto::{Act, ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
+use taut_proto::{Act, ClientStats, Role, Transport, Untrusted, control::LogEvent, control::RefusalCode};
 
 /// A client as the server sees it.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ pub enum LinkEvent {
         /// Where it came from.
         address: SocketAddr,
         /// The name that it gave; empty if it did not come that far.
-        node: String,
+        node: Untrusted,
         /// Why, for programs.
         code: RefusalCode,
         /// Why, for people.
