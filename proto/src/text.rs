@@ -141,11 +141,20 @@ mod tests {
         for (raw, shown) in [
             ("front", "front"),
             ("Bühne \"links\" C:\\x", "Bühne \"links\" C:\\x"),
-            ("\u{1b}[2J\u{1b}]0;owned\u{7}", "\\u{1b}[2J\\u{1b}]0;owned\\u{7}"),
+            (
+                "\u{1b}[2J\u{1b}]0;owned\u{7}",
+                "\\u{1b}[2J\\u{1b}]0;owned\\u{7}",
+            ),
             ("\u{9b}31m", "\\u{9b}31m"),
             ("a\r\nERROR b", "a\\r\\nERROR b"),
-            ("user\u{202e}gnp.exe\u{2066}", "user\\u{202e}gnp.exe\\u{2066}"),
-            ("a\u{2028}b\u{200b}c\u{feff}", "a\\u{2028}b\\u{200b}c\\u{feff}"),
+            (
+                "user\u{202e}gnp.exe\u{2066}",
+                "user\\u{202e}gnp.exe\\u{2066}",
+            ),
+            (
+                "a\u{2028}b\u{200b}c\u{feff}",
+                "a\\u{2028}b\\u{200b}c\\u{feff}",
+            ),
             ("\u{301}on nothing", "\\u{301}on nothing"),
         ] {
             let text = Untrusted::from(raw);
@@ -161,7 +170,10 @@ mod tests {
         let shown = text.to_string();
         assert!(shown.starts_with(&"ä".repeat(MAX_SHOWN_CHARS)));
         assert!(shown.ends_with("... (19000 bytes more)"), "{shown}");
-        assert_eq!(format!("{:.2}", Untrusted::from("abc")), "ab... (1 bytes more)");
+        assert_eq!(
+            format!("{:.2}", Untrusted::from("abc")),
+            "ab... (1 bytes more)"
+        );
         assert!(!text.is_printable());
     }
 

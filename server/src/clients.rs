@@ -199,6 +199,7 @@ mod tests {
             session: 1,
             node: node.into(),
             role,
+            grant: taut_link::proto::proof::Grant::Master,
             transport: Transport::QuicDatagram,
             rate_hz: 0,
             address: ([127, 0, 0, 1], 1000).into(),

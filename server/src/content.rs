@@ -109,7 +109,11 @@ fn screen(screen: &taut_scene::Screen) -> ScreenDescription {
 fn node(node: &taut_scene::Node) -> NodeDescription {
     NodeDescription {
         name: node.name.as_str().into(),
-        screens: node.screens.iter().map(|name| name.as_str().into()).collect(),
+        screens: node
+            .screens
+            .iter()
+            .map(|name| name.as_str().into())
+            .collect(),
         stereo: match node.stereo {
             taut_scene::Stereo::Mono => Stereo::Mono,
             taut_scene::Stereo::SideBySide => Stereo::SideBySide,
@@ -122,6 +126,11 @@ fn node(node: &taut_scene::Node) -> NodeDescription {
             height: node.window.height,
             fullscreen: node.window.fullscreen,
         },
-        monitors: node.window.monitors.iter().map(|name| name.as_str().into()).collect(),
+        monitors: node
+            .window
+            .monitors
+            .iter()
+            .map(|name| name.as_str().into())
+            .collect(),
     }
 }

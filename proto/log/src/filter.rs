@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::sync::OnceLock;
 
-use tracing_subscriber::filter::{EnvFilter, LevelFilter};
+use tracing_subscriber::filter::EnvFilter;
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::reload;
@@ -14,62 +14,41 @@ pub const AUDIT_TARGET: &str = "taut::audit";
 /// Variable that says what is logged, in the form of tracing's `EnvFilter`; before it, `RUST_LOG` does. It overrides every other choice.
 pub const VARIABLE: &str = "TAUT_LOG";
 
-/// How much is logged where no variable says otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Levels {
-    /// Of everything but the audit trail.
-    pub program: LevelFilter,
-    /// Of the audit trail.
-    pub audit: LevelFilter,
-}
-
 /// Changes the filter of the running program; unset where a variable decides.
-type Change = Box<dyn Fn(Levels) + Send + Sync>;
+type Change = Box<dyn Fn(&str) + Send + Sync>;
 static CHANGE: OnceLock<Change> = OnceLock::new();
 
-impl Levels {
-    /// The program's level, and the audit trail whole.
-    #[must_use]
-    pub fn of_program(program: LevelFilter) -> Self {
-        Self {
-            program,
-            audit: LevelFilter::INFO,
-        }
-    }
-
-    fn filter(self) -> EnvFilter {
-        EnvFilter::new(format!("{},{AUDIT_TARGET}={}", self.program, self.audit))
-    }
-}
-
-/// Sets up the log of this process: to standard error by [`crate::terminal`], at these levels or what a variable says. Once per process;
-/// a second time nothing happens.
-pub fn start(levels: Levels) {
+/// Sets up the log of this process: to standard error by [`crate::terminal`], what `directives` or a variable says. Once per process; a
+/// second time nothing happens.
+pub fn start(directives: &str) {
     let asked = [VARIABLE, EnvFilter::DEFAULT_ENV]
         .iter()
         .find_map(|variable| EnvFilter::try_from_env(variable).ok());
     let decided = asked.is_some();
-    let (filter, handle) = reload::Layer::new(asked.unwrap_or_else(|| levels.filter()));
+    let (filter, handle) = reload::Layer::new(asked.unwrap_or_else(|| EnvFilter::new(directives)));
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(crate::terminal())
         .with_ansi(std::io::stderr().is_terminal())
         .with_timer(Stamp::here());
-    let begun = tracing_subscriber::registry().with(filter).with(lines).try_init();
+    let begun = tracing_subscriber::registry()
+        .with(filter)
+        .with(lines)
+        .try_init();
     if begun.is_err() {
         return;
     }
     crate::panics::say_without_waiting();
     if !decided {
         // Fails only where the subscriber is gone.
-        let change = move |levels: Levels| drop(handle.reload(levels.filter()));
+        let change = move |directives: &str| drop(handle.reload(EnvFilter::new(directives)));
         let _ = CHANGE.set(Box::new(change));
     }
 }
 
-/// Logs at these levels from now on, unless a variable says otherwise.
-pub fn use_levels(levels: Levels) {
+/// Logs what these directives say from now on, unless a variable says otherwise.
+pub fn use_directives(directives: &str) {
     if let Some(change) = CHANGE.get() {
-        change(levels);
+        change(directives);
     }
 }
 

@@ -12,5 +12,5 @@ mod filter;
 mod panics;
 mod writer;
 
-pub use filter::{AUDIT_TARGET, Levels, VARIABLE, start, use_levels};
-pub use writer::{MAX_WAITING, flush, lost_lines, say, terminal};
+pub use filter::{AUDIT_TARGET, VARIABLE, start, use_directives};
+pub use writer::{MAX_WAITING, end_status, flush, lost_lines, say, status, terminal};

@@ -13,11 +13,15 @@ pub(crate) fn say_without_waiting() {
 fn sentence(panic: &PanicHookInfo<'_>) -> String {
     let thread = std::thread::current();
     let name = thread.name().unwrap_or("without a name").to_owned();
-    let place = panic.location().map_or_else(String::new, |at| format!(" at {at}"));
+    let place = panic
+        .location()
+        .map_or_else(String::new, |at| format!(" at {at}"));
     let message = panic.payload_as_str().unwrap_or("no message");
     let trace = std::backtrace::Backtrace::capture();
     match trace.status() {
-        std::backtrace::BacktraceStatus::Captured => format!("the thread {name} panicked{place}: {message}\n{trace}"),
+        std::backtrace::BacktraceStatus::Captured => {
+            format!("the thread {name} panicked{place}: {message}\n{trace}")
+        }
         _ => format!("the thread {name} panicked{place}: {message}"),
     }
 }

@@ -1,15 +1,20 @@
 //! The one thread that writes to standard error.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use tracing_appender::non_blocking::{ErrorCounter, NonBlocking, NonBlockingBuilder, WorkerGuard};
 
 /// Lines that wait for a terminal or a journal that is slow; further ones are lost.
 pub const MAX_WAITING: usize = 4096;
+
+/// Return to the first column and clear the line.
+const CLEAR_LINE: &[u8] = b"\r\x1b[2K";
+/// The piece that asks for nothing but the status line.
+const REFRESH: &[u8] = b"\r";
 
 /// The process's writer, once it was asked for.
 static TERMINAL: OnceLock<Writer> = OnceLock::new();
@@ -22,6 +27,15 @@ pub(crate) struct Writer {
     guard: Mutex<Option<WorkerGuard>>,
     /// The thread is within a write.
     busy: Arc<AtomicBool>,
+    status: Arc<Mutex<Status>>,
+}
+
+/// One line that is written again below every other.
+#[derive(Debug, Default)]
+struct Status {
+    text: String,
+    /// A refresh waits for the thread: no further one is needed.
+    asked: bool,
 }
 
 impl Writer {
@@ -29,10 +43,12 @@ impl Writer {
     pub(crate) fn new(to: impl Write + Send + 'static, waiting: usize) -> Self {
         let lost = Arc::<OnceLock<ErrorCounter>>::default();
         let busy = Arc::<AtomicBool>::default();
+        let status = Arc::<Mutex<Status>>::default();
         let telling = Telling {
             to,
             busy: busy.clone(),
             lost: lost.clone(),
+            status: status.clone(),
             told: 0,
         };
         let (lines, guard) = NonBlockingBuilder::default()
@@ -48,6 +64,24 @@ impl Writer {
             lost: counter,
             guard: Mutex::new(Some(guard)),
             busy,
+            status,
+        }
+    }
+
+    /// Replaces the status line.
+    pub(crate) fn status(&self, text: String) {
+        let mut status = lock(&self.status);
+        status.text = text;
+        if !std::mem::replace(&mut status.asked, true) {
+            let _ = self.lines().write(REFRESH);
+        }
+    }
+
+    /// Leaves the last status line standing.
+    pub(crate) fn end_status(&self) {
+        let mut status = lock(&self.status);
+        if !std::mem::take(&mut status.text).is_empty() {
+            let _ = self.lines().write(b"\n");
         }
     }
 
@@ -63,7 +97,7 @@ impl Writer {
 
     /// Waits for what was handed over, at most about a second; nothing is written afterwards.
     pub(crate) fn flush(&self) {
-        let guard = self.guard.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let guard = lock(&self.guard).take();
         if self.busy.load(Ordering::Acquire) && self.lost() > 0 {
             // Nobody reads, and the queue is full: there is nothing to wait for, and a guard that cannot say goodbye prints so.
             std::mem::forget(guard);
@@ -76,7 +110,32 @@ struct Telling<W> {
     to: W,
     busy: Arc<AtomicBool>,
     lost: Arc<OnceLock<ErrorCounter>>,
+    status: Arc<Mutex<Status>>,
     told: usize,
+}
+
+impl<W: Write> Telling<W> {
+    /// A line above the status line, if there is one.
+    fn with_status(&mut self, line: &[u8]) -> io::Result<()> {
+        let status = {
+            let mut status = lock(&self.status);
+            if line == REFRESH {
+                status.asked = false;
+            }
+            status.text.clone()
+        };
+        if status.is_empty() {
+            return match line {
+                REFRESH => Ok(()),
+                line => self.to.write_all(line),
+            };
+        }
+        self.to.write_all(CLEAR_LINE)?;
+        if line != REFRESH {
+            self.to.write_all(line)?;
+        }
+        self.to.write_all(status.as_bytes())
+    }
 }
 
 impl<W: Write> Write for Telling<W> {
@@ -85,13 +144,16 @@ impl<W: Write> Write for Telling<W> {
         let lost = self.lost.get().map_or(0, ErrorCounter::dropped_lines);
         if lost > self.told {
             let since = lost - self.told;
-            let told = writeln!(self.to, "taut: {since} lines were lost here: the terminal or the journal did not take them");
+            let told = writeln!(
+                self.to,
+                "taut: {since} lines were lost here: the terminal or the journal did not take them"
+            );
             if told.is_ok() {
                 self.told = lost;
             }
         }
         // A terminal that is gone has nobody to be told.
-        let written = self.to.write_all(line);
+        let written = self.with_status(line);
         self.busy.store(false, Ordering::Release);
         written.map(|()| line.len())
     }
@@ -112,6 +174,20 @@ pub fn say(line: &str) {
     let _ = terminal().write(format!("{line}\n").as_bytes());
 }
 
+/// Replaces the status line: one line that stays below all others. For a terminal alone; where standard error is none, nothing happens.
+pub fn status(text: String) {
+    if io::stderr().is_terminal() {
+        process_writer().status(text);
+    }
+}
+
+/// Leaves the last status line standing.
+pub fn end_status() {
+    if let Some(writer) = TERMINAL.get() {
+        writer.end_status();
+    }
+}
+
 /// Lines of this process that were lost.
 pub fn lost_lines() -> u64 {
     TERMINAL.get().map_or(0, Writer::lost)
@@ -122,6 +198,10 @@ pub fn flush() {
     if let Some(writer) = TERMINAL.get() {
         writer.flush();
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn process_writer() -> &'static Writer {

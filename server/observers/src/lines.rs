@@ -359,7 +359,7 @@ mod tests {
 
     fn empty_scene() -> SceneDescription {
         let body = taut_proto::scene::BodyDescription {
-            name: "ball".to_owned(),
+            name: "ball".into(),
             mesh: taut_proto::MeshHash::of(b""),
             pose: PoseF64::IDENTITY,
             colour: [1.0; 4],
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn a_name_cannot_break_the_line() {
         let mut scene = empty_scene();
-        scene.name = "two\nlines \"quoted\"".to_owned();
+        scene.name = "two\nlines \"quoted\"".into();
         let hello = Hello {
             workbench: "bench".to_owned(),
             program: "taut".to_owned(),

@@ -11,6 +11,7 @@ use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
 use tokio::runtime::Runtime;
 
+use crate::audit::AuditTrail;
 use crate::broadcast::{BridgeCommands, StateWriter};
 use crate::checker::PenetrationChecker;
 use crate::clients::ClientLedger;
@@ -128,6 +129,7 @@ impl Session {
             fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
+            audit: AuditTrail::default(),
             threads: Vec::new(),
             monitor: None,
             recorder,
@@ -182,6 +184,7 @@ impl Session {
         )?;
         session.start_frames(&setup.realtime)?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
+        session.start_service_manager()?;
         session.enforce(setup.realtime.policy)?;
         session.tell_start(&opening);
         Ok(session)

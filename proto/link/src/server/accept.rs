@@ -176,7 +176,10 @@ fn admit(
     })?;
     // Who may choose his name must not take a screen's.
     let is_any_node = matches!(hello.grant, Grant::AnyNode { .. });
-    if is_any_node && hello.role != Role::Render && shared.content.nodes.iter().any(|node| node == name) {
+    if is_any_node
+        && hello.role != Role::Render
+        && shared.content.nodes.iter().any(|node| node == name)
+    {
         let text = format!(
             "\"{}\" is a render node of the workbench: choose another name (--node)",
             hello.node
@@ -185,23 +188,21 @@ fn admit(
     }
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
-        shared
-            .sessions
-            .admit(name, hello.role, now_ns, |number| {
-                let keys = binding::server_keys(connection, shared.epoch, number)
-                    .map_err(|error| error.to_string())?;
-                let admitted = Admitted {
-                    number,
-                    node: name.to_owned(),
-                    role: hello.role,
-                    grant: hello.grant,
-                    transport: hello.transport,
-                    rate_hz: hello.rate_hz,
-                    joined_ns: now_ns,
-                    after_event: shared.discrete.newest(),
-                };
-                Ok(Session::new(admitted, connection.clone(), keys))
-            })?;
+        shared.sessions.admit(name, hello.role, now_ns, |number| {
+            let keys = binding::server_keys(connection, shared.epoch, number)
+                .map_err(|error| error.to_string())?;
+            let admitted = Admitted {
+                number,
+                node: name.to_owned(),
+                role: hello.role,
+                grant: hello.grant,
+                transport: hello.transport,
+                rate_hz: hello.rate_hz,
+                joined_ns: now_ns,
+                after_event: shared.discrete.newest(),
+            };
+            Ok(Session::new(admitted, connection.clone(), keys))
+        })?;
     if let Some(old) = replaced {
         let reason = format!(
             "a new node named \"{}\" took the place of this silent one",

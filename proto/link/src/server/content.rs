@@ -2,7 +2,9 @@
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
-use taut_proto::{Untrusted, CouplingOffer, MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
+use taut_proto::{
+    CouplingOffer, MeshBlob, MeshHash, SceneDescription, Untrusted, control::ControlMessage,
+};
 
 /// What clients fetch at join.
 #[derive(Clone, Debug)]
