@@ -54,7 +54,7 @@ fn content() -> Content {
         description: SceneDescription::of_body(
             "wall",
             BodyDescription {
-                name: "tip".to_owned(),
+                name: "tip".into(),
                 mesh: hash,
                 pose: start,
                 colour: [1.0; 4],

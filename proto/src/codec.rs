@@ -3,7 +3,7 @@
 //! | on the wire        | as                                                        |
 //! |--------------------|-----------------------------------------------------------|
 //! | integers, floats   | fixed size, little-endian                                 |
-//! | `String`, `Vec`    | u16 count, then the bytes or the elements                 |
+//! | `Untrusted`, `Vec` | u16 count, then the bytes or the elements                 |
 //! | `ArrayVec`         | u8 count, then the elements                               |
 //! | `Option`           | u8 0 or 1, then the value                                 |
 //! | enums              | u8 tag, then the fields                                   |
@@ -12,6 +12,7 @@
 //! the length of the input, whatever a count claims; a count larger than the bytes left is refused at once.
 //! A number that is not finite is refused in both directions: no NaN reaches a device or a picture.
 
+use crate::Untrusted;
 use arrayvec::ArrayVec;
 use bincode::{
     Decode, Encode,
@@ -337,16 +338,18 @@ macro_rules! wire_array {
 }
 wire_array!(u16, f32, f64);
 
-impl Wire for String {
+/// All text: `String` itself has no decoder, so that nobody formats what a peer wrote by accident.
+impl Wire for Untrusted {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        to.put(count("text", self.len(), MAX_TEXT_BYTES)?)?;
-        to.put_bytes(self.as_bytes())
+        to.put(count("text", self.raw().len(), MAX_TEXT_BYTES)?)?;
+        to.put_bytes(self.raw().as_bytes())
     }
     fn read(from: &mut Reader<'_>) -> Result<Self, DecodeError> {
         let len = from.take_count("text", MAX_TEXT_BYTES)?;
         let mut bytes = vec![0; len];
         from.take_bytes(&mut bytes)?;
-        String::from_utf8(bytes).map_err(|_| DecodeError::NotText)
+        let text = String::from_utf8(bytes).map_err(|_| DecodeError::NotText)?;
+        Ok(Untrusted::from(text))
     }
 }
 

@@ -21,7 +21,7 @@ pub use crate::role::Role;
 
 use crate::{
     ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
-    PROTOCOL_VERSION, SceneDescription,
+    PROTOCOL_VERSION, SceneDescription, Untrusted,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_ranged, wire_tag},
     proof::Grant,
     range::{MESH_BYTES, NAME, PORT, RATE, SESSION, SMALL, TIME, TIMEOUT},
@@ -76,7 +76,7 @@ pub enum RefusalCode {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// Name of the node, unique among the clients.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// How it wants its states.
@@ -114,7 +114,7 @@ pub struct Refusal {
     /// Protocol version of the server.
     pub version: u8,
     /// Why and what to do, for people: one sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// Asks for a mesh.
@@ -150,7 +150,7 @@ pub struct LogEvent {
     /// Weight.
     pub level: LogLevel,
     /// One sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// An operator wants force at the device, or none.
@@ -173,7 +173,7 @@ pub struct StatesBy {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
     /// Why, one sentence.
-    pub reason: String,
+    pub reason: Untrusted,
 }
 
 /// Everything that is said on a control stream.

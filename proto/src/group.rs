@@ -15,7 +15,7 @@
 //! take the one before for [`PREVIOUS_NS`] more. Who comes understands the others when that time is over: the generation before is not for it.
 
 use crate::{
-    DecodeError, EncodeError, Header, Kind, Payload, Role,
+    DecodeError, EncodeError, Header, Kind, Payload, Role, Untrusted,
     codec::{Reader, Wire, Writer, wire_ranged},
     derive::Root,
     range::{COUNT_32, SESSION},
@@ -60,7 +60,7 @@ pub struct GroupMember {
     /// Session number: `sender` in datagram headers.
     pub sender: u16,
     /// Name of the node.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// Where its hot plane listens, as the server sees it; `None` before its first datagram, and for QUIC datagrams.

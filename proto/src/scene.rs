@@ -1,7 +1,7 @@
 //! Scene description: everything a client needs to draw, except the meshes, which it asks for by hash.
 
 use crate::{
-    MeshHash, PoseF64,
+    MeshHash, PoseF64, Untrusted,
     codec::{wire_ranged, wire_tag},
     range::{ANGLE, COLOUR, LENGTH, NAME, PIXELS, PUPILS, SCALE, SHARE, SIZE},
 };
@@ -10,7 +10,7 @@ use crate::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneDescription {
     /// Name of the scene.
-    pub name: String,
+    pub name: Untrusted,
     /// Revision; [`crate::HotState::scene_revision`] refers to it.
     pub revision: u32,
     /// The god-object.
@@ -48,7 +48,7 @@ impl SceneDescription {
     #[must_use]
     pub fn of_body(name: &str, god_object: BodyDescription) -> Self {
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             revision: 1,
             god_object,
             obstacles: Vec::new(),
@@ -72,7 +72,7 @@ impl SceneDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDescription {
     /// Name, unique in the scene.
-    pub name: String,
+    pub name: Untrusted,
     /// Mesh, in the body's own frame.
     pub mesh: MeshHash,
     /// Body in the scene frame at start.
@@ -85,7 +85,7 @@ pub struct BodyDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScreenDescription {
     /// Name, unique in the workbench.
-    pub name: String,
+    pub name: Untrusted,
     /// Lower left corner as the viewer sees it.
     pub lower_left: [f64; 3],
     /// Lower right corner.
@@ -98,16 +98,16 @@ pub struct ScreenDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeDescription {
     /// Name that the node gives in its Hello.
-    pub name: String,
+    pub name: Untrusted,
     /// Names of the screens that it draws.
-    pub screens: Vec<String>,
+    pub screens: Vec<Untrusted>,
     /// How it shows two eyes.
     pub stereo: Stereo,
     /// Its window.
     pub window: WindowDescription,
     /// Which monitors its windows cover, in the order of the windows: an output's name such as DP-1, or its number from 0.
     /// Windows past the end take the monitors that follow.
-    pub monitors: Vec<String>,
+    pub monitors: Vec<Untrusted>,
 }
 
 /// How two eyes reach a screen.

@@ -173,8 +173,13 @@ impl Session {
 
     /// The monitors that the node's windows cover, in order: names or numbers.
     pub(crate) fn monitors(&self) -> Vec<String> {
-        description::find_node(self.link.description(), &self.node)
-            .map_or_else(|_| Vec::new(), |node| node.monitors.clone())
+        description::find_node(self.link.description(), &self.node).map_or_else(
+            |_| Vec::new(),
+            |node| {
+                let names = node.monitors.iter();
+                names.map(|name| name.raw().to_owned()).collect()
+            },
+        )
     }
 
     /// Moves the states that have arrived to the timeline.

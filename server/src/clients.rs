@@ -73,7 +73,7 @@ impl ClientLedger {
                 node,
                 text,
                 ..
-            } => Some(if node.is_empty() {
+            } => Some(if node == "" {
                 format!("a client at {address} was refused: {text}")
             } else {
                 format!("{node} at {address} was refused: {text}")
@@ -209,6 +209,7 @@ mod tests {
             session: 1,
             node: node.into(),
             role,
+            grant: taut_link::proto::proof::Grant::Master,
             transport: Transport::QuicDatagram,
             rate_hz: 0,
             address: ([127, 0, 0, 1], 1000).into(),

@@ -1,6 +1,5 @@
 //! The binary `taut`: one sub-command per role.
 
-use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -18,31 +17,23 @@ use taut::{
     arm, demo, doctor, doctor_device, keys, record, recorded_session, rendering, replay, serve,
     track,
 };
-use tracing_subscriber::EnvFilter;
-
-/// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
-const LOG_VARIABLE: &str = "TAUT_LOG";
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .init();
-    match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
+    taut_log::start("warn");
+    let code = match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("taut: {error:#}");
+            taut_log::say(&format!("taut: {error:#}"));
             ExitCode::from(
                 error
                     .downcast_ref::<Failure>()
                     .map_or(EXIT_FAILED, Failure::exit_code),
             )
         }
-    }
+    };
+    taut_log::flush();
+    code
 }
 
 fn run(command: Command) -> Result<ExitCode> {

@@ -8,6 +8,14 @@ macro_rules! counters {
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         pub struct $name { $($(#[$field_doc])* pub $field: u64,)* }
 
+        impl $name {
+            /// All, by name.
+            #[must_use]
+            pub fn named(&self) -> Vec<(&'static str, u64)> {
+                vec![$((stringify!($field), self.$field),)*]
+            }
+        }
+
         #[derive(Debug, Default)]
         pub(crate) struct $cells { $(pub(crate) $field: Cell,)* }
 

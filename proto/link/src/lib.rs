@@ -43,8 +43,8 @@ pub use server::{
 };
 pub use taut_proto as proto;
 pub use taut_proto::{
-    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
-    Transport,
+    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Printable, Role,
+    ServerPin, Transport, Untrusted,
 };
 
 /// Default port of the control plane.

@@ -201,7 +201,7 @@ fn claim() -> Claim<'static> {
 
 fn hello(claim: Claim<'_>, proof: [u8; 32]) -> Hello {
     Hello {
-        node: claim.node.to_owned(),
+        node: claim.node.into(),
         role: claim.role,
         transport: Transport::Udp,
         rate_hz: 0,

@@ -79,7 +79,7 @@ async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
 
 fn hello() -> Vec<u8> {
     let hello = ControlMessage::Hello(Hello {
-        node: "stranger".to_owned(),
+        node: "stranger".into(),
         role: Role::Render,
         transport: Transport::Udp,
         rate_hz: 0,

@@ -224,7 +224,7 @@ async fn there_is_one_tracker_at_a_time() {
     match error_of(options(&server, Role::Tracker, "another")).await {
         LinkError::Refused { code, text, .. } => {
             assert_eq!(code, RefusalCode::TrackerTaken);
-            assert!(text.contains("head tracker \"tracker\""), "{text}");
+            assert!(text.raw().contains("head tracker \"tracker\""), "{text}");
         }
         other => panic!("{other}"),
     }
@@ -274,7 +274,7 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
                 code: found, text, ..
             } => {
                 assert_eq!(found, code, "{text}");
-                assert!(text.contains("network."), "{text}");
+                assert!(text.raw().contains("network."), "{text}");
             }
             other => panic!("{name}: {other}"),
         }

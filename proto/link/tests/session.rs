@@ -224,7 +224,7 @@ async fn there_is_one_device_bridge() {
             code: RefusalCode::DeviceTaken,
             text,
             ..
-        }) => assert!(text.contains("\"bridge\""), "{text}"),
+        }) => assert!(text.raw().contains("\"bridge\""), "{text}"),
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("two bridges"),
     }
@@ -389,7 +389,7 @@ async fn a_bridge_is_told_how_to_couple_and_gets_whole_constraint_sets() {
     use taut_proto::{ConstraintSet, CouplingOffer, Division};
 
     let offer = CouplingOffer::AtServer {
-        reason: "as this test says".to_owned(),
+        reason: "as this test says".into(),
     };
     let server = server_with(ServerOptions {
         coupling: offer.clone(),

@@ -21,6 +21,7 @@ use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
 
+use crate::audit::AuditTrail;
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::fidelity::FidelityWatch;
@@ -54,6 +55,7 @@ pub struct Session {
     fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
+    audit: AuditTrail,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,

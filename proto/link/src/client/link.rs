@@ -230,7 +230,10 @@ impl ClientLink {
 
     /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
     pub fn post_log(&self, level: LogLevel, text: String) -> bool {
-        self.post(ControlMessage::Log(LogEvent { level, text }))
+        self.post(ControlMessage::Log(LogEvent {
+            level,
+            text: text.into(),
+        }))
     }
 
     /// Asks for force at the device, or for none, without waiting; `false` if it was not taken. Counts if [`crate::Role::Operator`] joined; the
@@ -294,7 +297,7 @@ impl ClientLink {
     /// The same for a link that others share; they find it closed.
     pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
-            reason: "the node left".to_owned(),
+            reason: "the node left".into(),
         });
         let goodbye = async {
             if self.outbox.send(bye).await.is_ok() {

@@ -332,6 +332,7 @@ impl Session {
             session: self.number,
             node: self.node.clone(),
             role: self.role,
+            grant: self.grant,
             transport: self.transport,
             rate_hz: self.rate_hz,
             address: self.connection.remote_address(),

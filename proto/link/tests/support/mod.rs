@@ -53,7 +53,7 @@ pub fn hash_of(mesh: &MeshBlob) -> MeshHash {
 pub fn content() -> Content {
     let meshes = vec![strip(12), strip(27_000)];
     let body = |name: &str, mesh: &MeshBlob| BodyDescription {
-        name: name.to_owned(),
+        name: name.into(),
         mesh: hash_of(mesh),
         pose: PoseF64::IDENTITY,
         colour: [1.0, 0.5, 0.1, 1.0],
@@ -63,14 +63,14 @@ pub fn content() -> Content {
         obstacles: vec![body("box", &meshes[1])],
         reference_point: [0.0, 0.0, 0.01],
         screens: vec![ScreenDescription {
-            name: "front".to_owned(),
+            name: "front".into(),
             lower_left: [-0.5, 0.5, 0.0],
             lower_right: [0.5, 0.5, 0.0],
             upper_left: [-0.5, 0.5, 1.0],
         }],
         nodes: vec![NodeDescription {
-            name: "left".to_owned(),
-            screens: vec!["front".to_owned()],
+            name: "left".into(),
+            screens: vec!["front".into()],
             stereo: Stereo::SideBySide,
             window: WindowDescription {
                 width: 640,
