@@ -248,9 +248,7 @@ impl RowSeparation {
                 RADIUS.write(radius, to)
             }
             RowSeparation::OfRods(along, radii) => {
-                along
-                    .iter()
-                    .try_for_each(|rod| DIRECTION.write(rod, to))?;
+                along.iter().try_for_each(|rod| DIRECTION.write(rod, to))?;
                 RADIUS.write(radii, to)
             }
         }

@@ -1,8 +1,8 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    Confirmation, ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample, Kind,
-    WrenchCommand,
+    Confirmation, ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample,
+    Kind, WrenchCommand,
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,

@@ -85,7 +85,11 @@ pub const UNIT: Bounds = bounds(-1.001, 1.001, "-1 to 1, and a thousandth for ro
 /// Velocity, linear or angular.
 pub const VELOCITY: Bounds = bounds(-1e6, 1e6, "-10^6 to 10^6 m/s or rad/s");
 /// Force or torque: the device port limits it to what the device may give.
-pub const FORCE: Bounds = bounds(-1e6, 1e6, "-10^6 to 10^6 N or N m; the device port limits it");
+pub const FORCE: Bounds = bounds(
+    -1e6,
+    1e6,
+    "-10^6 to 10^6 N or N m; the device port limits it",
+);
 /// Between the pupils.
 pub const PUPILS: Bounds = bounds(0.0, 1.0, "0 to 1 m");
 /// A share.
@@ -99,13 +103,13 @@ pub const SCALE: Bounds = bounds(1e-9, 1e9, "10^-9 to 10^9");
 /// Pixels of a window.
 pub const PIXELS: Bounds = bounds(0.0, 65_536.0, "0 to 65536");
 /// What a client measured of itself, ms: told, never computed with.
-pub const MEASURED: Bounds = bounds(-1e12, 1e12, "-10^12 to 10^12; reported, nothing depends on it");
-/// Bytes of a mesh.
-pub const MESH_BYTES: Bounds = bounds(
-    0.0,
-    crate::mesh_blob::MAX_MESH_BYTES as f64,
-    "0 to 128 MiB",
+pub const MEASURED: Bounds = bounds(
+    -1e12,
+    1e12,
+    "-10^12 to 10^12; reported, nothing depends on it",
 );
+/// Bytes of a mesh.
+pub const MESH_BYTES: Bounds = bounds(0.0, crate::mesh_blob::MAX_MESH_BYTES as f64, "0 to 128 MiB");
 /// Rows of a constraint set, and places among them.
 pub const SET_ROWS: Bounds = bounds(
     0.0,
@@ -174,10 +178,7 @@ impl Number {
     }
 
     /// Reads it, if it is in its range.
-    pub(crate) fn read<T: Wire + InBounds>(
-        &self,
-        from: &mut Reader<'_>,
-    ) -> Result<T, DecodeError> {
+    pub(crate) fn read<T: Wire + InBounds>(&self, from: &mut Reader<'_>) -> Result<T, DecodeError> {
         let value = T::read(from)?;
         match value.are_within(&self.bounds) {
             true => Ok(value),

@@ -228,7 +228,10 @@ fn a_node_that_is_slower_than_it_says_is_left_after_thirty_frames_and_comes_back
             // Whatever it draws is told when it is done, be it frames later.
             let second = (done < last + PERIOD).then(|| {
                 drawing = None;
-                (done.saturating_sub(last).max(MS), made_for(16_667, arrived(frame)))
+                (
+                    done.saturating_sub(last).max(MS),
+                    made_for(16_667, arrived(frame)),
+                )
             });
             master.hear(2, last);
             last = frame_of_wall(&mut master, last, second);
@@ -240,7 +243,10 @@ fn a_node_that_is_slower_than_it_says_is_left_after_thirty_frames_and_comes_back
     };
     // It draws in 50 ms from now on.
     assert_eq!(frames_until(NodeState::Late, 50 * MS), 1);
-    assert_eq!(frames_until(NodeState::FreeRunning, 50 * MS), PROBATION_FRAMES);
+    assert_eq!(
+        frames_until(NodeState::FreeRunning, 50 * MS),
+        PROBATION_FRAMES
+    );
     // In 5 ms again.
     let back = frames_until(NodeState::Synced, 5 * MS);
     let most = PROBATION_FRAMES + WARM_UP_FRAMES + 2;
@@ -543,7 +549,10 @@ fn a_member_is_followed_only_while_the_server_is_silent() {
         period_us: of_server.period_us + 1,
         ..of_member(2, 1094)
     };
-    assert!(!heir.may_follow(silent, 2, &slower), "frames grow no slower");
+    assert!(
+        !heir.may_follow(silent, 2, &slower),
+        "frames grow no slower"
+    );
     assert!(!heir.may_follow(silent, 2, &of_member(2, u64::MAX)));
 }
 

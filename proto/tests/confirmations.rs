@@ -59,7 +59,8 @@ fn genuine_states_are_confirmed_whatever_is_lost() {
 }
 
 #[test]
-fn a_state_that_the_server_did_not_send_is_found_by_the_first_confirmation_that_was_asked_for_after_it() {
+fn a_state_that_the_server_did_not_send_is_found_by_the_first_confirmation_that_was_asked_for_after_it()
+ {
     for tick in [7, 60, 61, 1 << 60] {
         let mut waiting = client(50);
         // Of a tick of its own, or of one that is taken, before the genuine one.

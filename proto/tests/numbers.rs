@@ -82,7 +82,10 @@ fn the_last_number_of_a_kind_is_refused_by_name() {
     assert_eq!(refused(bent(&arrive, end - 4, &period)), "Arrive.period_us");
     let release = Payload::Release(release());
     assert_eq!(refused(bent(&release, 0, &far)), "ReleaseHead.term");
-    assert_eq!(refused(bent(&release, 26, &far[..4])), "ReleaseHead.period_us");
+    assert_eq!(
+        refused(bent(&release, 26, &far[..4])),
+        "ReleaseHead.period_us"
+    );
     let hot = Payload::Hot(hot());
     assert_eq!(refused(bent(&hot, 0, &far)), "HotState.sample_time_ns");
     assert_eq!(refused(bent(&hot, 8, &far)), "HotState.tick");

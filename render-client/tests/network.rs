@@ -383,7 +383,7 @@ fn a_node_with_two_screens_shows_one_instant_on_both_with_a_barrier_and_without(
     let barrier = MasterSettings {
         swap: Swap::Immediate,
         period_ns: 16_666_667,
-            slowest_ns: 1_000_000_000,
+        slowest_ns: 1_000_000_000,
     };
     for frames in [Some(barrier), None] {
         let is_locked = frames.is_some();

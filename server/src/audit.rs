@@ -37,6 +37,8 @@ enum Audit<'e> {
     Forbidden { who: Who, act: Act },
     /// An operator asked for force, or for none.
     Arm { who: Who, arm: bool },
+    /// A node keeps frames by itself or in step, or names forged states.
+    Frames { node: &'e str, what: &'static str },
     /// The device port did something.
     Port { what: &'e str, is_fault: bool },
 }
@@ -109,6 +111,7 @@ impl Audit<'_> {
                 let event_is = if *arm { "arm" } else { "disarm" };
                 tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %who.node, role = %who.role, credential = %who.credential, address = %who.address);
             }
+            Self::Frames { node, what } => told!("frames", %node, what),
             Self::Port { what, is_fault } => {
                 let event_is = if *is_fault { "fault" } else { "device" };
                 tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, what);
@@ -166,6 +169,20 @@ impl AuditTrail {
                 if let Some(who) = self.who(node) {
                     Audit::Arm { who, arm: *arm }.record();
                 }
+            }
+            LinkEvent::FreeRunning { node, free } => {
+                Audit::Frames {
+                    node,
+                    what: if *free { "free-running" } else { "in-step" },
+                }
+                .record();
+            }
+            LinkEvent::StatesForged { node } => {
+                Audit::Frames {
+                    node,
+                    what: "forged-states",
+                }
+                .record();
             }
             LinkEvent::Silent { .. } | LinkEvent::Stats { .. } | LinkEvent::Log { .. } => {}
         }

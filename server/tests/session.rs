@@ -224,7 +224,7 @@ fn received(
         };
         let plate = &link.description().obstacles[1];
         assert_eq!(
-            (plate.name.as_str(), plate.pose.position[2]),
+            (plate.name.raw(), plate.pose.position[2]),
             ("plate", -0.005)
         );
         let begun = Instant::now();

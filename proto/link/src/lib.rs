@@ -29,8 +29,8 @@ pub mod transport;
 pub use client::{
     ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GaveUp, GroupReceiver,
     LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
-    ServerState,
-    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, SessionEnd, SupervisedLink, connect,
+    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd,
+    SupervisedLink, connect,
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};

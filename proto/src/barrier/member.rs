@@ -123,7 +123,11 @@ impl Member {
             return false;
         }
         self.misses = if arrived { 0 } else { self.misses + 1 };
-        self.probation = if self.is_waited_for() { 0 } else { self.probation + 1 };
+        self.probation = if self.is_waited_for() {
+            0
+        } else {
+            self.probation + 1
+        };
         self.misses >= MAX_MISSES || self.probation >= PROBATION_FRAMES
     }
 

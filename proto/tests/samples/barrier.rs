@@ -44,7 +44,13 @@ pub fn release() -> Release {
 pub fn any_arrive() -> impl Strategy<Value = Arrive> {
     (
         (far(), far(), far(), any::<u64>(), far()),
-        (any::<u32>(), far(), far(), any::<u32>(), 0..=100_000_000_u32),
+        (
+            any::<u32>(),
+            far(),
+            far(),
+            any::<u32>(),
+            0..=100_000_000_u32,
+        ),
     )
         .prop_map(
             |(
@@ -74,7 +80,12 @@ pub fn any_release() -> impl Strategy<Value = Release> {
         any_hot(),
     )
         .prop_map(
-            |((term, master, frame, swap_ns), (period_us, skew_ns, waited, late), members, state)| {
+            |(
+                (term, master, frame, swap_ns),
+                (period_us, skew_ns, waited, late),
+                members,
+                state,
+            )| {
                 let of_members = ((1_u64 << members.len()) - 1) as u32;
                 Release {
                     head: ReleaseHead {

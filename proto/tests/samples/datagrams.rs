@@ -44,9 +44,13 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
     let sent = |tick, state_hash| SentState { tick, state_hash };
     let confirmation = Confirmation {
         asked_ns: 17,
-        states: [sent(1000, 0x0102_0304_0506_0708), sent(999, 9), sent(990, 10)]
-            .into_iter()
-            .collect(),
+        states: [
+            sent(1000, 0x0102_0304_0506_0708),
+            sent(999, 9),
+            sent(990, 10),
+        ]
+        .into_iter()
+        .collect(),
     };
     let response = TimeResponse {
         client_sent: 17,
@@ -77,37 +81,43 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         prop::collection::vec(finite64(), 6)
             .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
     };
-    let input = ((far(), far(), any::<u16>(), any::<u16>(), far()), pose64(), six(), six()).prop_map(
-        |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
-            Payload::Input(InputSample {
-                sample_time_ns,
-                index,
-                pose,
-                velocity,
-                buttons,
-                flags,
-                rendered,
-                set_sequence,
-            })
-        },
-    );
-    let wrench =
-        ((far(), far(), any::<u16>()), six()).prop_map(|((time_ns, input_index, flags), wrench)| {
+    let input = (
+        (far(), far(), any::<u16>(), any::<u16>(), far()),
+        pose64(),
+        six(),
+        six(),
+    )
+        .prop_map(
+            |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
+                Payload::Input(InputSample {
+                    sample_time_ns,
+                    index,
+                    pose,
+                    velocity,
+                    buttons,
+                    flags,
+                    rendered,
+                    set_sequence,
+                })
+            },
+        );
+    let wrench = ((far(), far(), any::<u16>()), six()).prop_map(
+        |((time_ns, input_index, flags), wrench)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
                 input_index,
                 wrench,
                 flags,
             })
-        });
-    let response =
-        (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
-            Payload::TimeResponse(TimeResponse {
-                client_sent,
-                server_received,
-                server_sent,
-            })
-        });
+        },
+    );
+    let response = (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
+        Payload::TimeResponse(TimeResponse {
+            client_sent,
+            server_received,
+            server_sent,
+        })
+    });
     let head = ((far(), far()), pose64()).prop_map(|((sample_time_ns, index), pose)| {
         Payload::Head(HeadSample {
             sample_time_ns,

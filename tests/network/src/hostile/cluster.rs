@@ -16,9 +16,7 @@ use tokio::runtime::Runtime;
 
 use super::liar::{Liar, multicast_works, to_groups};
 use super::{Attack, Finding};
-use crate::bench::{
-    BenchError, client_options, server_options, small_content, state, wait_until,
-};
+use crate::bench::{BenchError, client_options, server_options, small_content, state, wait_until};
 use crate::report::Extent;
 
 /// The attacks of this group.
@@ -63,7 +61,8 @@ fn report(server: &ServerLink) -> FrameReport {
 }
 
 fn credential(key: &ClusterKey, role: Role, node: &str) -> JoinKey {
-    key.credential(role, Holder::Node(node.to_owned()), 1).into()
+    key.credential(role, Holder::Node(node.to_owned()), 1)
+        .into()
 }
 
 /// Sends a state a millisecond, tells frames, and lets `screens` draw, until `done` has run.
@@ -145,7 +144,8 @@ fn slow_node(_: &Extent) -> Result<Finding, BenchError> {
     while_serving(&server, &screens, || {
         wait_until("the slow node is named", || {
             while let Some(event) = server.try_event() {
-                named |= matches!(event, LinkEvent::FreeRunning { node, free: true } if node == "slow");
+                named |=
+                    matches!(event, LinkEvent::FreeRunning { node, free: true } if node == "slow");
             }
             named
         })?;
@@ -281,7 +281,9 @@ fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
             drawn += states.iter().filter(is_forged).count();
             let believed = states.iter().filter(|state| state.of_server().is_some());
             if believed.filter(is_forged).count() > 0 {
-                return Err(BenchError::Missing("a forged state counts as the server's".into()));
+                return Err(BenchError::Missing(
+                    "a forged state counts as the server's".into(),
+                ));
             }
             states.clear();
             if screen.states_withdrawn() > alarms_before {

@@ -54,7 +54,7 @@ impl Liar {
         let (grant, secret) = key.secret_for(role, node).map_err(failed)?;
         let claim = Claim { role, node, grant };
         let hello = ControlMessage::Hello(Hello {
-            node: node.to_owned(),
+            node: node.into(),
             role,
             transport: Transport::Udp,
             rate_hz: 0,
