@@ -123,7 +123,7 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
         // The roles that this workbench does not let in, although the key could make them.
         let options = ClientOptions::new(&server, key.clone(), Role::Operator, "o");
         match connect(options).await {
-            Err(LinkError::Refused { text, .. }) => assert!(text.contains("network.roles")),
+            Err(LinkError::Refused { text, .. }) => assert!(text.raw().contains("network.roles")),
             Err(other) => panic!("{other}"),
             Ok(_) => panic!("let in"),
         }
