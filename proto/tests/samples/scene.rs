@@ -142,7 +142,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                 reference_point,
                 scene_origin,
                 display_scale,
-                screens: screens.into_iter().map(Untrusted::from).collect(),
+                screens,
                 nodes,
                 viewer,
                 eye_separation,
