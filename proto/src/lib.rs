@@ -50,6 +50,7 @@ pub mod stats;
 pub mod text;
 pub mod time;
 pub mod version;
+pub mod web;
 pub mod wrench;
 
 pub use arrayvec::ArrayVec;
