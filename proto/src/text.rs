@@ -30,7 +30,7 @@ impl Untrusted {
     /// Whether it is shown as it came.
     #[must_use]
     pub fn is_printable(&self) -> bool {
-        self.to_string() == self.0
+        Printable(&self.0).to_string() == self.0
     }
 }
 
