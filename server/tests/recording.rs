@@ -13,10 +13,10 @@ use taut::terminal::Terminal;
 use taut_link::ClusterKey;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
-/// How long a session runs: the simulated hand touches before.
+/// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
-/// A busy machine may take longer until the loops have turned that often.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Updates that a recording must hold to be worth something.
 const UPDATES: u64 = 200;
 

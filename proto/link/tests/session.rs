@@ -258,11 +258,12 @@ async fn session_time_is_within_its_stated_uncertainty() {
             );
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
-        let round_trip = client.round_trip().unwrap_or(PATIENCE);
-        assert!(
-            round_trip < Duration::from_millis(50),
-            "loopback takes {round_trip:?}"
-        );
+        wait_until("a round trip as short as loopback's", || {
+            client
+                .round_trip()
+                .is_some_and(|time| time < Duration::from_millis(50))
+        })
+        .await;
     }
 }
 

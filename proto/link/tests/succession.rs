@@ -141,7 +141,7 @@ fn until(what: &str, mut done: impl FnMut() -> bool) {
     let start = Instant::now();
     while !done() {
         assert!(
-            start.elapsed() < 3 * PATIENCE,
+            start.elapsed() < 2 * PATIENCE,
             "{what}: did not happen in time"
         );
         std::thread::sleep(Duration::from_millis(5));
