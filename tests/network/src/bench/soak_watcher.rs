@@ -11,6 +11,7 @@ use taut_link::{
     SupervisedLink,
 };
 use taut_proto::HotState;
+use taut_proto::state::{RunState, TOOL_DEVICE_SILENT, ToolState};
 use tokio::runtime::Runtime;
 
 use super::BenchError;
@@ -26,6 +27,9 @@ const OF_MOTION: f64 = 2.0;
 /// What it may change by without motion, N per ms, and the fault of two samples' times, ms.
 const SLEW: f64 = 0.5;
 const SLACK_MS: f64 = 2.0;
+
+/// Session time in which the server may still tell of the force that it computed itself, before it hears what its bridge renders, ns.
+const SETTLING_NS: u64 = 2_000_000_000;
 
 /// What may be done with the device meanwhile: a bridge that was killed starts anew, with another force.
 pub(super) type Restarts = Arc<AtomicU64>;
@@ -68,6 +72,7 @@ impl Watcher {
             restarts_seen: u64::MAX,
             between_bridges: false,
             newest: None,
+            settled_ns: None,
             event: None,
         };
         let (over, count) = (stop.clone(), states.clone());
@@ -124,7 +129,7 @@ fn watch(
             Some(Renewal::Session { link: next, .. }) => {
                 link = next;
                 gate = link.frame_gate(Duration::ZERO);
-                (look.newest, look.event) = (None, None);
+                (look.newest, look.event, look.settled_ns) = (None, None, None);
                 look.felt.store(false, Ordering::Relaxed);
             }
             Some(Renewal::Ended(end)) => return look.tell(&format!("ended: {end:?}")),
@@ -161,10 +166,25 @@ struct Look {
     /// The bridge was ended, and the next one's first force, which is none, has not come yet.
     between_bridges: bool,
     newest: Option<HotState>,
+    /// Sample time from which on the force is the bridge's own: a while after the device was silent last.
+    settled_ns: Option<u64>,
     event: Option<u32>,
 }
 
 impl Look {
+    /// Without a bridge that is heard, a state tells of what the server computed, which nobody feels.
+    fn is_told_by_the_bridge(&mut self, state: &HotState) -> bool {
+        let silent = |tool: &ToolState| tool.flags & TOOL_DEVICE_SILENT != 0;
+        let heard = state.run == RunState::Running && !state.tools.iter().any(silent);
+        let from_now = state.sample_time_ns.saturating_add(SETTLING_NS);
+        let settled = match self.settled_ns {
+            Some(settled) if heard => settled,
+            _ => from_now,
+        };
+        self.settled_ns = Some(settled);
+        state.sample_time_ns >= settled
+    }
+
     fn tell(&self, what: &str) {
         let _ = self.findings.send(format!("{}: {what}", self.name));
     }
@@ -181,7 +201,7 @@ impl Look {
         let restarts = self.restarts.load(Ordering::SeqCst);
         let is_same = std::mem::replace(&mut self.restarts_seen, restarts) == restarts;
         let has_force = state.tools.iter().any(|tool| tool.force != [0.0; 3]);
-        let judged = is_same && !self.between_bridges;
+        let judged = is_same && !self.between_bridges && self.is_told_by_the_bridge(&state);
         self.between_bridges = (self.between_bridges || !is_same) && has_force;
         self.felt
             .store(has_force && !self.between_bridges, Ordering::Relaxed);
