@@ -7,6 +7,7 @@ mod frames;
 mod processes;
 mod row;
 mod sections;
+mod soak;
 
 pub use row::{Row, Verdict, csv, table};
 pub use sections::{Extent, SECTIONS, Section};
