@@ -131,6 +131,21 @@ pub fn put(text: impl Into<String>) {
     }
 }
 
+/// Standard error as a writer for logs: [`put`] takes what is written. Never waits, never fails.
+#[derive(Clone, Copy, Debug)]
+pub struct Lines;
+
+impl Write for Lines {
+    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
+        put(String::from_utf8_lossy(text));
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Gives the last lines on standard error a moment: before the process returns from `main`.
 pub fn finish() {
     if let Some(writer) = standard_error() {

@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(|| taut_bridge::console::Lines)
         .with_ansi(std::io::stderr().is_terminal())
         .init();
     taut_bridge::execute(&cli.bridge)

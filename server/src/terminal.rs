@@ -1,10 +1,12 @@
 //! What a person at the terminal sees: lines of text, and below them one live status line.
 //!
 //! Everything goes to standard error; standard output is for reports. Where standard error is no terminal there is no
-//! status line.
+//! status line. Nobody waits for it: the texts go by [`taut_bridge::console`], and a terminal that is stopped loses them.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::sync::{Arc, Mutex, PoisonError};
+
+use taut_bridge::console;
 
 /// Return to the first column and clear the line.
 const CLEAR_LINE: &str = "\r\x1b[2K";
@@ -34,9 +36,9 @@ impl Terminal {
     pub fn say(&self, line: &str) {
         let lines = self.lines();
         if lines.live && !lines.status.is_empty() {
-            write(&format!("{CLEAR_LINE}{line}\n{}", lines.status));
+            console::put(format!("{CLEAR_LINE}{line}\n{}", lines.status));
         } else {
-            write(&format!("{line}\n"));
+            console::put(format!("{line}\n"));
         }
     }
 
@@ -56,7 +58,7 @@ impl Terminal {
     pub fn status(&self, status: String) {
         let mut lines = self.lines();
         if lines.live {
-            write(&format!("{CLEAR_LINE}{status}"));
+            console::put(format!("{CLEAR_LINE}{status}"));
             lines.status = status;
         }
     }
@@ -65,7 +67,7 @@ impl Terminal {
     pub fn end_status(&self) {
         let mut lines = self.lines();
         if !lines.status.is_empty() {
-            write("\n");
+            console::put("\n");
             lines.status.clear();
         }
     }
@@ -73,11 +75,4 @@ impl Terminal {
     fn lines(&self) -> std::sync::MutexGuard<'_, Lines> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// A terminal that is gone has nobody to be told.
-fn write(text: &str) {
-    let mut stderr = std::io::stderr().lock();
-    let _ = stderr.write_all(text.as_bytes());
-    let _ = stderr.flush();
 }

@@ -3,7 +3,6 @@
 use std::sync::atomic::Ordering;
 
 use god_object::spatial::linear;
-use taut_bridge::ArmWish;
 use taut_link::{LinkEvent, proto};
 use taut_recording::EventRecord;
 
@@ -29,10 +28,6 @@ impl Session {
         };
         let mut lines = Vec::new();
         while let Some(event) = link.try_event() {
-            if let LinkEvent::Arm { arm, .. } = event {
-                self.arm_switch
-                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
-            }
             lines.extend(
                 self.clients
                     .follow(&event)

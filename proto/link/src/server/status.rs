@@ -97,7 +97,7 @@ pub enum LinkEvent {
         /// The line.
         event: LogEvent,
     },
-    /// An operator wants force at the device, or none.
+    /// An operator wants force at the device, or none; for the log: [`ServerLink::on_arm`](super::ServerLink::on_arm) has heard of it before.
     Arm {
         /// Its name.
         node: String,
