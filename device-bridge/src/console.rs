@@ -6,6 +6,7 @@
 //!
 //! [`take_panics`] lets the words of a panic go the same way: the system's own hook would wait before anything is unwound.
 
+use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -31,6 +32,8 @@ pub struct LineWriter {
 #[derive(Debug)]
 enum Item {
     Text(String),
+    /// Finding the names in it takes a while.
+    Trace(Box<Backtrace>),
     /// Answered once everything before it is written.
     Reached(SyncSender<()>),
 }
@@ -62,7 +65,11 @@ impl LineWriter {
     pub fn put(&self, text: impl Into<String>) {
         let mut text = text.into();
         cut(&mut text);
-        match self.queue.try_send(Item::Text(text)) {
+        self.hand_over(Item::Text(text));
+    }
+
+    fn hand_over(&self, item: Item) {
+        match self.queue.try_send(item) {
             Ok(()) => {}
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
                 self.lost.fetch_add(1, Ordering::Relaxed);
@@ -95,6 +102,9 @@ fn cut(text: &mut String) {
 fn write_all(items: &Receiver<Item>, mut out: impl Write, lost: &AtomicU64) {
     for item in items {
         match item {
+            Item::Trace(trace) => {
+                let _ = writeln!(out, "{trace}");
+            }
             Item::Text(text) => {
                 let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
                 let lost = lost.swap(0, Ordering::Relaxed);
@@ -176,12 +186,13 @@ pub fn take_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let thread = std::thread::current();
         let name = thread.name().unwrap_or("without a name");
-        let trace = std::backtrace::Backtrace::capture();
-        let mut text = format!("thread '{name}' broke down: {panic}");
-        if trace.status() == std::backtrace::BacktraceStatus::Captured {
-            text += &format!("\n{trace}");
+        say(format!("thread '{name}' broke down: {panic}"));
+        let trace = Backtrace::capture();
+        if trace.status() == BacktraceStatus::Captured
+            && let Some(writer) = standard_error()
+        {
+            writer.hand_over(Item::Trace(Box::new(trace)));
         }
-        say(text);
     }));
 }
 

@@ -39,7 +39,15 @@ impl EndFlag {
     /// # Errors
     /// The system takes no handler.
     pub fn listen() -> io::Result<Self> {
-        let flag = Self::default();
+        Self::listen_into(Arc::default())
+    }
+
+    /// The same with a flag that the caller has, too.
+    ///
+    /// # Errors
+    /// The system takes no handler.
+    pub fn listen_into(asked: Arc<AtomicBool>) -> io::Result<Self> {
+        let flag = Self::of(asked);
         for signal in signals() {
             // In this order: the first signal asks, and one that comes when there is no force does what it does by itself.
             flag::register_conditional_default(signal, Arc::clone(&flag.may_be_killed))?;

@@ -321,3 +321,29 @@ fn edge_coupler(
         }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_watcher_that_breaks_down_takes_the_device_loop_with_it() {
+        let (end, ended) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let (of_loop, told) = (Arc::clone(&end), Arc::clone(&ended));
+        let broke = std::panic::catch_unwind(move || {
+            let thread = thread::Builder::new().spawn(move || {
+                while !of_loop.load(Ordering::Relaxed) {
+                    thread::sleep(Duration::from_millis(1));
+                }
+                told.store(true, Ordering::Relaxed);
+            });
+            let _thread = LoopThread {
+                end,
+                thread: thread.ok(),
+            };
+            panic!("on purpose");
+        });
+        assert!(broke.is_err());
+        assert!(ended.load(Ordering::Relaxed), "the loop goes on");
+    }
+}

@@ -300,12 +300,11 @@ impl DevicePort {
         );
         let damped = shared + damping.wrench * gain;
         let safe = clamp(&damped, settings.max_force, settings.max_torque).wrench;
-        // A force that goes away or is held answers no motion: only the commands in force do.
-        let answers = matches!(
-            self.arming.state(),
-            ArmingState::Arming | ArmingState::Armed
-        );
-        let speed = if answers { self.motion.speed() } else { 0.0 };
+        // A force that comes, goes away or is held is led by the port: only one in full answers the motion.
+        let speed = match self.arming.state() {
+            ArmingState::Armed => self.motion.speed(),
+            _ => 0.0,
+        };
         let slewed = self.slew.step(now, &safe, speed);
 
         self.tell_limits(now, &limited, &slewed, damping.debt);
@@ -315,6 +314,8 @@ impl DevicePort {
     /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
         let felt = self.arming.gain() > 0.0;
+        // A force that comes or goes away is slow on purpose; why it does is told by itself.
+        let armed = self.arming.state() == ArmingState::Armed;
         let spells = &mut self.spells;
         let acting = [
             (
@@ -330,12 +331,12 @@ impl DevicePort {
             (
                 &mut spells.force_slew,
                 EventKind::ForceSlewLimited,
-                slewed.force_asked,
+                slewed.force_asked.filter(|_| armed),
             ),
             (
                 &mut spells.torque_slew,
                 EventKind::TorqueSlewLimited,
-                slewed.torque_asked,
+                slewed.torque_asked.filter(|_| armed),
             ),
             (
                 &mut spells.passivity,
