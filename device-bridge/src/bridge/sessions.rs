@@ -153,13 +153,14 @@ impl Run<'_> {
         let link = Arc::new(link);
         let end_loop = Arc::new(AtomicBool::new(false));
         let (sender, notices) = sync_channel(NOTICES);
+        let period = Duration::from_secs_f64(1.0 / self.args.rate);
         let mut device_loop = DeviceLoop {
             link: Arc::clone(&link),
             end: Arc::clone(&end_loop),
             asked: self.over.end.clone(),
             wishes: Arc::clone(&self.wishes),
             notices: sender,
-            period: Duration::from_secs_f64(1.0 / self.args.rate),
+            period,
             priority: self.args.priority,
             core: self.args.core,
             totals: std::mem::replace(&mut self.totals, Totals::new()),
@@ -168,7 +169,8 @@ impl Run<'_> {
             Some(epoch) if epoch == link.epoch() => CommandSource::Same,
             _ => CommandSource::Other,
         };
-        let edge = edge_coupler(self.args.coupling, link.coupling())?;
+        let edge = edge_coupler(self.args.coupling, link.coupling())?
+            .map(|coupler| coupler.within(period));
         bridge.begin_session(source, edge);
         let thread = thread::Builder::new()
             .name("taut-bridge-dev".to_owned())
