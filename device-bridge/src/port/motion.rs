@@ -86,7 +86,7 @@ mod tests {
         let steady = Vector6::new(0.3e-3, 0.0, 0.0, 0.0, 4e-3, 0.0);
         assert!((seen(|_| steady) - 0.5).abs() < 1e-6);
         // Half a millimetre to and fro: 0.5 m/s in each sample.
-        let noise = |tick: u32| Vector6::x() * if tick % 2 == 0 { 5e-4 } else { -5e-4 };
+        let noise = |tick: u32| Vector6::x() * if tick.is_multiple_of(2) { 5e-4 } else { -5e-4 };
         assert!(seen(noise) < 0.12, "{} m/s", seen(noise));
     }
 
