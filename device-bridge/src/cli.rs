@@ -220,7 +220,7 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
     let (report, code) = match run(args) {
         Ok(report) => (Some(report), ExitCode::SUCCESS),
         Err(error) => {
-            console::say(format!("taut: {error}"));
+            taut_log::say(&format!("taut: {error}"));
             let code = ExitCode::from(error.exit_code());
             match error {
                 BridgeError::ServerLost { report, .. } => (Some(*report), code),
@@ -233,14 +233,13 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
             match serde_json::to_string_pretty(&report) {
                 Ok(text) => drop(console::report(text)),
                 Err(error) => {
-                    console::say(format!("the report cannot be written as JSON: {error}"));
+                    taut_log::say(&format!("the report cannot be written as JSON: {error}"));
                 }
             }
         } else {
             console::report(report.to_string());
         }
     }
-    console::finish();
     code
 }
 

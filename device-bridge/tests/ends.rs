@@ -23,7 +23,7 @@ use support::{PATIENCE, Workbench};
 use taut_bridge::signals::EndFlag;
 use taut_bridge::{
     BridgeArgs, Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, Pose,
-    SimulatedDevice, ViaPoint, console, run_device,
+    SimulatedDevice, ViaPoint, run_device,
 };
 
 /// What the process is told by.
@@ -73,10 +73,7 @@ fn is_the_bridge() {
     let (Ok(server), Ok(record)) = (std::env::var(SERVER), std::env::var(RECORD)) else {
         return;
     };
-    console::take_panics();
-    tracing_subscriber::fmt()
-        .with_writer(|| console::Lines)
-        .init();
+    taut_log::start("info");
     let mut args = BridgeArgs::joining(&server, "bridge").expect("an address");
     args.key = std::env::var_os(KEY).map(Into::into);
     args.priority = 0;
@@ -98,8 +95,8 @@ fn is_the_bridge() {
             breaks: std::env::var_os(BREAKS).is_some(),
         })
     });
-    console::say(format!("the bridge ended: {:?}", ended.map(|_| ())));
-    console::finish();
+    taut_log::say(&format!("the bridge ended: {:?}", ended.map(|_| ())));
+    taut_log::flush();
 }
 
 /// A bridge in a process of its own, pressing on the wall of a server.

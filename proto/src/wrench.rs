@@ -1,6 +1,9 @@
 //! WRENCH payload: what the user is to feel, downstream to the device bridge.
 
-use crate::codec::wire_struct;
+use crate::{
+    codec::wire_ranged,
+    range::{BITS, COUNT, FORCE, TIME},
+};
 
 /// One command to the device. A bridge that hears none for its watchdog time gives zero force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,9 +23,9 @@ pub const WRENCH_PAUSED: u16 = 1;
 /// [`WrenchCommand::flags`]: the bridge couples by itself; what goes to it is constraint sets, not this.
 pub const WRENCH_AT_EDGE: u16 = 2;
 
-wire_struct!(WrenchCommand {
-    time_ns,
-    input_index,
-    wrench,
-    flags
+wire_ranged!(WrenchCommand {
+    time_ns in TIME,
+    input_index in COUNT,
+    wrench in FORCE,
+    flags in BITS
 });

@@ -63,7 +63,8 @@ fn symmetric_delays_give_the_exact_offset() {
         assert_eq!(filter.session_time(i * 5 * MS), None, "not before the lock");
         server.exchange(&mut filter, i * 5 * MS, 100_000, 100_000);
     }
-    assert!(error_ns(&filter, &server, 50 * MS).abs() <= 1);
+    // Half of the drift during an exchange is all that is not known.
+    assert!(error_ns(&filter, &server, 50 * MS).abs() <= 15);
 }
 
 #[test]
@@ -160,7 +161,7 @@ fn a_restarted_server_is_followed_after_a_fresh_lock() {
         after.exchange(&mut filter, i * 100 * MS, 100_000, 100_000);
     }
     assert_eq!(filter.steps(), 1);
-    assert!(error_ns(&filter, &after, 11_000 * MS).abs() <= 1);
+    assert!(error_ns(&filter, &after, 11_000 * MS).abs() <= 15);
 }
 
 #[test]
@@ -188,4 +189,95 @@ fn an_exchange_that_contradicts_itself_is_ignored() {
         "beyond all time"
     );
     assert_eq!(filter.round_trip_ns(), None);
+}
+
+/// Exchanges every 50 ms for `seconds` while the way up and the way down take what `ways` says (ns, of the time since the attack began); at each, what
+/// the filter says after a minute without an attack.
+fn under_attack(
+    drift_ppm: i64,
+    seconds: u64,
+    ways: impl Fn(u64) -> (u64, u64),
+    mut seen: impl FnMut(u64, i64, u64),
+) {
+    let server = Server {
+        offset: 7_000_000_000,
+        drift_ppm,
+    };
+    let mut random = Random(5);
+    let mut filter = ClockFilter::default();
+    let begin = 60_000 * MS;
+    for sent in (0..begin + seconds * 1000 * MS).step_by(50 * MS as usize) {
+        let (up, down) = match sent.checked_sub(begin) {
+            None => (0, 0),
+            Some(elapsed) => ways(elapsed),
+        };
+        let mut usual = || 50_000 + random.below(100_000);
+        let end = server.exchange(&mut filter, sent, up + usual(), down + usual());
+        if sent >= begin {
+            let Some(time) = filter.session_time(end) else {
+                panic!("not locked");
+            };
+            let error = error_ns(&filter, &server, end);
+            assert!(error.unsigned_abs() <= time.uncertainty_ns, "{error}");
+            seen(sent - begin, error, time.uncertainty_ns);
+        }
+    }
+}
+
+#[test]
+fn a_delay_that_grows_on_either_way_moves_session_time_by_no_more_than_drift() {
+    let growing = |elapsed: u64| elapsed / 10; // 2 s after 20 s
+    for drift_ppm in [0, 50, -DRIFT_PPM] {
+        for (up, down) in [(1, 0), (0, 1), (1, 1), (1, 3)] {
+            under_attack(
+                drift_ppm,
+                20,
+                |elapsed| (up * growing(elapsed), down * growing(elapsed)),
+                |elapsed, error, uncertainty| {
+                    // What was known when it began, and the drift since.
+                    let allowed = 200_000 + elapsed / 1_000_000 * DRIFT_PPM as u64 * 2;
+                    assert!(error.unsigned_abs() <= allowed, "{error} after {elapsed}");
+                    assert!(uncertainty <= 2 * allowed, "{uncertainty} after {elapsed}");
+                },
+            );
+        }
+    }
+}
+
+#[test]
+fn a_path_that_was_never_quick_is_as_uncertain_as_half_its_round_trip() {
+    let server = Server {
+        offset: 3_000_000_000,
+        drift_ppm: 0,
+    };
+    let mut filter = ClockFilter::default();
+    for i in 0..64 {
+        server.exchange(&mut filter, i * 50 * MS, 400 * MS, 20 * MS);
+    }
+    let now = 64 * 50 * MS + 500 * MS;
+    let time = filter.session_time(now).expect("locked");
+    let error = error_ns(&filter, &server, now);
+    assert_eq!(error / MS as i64, 190, "half of the difference of the ways");
+    assert!(time.uncertainty_ns > 209 * MS && time.uncertainty_ns < 215 * MS);
+}
+
+#[test]
+fn clocks_that_drift_faster_than_assumed_are_found_out_and_followed() {
+    let server = Server {
+        offset: 0,
+        drift_ppm: 5 * DRIFT_PPM,
+    };
+    let mut filter = ClockFilter::default();
+    for i in 0..2000 {
+        server.exchange(&mut filter, i * 50 * MS, 100_000, 100_000);
+    }
+    // Slewing cannot keep up with it; the uncertainty says by how much it trails, but for what one round trip hides.
+    let now = 2000 * 50 * MS;
+    let time = filter.session_time(now).expect("locked");
+    let error = error_ns(&filter, &server, now).unsigned_abs();
+    assert!(
+        error > MS && error <= time.uncertainty_ns + 200_000,
+        "{error}"
+    );
+    assert_eq!(filter.steps(), 0);
 }

@@ -1,6 +1,5 @@
 //! The binary `taut`: one sub-command per role.
 
-use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -19,25 +18,14 @@ use taut::{
     track,
 };
 use taut_bridge::console;
-use tracing_subscriber::EnvFilter;
-
-/// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
-const LOG_VARIABLE: &str = "TAUT_LOG";
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    console::take_panics();
-    let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(|| console::Lines)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .init();
+    taut_log::start("warn");
     let code = match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
         Ok(code) => code,
         Err(error) => {
-            console::say(format!("taut: {error:#}"));
+            taut_log::say(&format!("taut: {error:#}"));
             ExitCode::from(
                 error
                     .downcast_ref::<Failure>()
@@ -45,7 +33,7 @@ fn main() -> ExitCode {
             )
         }
     };
-    console::finish();
+    taut_log::flush();
     code
 }
 

@@ -84,7 +84,7 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         )));
     }
     if lost > 0 {
-        taut_bridge::console::say(format!(
+        taut_log::say(&format!(
             "taut: {lost} samples were lost on the way; record on the haptic PC itself, or with --transport quic"
         ));
     }
@@ -136,13 +136,13 @@ impl Recorder {
                     self.lost += self.link.counters().lost;
                     self.link = link;
                     self.trace.next_session();
-                    taut_bridge::console::say(format!(
+                    taut_log::say(&format!(
                         "taut: joined again; the trace has a gap after {:.3} s",
                         self.trace.last_time_s
                     ));
                 }
                 Some(Renewal::Session { link, .. }) => {
-                    taut_bridge::console::say(format!(
+                    taut_log::say(&format!(
                         "taut: the server came back with another scene (\"{}\"): the trace ends where it went",
                         link.description().name
                     ));

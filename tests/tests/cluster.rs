@@ -284,7 +284,7 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
         drawing.interrupt();
         assert!(drawing.end(END_LIMIT).status.success());
     } else {
-        println!("skipped: the render node, because there is no adapter");
+        taut_test_kit::left_out("the render node, because there is no adapter");
     }
     let report = server.stop();
     assert_eq!(report["penetrations"], 0);

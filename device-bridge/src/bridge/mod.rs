@@ -6,7 +6,7 @@
 //! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines; looks at the flags of signals and of the arm switch itself |
 //! | `taut-bridge-net` | the link's sockets (tokio) |
 //! | `console` | what is typed, where standard input is a terminal: `arm`, `off` |
-//! | `lines` | writes to the terminal, [`crate::console`] |
+//! | `lines` | writes to the terminal, [`taut_log`] |
 //!
 //! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
 //! has the force at zero 120 ms later, whatever else goes on. Where that thread breaks down, the device loop ends with it.

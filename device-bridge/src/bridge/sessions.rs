@@ -139,7 +139,7 @@ impl Run<'_> {
             }
             Some(Ok(link)) => Err(BridgeError::OtherScene {
                 server: self.args.server.clone(),
-                scene: link.description().name.clone(),
+                scene: link.description().name.to_string(),
             }),
         }
     }
@@ -315,7 +315,7 @@ fn edge_coupler(
         }
         (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
             Err(BridgeError::NoEdge {
-                reason: reason.clone(),
+                reason: reason.to_string(),
             })
         }
         (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {

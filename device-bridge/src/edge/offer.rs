@@ -35,7 +35,7 @@ pub enum OfferError {
 #[must_use]
 pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> CouplingOffer {
     let at_server = |reason: &str| CouplingOffer::AtServer {
-        reason: reason.to_owned(),
+        reason: reason.into(),
     };
     if settings.max_constraints > MAX_SET_ROWS {
         return at_server("its constraint sets may have more rows than travel (1024)");

@@ -19,8 +19,8 @@ use tempfile::TempDir;
 /// Of the wall z < 0 that the server renders, in N/m.
 pub const STIFFNESS: f64 = 500.0;
 
-/// Time after which something is not slow but broken.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+/// Only a hang takes this long.
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
 #[derive(Parser)]
 struct Cli {
@@ -46,7 +46,7 @@ fn content() -> Content {
         description: SceneDescription::of_body(
             "wall",
             BodyDescription {
-                name: "tip".to_owned(),
+                name: "tip".into(),
                 mesh: hash,
                 pose: start,
                 colour: [1.0; 4],
@@ -64,6 +64,8 @@ pub struct Seen {
     pub first_z: Option<f64>,
     /// Heights of the hand, m, one per reading.
     heights: Vec<f64>,
+    /// Longest time between two ticks.
+    pub longest_tick: Duration,
 }
 
 impl Seen {
@@ -193,7 +195,9 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
     let body = move || {
         let mut seen = Seen::default();
         while !stop.load(Ordering::Relaxed) {
+            let before = Instant::now();
             thread::sleep(Duration::from_millis(1));
+            seen.longest_tick = seen.longest_tick.max(before.elapsed());
             let now = Duration::from_nanos(clock.now_ns());
             let mut wrench = Vector6::zeros();
             if let Ok(sample) = device.read(now) {

@@ -17,6 +17,8 @@ pub(crate) enum Wish {
     Page,
     /// The `hello` line alone.
     Hello,
+    /// The program's metrics.
+    Metrics,
     /// Lines as the body of an answer.
     Lines,
     /// Lines over WebSocket; the client's key.
@@ -46,7 +48,10 @@ impl Refusal {
         match self {
             Self::NotHttp => ("400 Bad Request", "this port speaks HTTP and WebSocket"),
             Self::Method => ("405 Method Not Allowed", "use GET"),
-            Self::NotFound => ("404 Not Found", "there are /, /hello, /stream and /ws"),
+            Self::NotFound => (
+                "404 Not Found",
+                "there are /, /hello, /stream, /ws and /metrics",
+            ),
             Self::Token => (
                 "401 Unauthorized",
                 "give the token: the header `Authorization: Bearer TOKEN`, or ?token=TOKEN",
@@ -106,6 +111,7 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
     match path {
         "/" => Ok(Wish::Page),
         "/hello" => Ok(Wish::Hello),
+        "/metrics" => Ok(Wish::Metrics),
         "/stream" => Ok(Wish::Lines),
         "/ws" => header("Sec-WebSocket-Key")
             .map(|key| Wish::WebSocket(key.to_owned()))
@@ -149,6 +155,7 @@ mod tests {
     fn wishes_are_understood() {
         assert_eq!(ask("/", HERE, None), Ok(Wish::Page));
         assert_eq!(ask("/hello?x=1", HERE, None), Ok(Wish::Hello));
+        assert_eq!(ask("/metrics", HERE, None), Ok(Wish::Metrics));
         assert_eq!(ask("/stream", "Host: [::1]:80\r\n", None), Ok(Wish::Lines));
         let key = format!("{HERE}sec-websocket-key: abc\r\n");
         assert_eq!(ask("/ws", &key, None), Ok(Wish::WebSocket("abc".into())));

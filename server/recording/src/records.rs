@@ -66,7 +66,7 @@ pub struct ForceRecord {
     pub sequence: u64,
     /// Session time that the coupling was given.
     pub time: Duration,
-    /// Sequence number of the device sample.
+    /// Sequence number of the first reading that gave the device sample: what two forces share that answer the same sample.
     pub device_sequence: u64,
     /// Device pose that it answers.
     pub device_pose: Pose,

@@ -92,9 +92,12 @@ impl CouplingLoop {
         }
 
         let before = thread_cpu_time();
-        let output = self
-            .coupling
-            .step(now.as_secs_f64(), &device.pose, &contacts.set);
+        let output = self.coupling.answer(
+            now.as_secs_f64(),
+            device.sample,
+            &device.pose,
+            &contacts.set,
+        );
         let took = thread_cpu_time().saturating_sub(before);
         self.cpu_time += took;
         self.statistics.force.record_time(took);
@@ -113,6 +116,7 @@ impl CouplingLoop {
             sequence: self.sequence,
             time: now,
             sample_read: device.read,
+            sample_time: device.time,
             cpu_time: self.cpu_time,
             wrench: output.wrench,
             constraint_sequence: contacts.set.sequence,
@@ -128,7 +132,7 @@ impl CouplingLoop {
             tap.push(ForceRecord {
                 sequence: self.sequence,
                 time: now,
-                device_sequence: device.sequence,
+                device_sequence: device.sample,
                 device_pose: device.pose,
                 constraint_sequence: contacts.set.sequence,
                 wrench: output.wrench,

@@ -22,6 +22,7 @@ use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
 
+use crate::audit::AuditTrail;
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::fidelity::FidelityWatch;
@@ -55,6 +56,7 @@ pub struct Session {
     fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
+    audit: AuditTrail,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,

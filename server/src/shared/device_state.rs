@@ -15,8 +15,10 @@ use super::fanout::{Publisher, Subscriber, fanout};
 /// One sample of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceState {
-    /// Counts the samples; 0 is the pose at the start, before the device was read.
+    /// Counts the readings; 0 is the pose at the start, before the device was read.
     pub sequence: u64,
+    /// Identity of the device's sample: the `sequence` of the first reading that gave it. The same again is the same sample, read again.
+    pub sample: u64,
     /// Session time at which the device was there.
     pub time: Duration,
     /// Session time at which the haptics loop read it, later than `time` by what the device and its way take.
@@ -73,6 +75,7 @@ impl DeviceState {
     pub fn at_start(pose: &Pose) -> Self {
         Self {
             sequence: 0,
+            sample: 0,
             time: Duration::ZERO,
             read: Duration::ZERO,
             pose: *pose,

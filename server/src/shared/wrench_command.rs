@@ -19,6 +19,8 @@ pub struct WrenchCommand {
     pub time: Duration,
     /// Session time at which the device sample that it answers was read.
     pub sample_read: Duration,
+    /// Session time at which the device was there: the age of the force counts from here.
+    pub sample_time: Duration,
     /// Thread CPU time that the coupling has taken since the start, for this answer and all before it: who reads two of them knows the cost of all between.
     pub cpu_time: Duration,
     /// Force and torque on the hand at the reference point, N and N m, world axes.
@@ -48,6 +50,7 @@ impl WrenchCommand {
             sequence: 0,
             time: Duration::ZERO,
             sample_read: Duration::ZERO,
+            sample_time: Duration::ZERO,
             cpu_time: Duration::ZERO,
             wrench: Vector6::zeros(),
             constraint_sequence: 0,

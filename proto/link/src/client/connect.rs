@@ -11,7 +11,9 @@ use super::{
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
-    framing::{CLOSE_REFUSED, ReadMessageError, close_text, read_message, write_message},
+    framing::{
+        CLOSE_REFUSED, ReadMessageError, close_text, peer_text, read_message, write_message,
+    },
     pinning::PinnedServer,
     transport,
 };
@@ -205,7 +207,7 @@ async fn reach(
                         },
                         None => LinkError::Protocol {
                             server,
-                            reason: error.to_string(),
+                            reason: peer_text(&error),
                         },
                     });
                 }
@@ -246,7 +248,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         grant,
     };
     let hello = Hello {
-        node: options.node.clone(),
+        node: options.node.as_str().into(),
         role: options.role,
         transport: options.transport,
         rate_hz: options.rate_hz,

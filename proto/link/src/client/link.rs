@@ -127,6 +127,12 @@ impl ClientLink {
         self.hot.inbound.drain_states(out);
     }
 
+    /// How often states that came by the multicast group were found to be forged, or were not confirmed by the server in time: when that grows, whoever
+    /// keeps states forgets those of before. Those that were still waiting to be drained are gone already.
+    pub fn states_withdrawn(&self) -> u64 {
+        self.hot.inbound.states_withdrawn()
+    }
+
     /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
     /// two frames that this node is made for; the slowest node's is everybody's. There is one gate at a time: a second one takes over.
     pub fn frame_gate(&self, period: Duration) -> FrameGate {
@@ -232,7 +238,10 @@ impl ClientLink {
 
     /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
     pub fn post_log(&self, level: LogLevel, text: String) -> bool {
-        self.post(ControlMessage::Log(LogEvent { level, text }))
+        self.post(ControlMessage::Log(LogEvent {
+            level,
+            text: text.into(),
+        }))
     }
 
     /// Asks for force at the device, or for none, without waiting; `false` if it was not taken. Counts if [`crate::Role::Operator`] joined; the
@@ -296,7 +305,7 @@ impl ClientLink {
     /// The same for a link that others share; they find it closed.
     pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
-            reason: "the node left".to_owned(),
+            reason: "the node left".into(),
         });
         let goodbye = async {
             if self.outbox.send(bye).await.is_ok() {

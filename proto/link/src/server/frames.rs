@@ -19,7 +19,7 @@ use taut_proto::{
 const MAX_SHOWN: usize = 64;
 /// The server's session number and its term.
 const SERVER: u16 = 0;
-const FIRST_TERM: u32 = 1;
+const FIRST_TERM: u64 = 1;
 
 pub(crate) struct Frames {
     pub(super) master: Mutex<Leading>,

@@ -1,6 +1,6 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-use super::{ClientStatus, rights::Rights, shared::Shared};
+use super::{ClientStatus, LinkEvent, rights::Rights, shared::Shared};
 use crate::counters::Cell;
 use std::{
     net::SocketAddr,
@@ -223,11 +223,16 @@ impl Session {
     }
 
     /// Takes the client's word on how it gets its states.
-    pub(crate) fn take_states_by(&self, states: StatesBy) {
+    pub(crate) fn take_states_by(&self, states: StatesBy, shared: &Shared) {
         let by_multicast = states.multicast && self.may_listen();
         if self.by_multicast.swap(by_multicast, Ordering::Relaxed) != by_multicast {
             let path = if by_multicast { "multicast" } else { "unicast" };
             tracing::info!(node = self.node, "client takes its states by {path}");
+        }
+        if states.forged {
+            shared.tell(LinkEvent::StatesForged {
+                node: self.node.clone(),
+            });
         }
     }
 
@@ -327,6 +332,7 @@ impl Session {
             session: self.number,
             node: self.node.clone(),
             role: self.role,
+            grant: self.grant,
             transport: self.transport,
             rate_hz: self.rate_hz,
             address: self.connection.remote_address(),

@@ -71,6 +71,8 @@ pub struct Coupling {
     correction: Vector6,
     /// Most visits of rows in the projections of a step; `None`: as many as the solver's own limits allow.
     most_row_visits: Option<u32>,
+    /// Number of the device sample of the last step.
+    sample: Option<u64>,
 }
 
 /// What depends on the constraint set alone: taken from it when it arrives, used for every device sample until the next one.
@@ -138,16 +140,40 @@ impl Coupling {
             turn: TurnMemory::default(),
             correction: Vector6::zeros(),
             most_row_visits: None,
+            sample: None,
         }
     }
 
-    /// The force for one device pose. `time` in seconds never runs back; it drives the constraint adaptation.
+    /// The force for a new device sample: [`Self::answer`] for callers that ask once a sample.
+    pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
+        let sample = self.sample.map_or(0, |last| last.wrapping_add(1));
+        self.answer(time, sample, device_pose, set)
+    }
+
+    /// The force for one device sample. `time` in seconds never runs back; it drives the constraint adaptation.
     ///
+    /// `sample` numbers the reading of the device. The number of the call before says that it is the same reading, with a newer set: the
+    /// force is computed anew, and takes the place of the one before. It is no motion: energy and speed go on from sample to sample.
     /// A set with sequence, pose and number of rows of the one before is taken for the same set.
     /// A pose that is not finite gives a zero wrench and `ProjectionStatus::NotFinite`.
-    pub fn step(&mut self, time: f64, device_pose: &Pose, set: &ConstraintSet) -> CouplingOutput {
-        if !pose_is_finite(device_pose) || !pose_is_finite(&set.god_object_pose) {
-            return self.without_force(ProjectionStatus::NotFinite);
+    pub fn answer(
+        &mut self,
+        time: f64,
+        sample: u64,
+        device_pose: &Pose,
+        set: &ConstraintSet,
+    ) -> CouplingOutput {
+        let moved = self.sample.replace(sample) != Some(sample);
+        if !pose_is_finite(device_pose) {
+            if let Some(energy) = &mut self.energy {
+                energy.forget_pose();
+            }
+            return self.without_force(ProjectionStatus::NotFinite, None);
+        }
+        let device = at_reference_point(device_pose, &self.basis.reference_point);
+        let new_sample = moved.then_some(&device);
+        if !pose_is_finite(&set.god_object_pose) {
+            return self.without_force(ProjectionStatus::NotFinite, new_sample);
         }
         let arrived = !self.present.is(set);
         if arrived {
@@ -157,14 +183,13 @@ impl Coupling {
         if self.present.moving {
             self.carry_rows(time, set);
         }
-        let device = at_reference_point(device_pose, &self.basis.reference_point);
         if let Some(damping) = &mut self.damping {
             damping.observe(time, &device);
         }
         let difference = self.turn.difference(&device, &self.present.god_object);
         let unconstrained = difference * self.settings.k_s;
         let Some(metric) = self.present.metric else {
-            return self.without_force(ProjectionStatus::NotFinite);
+            return self.without_force(ProjectionStatus::NotFinite, new_sample);
         };
 
         // Where the last force would leave the body: a new constraint jumps only as far as this violates it.
@@ -197,7 +222,7 @@ impl Coupling {
             && projection.status == ProjectionStatus::Infeasible
             && projection.kkt_residual <= KKT_TOLERANCE;
         if projection.status != ProjectionStatus::Solved && !squeezed {
-            return self.without_force(projection.status);
+            return self.without_force(projection.status, new_sample);
         }
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
@@ -248,7 +273,7 @@ impl Coupling {
         }
         let mut wrench = held * self.settings.k_h;
         if let Some(textures) = &mut self.textures {
-            let moved = projection.acceleration / self.settings.k_s;
+            let felt_at = projection.acceleration / self.settings.k_s;
             let active = projection.active.iter();
             let touched = active.filter_map(|row| {
                 let contact = set.constraints.get(row.row as usize)?;
@@ -260,7 +285,7 @@ impl Coupling {
                     contact.normal,
                 ))
             });
-            wrench = textures.tilt(&wrench, &self.present.god_object, &moved, touched);
+            wrench = textures.tilt(&wrench, &self.present.god_object, &felt_at, moved, touched);
         }
         let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
@@ -282,7 +307,9 @@ impl Coupling {
         }
         if let Some(mut energy) = self.energy {
             energy.grant(self.obstacle_work.work());
-            energy.arrive(&device);
+            if moved {
+                energy.arrive(&device);
+            }
             let (bounded, clamped) = self.limited(&energy.within_reserve(&metric, &wrench));
             energy.hold(&device, &bounded);
             (wrench, saturated) = (bounded, saturated || clamped);
@@ -327,10 +354,15 @@ impl Coupling {
     }
 
     /// No force, and nothing to remember of the body that it held.
-    fn without_force(&mut self, status: ProjectionStatus) -> CouplingOutput {
+    ///
+    /// `sample` is the device (pose of the reference point) where it is newer than the last step: what held the hand until then has done its work.
+    fn without_force(&mut self, status: ProjectionStatus, sample: Option<&Pose>) -> CouplingOutput {
         self.anchor.forget();
         self.obstacle_work.arrive(None);
         if let Some(energy) = &mut self.energy {
+            if let Some(device) = sample {
+                energy.arrive(device);
+            }
             energy.release();
         }
         CouplingOutput::without_force(status)

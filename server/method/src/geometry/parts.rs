@@ -46,8 +46,8 @@ pub(super) fn inverted_parts(
     let inverted = |index: usize| {
         let part = &parts[index];
         let step = part.triangles.len().div_ceil(SAMPLES);
-        // `!(> 0)` holds for NaN, too.
-        !(part.volume > 0.0)
+        let outward = part.volume > 0.0; // false for NaN
+        !outward
             && part.triangles.iter().step_by(step).any(|t| {
                 let [a, b, c] = triangles[*t as usize].map(|v| vertices[v as usize].coords);
                 let middle = Point3::from((a + b + c) / 3.0);

@@ -69,8 +69,9 @@ impl EnergyObserver {
     /// A new device sample: the wrench held since the last one has done its work. `device` is the pose of the reference
     /// point. Returns the energy given so far, J.
     pub fn arrive(&mut self, device: &Pose) -> f64 {
-        if let Some((last, wrench)) = &self.held {
+        if let Some((last, wrench)) = &mut self.held {
             self.moved = pose_difference(device, last, &Vector3::zeros());
+            *last = *device;
             let work = wrench.dot(&self.moved);
             if work.is_finite() {
                 self.given.add(work);
@@ -88,6 +89,13 @@ impl EnergyObserver {
 
     /// No wrench is held: what the device does until the next one is no work.
     pub fn release(&mut self) {
+        if let Some((_, wrench)) = &mut self.held {
+            *wrench = Vector6::zeros();
+        }
+    }
+
+    /// Nobody knows where the device is: its way to the next sample is no motion of one period.
+    pub fn forget_pose(&mut self) {
         self.held = None;
         self.moved = Vector6::zeros();
     }

@@ -36,6 +36,8 @@ struct TexturedSurface {
 pub struct Textures {
     surfaces: Vec<TexturedSurface>,
     felt: Option<Pose>,
+    /// Where the felt body was at the device sample before.
+    before: Option<Pose>,
 }
 
 impl Textures {
@@ -53,6 +55,7 @@ impl Textures {
         any.then_some(Self {
             surfaces,
             felt: None,
+            before: None,
         })
     }
 
@@ -67,20 +70,25 @@ impl Textures {
     ///
     /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
     /// there (m, rad); `touched` yields obstacle index, its feature, point (m, world) and unit normal (world) of every active contact.
-    /// Call it for every sample: from one to the next the speed is taken. Obstacles without a texture count as contacts of
+    /// Call it for every sample: from one to the next the speed is taken. `new_sample` is false where the device sample is that of the call
+    /// before, with a newer constraint set. Obstacles without a texture count as contacts of
     /// tilt zero. Without any textured contact the wrench is returned unchanged.
     pub fn tilt(
         &mut self,
         wrench: &Vector6,
         god_object: &Pose,
         moved: &Vector6,
+        new_sample: bool,
         touched: impl Iterator<Item = (u16, Feature, Point3<f64>, Vector3<f64>)>,
     ) -> Vector6 {
         let felt = advance_pose(god_object, moved, 1.0);
-        let step = self.felt.map_or(Vector6::zeros(), |last| {
-            pose_difference(&felt, &last, &Vector3::zeros())
+        let last = self.felt.replace(felt);
+        if new_sample {
+            self.before = last;
+        }
+        let step = self.before.map_or(Vector6::zeros(), |before| {
+            pose_difference(&felt, &before, &Vector3::zeros())
         });
-        self.felt = Some(felt);
         let force = linear(wrench);
         let magnitude = force.norm();
         let enough = magnitude > SMALLEST_FORCE; // false for NaN

@@ -6,6 +6,7 @@ mod displays;
 mod dynamics;
 mod frames;
 mod load;
+mod log;
 mod looking_on;
 mod monitoring;
 mod network;
@@ -20,6 +21,7 @@ mod viewer;
 pub use dynamics::DeviceDynamics;
 pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
+pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,

@@ -10,6 +10,7 @@ use super::displays::{nodes, screens};
 use super::dynamics::dynamics;
 use super::frames::frames;
 use super::load::Workbench;
+use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::monitoring::monitoring;
 use super::network::network;
@@ -67,6 +68,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
+    let log = table(&root, "log", log).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
@@ -106,6 +108,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         monitoring,
         realtime,
         safety,
+        log,
         show,
         vrpn,
         observers,

@@ -115,7 +115,7 @@ pub fn content_with(triangles: u32) -> Content {
         .unwrap_or_else(|error| panic!("{error}"));
     let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
     let body = BodyDescription {
-        name: "body".to_owned(),
+        name: "body".into(),
         mesh: MeshHash::of(&bytes),
         pose: PoseF64::IDENTITY,
         colour: [1.0, 0.5, 0.1, 1.0],
