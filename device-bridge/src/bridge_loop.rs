@@ -13,7 +13,7 @@ use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
 
 use crate::device::DeviceFault;
 use crate::edge::EdgeCoupler;
-use crate::port::{Command, DevicePort, Events};
+use crate::port::{Command, CommandSource, DevicePort, Events};
 use crate::report::Durations;
 
 /// How many ticks a round trip may take to be measured: 1 s at 1 kHz.
@@ -117,11 +117,11 @@ impl BridgeLoop {
 
     /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
     /// is computed here.
-    pub(crate) fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
+    pub(crate) fn begin_session(&mut self, source: CommandSource, edge: Option<EdgeCoupler>) {
         self.newest = None;
         self.heard = None;
         self.edge = edge.map(Box::new);
-        self.port.restart();
+        self.port.restart(source);
     }
 
     /// Whether constraint sets are wanted.
@@ -388,7 +388,7 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
         }
-        bridge.begin_session(None);
+        bridge.begin_session(CommandSource::Other, None);
         // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
         // limit, and what comes ramps in.
         let mut lowest = f64::INFINITY;

@@ -11,12 +11,13 @@ use taut::cli::{
 };
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
-use taut::signals::BlockingEndSignal;
+use taut::shutdown::Shutdown;
 use taut::terminal::Terminal;
 use taut::{
     arm, demo, doctor, doctor_device, keys, record, recorded_session, rendering, replay, serve,
     track,
 };
+use taut_bridge::console;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -63,7 +64,7 @@ fn end_session(
     if json {
         print_json(&report)?;
     } else {
-        println!("{report}");
+        console::report(report.to_string());
     }
     match failure {
         Some(failure) => Err(failure.into()),
@@ -86,9 +87,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
 
 /// A session computed again must come to the same: a difference is a failure.
 fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
-    let interrupted = BlockingEndSignal::listen()
-        .and_then(BlockingEndSignal::into_request)
-        .map_err(Failure::failed)?;
+    let interrupted = Shutdown::by_signals()?;
     let report = recorded_session::run(directory, args.out.as_deref(), args.timings, &interrupted)?;
     if args.json {
         print_json(&report)?;
@@ -177,9 +176,8 @@ fn track_command(args: &TrackArgs) -> Result<ExitCode> {
 }
 
 fn print_json(value: &impl Serialize) -> Result<()> {
-    println!(
-        "{}",
-        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?
-    );
+    let text =
+        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?;
+    console::report(text);
     Ok(())
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
+use taut_bridge::signals::EndFlag;
 use taut_link::ClusterKey;
 use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
 
@@ -14,7 +15,6 @@ use crate::key;
 use crate::metrics::{self, MetricsLines};
 use crate::report::SessionReport;
 use crate::session::Session;
-use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
 /// Time between two looks at network, children and clock; also of the status line.
@@ -40,23 +40,20 @@ pub fn run(
         recording: args.recording.clone(),
     };
     let setup = session_setup(&workbench, key, &overrides)?;
-    let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
+    let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
+    session.end_with(&end);
     taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
     let mut admission = AdmissionWatch::new(&args.config);
-    watch(
-        &mut session,
-        &mut signal,
-        args.duration,
-        terminal,
-        |session| {
-            admission.follow(session, terminal);
-            metrics.follow(session);
-        },
-    );
+    watch(&mut session, args.duration, terminal, |session| {
+        admission.follow(session, terminal);
+        metrics.follow(session);
+    });
     terminal.end_status();
-    Ok(session.stop(terminal))
+    let ended = session.stop(terminal);
+    end.let_signals_kill();
+    Ok(ended)
 }
 
 /// What is logged, as `tracing` takes it.
@@ -153,10 +150,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
     }
 }
 
-/// Lets the session run until `duration` is over, the signal is given, or something breaks; `each` is called at every look.
+/// Lets the session run until `duration` is over or its end is asked for; `each` is called at every look.
 pub fn watch(
     session: &mut Session,
-    signal: &mut BlockingEndSignal,
     duration: Option<f64>,
     terminal: &Terminal,
     mut each: impl FnMut(&mut Session),
@@ -166,7 +162,8 @@ pub fn watch(
         let left = end.map_or(LOOK_PERIOD, |end| {
             end.saturating_sub(session.age()).min(LOOK_PERIOD)
         });
-        if signal.wait(left) || session.is_ending() {
+        std::thread::sleep(left);
+        if session.is_ending() {
             return;
         }
         session.follow_network(terminal);

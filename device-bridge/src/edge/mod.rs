@@ -19,6 +19,7 @@ mod ahead;
 mod coupler;
 mod offer;
 mod sets;
+mod work;
 
 pub use ahead::{device_ahead, device_predicted};
 pub use coupler::{EdgeCoupler, EdgeWrench};

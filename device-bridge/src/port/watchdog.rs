@@ -45,7 +45,7 @@ pub(super) enum Missing {
 pub(super) enum Freshness {
     /// In full.
     Fresh,
-    /// In full still, but nothing new came for longer than [`LATE`].
+    /// In full still, but nothing new came for longer than [`SafetySettings::late`].
     Late,
     /// No more.
     Stale {
@@ -57,9 +57,6 @@ pub(super) enum Freshness {
         since: Duration,
     },
 }
-
-/// Longer than any period of a loop that works: from here on the last force is said to be held.
-pub(super) const LATE: Duration = Duration::from_millis(5);
 
 /// How fresh `command` is at `now`.
 pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySettings) -> Freshness {
@@ -91,7 +88,7 @@ pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySetti
             age: now.saturating_sub(made),
             since,
         },
-        _ if now.saturating_sub(command.made) > LATE => Freshness::Late,
+        _ if now.saturating_sub(command.made) > settings.late() => Freshness::Late,
         _ => Freshness::Fresh,
     }
 }

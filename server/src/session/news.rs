@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use god_object::spatial::linear;
-use taut_bridge::{ArmWish, EventKind};
+use taut_bridge::EventKind;
 use taut_link::{LinkEvent, ServerLink, proto};
 use taut_recording::EventRecord;
 
@@ -32,10 +32,6 @@ impl Session {
         let now = self.clock.now();
         while let Some(event) = link.try_event() {
             let to_be_told = self.audit.follow(&event, now);
-            if let LinkEvent::Arm { arm, .. } = event {
-                self.arm_switch
-                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
-            }
             let line = self.clients.follow(&event);
             if to_be_told {
                 lines.extend(line.map(|line| (severity(&event), line)));

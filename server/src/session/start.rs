@@ -5,7 +5,7 @@ use std::sync::Arc;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{keep_cores_awake, lock_memory};
-use taut_bridge::{Device, RemoteDevice};
+use taut_bridge::{ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
@@ -114,6 +114,10 @@ impl Session {
             taps,
         )
         .with_motions(setup.motions.clone());
+        let switch = loops.arm_switch.clone();
+        link.on_arm(move |arm| {
+            switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+        });
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);

@@ -117,6 +117,7 @@ pub(crate) async fn connect_with(
         hot,
         AtJoin {
             session: welcome.session,
+            epoch: welcome.epoch,
             node_timeout: Duration::from_millis(
                 welcome
                     .node_timeout_ms

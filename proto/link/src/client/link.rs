@@ -40,6 +40,7 @@ pub struct ClientLink {
     endpoint: Endpoint,
     hot: Arc<Hot>,
     session: u16,
+    epoch: u32,
     node_timeout: Duration,
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
@@ -50,6 +51,7 @@ pub struct ClientLink {
 /// What the server tells at join.
 pub(crate) struct AtJoin {
     pub(crate) session: u16,
+    pub(crate) epoch: u32,
     pub(crate) node_timeout: Duration,
     pub(crate) description: SceneDescription,
     /// For a device bridge.
@@ -74,6 +76,7 @@ impl ClientLink {
             endpoint,
             hot,
             session: told.session,
+            epoch: told.epoch,
             node_timeout: told.node_timeout,
             description: told.description,
             coupling: told.coupling,
@@ -95,6 +98,11 @@ impl ClientLink {
     /// Number of this session at the server.
     pub fn session(&self) -> u16 {
         self.session
+    }
+
+    /// Incarnation of the server: another process has another one.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
     }
 
     /// Silence on the hot plane after which the server gives a node up, and after which it is to be given up itself.

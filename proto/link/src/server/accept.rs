@@ -324,10 +324,15 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 node: session.node.clone(),
                 event,
             }),
-            ControlMessage::Arm(request) => shared.tell(LinkEvent::Arm {
-                node: session.node.clone(),
-                arm: request.arm,
-            }),
+            ControlMessage::Arm(request) => {
+                if let Some(take) = shared.arm.get() {
+                    take(request.arm);
+                }
+                shared.tell(LinkEvent::Arm {
+                    node: session.node.clone(),
+                    arm: request.arm,
+                });
+            }
             ControlMessage::StatesBy(states) => session.take_states_by(states, shared),
             ControlMessage::Bye(bye) => return bye.reason.to_string(),
             other => return broken(session, &format!("a client sent {}", other.name())),

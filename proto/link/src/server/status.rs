@@ -114,7 +114,7 @@ pub enum LinkEvent {
         /// Its name.
         node: String,
     },
-    /// An operator wants force at the device, or none.
+    /// An operator wants force at the device, or none; for the log: [`ServerLink::on_arm`](super::ServerLink::on_arm) has heard of it before.
     Arm {
         /// Its name.
         node: String,
