@@ -6,6 +6,7 @@ use std::path::Path;
 use god_object::Pose;
 
 use super::device::device;
+use super::scale::places;
 use super::displays::{nodes, screens};
 use super::dynamics::dynamics;
 use super::frames::frames;
@@ -73,6 +74,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
+    if let Some(network) = &network {
+        places(&root, &nodes, network, &frames);
+    }
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
