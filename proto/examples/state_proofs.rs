@@ -83,15 +83,27 @@ fn main() {
     });
     assert!(decode::<Confirmation>(&payload[..length]).is_ok());
 
-    println!("fingerprint of a state of {STATE_BYTES} bytes: {hash:.2} us; signature {sign:.1} us, check {verify:.1} us");
+    println!(
+        "fingerprint of a state of {STATE_BYTES} bytes: {hash:.2} us; signature {sign:.1} us, check {verify:.1} us"
+    );
     println!("| way | server, ms/s | each receiver, ms/s | bytes/s | believed for at most |");
     println!("| --- | --- | --- | --- | --- |");
     let row = |way: &str, server: f64, receiver: f64, bytes: f64, latency: &str| {
         let ms = |us: f64| us * 1e-3;
-        println!("| {way} | {:.2} | {:.2} | {bytes:.0} | {latency} |", ms(server), ms(receiver));
+        println!(
+            "| {way} | {:.2} | {:.2} | {bytes:.0} | {latency} |",
+            ms(server),
+            ms(receiver)
+        );
     };
     let hashes = STATES * hash;
-    row("a signature for each state", STATES * sign, STATES * verify, STATES * 64.0, "not at all");
+    row(
+        "a signature for each state",
+        STATES * sign,
+        STATES * verify,
+        STATES * 64.0,
+        "not at all",
+    );
     let batches = STATES / 10.0;
     row(
         "a signature for ten states",
@@ -100,7 +112,13 @@ fn main() {
         batches * 64.0,
         "10 ms and a lost batch",
     );
-    row("hash chain, key disclosed after 50 ms", hashes, 2.0 * hashes, STATES * 48.0, "50 ms and the clock's error");
+    row(
+        "hash chain, key disclosed after 50 ms",
+        hashes,
+        2.0 * hashes,
+        STATES * 48.0,
+        "50 ms and the clock's error",
+    );
     let each = EXCHANGES * seal;
     row(
         "confirmed to each session, for each of them",

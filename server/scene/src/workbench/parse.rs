@@ -6,7 +6,6 @@ use std::path::Path;
 use god_object::Pose;
 
 use super::device::device;
-use super::scale::places;
 use super::displays::{nodes, screens};
 use super::dynamics::dynamics;
 use super::frames::frames;
@@ -18,6 +17,7 @@ use super::network::network;
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
+use super::scale::places;
 use super::spec::Device;
 use super::viewer::{show, viewer};
 use crate::document::{Document, Section};

@@ -202,7 +202,10 @@ fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
     let room = ("max_clients = 16", "max_clients = 64");
     let report = workbench_with(40, &[room]);
     let text = report.to_string();
-    assert!(!report.is_good() && text.contains("32 at most swap together"), "{text}");
+    assert!(
+        !report.is_good() && text.contains("32 at most swap together"),
+        "{text}"
+    );
     let off = ("swap = \"scheduled\"", "swap = \"off\"");
     let report = workbench_with(40, &[room, off]);
     assert!(report.is_good(), "{report}");
@@ -218,6 +221,9 @@ fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
 fn a_least_rate_above_the_rate_is_a_fault() {
     let report = workbench_with(0, &[("least_rate = 10", "least_rate = 61")]);
     let text = report.to_string();
-    assert!(!report.is_good() && text.contains("every node would swap on its own"), "{text}");
+    assert!(
+        !report.is_good() && text.contains("every node would swap on its own"),
+        "{text}"
+    );
     assert!(!workbench_with(0, &[("rate = 60 ", "rate = 0.5 ")]).is_good());
 }

@@ -92,7 +92,9 @@ pub fn ways(receivers: usize) -> Result<Ways, BenchError> {
             // Turn by turn, so that neither finds the caches warmer.
             for turn in 0..2 {
                 if (round + turn) % 2 == 0 {
-                    timed(&mut one_by_one, || send_each(&sender, &buffers, bytes, &addresses))?;
+                    timed(&mut one_by_one, || {
+                        send_each(&sender, &buffers, bytes, &addresses)
+                    })?;
                 } else {
                     timed(&mut at_once, || {
                         send_all(&sender, &buffers, bytes, &to, &mut headers)
@@ -187,7 +189,12 @@ pub fn cost(
         .map(|k| start_client(this, &address, &key_path, &format!("node-{k}"), "udp"))
         .collect::<Result<Vec<_>, _>>()?;
     wait_until("datagrams of all", || {
-        server.clients().iter().filter(|c| c.udp_address.is_some()).count() == clients
+        server
+            .clients()
+            .iter()
+            .filter(|c| c.udp_address.is_some())
+            .count()
+            == clients
     })?;
     let cost = on_own_thread("broadcast", || {
         let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
