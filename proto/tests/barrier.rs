@@ -5,10 +5,10 @@ mod barrier_support;
 use barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
-    ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, FARTHEST_AHEAD, HUSH_NS, LEAD_NS, MAX_MISSES,
-    MOST_REIGNS_AHEAD, Master, MasterSettings, Newest, Node, NodeState, PROBATION_FRAMES,
-    RECLAIM_NS, ReleaseHead, SILENCE_NS, SLOWEST_ARRIVE_NS, SUCCESSION_NS, SWAP_TOLD_NS,
-    Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
+    ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, FARTHEST_AHEAD, HUSH_NS, LEAD_NS, MAX_MEMBERS,
+    MAX_MISSES, MOST_REIGNS_AHEAD, Master, MasterSettings, Newest, Node, NodeState,
+    PROBATION_FRAMES, RECLAIM_NS, ReleaseHead, SILENCE_NS, SLOWEST_ARRIVE_NS, SUCCESSION_NS,
+    SWAP_TOLD_NS, Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
 };
 
 const MS: u64 = 1_000_000;
@@ -370,6 +370,22 @@ fn a_frame_that_nobody_began_is_refused() {
         taut_proto::barrier::Answer::Refused
     );
     assert_eq!(master.counts().refused, 1);
+}
+
+#[test]
+fn the_thirty_third_node_is_told_apart() {
+    let sessions: Vec<u16> = (1..=MAX_MEMBERS as u16).collect();
+    let (mut master, last) = in_step(Swap::Immediate, &sessions);
+    let (answer, _) = master.arrive(last, 99, &Arrive::default());
+    assert_eq!(
+        (answer, master.members().count()),
+        (Answer::Full, MAX_MEMBERS)
+    );
+    master.leave(7);
+    assert_eq!(
+        master.arrive(last, 99, &Arrive::default()).0,
+        Answer::Repeat
+    );
 }
 
 #[test]

@@ -117,3 +117,72 @@ impl Answer {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_link::Provenance;
+    use taut_proto::HotState;
+
+    fn received(run: RunState, provenance: Provenance) -> ReceivedState {
+        ReceivedState {
+            state: HotState {
+                run,
+                ..HotState::empty()
+            },
+            sequence: 1,
+            received: Instant::now(),
+            state_hash: 1,
+            provenance,
+        }
+    }
+
+    fn looked(
+        answer: &mut Answer,
+        run: RunState,
+        provenance: Provenance,
+    ) -> Option<Result<&'static str, &'static str>> {
+        let state = received(run, provenance);
+        state.of_server().and_then(|state| answer.look(state))
+    }
+
+    #[test]
+    fn no_force_is_asked_for_before_anything_is_believed() {
+        let mut answer = Answer::new(false);
+        assert!(answer.is_to_ask(), "before any state");
+        assert_eq!(
+            looked(&mut answer, RunState::Paused, Provenance::Session),
+            None,
+            "what the device does before it was asked is no answer"
+        );
+        assert!(answer.is_to_ask());
+        answer.asked = true;
+        for _ in 0..100 {
+            let forged = looked(&mut answer, RunState::Paused, Provenance::Group);
+            assert_eq!(forged, None, "a member's word");
+        }
+        assert_eq!(
+            looked(&mut answer, RunState::Running, Provenance::Session),
+            None
+        );
+        assert!(looked(&mut answer, RunState::Paused, Provenance::Session).is_some());
+    }
+
+    #[test]
+    fn force_is_asked_for_when_the_server_has_said_what_the_device_does() {
+        let mut answer = Answer::new(true);
+        assert!(!answer.is_to_ask());
+        assert_eq!(
+            looked(&mut answer, RunState::Running, Provenance::Group),
+            None
+        );
+        assert!(!answer.is_to_ask(), "a state of the group says nothing");
+        assert_eq!(
+            looked(&mut answer, RunState::Paused, Provenance::Session),
+            None
+        );
+        assert!(answer.is_to_ask());
+        let mut armed = Answer::new(true);
+        assert!(looked(&mut armed, RunState::Running, Provenance::Session).is_some());
+    }
+}

@@ -177,6 +177,13 @@ impl AuditTrail {
                 }
                 .record();
             }
+            LinkEvent::NoPlace { node } => {
+                Audit::Frames {
+                    node,
+                    what: "no-place",
+                }
+                .record();
+            }
             LinkEvent::StatesForged { node } => {
                 Audit::Frames {
                     node,

@@ -3,6 +3,7 @@
 //! A client reports about once a second. Its distributions here are made of those reports: the median of the seconds' medians, the
 //! largest of the seconds' 99th percentiles, and the largest of all for p99.9 and max.
 
+use taut_link::proto::barrier::MAX_MEMBERS;
 use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
 
 use crate::report::ClientReport;
@@ -93,6 +94,9 @@ impl ClientLedger {
             LinkEvent::FreeRunning { node, free: false } => {
                 Some(format!("{node} is in step with the others again"))
             }
+            LinkEvent::NoPlace { node } => Some(format!(
+                "{node} swaps on its own: {MAX_MEMBERS} nodes swap together already, and there is no place for more"
+            )),
             LinkEvent::StatesForged { node } => Some(format!(
                 "{node} says that a member of the multicast group forges this server's states: it takes them by unicast until the membership changes; look at who is in"
             )),

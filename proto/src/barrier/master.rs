@@ -70,8 +70,10 @@ pub enum Answer {
     Counted,
     /// The node missed a RELEASE: send it the newest again, to it alone.
     Repeat,
-    /// It names a frame that nobody began or a reign that nobody can have begun, or there are [`MAX_MEMBERS`] already: it has no effect.
+    /// It names a frame that nobody began or a reign that nobody can have begun: it has no effect.
     Refused,
+    /// There are [`MAX_MEMBERS`] already: the node swaps on its own.
+    Full,
 }
 
 /// What became of a node.
@@ -174,8 +176,7 @@ impl Master {
         arrive: &Arrive,
     ) -> (Answer, Option<FrameSkew>) {
         let Some(index) = self.find_or_admit(now_ns, session) else {
-            self.counts.refused += 1;
-            return (Answer::Refused, None);
+            return (Answer::Full, None);
         };
         let begun = self.counts.released > 0;
         let open = self.newest.frame + 1;

@@ -167,7 +167,7 @@ fn severity(event: &LinkEvent) -> Severity {
             true => Severity::Error,
             false => Severity::Info,
         },
-        LinkEvent::StatesForged { .. } => Severity::Error,
+        LinkEvent::NoPlace { .. } | LinkEvent::StatesForged { .. } => Severity::Error,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Forbidden { .. } => Severity::Warning,

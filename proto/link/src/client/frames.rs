@@ -234,7 +234,7 @@ impl Frames {
         match answer {
             Answer::Counted => ToMember::Nothing,
             Answer::Repeat => ToMember::Newest,
-            Answer::Refused => ToMember::Refused,
+            Answer::Refused | Answer::Full => ToMember::Refused,
         }
     }
 

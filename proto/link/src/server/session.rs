@@ -41,6 +41,7 @@ pub(crate) struct Session {
     /// Newest event that the client has, in the upper half beside a 1; 0 before it said so.
     acknowledged: AtomicU64,
     by_multicast: AtomicBool,
+    has_no_place: AtomicBool,
     pace: Mutex<Pace>,
     packets_sent: Cell,
     bytes_sent: Cell,
@@ -95,6 +96,7 @@ impl Session {
             due_ns: AtomicU64::new(0),
             acknowledged: AtomicU64::new(0),
             by_multicast: AtomicBool::new(false),
+            has_no_place: AtomicBool::new(false),
             pace: Mutex::default(),
             packets_sent: Cell::default(),
             bytes_sent: Cell::default(),
@@ -220,6 +222,11 @@ impl Session {
     fn note_full(&self, shared: &Shared) {
         lock(&self.pace).blocked(shared.clock.now_ns());
         shared.counters.congested.one();
+    }
+
+    /// Notes that there is no place for it among those that swap together; whether that is news.
+    pub(crate) fn note_no_place(&self) -> bool {
+        !self.has_no_place.swap(true, Ordering::Relaxed)
     }
 
     /// Takes the client's word on how it gets its states.

@@ -109,6 +109,11 @@ pub enum LinkEvent {
         /// On its own, or in step again.
         free: bool,
     },
+    /// As many nodes as can swap together are there already: this one swaps on its own.
+    NoPlace {
+        /// Its name.
+        node: String,
+    },
     /// It says that a member of the group sealed a state in the server's name: it takes states by itself until the group's keys change.
     StatesForged {
         /// Its name.

@@ -14,6 +14,7 @@ mod parse;
 mod parts;
 mod realtime;
 mod safety;
+mod scale;
 mod spec;
 mod tracker;
 mod viewer;

@@ -17,6 +17,7 @@ use super::network::network;
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
+use super::scale::places;
 use super::spec::Device;
 use super::viewer::{show, viewer};
 use crate::document::{Document, Section};
@@ -73,6 +74,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
+    if let Some(network) = &network {
+        places(&root, &nodes, network, &frames);
+    }
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.

@@ -181,3 +181,49 @@ fn all_formats_give_the_same_box() {
         assert!(check(&[folder.0.path().join(name)])[0].is_good(), "{name}");
     }
 }
+
+/// The shipped workbench with this many more nodes, and with the first of `changes` put in the place of the second.
+fn workbench_with(nodes: usize, changes: &[(&str, &str)]) -> FileReport {
+    let mut text = SHIPPED_WORKBENCH.to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let at = text.find("[viewer]").expect("there is a viewer");
+    let more: String = (0..nodes)
+        .map(|k| format!("[[node]]\nname = \"more-{k}\"\nscreens = [\"front\"]\n\n"))
+        .collect();
+    text.insert_str(at, &more);
+    Folder::new().check("workbench.toml", text)
+}
+
+#[test]
+fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
+    let room = ("max_clients = 16", "max_clients = 64");
+    let report = workbench_with(40, &[room]);
+    let text = report.to_string();
+    assert!(
+        !report.is_good() && text.contains("32 at most swap together"),
+        "{text}"
+    );
+    let off = ("swap = \"scheduled\"", "swap = \"off\"");
+    let report = workbench_with(40, &[room, off]);
+    assert!(report.is_good(), "{report}");
+    assert!(report.to_string().contains("% of a core"), "{report}");
+    let report = workbench_with(20, &[]);
+    assert!(report.to_string().contains("`max_clients`"), "{report}");
+    let slow = ("broadcast_rate = 1000", "broadcast_rate = 250");
+    let report = workbench_with(0, &[room, slow]);
+    assert!(report.is_good() && report.notes.is_empty(), "{report}");
+}
+
+#[test]
+fn a_least_rate_above_the_rate_is_a_fault() {
+    let report = workbench_with(0, &[("least_rate = 10", "least_rate = 61")]);
+    let text = report.to_string();
+    assert!(
+        !report.is_good() && text.contains("every node would swap on its own"),
+        "{text}"
+    );
+    assert!(!workbench_with(0, &[("rate = 60 ", "rate = 0.5 ")]).is_good());
+}

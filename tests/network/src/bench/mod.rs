@@ -15,6 +15,7 @@ mod process;
 mod program;
 mod quantiles;
 mod realtime;
+pub mod scale;
 pub mod screen;
 pub mod screen_death;
 pub mod server_kill;

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use taut_link::proto::barrier::{Arrive, MOST_REIGNS_AHEAD, MasterSettings, Swap};
+use taut_link::proto::events::EventAck;
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::state::RunState;
 use taut_link::proto::{Holder, JoinKey, Payload, confirmation};
@@ -195,6 +196,12 @@ fn last_term(_: &Extent) -> Result<Finding, BenchError> {
             claim(term)?;
         }
         let beyond = claim(u64::MAX).is_err();
+        // Of an event that there was not: it would end what is repeated for the others.
+        let garbage = server.counters().garbage;
+        liar.say(&Payload::EventAck(EventAck { newest: 1 << 30 }))?;
+        wait_until("the acknowledgement is refused", || {
+            server.counters().garbage > garbage
+        })?;
         wait_until("the claims arrive", || {
             report(&server).counts.refused >= before.refused + claims.len() as u64
         })?;

@@ -95,10 +95,10 @@ impl Liar {
     /// The group as this member was told of it last, once `node` is in it.
     pub(super) async fn group_with(&mut self, node: &str) -> Result<Group, BenchError> {
         loop {
-            if let ControlMessage::Group(group) = read(&mut self.recv).await? {
-                if group.members.iter().any(|member| member.node == node) {
-                    return Ok(group);
-                }
+            if let ControlMessage::Group(group) = read(&mut self.recv).await?
+                && group.members.iter().any(|member| member.node == node)
+            {
+                return Ok(group);
             }
         }
     }

@@ -6,6 +6,7 @@
 mod frames;
 mod processes;
 mod row;
+mod scale;
 mod sections;
 mod soak;
 

@@ -8,6 +8,7 @@ use taut_proto::membership::SilenceLimits;
 use super::frames::{failover_rows, skew_rows};
 use super::processes::{missing, screen_death_rows, server_kill_rows};
 use super::row::{Row, brief};
+use super::scale::scale_rows;
 use crate::bench::age::{self, Age};
 use crate::bench::death::{self, Aftermath, Death};
 use crate::bench::{BenchError, events, isolation, join, latency};
@@ -25,6 +26,8 @@ pub struct Extent {
     pub joins: usize,
     /// Deaths of each sort; of those that whole processes or all nodes take part in, at most three.
     pub deaths: usize,
+    /// Numbers of clients whose cost is measured.
+    pub clients: &'static [usize],
     /// Numbers of nodes whose swaps are compared.
     pub screens: &'static [u64],
     /// Runs of each sort of frames, of which the median counts.
@@ -82,6 +85,11 @@ pub const SECTIONS: &[Section] = &[
         name: "isolation",
         about: "period of the haptics loop without and with eight clients, stalled and flooding ones included",
         run: isolation_rows,
+    },
+    Section {
+        name: "scale",
+        about: "processor time for each state and client, 8 to 64 clients",
+        run: scale_rows,
     },
     Section {
         name: "forged",
@@ -420,6 +428,7 @@ impl Extent {
             forgeries: 1_000_000,
             joins: 10,
             deaths: 5,
+            clients: &[8, 32, 64],
             screens: &[2, 4],
             skew_turns: 5,
             node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),
@@ -440,6 +449,7 @@ impl Extent {
             forgeries: 20_000,
             joins: 1,
             deaths: 1,
+            clients: &[4],
             screens: &[2],
             skew_turns: 1,
             // A busy machine starves a thread for longer than a workbench forgives.
