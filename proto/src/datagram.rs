@@ -6,6 +6,7 @@ use crate::{
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,
+    path::PathToken,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -38,6 +39,10 @@ pub enum Payload {
     Constraints(ConstraintPart),
     /// Where the viewer's head is.
     Head(HeadSample),
+    /// "Who is there?"
+    PathChallenge(PathToken),
+    /// "I am."
+    PathResponse(PathToken),
 }
 
 impl Payload {
@@ -55,6 +60,8 @@ impl Payload {
             Payload::Wrench(_) => Kind::Wrench,
             Payload::Constraints(_) => Kind::Constraints,
             Payload::Head(_) => Kind::Head,
+            Payload::PathChallenge(_) => Kind::PathChallenge,
+            Payload::PathResponse(_) => Kind::PathResponse,
         }
     }
 
@@ -72,6 +79,9 @@ impl Payload {
             Payload::Wrench(value) => encode_into(value, buffer),
             Payload::Constraints(value) => encode_into(value, buffer),
             Payload::Head(value) => encode_into(value, buffer),
+            Payload::PathChallenge(value) | Payload::PathResponse(value) => {
+                encode_into(value, buffer)
+            }
         }
     }
 
@@ -90,6 +100,8 @@ impl Payload {
             Kind::Wrench => Payload::Wrench(decode(bytes)?),
             Kind::Constraints => Payload::Constraints(decode(bytes)?),
             Kind::Head => Payload::Head(decode(bytes)?),
+            Kind::PathChallenge => Payload::PathChallenge(decode(bytes)?),
+            Kind::PathResponse => Payload::PathResponse(decode(bytes)?),
         })
     }
 }

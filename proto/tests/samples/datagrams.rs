@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use taut_proto::{
     HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
     events::EventAck,
+    path::PathToken,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -60,6 +61,14 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("arrive", Payload::Arrive(arrive())),
         ("release", Payload::Release(release())),
         ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
+        (
+            "path_challenge",
+            Payload::PathChallenge(PathToken { token: 0x0102 }),
+        ),
+        (
+            "path_response",
+            Payload::PathResponse(PathToken { token: 0x0102 }),
+        ),
     ]
 }
 
@@ -117,5 +126,6 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         head,
         any_arrive().prop_map(Payload::Arrive),
         any_release().prop_map(Payload::Release),
+        any::<u64>().prop_map(|token| Payload::PathResponse(PathToken { token })),
     ]
 }

@@ -5,7 +5,7 @@ use super::{
     gate::{act_of_message, demand},
     joining::Joining,
     receive::receive,
-    session::{Admitted, Session, lock},
+    session::{Admitted, Session},
     shared::{Admission, Refused, Shared},
 };
 use crate::{

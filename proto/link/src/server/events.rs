@@ -2,7 +2,6 @@
 //!
 //! Written by the broadcaster, read by the writers of the streams; both hold the lock for a copy of a few records and across no system call.
 
-use super::session::lock;
 use std::sync::{
     Mutex,
     atomic::{AtomicBool, Ordering},

@@ -2,7 +2,7 @@
 
 use super::{
     frames::Frames,
-    session::{Session, lock},
+    session::Session,
     shared::Shared,
 };
 use std::{

@@ -5,7 +5,7 @@
 
 use super::{
     frame_report::{FrameReport, Recorder},
-    session::{Sent, Session, lock},
+    session::{Sent, Session},
     shared::Shared,
 };
 use std::sync::{Condvar, Mutex, TryLockError};

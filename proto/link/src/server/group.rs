@@ -3,7 +3,7 @@
 //! One task looks at the sessions [`POLL_PERIOD`] by period: what changed meanwhile is one change. Each session's writer ([`super::downstream`])
 //! takes the newest from a watch, so that a member whose stream is slow skips what is old already.
 
-use super::{session::lock, shared::Shared};
+use super::shared::Shared;
 use crate::{LinkError, MulticastOptions, multicast};
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{

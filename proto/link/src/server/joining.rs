@@ -1,6 +1,6 @@
 //! Attempts to join, under the limits of `taut_proto::limits`: before TLS, and with the outcome noted whatever ends it.
 
-use super::{session::lock, shared::Shared};
+use super::shared::Shared;
 use std::{net::IpAddr, sync::Arc};
 use taut_proto::limits::{Attempt, JoinGuard, JoinLimits, Rate, UnknownSources};
 

@@ -11,7 +11,6 @@ use super::{
     head_input::head_inputs,
     receive,
     sent_states::SentStates,
-    session::lock,
     shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{

@@ -7,7 +7,7 @@ use super::{
     DeviceInput, HeadInput,
     device_input::Taken,
     gate::{act_of_datagram, permits},
-    session::{Session, lock},
+    session::Session,
     shared::Shared,
 };
 use crate::readiness::wait_readable;

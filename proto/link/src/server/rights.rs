@@ -1,6 +1,5 @@
 //! What the gate remembers of one session: how much it sends, and what it tried without being allowed to.
 
-use super::session::lock;
 use std::sync::{
     Mutex,
     atomic::{AtomicU16, Ordering},

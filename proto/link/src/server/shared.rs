@@ -9,7 +9,7 @@ use super::{
     group::GroupHub,
     head_input::HeadWriter,
     sent_states::SentStates,
-    session::{Session, lock},
+    session::Session,
 };
 use crate::{SessionClock, counters::CounterCells};
 use std::{
