@@ -118,6 +118,9 @@ mod tests {
         }
         assert_eq!(VersionRange::new(0, 4), None);
         assert_eq!(VersionRange::new(5, 4), None);
-        assert_eq!(format!("{} and {}", range(4, 4), range(4, 6)), "4 and 4 to 6");
+        assert_eq!(
+            format!("{} and {}", range(4, 4), range(4, 6)),
+            "4 and 4 to 6"
+        );
     }
 }

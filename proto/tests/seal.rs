@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, DecodeError, HotState, InputSample, Kind, PROTOCOL_VERSION, Payload, PoseF32, PoseF64,
-    VersionRange,
+    ArrayVec, DecodeError, HotState, InputSample, Kind, PROTOCOL_VERSION, Payload, PoseF32,
+    PoseF64, VersionRange,
     barrier::{Release, ReleaseHead},
     header::{HEADER_BYTES, MAX_DATAGRAM_BYTES},
     seal::{DatagramBuffer, OpenError, Opener, Sealer},

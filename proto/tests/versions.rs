@@ -98,7 +98,10 @@ fn a_hello_is_read_by_its_range_whatever_a_later_version_adds() {
 #[test]
 fn after_the_join_only_the_agreed_version_is_read() {
     let message = message("welcome");
-    let body = message.to_frame_of(5).expect("encodes").split_off(LENGTH_BYTES);
+    let body = message
+        .to_frame_of(5)
+        .expect("encodes")
+        .split_off(LENGTH_BYTES);
     let read = |ours| ControlMessage::from_frame_body_of(&body, ours);
     assert_eq!(read(VersionRange::only(5)), Ok(message));
     assert!(matches!(

@@ -18,7 +18,8 @@ use taut_link::{
     connect, serve,
 };
 use taut_proto::{
-    Header, HotState, InputSample, Kind, MeshBlob, MeshHash, PoseF64, SceneDescription,
+    Header, HotState, InputSample, Kind, MeshBlob, MeshHash, PROTOCOL_VERSION, PoseF64,
+    SceneDescription,
     header::{HEADER_BYTES, TAG_BYTES},
     mesh_blob::Positions,
     scene::BodyDescription,
@@ -163,6 +164,7 @@ fn start(
     // Whoever is on the path has seen the epoch.
     let epoch = server.epoch();
     let header = |sender| Header {
+        version: PROTOCOL_VERSION,
         kind: Kind::Input,
         epoch,
         sender,

@@ -195,10 +195,13 @@ mod tests {
         assert_eq!(read.expect("whole"), message);
 
         // Longer than the patience, then a whole message, then half of one.
-        let (read, ()) = tokio::join!(read_whole_message(&mut recv, 1000, VersionRange::SUPPORTED, patience), async {
-            tokio::time::sleep(2 * patience).await;
-            send.write_all(&frame).await.expect("open");
-        });
+        let (read, ()) = tokio::join!(
+            read_whole_message(&mut recv, 1000, VersionRange::SUPPORTED, patience),
+            async {
+                tokio::time::sleep(2 * patience).await;
+                send.write_all(&frame).await.expect("open");
+            }
+        );
         assert_eq!(read.expect("whole"), message);
         let half = &frame[..frame.len() / 2];
         send.write_all(half).await.expect("open");

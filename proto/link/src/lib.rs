@@ -38,8 +38,9 @@ pub use error::LinkError;
 pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
 pub use multicast::MulticastOptions;
 pub use server::{
-    AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits, FrameMaster, FrameReport,
-    HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink, ServerOptions, Spread, serve,
+    AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
+    FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink,
+    ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

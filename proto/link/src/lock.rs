@@ -36,7 +36,10 @@ mod os {
         number.unsigned_abs()
     }
 
-    #[allow(unsafe_code, reason = "a raw lock promises exclusion by an unsafe trait")]
+    #[allow(
+        unsafe_code,
+        reason = "a raw lock promises exclusion by an unsafe trait"
+    )]
     // SAFETY: the value names the one thread that may be inside. It is set by a compare-exchange from 0, or by the kernel, which hands it to one waiter;
     // it is cleared by its holder alone, whose guard cannot leave its thread (`GuardNoSend`).
     unsafe impl lock_api::RawMutex for Lock {
@@ -89,11 +92,12 @@ mod os {
 mod tests {
     use super::*;
     use std::{
-        fs, thread,
+        fs,
         sync::{
             Arc,
             atomic::{AtomicU32, Ordering},
         },
+        thread,
         time::{Duration, Instant},
     };
 

@@ -13,7 +13,7 @@ use taut_link::{
     serve, transport,
 };
 use taut_proto::{
-    PROTOCOL_VERSION,
+    PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
     proof::Grant,
 };
@@ -79,6 +79,7 @@ async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
 
 fn hello() -> Vec<u8> {
     let hello = ControlMessage::Hello(Hello {
+        versions: VersionRange::SUPPORTED,
         node: "stranger".to_owned(),
         role: Role::Render,
         transport: Transport::Udp,
@@ -93,11 +94,20 @@ fn hello() -> Vec<u8> {
 async fn another_protocol_version_is_refused_and_counted() {
     let server = server().await;
     let mut frame = hello();
-    frame[LENGTH_BYTES + 2] = PROTOCOL_VERSION + 1;
+    // The range stands first in Hello.
+    frame[LENGTH_BYTES + 4] = PROTOCOL_VERSION + 1;
+    frame[LENGTH_BYTES + 5] = PROTOCOL_VERSION + 2;
     match answer_to(server.quic_addr(), &frame).await {
         ControlMessage::Refused(refusal) => {
             assert_eq!(refusal.code, RefusalCode::WrongVersion);
             assert_eq!(refusal.version, PROTOCOL_VERSION);
+            let both = format!(
+                "version {} to {}, this program speaks {}",
+                PROTOCOL_VERSION + 1,
+                PROTOCOL_VERSION + 2,
+                VersionRange::SUPPORTED
+            );
+            assert!(refusal.text.contains(&both), "{}", refusal.text);
         }
         other => panic!("{other:?}"),
     }
@@ -161,6 +171,7 @@ async fn a_full_server_says_so() {
         ..ServerOptions::loopback(key('a'))
     })
     .await;
+    // The workbench's own node has its place; another one finds none.
     let _first = client(&server, Role::Render, "left").await;
     let error = error_of(options(&server, Role::Render, "right")).await;
     assert!(
@@ -173,6 +184,41 @@ async fn a_full_server_says_so() {
         ),
         "{error}"
     );
+}
+
+/// Whoever may be any observer fills the house; those whom the workbench cannot do without get in all the same.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_house_full_of_observers_has_room_for_device_tracker_operator_and_named_nodes() {
+    let server = server_with(ServerOptions {
+        max_clients: 8,
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let mut inside = Vec::new();
+    let refusal = loop {
+        let name = format!("watcher-{}", inside.len());
+        match connect(options(&server, Role::Observer, &name)).await {
+            Ok(link) => inside.push(link),
+            Err(error) => break error,
+        }
+        assert!(inside.len() <= 8);
+    };
+    // 8 less device, tracker, operator and the one node of the workbench.
+    assert_eq!(inside.len(), 4);
+    assert!(
+        refusal.to_string().contains("raise max_clients"),
+        "{refusal}"
+    );
+    for (role, name) in [
+        (Role::Device, "bridge"),
+        (Role::Operator, "alice"),
+        (Role::Tracker, "head"),
+        (Role::Render, "left"),
+    ] {
+        inside.push(client(&server, role, name).await);
+    }
+    assert_eq!(server.clients().len(), 8);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

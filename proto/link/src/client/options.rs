@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
+use taut_proto::{HotState, JoinKey, Role, Transport, VersionRange, WrenchCommand};
 
 /// Longer than any server's own: QUIC takes the shorter one of both ends.
 const LONGEST_IDLE: Duration = Duration::from_secs(120);
@@ -17,6 +17,8 @@ pub struct ClientOptions {
     pub server: String,
     /// The cluster key, or a credential for this role and name.
     pub key: JoinKey,
+    /// Versions of the protocol that it speaks.
+    pub versions: VersionRange,
     /// What this client is.
     pub role: Role,
     /// Its name, unique in the workbench.
@@ -47,6 +49,7 @@ impl ClientOptions {
         ClientOptions {
             server: server.into(),
             key: key.into(),
+            versions: VersionRange::SUPPORTED,
             role,
             node: node.into(),
             transport: Transport::Udp,
