@@ -24,6 +24,8 @@ use tracing_subscriber::EnvFilter;
 const LOG_VARIABLE: &str = "TAUT_LOG";
 
 fn main() -> ExitCode {
+    // Before any key is read. Where the system has no such thing, the file's mode is all there is.
+    taut_link::keep_memory_private();
     let cli = Cli::parse();
     let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
     tracing_subscriber::fmt()

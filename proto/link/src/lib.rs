@@ -35,7 +35,10 @@ pub use client::{
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};
 pub use error::LinkError;
-pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
+pub use key_file::{
+    check_secret_file, create_key_file, keep_memory_private, read_join_key, read_key_file,
+    write_credential_file,
+};
 pub use multicast::MulticastOptions;
 pub use server::{
     AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,

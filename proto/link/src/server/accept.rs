@@ -99,7 +99,7 @@ async fn joined(
     tokio::select! {
         biased;
         joined = timeout(JOIN_TIMEOUT, join(shared, incoming, attempt)) => joined.ok().flatten(),
-        _ = lost => None,
+        Err(_) = lost => None,
     }
 }
 

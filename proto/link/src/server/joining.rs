@@ -57,13 +57,11 @@ pub(crate) struct Joining {
     outcome: Attempt,
     /// Its place among those who have not proven anything.
     ticket: Ticket,
-    /// Kept once it has proven itself: nobody takes its place any more.
-    place: Option<Place>,
 }
 
 /// Held among those who wait; dropped by whoever takes the place.
 pub(crate) type Place = oneshot::Sender<()>;
-/// Ends when the place is lost.
+/// Fails when the place is lost.
 pub(crate) type Lost = oneshot::Receiver<()>;
 
 impl Joining {
@@ -82,7 +80,6 @@ impl Joining {
             address,
             outcome: Attempt::Ended,
             ticket,
-            place: None,
         };
         Some((attempt, lost))
     }
@@ -90,8 +87,14 @@ impl Joining {
     /// It proved its secret; `false` if it had lost its place before.
     pub(crate) fn proven(&mut self) -> bool {
         self.outcome = Attempt::Proven;
-        self.place = lock(&self.shared.waiting).leave(self.ticket);
-        self.place.is_some()
+        self.leave()
+    }
+
+    /// Gives its place back; `false` if somebody else has taken it.
+    fn leave(&self) -> bool {
+        let place = lock(&self.shared.waiting).leave(self.ticket);
+        // Said, not dropped: it is over, but not lost.
+        place.is_some_and(|place| place.send(()).is_ok())
     }
 
     pub(crate) fn wrong_proof(&mut self) {
@@ -101,7 +104,7 @@ impl Joining {
 
 impl Drop for Joining {
     fn drop(&mut self) {
-        lock(&self.shared.waiting).leave(self.ticket);
+        self.leave();
         let now_ns = self.shared.clock.now_ns();
         lock(&self.shared.joins).end(self.address, self.outcome, now_ns);
     }

@@ -12,7 +12,7 @@ use super::frames::frames;
 use super::load::Workbench;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::monitoring::monitoring;
-use super::network::network;
+use super::network::{network, places};
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
@@ -64,6 +64,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
     let frames = table(&root, "frames", frames).unwrap_or_default();
+    if let Some(network) = &network {
+        places(&root, network, nodes.len(), &frames);
+    }
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
