@@ -128,3 +128,53 @@ async fn a_client_whose_address_changes_is_followed_as_soon_as_it_has_answered()
     assert_eq!(server.clients()[0].udp_address, ports[1].local_addr().ok());
     assert_eq!(client.is_closed(), None);
 }
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_the_device_sends_comes_by_its_own_socket_and_nobody_else_s_does() {
+    use std::sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    };
+    let server = server().await;
+    let bridge = client(&server, Role::Device, "bridge").await;
+    wait_until("its path", || server.clients()[0].udp_address.is_some()).await;
+    let over = Arc::new(AtomicBool::new(false));
+    let (mut receiver, of_thread) = (server.device_receiver(), over.clone());
+    let reading = std::thread::Builder::new()
+        .name("device-input".to_owned())
+        .spawn(move || receiver.run(&|| of_thread.load(Ordering::Relaxed)))
+        .expect("a thread");
+    // Two sockets of one port: the second is connected to the bridge.
+    let port = format!(":{:04X}", server.udp_addr().port());
+    let connected = || {
+        let table = std::fs::read_to_string("/proc/self/net/udp").expect("Linux");
+        let fields =
+            |line: &str| -> Vec<String> { line.split_whitespace().map(str::to_owned).collect() };
+        let lines = table.lines().map(fields);
+        lines
+            .filter(|line| line.len() > 2 && line[1].ends_with(&port))
+            .filter(|line| !line[2].ends_with(":0000"))
+            .count()
+    };
+    wait_until("the device's own socket", || connected() == 1).await;
+    let before = server.counters();
+    let mut index = 0;
+    wait_until("readings", || {
+        index += 1;
+        bridge.send_input(&input(index));
+        server.counters().inputs > before.inputs + 100
+    })
+    .await;
+    // A stranger who knows the port reaches the common socket, and a second server does not get the port.
+    let stranger = UdpSocket::bind("127.0.0.1:0").expect("a port");
+    stranger.send_to(b"hello", server.udp_addr()).expect("sent");
+    wait_until("garbage", || server.counters().garbage > before.garbage).await;
+    let taken = UdpSocket::bind(server.udp_addr());
+    assert!(taken.is_err(), "the port is free for another server");
+    // When the bridge is gone, so is its socket.
+    bridge.close().await;
+    wait_until("the end of its socket", || connected() == 0).await;
+    over.store(true, Ordering::Relaxed);
+    reading.join().expect("no panic");
+}

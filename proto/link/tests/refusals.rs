@@ -9,13 +9,13 @@ use std::{
 };
 use support::*;
 use taut_link::{
-    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, pinning::PinnedServer,
-    serve, transport,
+    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, binding, connect,
+    pinning::PinnedServer, serve, transport,
 };
 use taut_proto::{
     PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
-    proof::Grant,
+    proof::{Claim, Grant},
 };
 
 async fn error_of(options: ClientOptions) -> LinkError {
@@ -219,6 +219,52 @@ async fn a_house_full_of_observers_has_room_for_device_tracker_operator_and_name
         inside.push(client(&server, role, name).await);
     }
     assert_eq!(server.clients().len(), 8);
+}
+
+/// A bridge that proves its key and then takes nothing: its place is free when its time to join is over.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_join_that_stalls_leaves_no_session_behind() {
+    let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
+    let server = server().await;
+    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
+    let mut config = transport::client_config(pinned, Duration::from_secs(5))
+        .unwrap_or_else(|error| fail(&error));
+    let mut narrow = quinn::TransportConfig::default();
+    narrow.stream_receive_window(quinn::VarInt::from_u32(16)); // less than a Welcome
+    config.transport_config(Arc::new(narrow));
+    let any = SocketAddr::from(([127, 0, 0, 1], 0));
+    let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
+    let connecting = endpoint
+        .connect_with(config, server.quic_addr(), "taut")
+        .unwrap_or_else(|error| fail(&error));
+    let connection = connecting.await.unwrap_or_else(|error| fail(&error));
+    let claim = Claim {
+        role: Role::Device,
+        node: "bridge",
+        grant: Grant::Master,
+    };
+    let bound = binding::proof_binding(&connection).unwrap_or_else(|error| fail(&error));
+    let secret = key('a').join_secret(claim.role, claim.node, claim.grant);
+    let hello = ControlMessage::Hello(Hello {
+        versions: VersionRange::SUPPORTED,
+        node: claim.node.to_owned(),
+        role: claim.role,
+        transport: Transport::Udp,
+        rate_hz: 0,
+        proof: secret.client_proof(&bound, claim),
+        grant: claim.grant,
+    });
+    let frame = hello.to_frame().unwrap_or_else(|error| fail(&error));
+    let (mut send, _recv) = connection
+        .open_bi()
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    send.write_all(&frame)
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    wait_until("its place", || server.clients().len() == 1).await;
+    wait_until("the end of its time", || server.clients().is_empty()).await;
+    client(&server, Role::Device, "bridge").await.close().await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

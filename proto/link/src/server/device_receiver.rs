@@ -102,6 +102,12 @@ impl DeviceReceiver {
         let shared = self.shared.clone();
         let paths = &shared.device_paths;
         paths.wanted.store(true, Ordering::Relaxed);
+        // A device that came before is as welcome.
+        for session in shared.sessions.all().iter() {
+            if let Some(from) = session.udp_address() {
+                paths.moved(session, from, &shared);
+            }
+        }
         let (mut path, mut generation): (Option<DevicePath>, _) = (None, 0);
         let mut looked_at = TokenBucket::default();
         while !is_over() && !shared.is_stopping() {

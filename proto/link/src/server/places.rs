@@ -10,6 +10,9 @@ use taut_proto::{Role, barrier::MAX_MEMBERS};
 /// Places beside those of the render nodes: device bridge, tracker, operator.
 const SINGLE_PLACES: usize = 3;
 
+/// Session numbers are 1 to 65535: half of them are always free.
+const MOST_CLIENTS: usize = 1 << 15;
+
 /// The places of one workbench.
 pub(crate) struct Places {
     nodes: BTreeSet<String>,
@@ -24,7 +27,9 @@ impl Places {
     pub(crate) fn new(most: usize, nodes: &[String], locks_frames: bool) -> Places {
         let nodes: BTreeSet<_> = nodes.iter().cloned().collect();
         Places {
-            shared: most.saturating_sub(SINGLE_PLACES + nodes.len()),
+            shared: most
+                .min(MOST_CLIENTS)
+                .saturating_sub(SINGLE_PLACES + nodes.len()),
             nodes,
             in_step: locks_frames.then_some(MAX_MEMBERS),
         }

@@ -191,7 +191,7 @@ impl Sessions {
         let mut number = list.last_number;
         loop {
             number = number.checked_add(1).unwrap_or(1);
-            // Ends: there are more numbers than clients (a workbench file allows 256, and descriptors end before 2^16).
+            // Ends: there are more numbers than places.
             if list.sessions.iter().all(|session| session.number != number) {
                 break;
             }

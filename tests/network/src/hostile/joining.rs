@@ -26,7 +26,7 @@ pub(super) const ATTACKS: &[Attack] = &[
     Attack {
         name: "silent-joins",
         tried: "four addresses hold 96 joins open without a word, again and again, while a device comes",
-        promised: "the device is in within 3 s, as without them",
+        promised: "the device gets in: none of them keeps its place against a newcomer",
         run: silent_joins,
     },
     Attack {
@@ -47,9 +47,8 @@ pub(super) const ATTACKS: &[Attack] = &[
 const MAX_CLIENTS: usize = 12;
 /// Joins that one address holds: as many as it may have under way.
 const HELD_OF_ONE: usize = 24;
-/// Time in which a device must be in beside silent joins: the time of a join, whose places are then free in any case, is 3 s; on a busy
-/// machine the join itself takes some.
-const JOIN_LIMIT: Duration = Duration::from_secs(3);
+/// Longest wait for all places of joining to be taken.
+const CROWD_LIMIT: Duration = Duration::from_secs(10);
 /// States that are sent after the path was steered.
 const STEERED_STATES: u64 = 400;
 /// Bytes of a challenge: header, token, seal.
@@ -142,7 +141,7 @@ fn silent_joins(_: &Extent) -> Result<Finding, BenchError> {
         runtime.spawn(hold(from, server.quic_addr(), key.clone()));
     }
     let full = || server.counters().crowded_out > 0;
-    let end = Instant::now() + JOIN_LIMIT;
+    let end = Instant::now() + CROWD_LIMIT;
     while !full() && Instant::now() < end {
         std::thread::sleep(MILLISECOND);
     }
@@ -163,7 +162,7 @@ fn silent_joins(_: &Extent) -> Result<Finding, BenchError> {
             counters.crowded_out,
             counters.turned_away
         ),
-        kept: joined.is_ok() && took < JOIN_LIMIT && counters.crowded_out > 0,
+        kept: joined.is_ok() && counters.crowded_out > 0,
     })
 }
 
