@@ -226,7 +226,7 @@ fn steered_path(_: &Extent) -> Result<Finding, BenchError> {
     let mut steered_from = None;
     while steered_from.is_none_or(|from| tick < from + STEERED_STATES) && Instant::now() < end {
         tick += 1;
-        broadcaster.send(&state(tick));
+        broadcaster.send(&state(tick, tick * 1_000_000, false));
         middle.pass(&server, steered_from.is_some());
         client.drain_states(&mut states);
         if steered_from.is_none() && states.len() >= 20 {
