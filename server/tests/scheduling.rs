@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use taut_link::create_key_file;
@@ -18,13 +18,16 @@ enum Class {
     Normal { nice: i32 },
 }
 
-/// Killed when the test ends, however it ends.
-struct Server(Child);
+/// Killed when the test ends, however it ends. What it writes must find a reader as long as it runs.
+struct Server {
+    child: Child,
+    stderr: BufReader<ChildStderr>,
+}
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
@@ -50,7 +53,7 @@ fn classes(process: u32) -> BTreeMap<String, Vec<Class>> {
     found
 }
 
-fn serve(directory: &Path) -> (Server, String) {
+fn serve(directory: &Path) -> Server {
     create_key_file(&directory.join("cluster.key")).expect("a key");
     let mut file: toml::Table = taut_scene::SHIPPED_WORKBENCH.parse().expect("TOML");
     let mut set = |table: &str, key: &str, value: toml::Value| {
@@ -73,16 +76,16 @@ fn serve(directory: &Path) -> (Server, String) {
         .stdout(Stdio::null())
         .spawn()
         .expect("the program");
-    let lines = BufReader::new(child.stderr.take().expect("piped"));
-    let server = Server(child);
-    let (mut said, mut serves) = (String::new(), false);
-    for line in lines.lines().map_while(Result::ok) {
-        serves |= line.contains("serving on");
-        said += &line;
-        said.push('\n');
-        // Said after the address, before it waits.
-        if serves && line.contains("fingerprint") {
-            return (server, said);
+    let stderr = BufReader::new(child.stderr.take().expect("piped"));
+    let mut server = Server { child, stderr };
+    let mut said = String::new();
+    while server
+        .stderr
+        .read_line(&mut said)
+        .is_ok_and(|read| read > 0)
+    {
+        if said.contains("serving on") {
+            return server;
         }
     }
     panic!("it does not serve: {said}");
@@ -91,8 +94,8 @@ fn serve(directory: &Path) -> (Server, String) {
 #[test]
 fn the_device_comes_first_then_the_loops_and_strangers_are_of_the_normal_class() {
     let directory = tempfile::tempdir().expect("a directory");
-    let (server, _said) = serve(directory.path());
-    let process = server.0.id();
+    let server = serve(directory.path());
+    let process = server.child.id();
     let wanted = ["device-input", "haptics", "coupling", "broadcast", "frames"];
     let end = Instant::now() + PATIENCE;
     loop {
