@@ -47,6 +47,9 @@ const STOP_TIMEOUT: Duration = Duration::from_millis(500);
 /// How often a stopped server looks whether its port is free.
 const FREE_CHECK: Duration = Duration::from_millis(1);
 
+/// What a thread of the network does until the server stops.
+type ThreadBody = fn(&Arc<Shared>);
+
 /// A running server. Dropping it stops it at once; [`ServerLink::shutdown`] also waits until the clients have heard.
 pub struct ServerLink {
     shared: Arc<Shared>,
@@ -124,7 +127,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         quic_sender: QuicSender::default(),
         stopping: AtomicBool::new(false),
     });
-    let bodies: [(_, fn(&Arc<Shared>)); 2] = [
+    let bodies: [(_, ThreadBody); 2] = [
         ("taut-udp", receive::run_udp),
         ("taut-quic", quic_outbox::run),
     ];
