@@ -118,10 +118,10 @@ pub enum DecodeError {
         "the peer speaks protocol version {theirs}, this program speaks {ours}: install the same release on both"
     )]
     WrongVersion {
-        /// Version of the peer.
-        theirs: u8,
-        /// [`crate::PROTOCOL_VERSION`].
-        ours: u8,
+        /// What the peer speaks, as far as it said.
+        theirs: crate::VersionRange,
+        /// What is spoken here.
+        ours: crate::VersionRange,
     },
     /// A field contradicts another one.
     #[error("a message contradicts itself in {what}: the sender or the network is broken")]
@@ -156,6 +156,14 @@ pub fn encode_onto(value: &impl Wire, bytes: &mut Vec<u8>) -> Result<(), EncodeE
 
 /// Reads one value that must fill `bytes` exactly.
 pub fn decode<T: Wire>(bytes: &[u8]) -> Result<T, DecodeError> {
+    match decode_front(bytes)? {
+        (value, 0) => Ok(value),
+        (_, left) => Err(DecodeError::TrailingBytes { left }),
+    }
+}
+
+/// Reads one value from the front of `bytes`; how many bytes are left behind it.
+pub(crate) fn decode_front<T: Wire>(bytes: &[u8]) -> Result<(T, usize), DecodeError> {
     if bytes.len() > MAX_VALUE_BYTES {
         return Err(DecodeError::TooLong {
             what: "message",
@@ -168,10 +176,7 @@ pub fn decode<T: Wire>(bytes: &[u8]) -> Result<T, DecodeError> {
         left: bytes.len(),
     };
     let value = T::read(&mut reader)?;
-    match reader.left {
-        0 => Ok(value),
-        left => Err(DecodeError::TrailingBytes { left }),
-    }
+    Ok((value, reader.left))
 }
 
 /// Where [`Wire::write`] puts bytes.

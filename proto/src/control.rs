@@ -1,13 +1,14 @@
 //! Control messages, on QUIC streams.
 //!
-//! A message on a stream is framed as below; the frame and `Refused` keep their layout in every later version, so that programs of
-//! two versions can at least tell each other why they part.
+//! A message on a stream is framed as below. The frame, `Refused`, and the beginning of `Hello` (the range of versions) keep their layout in every
+//! later version, so that programs of two versions agree on one, or can at least tell each other why they part. What a later version
+//! adds to `Hello` stands behind the rest, and is not read by those who do not know it.
 //!
 //! | offset | field   | bytes | meaning                              |
 //! |--------|---------|-------|--------------------------------------|
 //! | 0      | length  | 4     | bytes after this field, ≥ 4          |
 //! | 4      | magic   | 2     | [`MAGIC`]                            |
-//! | 6      | version | 1     | [`PROTOCOL_VERSION`]                 |
+//! | 6      | version | 1     | of the session; of `Hello` and `Refused` the sender's newest |
 //! | 7      | tag     | 1     | which message                        |
 //! | 8      | body    |       | its fields                           |
 //!
@@ -21,11 +22,11 @@ pub use crate::role::Role;
 
 use crate::{
     ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
-    PROTOCOL_VERSION, SceneDescription, Untrusted,
+    PROTOCOL_VERSION, SceneDescription, Untrusted, VersionRange,
     codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_ranged, wire_tag},
     proof::Grant,
     range::{MESH_BYTES, NAME, PORT, RATE, SESSION, SMALL, TIME, TIMEOUT},
-    version::MAGIC,
+    version::{FIRST_NEGOTIATED, MAGIC},
 };
 
 /// Bytes of a frame's `length` field.
@@ -75,6 +76,8 @@ pub enum RefusalCode {
 /// First message of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
+    /// Versions that the client speaks: the highest that the server speaks, too, is used.
+    pub versions: VersionRange,
     /// Name of the node, unique among the clients.
     pub node: Untrusted,
     /// What it is.
@@ -92,6 +95,8 @@ pub struct Hello {
 /// The server lets the client in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Welcome {
+    /// Version of this session: of the frame that this is in, and of all that follows.
+    pub version: u8,
     /// [`crate::proof::JoinSecret::server_proof`].
     pub proof: [u8; 32],
     /// Session number: the client's `sender` in datagram headers.
@@ -111,7 +116,7 @@ pub struct Welcome {
 pub struct Refusal {
     /// Why, for programs.
     pub code: RefusalCode,
-    /// Protocol version of the server.
+    /// Newest protocol version of the server.
     pub version: u8,
     /// Why and what to do, for people: one sentence.
     pub text: Untrusted,
@@ -221,11 +226,16 @@ impl ControlMessage {
         }
     }
 
-    /// The framed message.
+    /// The framed message, in the newest version.
     pub fn to_frame(&self) -> Result<Vec<u8>, EncodeError> {
+        self.to_frame_of(PROTOCOL_VERSION)
+    }
+
+    /// The framed message of a session of this version.
+    pub fn to_frame_of(&self, version: u8) -> Result<Vec<u8>, EncodeError> {
         let mut frame = vec![0; LENGTH_BYTES];
         codec::encode_onto(&MAGIC, &mut frame)?;
-        frame.push(PROTOCOL_VERSION);
+        frame.push(version);
         codec::encode_onto(self, &mut frame)?;
         let length = u32::try_from(frame.len() - LENGTH_BYTES)
             .ok()
@@ -251,26 +261,44 @@ impl ControlMessage {
         Ok(len)
     }
 
-    /// Reads a message from what follows a frame's `length` field. Another version is an error, except in `Refused`.
+    /// Reads a message from what follows a frame's `length` field, by an end that speaks what this build speaks.
     pub fn from_frame_body(bytes: &[u8]) -> Result<ControlMessage, DecodeError> {
+        ControlMessage::from_frame_body_of(bytes, VersionRange::SUPPORTED)
+    }
+
+    /// The same by an end that speaks `ours`. A version that is not in it is an error, but `Refused` is always read, and `Hello` by the range
+    /// that it states.
+    pub fn from_frame_body_of(
+        bytes: &[u8],
+        ours: VersionRange,
+    ) -> Result<ControlMessage, DecodeError> {
         let Some(([m0, m1, version], message)) = bytes.split_first_chunk::<3>() else {
             return Err(DecodeError::Truncated);
         };
         if u16::from_le_bytes([*m0, *m1]) != MAGIC {
             return Err(DecodeError::WrongMagic);
         }
-        let refused = message.first() == Some(&REFUSED_TAG);
-        if *version != PROTOCOL_VERSION && !refused {
-            return Err(DecodeError::WrongVersion {
-                theirs: *version,
-                ours: PROTOCOL_VERSION,
-            });
+        match message.split_first() {
+            Some((&REFUSED_TAG, _)) => codec::decode(message),
+            Some((&HELLO_TAG, hello)) if *version >= FIRST_NEGOTIATED => {
+                // The range first: the rest may be of a version that is not known here.
+                let (theirs, _) = codec::decode_front::<VersionRange>(hello)?;
+                if ours.highest_common(theirs).is_none() {
+                    return Err(DecodeError::WrongVersion { theirs, ours });
+                }
+                Ok(codec::decode_front(message)?.0)
+            }
+            _ if ours.contains(*version) => codec::decode(message),
+            _ => Err(DecodeError::WrongVersion {
+                theirs: VersionRange::only(*version),
+                ours,
+            }),
         }
-        codec::decode(message)
     }
 }
 
 const REFUSED_TAG: u8 = 0;
+const HELLO_TAG: u8 = 1;
 
 macro_rules! wire_messages {
     ($($variant:ident($body:ty) = $tag:literal),* $(,)?) => {
@@ -298,6 +326,7 @@ wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
 wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
 wire_ranged!(Hello {
+    versions,
     node,
     role,
     transport,
@@ -306,6 +335,7 @@ wire_ranged!(Hello {
     grant
 });
 wire_ranged!(Welcome {
+    version in SMALL,
     proof,
     session in SESSION,
     epoch in NAME,

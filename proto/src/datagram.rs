@@ -6,6 +6,7 @@ use crate::{
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,
+    path::PathToken,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -40,6 +41,10 @@ pub enum Payload {
     Head(HeadSample),
     /// Which states the server sent lately.
     Confirm(Confirmation),
+    /// "Who is there?"
+    PathChallenge(PathToken),
+    /// "I am."
+    PathResponse(PathToken),
 }
 
 impl Payload {
@@ -58,6 +63,8 @@ impl Payload {
             Payload::Constraints(_) => Kind::Constraints,
             Payload::Head(_) => Kind::Head,
             Payload::Confirm(_) => Kind::Confirm,
+            Payload::PathChallenge(_) => Kind::PathChallenge,
+            Payload::PathResponse(_) => Kind::PathResponse,
         }
     }
 
@@ -76,6 +83,9 @@ impl Payload {
             Payload::Constraints(value) => encode_into(value, buffer),
             Payload::Head(value) => encode_into(value, buffer),
             Payload::Confirm(value) => encode_into(value, buffer),
+            Payload::PathChallenge(value) | Payload::PathResponse(value) => {
+                encode_into(value, buffer)
+            }
         }
     }
 
@@ -95,6 +105,8 @@ impl Payload {
             Kind::Constraints => Payload::Constraints(decode(bytes)?),
             Kind::Head => Payload::Head(decode(bytes)?),
             Kind::Confirm => Payload::Confirm(decode(bytes)?),
+            Kind::PathChallenge => Payload::PathChallenge(decode(bytes)?),
+            Kind::PathResponse => Payload::PathResponse(decode(bytes)?),
         })
     }
 }

@@ -48,6 +48,12 @@ const ROOT_PURPOSE: &[u8] = b"taut group keys 1";
 #[derive(Clone, PartialEq, Eq)]
 pub struct GroupSecret(pub [u8; GROUP_SECRET_BYTES]);
 
+impl Drop for GroupSecret {
+    fn drop(&mut self) {
+        zeroize::Zeroize::zeroize(&mut self.0);
+    }
+}
+
 impl fmt::Debug for GroupSecret {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("GroupSecret(secret)")
@@ -116,7 +122,9 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         | Kind::Head
         | Kind::Wrench
         | Kind::Constraints
-        | Kind::Confirm => false,
+        | Kind::Confirm
+        | Kind::PathChallenge
+        | Kind::PathResponse => false,
     }
 }
 

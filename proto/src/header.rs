@@ -3,7 +3,7 @@
 //! | offset | field    | bytes | meaning                                                  |
 //! |--------|----------|-------|----------------------------------------------------------|
 //! | 0      | magic    | 2     | [`MAGIC`]                                                |
-//! | 2      | version  | 1     | [`PROTOCOL_VERSION`]                                     |
+//! | 2      | version  | 1     | the one that both ends agreed on at join                 |
 //! | 3      | kind     | 1     | [`Kind`]                                                 |
 //! | 4      | epoch    | 4     | incarnation of the server                                |
 //! | 8      | sender   | 2     | session number of the client; 0 is the server            |
@@ -12,7 +12,7 @@
 //! | 20     | length   | 2     | payload bytes, without the tag                           |
 //! | 22     | reserved | 2     | 0                                                        |
 
-use crate::{DecodeError, PROTOCOL_VERSION, version::MAGIC};
+use crate::{DecodeError, version::MAGIC};
 
 /// Bytes of the header.
 pub const HEADER_BYTES: usize = 24;
@@ -50,6 +50,10 @@ pub enum Kind {
     Head,
     /// [`crate::Confirmation`], server to a client that hears the group.
     Confirm,
+    /// [`crate::path::PathToken`], server to client: "who is there?"
+    PathChallenge,
+    /// [`crate::path::PathToken`], client to server, from where the challenge arrived.
+    PathResponse,
 }
 
 impl Kind {
@@ -67,6 +71,8 @@ impl Kind {
             Kind::Constraints => 10,
             Kind::Head => 11,
             Kind::Confirm => 12,
+            Kind::PathChallenge => 13,
+            Kind::PathResponse => 14,
         }
     }
 
@@ -84,6 +90,8 @@ impl Kind {
             10 => Ok(Kind::Constraints),
             11 => Ok(Kind::Head),
             12 => Ok(Kind::Confirm),
+            13 => Ok(Kind::PathChallenge),
+            14 => Ok(Kind::PathResponse),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,
@@ -95,6 +103,8 @@ impl Kind {
 /// The header's fields that vary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
+    /// Version of the protocol; whoever opens the datagram compares it with the one of the session.
+    pub version: u8,
     /// What the payload is.
     pub kind: Kind,
     /// Incarnation of the server: drawn at random when it starts.
@@ -114,7 +124,7 @@ impl Header {
     pub fn to_bytes(self) -> [u8; HEADER_BYTES] {
         let mut bytes = [0; HEADER_BYTES];
         bytes[0..2].copy_from_slice(&MAGIC.to_le_bytes());
-        bytes[2] = PROTOCOL_VERSION;
+        bytes[2] = self.version;
         bytes[3] = self.kind.code();
         bytes[4..8].copy_from_slice(&self.epoch.to_le_bytes());
         bytes[8..10].copy_from_slice(&self.sender.to_le_bytes());
@@ -124,7 +134,7 @@ impl Header {
         bytes
     }
 
-    /// Reads the header of `datagram` and checks magic, version, kind, length against the datagram's, and the reserved bytes.
+    /// Reads the header of `datagram` and checks magic, kind, length against the datagram's, and the reserved bytes.
     pub fn parse(datagram: &[u8]) -> Result<Header, DecodeError> {
         let Some((bytes, rest)) = datagram.split_first_chunk::<HEADER_BYTES>() else {
             return Err(DecodeError::Truncated);
@@ -135,13 +145,8 @@ impl Header {
         if u16_at(0) != MAGIC {
             return Err(DecodeError::WrongMagic);
         }
-        if bytes[2] != PROTOCOL_VERSION {
-            return Err(DecodeError::WrongVersion {
-                theirs: bytes[2],
-                ours: PROTOCOL_VERSION,
-            });
-        }
         let header = Header {
+            version: bytes[2],
             kind: Kind::from_code(bytes[3])?,
             epoch: u32_at(4),
             sender: u16_at(8),

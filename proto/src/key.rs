@@ -22,6 +22,7 @@ use ring::{
     signature::{Ed25519KeyPair, KeyPair},
 };
 use std::fmt;
+use zeroize::{Zeroize, Zeroizing};
 
 pub use crate::proof::EXPORTER_BYTES;
 
@@ -49,7 +50,7 @@ pub enum KeyError {
     NoRandomness,
 }
 
-/// The master secret of a workbench: its holder may be anything, the server included.
+/// The master secret of a workbench: its holder may be anything, the server included. Wiped from memory when it is dropped.
 #[derive(Clone, PartialEq, Eq)]
 pub struct ClusterKey {
     bytes: [u8; KEY_BYTES],
@@ -58,6 +59,12 @@ pub struct ClusterKey {
 impl fmt::Debug for ClusterKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("ClusterKey(secret)")
+    }
+}
+
+impl Drop for ClusterKey {
+    fn drop(&mut self) {
+        self.bytes.zeroize();
     }
 }
 
@@ -83,13 +90,13 @@ impl ClusterKey {
     }
 
     /// The seed of the server's Ed25519 identity. For the server alone.
-    pub fn identity_seed(&self) -> [u8; 32] {
+    pub fn identity_seed(&self) -> Zeroizing<[u8; 32]> {
         self.derive(&[IDENTITY_LABEL])
     }
 
     /// What clients know the server by: the fingerprint of its public key.
     pub fn server_pin(&self) -> ServerPin {
-        let Ok(pair) = Ed25519KeyPair::from_seed_unchecked(&self.identity_seed()) else {
+        let Ok(pair) = Ed25519KeyPair::from_seed_unchecked(self.identity_seed().as_slice()) else {
             unreachable!("an Ed25519 seed has 32 bytes");
         };
         ServerPin::of_ed25519(pair.public_key().as_ref())
@@ -108,22 +115,23 @@ impl ClusterKey {
     /// The secret that a client of this role, name and grant must have.
     pub fn join_secret(&self, role: Role, node: &str, grant: Grant) -> JoinSecret {
         let role = [role.number()];
-        JoinSecret::new(match grant {
+        let derived = match grant {
             Grant::Master => self.derive(&[MASTER_LABEL]),
             Grant::Node { issue } => {
                 self.derive(&[NODE_LABEL, &role, &issue.to_le_bytes(), node.as_bytes()])
             }
             Grant::AnyNode { issue } => self.derive(&[ANY_NODE_LABEL, &role, &issue.to_le_bytes()]),
-        })
+        };
+        JoinSecret::new(*derived)
     }
 
     /// The labels have no common beginning, role and issue have fixed lengths, the name comes last: no two inputs give one message.
-    fn derive(&self, info: &[&[u8]]) -> [u8; 32] {
+    fn derive(&self, info: &[&[u8]]) -> Zeroizing<[u8; 32]> {
         let prk: Prk = Salt::new(HKDF_SHA256, SALT).extract(&self.bytes);
-        let mut bytes = [0; 32];
+        let mut bytes = Zeroizing::new([0; 32]);
         let filled = prk
             .expand(info, Bytes32)
-            .and_then(|okm| okm.fill(&mut bytes));
+            .and_then(|okm| okm.fill(&mut *bytes));
         debug_assert!(filled.is_ok(), "32 bytes are within the limits of HKDF");
         bytes
     }

@@ -285,7 +285,7 @@ impl<S: BuildHasher> JoinGuard<S> {
 }
 
 /// An IPv6 network hands a host 2⁶⁴ addresses: they count as one. An IPv4 address in the form of IPv6 counts as itself.
-fn network_of(address: IpAddr) -> IpAddr {
+pub(crate) fn network_of(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {
             let [a, b, c, d, ..] = address.segments();

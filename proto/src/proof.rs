@@ -10,6 +10,7 @@ use ring::{
     hmac,
 };
 use std::fmt;
+use zeroize::Zeroize;
 
 /// Bytes of keying material that a proof is bound to.
 pub const EXPORTER_BYTES: usize = 32;
@@ -81,13 +82,20 @@ pub struct Claim<'a> {
     pub grant: Grant,
 }
 
-/// The secret with which a client of one grant and the server prove themselves to each other.
+/// The secret with which a client of one grant and the server prove themselves to each other. Wiped from memory when it is
+/// dropped.
 #[derive(Clone, PartialEq, Eq)]
 pub struct JoinSecret([u8; 32]);
 
 impl fmt::Debug for JoinSecret {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("JoinSecret(secret)")
+    }
+}
+
+impl Drop for JoinSecret {
+    fn drop(&mut self) {
+        self.0.zeroize();
     }
 }
 

@@ -11,7 +11,7 @@
 //! left its numbers.
 
 use crate::{
-    DecodeError, EncodeError, Header, Kind, Payload,
+    DecodeError, EncodeError, Header, Kind, PROTOCOL_VERSION, Payload, VersionRange,
     derive::Root,
     header::{HEADER_BYTES, MAX_DATAGRAM_BYTES, TAG_BYTES},
     replay::{Freshness, ReplayWindow, WINDOW},
@@ -134,6 +134,7 @@ pub struct Sealer {
     epoch: u32,
     sender: u16,
     flags: u16,
+    version: u8,
     next: AtomicU64,
     /// Since when the present key is in use, as [`Sealer::roll_by_time`] was told; 0 before.
     in_use_since_ns: AtomicU64,
@@ -163,9 +164,16 @@ impl Sealer {
             epoch,
             sender,
             flags,
+            version: PROTOCOL_VERSION,
             next: AtomicU64::new(0),
             in_use_since_ns: AtomicU64::new(0),
         }
+    }
+
+    /// The same under the version that both ends agreed on, where it is not the newest.
+    #[must_use]
+    pub fn speaking(self, version: u8) -> Sealer {
+        Sealer { version, ..self }
     }
 
     /// The number of the next packet will be `sequence` at least. Never goes back: no number is given twice.
@@ -229,6 +237,7 @@ impl Sealer {
         // 2^64 packets are not sent: 584 million years at 1 kHz.
         let sequence = self.next.fetch_add(1, Ordering::Relaxed);
         let header = Header {
+            version: self.version,
             kind,
             epoch: self.epoch,
             sender: self.sender,
@@ -280,6 +289,7 @@ pub struct Opener {
     epoch: u32,
     sender: u16,
     flags: u16,
+    version: u8,
     window: ReplayWindow,
     scratch: DatagramBuffer,
 }
@@ -306,14 +316,27 @@ impl Opener {
             epoch,
             sender,
             flags,
+            version: PROTOCOL_VERSION,
             window: ReplayWindow::default(),
             scratch: [0; MAX_DATAGRAM_BYTES],
         }
     }
 
+    /// The same for the version that both ends agreed on, where it is not the newest.
+    #[must_use]
+    pub fn speaking(self, version: u8) -> Opener {
+        Opener { version, ..self }
+    }
+
     /// Opens `datagram`. Nothing that is not authentic changes the replay window. No allocation.
     pub fn open(&mut self, datagram: &[u8]) -> Result<Opened, OpenError> {
         let header = Header::parse(datagram).map_err(OpenError::Header)?;
+        if header.version != self.version {
+            return Err(OpenError::Header(DecodeError::WrongVersion {
+                theirs: VersionRange::only(header.version),
+                ours: VersionRange::only(self.version),
+            }));
+        }
         let ours = (self.epoch, self.sender, self.flags);
         // The last number cannot be marked as seen.
         if (header.epoch, header.sender, header.flags) != ours || header.sequence == u64::MAX {

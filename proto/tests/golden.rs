@@ -92,7 +92,7 @@ fn the_header_is_laid_out_as_documented() {
         &heartbeat[..48],
         concat!(
             "5748",
-            "03",
+            "04",
             "07",
             "04030201",
             "0500",

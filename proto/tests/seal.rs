@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    ArrayVec, DecodeError, HotState, InputSample, Kind, Payload, PoseF32, PoseF64,
+    ArrayVec, DecodeError, HotState, InputSample, Kind, PROTOCOL_VERSION, Payload, PoseF32,
+    PoseF64, VersionRange,
     barrier::{Release, ReleaseHead},
     header::{HEADER_BYTES, MAX_DATAGRAM_BYTES},
     seal::{DatagramBuffer, OpenError, Opener, Sealer},
@@ -163,8 +164,8 @@ fn another_version_is_named() {
     let mut datagram = sealed(&sealer, &input(1));
     datagram[2] = 9;
     let wrong = DecodeError::WrongVersion {
-        theirs: 9,
-        ours: taut_proto::PROTOCOL_VERSION,
+        theirs: VersionRange::only(9),
+        ours: VersionRange::only(PROTOCOL_VERSION),
     };
     assert_eq!(opener.open(&datagram), Err(OpenError::Header(wrong)));
 }
@@ -209,7 +210,7 @@ proptest! {
     #[test]
     fn a_forged_body_under_a_true_header_is_refused(sequence in any::<u64>(), body in prop::collection::vec(any::<u8>(), 16..1100)) {
         let header = taut_proto::Header {
-            kind: Kind::Input, epoch: EPOCH, sender: SENDER, flags: 0, sequence, length: (body.len() - 16) as u16,
+            version: PROTOCOL_VERSION, kind: Kind::Input, epoch: EPOCH, sender: SENDER, flags: 0, sequence, length: (body.len() - 16) as u16,
         };
         let datagram = [&header.to_bytes()[..], &body].concat();
         let (_, mut opener) = pair();

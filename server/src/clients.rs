@@ -7,12 +7,21 @@ use taut_link::proto::barrier::MAX_MEMBERS;
 use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
 
 use crate::report::ClientReport;
-use crate::timing::{Distribution, distribution_of};
+use crate::timing::{Distribution, Histogram};
 
-/// Every client that ever was there, by name.
+/// Names that are remembered: as many as may be in at once, and those who left last. Beyond it the one that was heard of longest ago is forgotten.
+const MAX_REMEMBERED: usize = 256;
+/// Reports are in milliseconds, histograms in nanoseconds.
+const NS_PER_MS: f64 = 1e6;
+
+/// The clients of a session by name, in the order in which they joined. Its memory does not grow with time.
 #[derive(Debug, Default)]
 pub struct ClientLedger {
     clients: Vec<ClientRecord>,
+    /// Counts what was heard of clients: who is forgotten first.
+    heard: u64,
+    /// Those that are remembered no more, but for render nodes and bridges.
+    forgotten_observers: u64,
 }
 
 #[derive(Debug)]
@@ -24,19 +33,24 @@ struct ClientRecord {
     state_hash_mismatches: u64,
     pose_ages: AgesMs,
     drawn_ages: AgesMs,
+    heard: u64,
 }
 
 /// One age, of all reports of a client.
 #[derive(Debug, Default)]
 struct AgesMs {
-    medians: Vec<f64>,
+    /// Made with the first report: most clients make none.
+    medians: Option<Histogram>,
     p99: f64,
     max: f64,
 }
 
 impl AgesMs {
     fn follow(&mut self, median: f32, p99: f32, max: f32) {
-        self.medians.push(f64::from(median));
+        // What is no number counts as 0.
+        self.medians
+            .get_or_insert_default()
+            .record((f64::from(median.max(0.0)) * NS_PER_MS) as u64);
         self.p99 = self.p99.max(f64::from(p99));
         self.max = self.max.max(f64::from(max));
     }
@@ -113,19 +127,33 @@ impl ClientLedger {
     }
 
     fn note(&mut self, status: &ClientStatus) {
-        let index = self
+        let known = self
             .clients
             .iter()
-            .position(|client| client.node == status.node)
-            .unwrap_or_else(|| {
-                self.clients.push(ClientRecord::new(status));
-                self.clients.len() - 1
-            });
+            .position(|client| client.node == status.node);
+        let index = known.unwrap_or_else(|| {
+            self.make_room();
+            self.clients.push(ClientRecord::new(status));
+            self.clients.len() - 1
+        });
+        self.heard += 1;
         let client = &mut self.clients[index];
+        client.heard = self.heard;
         client.state_hash_mismatches = status.state_hash_mismatches;
         client.transport = status.transport;
         if let Some(stats) = &status.stats {
             client.newest = stats.clone();
+        }
+    }
+
+    fn make_room(&mut self) {
+        if self.clients.len() < MAX_REMEMBERED {
+            return;
+        }
+        let order = self.clients.iter().enumerate();
+        if let Some((oldest, _)) = order.min_by_key(|(_, client)| client.heard) {
+            let forgotten = self.clients.remove(oldest);
+            self.forgotten_observers += u64::from(forgotten.observes());
         }
     }
 
@@ -146,16 +174,16 @@ impl ClientLedger {
         );
     }
 
-    /// One report per render node or bridge, in the order in which they joined, and the number of observers.
+    /// One report per render node or bridge that is remembered, in the order in which they joined, and the number of all others.
     pub fn reports(&self) -> (Vec<ClientReport>, u64) {
-        let observes = |client: &&ClientRecord| !matches!(client.role, Role::Render | Role::Device);
         let reports = self
             .clients
             .iter()
-            .filter(|client| !observes(client))
+            .filter(|client| !client.observes())
             .map(ClientRecord::report)
             .collect();
-        (reports, self.clients.iter().filter(observes).count() as u64)
+        let observers = self.clients.iter().filter(|client| client.observes());
+        (reports, self.forgotten_observers + observers.count() as u64)
     }
 }
 
@@ -169,19 +197,27 @@ impl ClientRecord {
             state_hash_mismatches: 0,
             pose_ages: AgesMs::default(),
             drawn_ages: AgesMs::default(),
+            heard: 0,
         }
+    }
+
+    /// Whether it has no report of its own.
+    fn observes(&self) -> bool {
+        !matches!(self.role, Role::Render | Role::Device)
     }
 
     fn report(&self) -> ClientReport {
         let frames = self.newest.frames;
-        let of_reports = |medians: &[f64], p99: f64, max: f64| Distribution {
-            p50: distribution_of(medians).p50,
-            p99,
-            p999: max,
-            max,
-            count: frames,
+        let of_ages = |ages: &AgesMs| {
+            let medians = ages.medians.as_ref().map(Histogram::distribution);
+            Distribution {
+                p50: medians.unwrap_or_default().p50 / NS_PER_MS,
+                p99: ages.p99,
+                p999: ages.max,
+                max: ages.max,
+                count: frames,
+            }
         };
-        let of_ages = |ages: &AgesMs| of_reports(&ages.medians, ages.p99, ages.max);
         ClientReport {
             node: self.node.clone(),
             transport: transport_name(self.transport).into(),
@@ -274,25 +310,29 @@ mod tests {
             ),
             (180, "quic", 3)
         );
-        assert_eq!(
-            report.pose_age_ms,
-            Distribution {
-                p50: 9.0,
-                p99: 40.0,
-                p999: 60.0,
-                max: 60.0,
-                count: 180
-            }
-        );
-        assert_eq!(
-            report.drawn_age_ms,
-            Distribution {
-                p50: 36.0,
-                p99: 100.0,
-                p999: 120.0,
-                max: 120.0,
-                count: 180
-            }
-        );
+        for (age, median, p99, max) in [
+            (report.pose_age_ms, 9.0, 40.0, 60.0),
+            (report.drawn_age_ms, 36.0, 100.0, 120.0),
+        ] {
+            // The width of a histogram's bucket.
+            assert!((age.p50 / median - 1.0).abs() < 0.016, "{age:?}");
+            assert_eq!((age.p99, age.p999, age.max), (p99, max, max));
+            assert_eq!(age.count, 180);
+        }
+    }
+
+    #[test]
+    fn clients_that_come_and_go_for_years_take_no_more_room() {
+        let mut ledger = ClientLedger::default();
+        ledger.follow(&joined("left", Role::Render));
+        for number in 0..10 * MAX_REMEMBERED {
+            ledger.follow(&joined(&format!("watcher-{number}"), Role::Observer));
+            // Who is here is seen ten times a second, and is not forgotten for those who went.
+            ledger.follow(&joined("left", Role::Render));
+        }
+        assert_eq!(ledger.clients.len(), MAX_REMEMBERED);
+        let (reports, observers) = ledger.reports();
+        assert_eq!(reports.len(), 1);
+        assert_eq!(observers, 10 * MAX_REMEMBERED as u64);
     }
 }

@@ -9,7 +9,7 @@ use taut_bridge::{
     ContactBound, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
     ValidationSettings,
 };
-use taut_link::{ClusterKey, MulticastOptions};
+use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
     BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, TransportKind, Viewer,
@@ -36,8 +36,10 @@ const GOD_OBJECT_RATE_HZ: f64 = 1000.0;
 /// Real-time priority of the broadcaster: below the coupling, above all normal work.
 const BROADCAST_PRIORITY: u8 = 50;
 
-/// Real-time priority of the network's threads, below the broadcaster: a bridge's samples must not wait for pictures.
-const NETWORK_PRIORITY: u8 = 40;
+/// The thread that reads the device's own socket is so much above the haptics loop, which reads what it brings.
+const DEVICE_INPUT_ABOVE_HAPTICS: u8 = 5;
+/// The highest real-time priority.
+const MAX_PRIORITY: u8 = 99;
 
 /// What the command line says instead of the workbench file.
 #[derive(Clone, Debug, Default)]
@@ -97,6 +99,7 @@ pub fn session_setup(
             .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
         announced_udp_port: None,
         key,
+        also: also_key(network)?,
         multicast: (network.transport == TransportKind::Multicast).then_some(MulticastOptions {
             group: network.multicast_group,
             announced: None,
@@ -138,6 +141,24 @@ pub fn session_setup(
         realtime,
         monitor: monitor(&workbench.monitoring, overrides),
     })
+}
+
+/// The second cluster key, while its time is not over.
+fn also_key(network: &taut_scene::Network) -> Result<Option<AlsoKey>, Failure> {
+    let Some(also) = &network.also_key else {
+        return Ok(None);
+    };
+    let also = AlsoKey {
+        key: read_key_file(&also.file)?,
+        until: also.until,
+    };
+    if !also.counts() {
+        tracing::warn!(
+            "the time of `also_key` in [network] is over: it opens nothing; take it out"
+        );
+        return Ok(None);
+    }
+    Ok(Some(also))
 }
 
 fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> RecordingSettings {
@@ -264,7 +285,10 @@ fn realtime(workbench: &Workbench) -> RealtimeSettings {
         haptics_priority: wanted.haptics_priority,
         coupling_priority: wanted.coupling_priority,
         broadcast_priority: BROADCAST_PRIORITY,
-        network_priority: NETWORK_PRIORITY,
+        device_input_priority: wanted
+            .haptics_priority
+            .saturating_add(DEVICE_INPUT_ABOVE_HAPTICS)
+            .min(MAX_PRIORITY),
         god_object_priority: wanted.god_object_priority,
         haptics_core: wanted.haptics_core,
         coupling_core: wanted.coupling_core,

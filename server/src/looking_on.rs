@@ -53,6 +53,14 @@ impl LookingOnSettings {
             ));
         }
         let token = if workbench.observers.enabled {
+            if let Some(file) = &workbench.observers.token_file {
+                taut_link::check_secret_file(file).map_err(|reason| {
+                    Failure::BadInput(format!(
+                        "cannot use the token of [observers] in {}: {reason}",
+                        file.display()
+                    ))
+                })?;
+            }
             workbench.observers.token().map_err(Failure::bad_input)?
         } else {
             None

@@ -20,6 +20,8 @@ use taut::{
 use taut_bridge::console;
 
 fn main() -> ExitCode {
+    // Before any key is read. Where the system has no such thing, the file's mode is all there is.
+    taut_link::keep_memory_private();
     let cli = Cli::parse();
     taut_log::start("warn");
     let code = match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {

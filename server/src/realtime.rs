@@ -12,6 +12,8 @@ use crate::report::RealtimeReport;
 
 /// Ahead of all normal work, behind the real-time class.
 const AHEAD_NICE: i32 = -10;
+/// A little behind normal work: a third of its share where both want a core.
+const BEHIND_NICE: i32 = 5;
 /// Behind all normal work, before idle.
 const BACKGROUND_NICE: i32 = 15;
 
@@ -32,6 +34,8 @@ pub enum Scheduling {
     /// The normal class, ahead of everybody else in it, with sharp timers: for work that may take long. A thread of the real-time
     /// class that used up a core would be throttled, and the loops with it.
     Ahead,
+    /// The normal class, a little behind everybody else: for what strangers can cause.
+    Behind,
     /// The normal class, behind everybody else.
     Background,
 }
@@ -56,6 +60,7 @@ impl RealtimeLedger {
                 self.note(name, sharpen_timers());
                 self.note(name, request_nice(AHEAD_NICE))
             }
+            Scheduling::Behind => request_nice(BEHIND_NICE).is_granted(),
             Scheduling::Background => request_nice(BACKGROUND_NICE).is_granted(),
         }
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use god_object::{Pose, Settings, World};
 use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
-use taut_link::{ClusterKey, Content, JoinPolicy, MulticastOptions};
+use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
 use taut_scene::{BuiltMotion, FidelityPlan};
 
@@ -86,6 +86,8 @@ pub struct LinkSettings {
     pub announced_udp_port: Option<u16>,
     /// The cluster key.
     pub key: ClusterKey,
+    /// Another one that counts for a while.
+    pub also: Option<AlsoKey>,
     /// Where states for all go, if the workbench says so.
     pub multicast: Option<MulticastOptions>,
     /// Who is let in, of those who can prove something.
@@ -117,8 +119,9 @@ pub struct RealtimeSettings {
     pub coupling_priority: u8,
     /// Real-time priority of the broadcaster; below that of the coupling.
     pub broadcast_priority: u8,
-    /// Real-time priority of the network's threads; below that of the broadcaster.
-    pub network_priority: u8,
+    /// Real-time priority of the thread that reads the device's own socket; above those of the loops. All other datagrams are read in the
+    /// normal class.
+    pub device_input_priority: u8,
     /// Real-time priority of the god-object loop; `None` is the normal class, ahead of others, because an update may take long.
     pub god_object_priority: Option<u8>,
     /// Core of the haptics loop; `None` is the system's choice.

@@ -1,8 +1,12 @@
 //! What a flood on the state port costs an honest client and the receiving thread: `cargo run --release -p taut-link --example flood`.
 //!
 //! A device sends readings at 1 kHz and gets states at 1 kHz. Beside it, on the same loopback and as fast as the system lets one thread send:
-//! nothing; garbage; datagrams with a good header of nobody's session; forged datagrams with the session's own header, whose seal is wrong.
+//! nothing; garbage; datagrams with a good header of nobody's session; forged datagrams with the session's own header, whose seal is wrong. Each with the device's readings on
+//! the common socket, read in the normal class, and on the device's own, read at SCHED_FIFO 85.
 //! Compare the rows with the first one, of the same run: the machine's speed is not ours.
+//!
+//! Then 8,000 first packets of QUIC a second, beside a loop of 1 kHz that works 0.2 ms of each (nice -10, as the god-object loop): once with QUIC in the real-time
+//! class, as it was, and once behind the normal one, with the device on its own socket. Where the system grants no real-time class both are the same.
 
 use std::{
     net::{SocketAddr, UdpSocket},
@@ -15,10 +19,11 @@ use std::{
 };
 use taut_link::{
     ClientLink, ClientOptions, ClusterKey, Content, Counters, Role, ServerLink, ServerOptions,
-    connect, serve,
+    connect, pinning::PinnedServer, serve, transport,
 };
 use taut_proto::{
-    Header, HotState, InputSample, Kind, MeshBlob, MeshHash, PoseF64, SceneDescription,
+    Header, HotState, InputSample, Kind, MeshBlob, MeshHash, PROTOCOL_VERSION, PoseF64,
+    SceneDescription,
     header::{HEADER_BYTES, TAG_BYTES},
     mesh_blob::Positions,
     scene::BodyDescription,
@@ -36,30 +41,175 @@ enum Flood {
     Garbage,
     NoSession,
     Forged,
+    FirstPackets,
 }
 
+/// How the threads of QUIC are scheduled, and whether the device has a socket of its own.
+#[derive(Clone, Copy, PartialEq)]
+enum Class {
+    /// As the system has it.
+    Normal,
+    /// SCHED_FIFO 40.
+    RealTime,
+    /// Nice 5; the device's own socket is read at SCHED_FIFO 85.
+    Behind,
+}
+
+/// First packets, 1/s.
+const FIRST_PACKETS: u32 = 8_000;
+/// Work of the loop beside the flood in each period.
+const WORK: Duration = Duration::from_micros(200);
+
 fn main() -> Result<(), Failure> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
     println!(
-        "flood        sent/s   inputs lost  states lost  round trip p50/p99 us  receiving thread  flooded  forged  garbage"
+        "flood        sent/s   inputs lost  states lost  round trip p50/p99 us  thread taut-udp  flooded  forged  garbage"
     );
-    for (name, flood) in [
-        ("none", Flood::None),
-        ("garbage", Flood::Garbage),
-        ("no session", Flood::NoSession),
-        ("forged", Flood::Forged),
-        ("none again", Flood::None),
+    for (socket, class) in [
+        ("the common socket", Class::Normal),
+        ("the device's own", Class::Behind),
     ] {
-        let row = runtime.block_on(measure(flood))?;
-        println!("{name:<12} {row}");
+        println!("read from {socket}:");
+        let runtime = self::runtime(class)?;
+        for (name, flood) in [
+            ("none", Flood::None),
+            ("garbage", Flood::Garbage),
+            ("no session", Flood::NoSession),
+            ("forged", Flood::Forged),
+            ("none again", Flood::None),
+        ] {
+            let row = runtime.block_on(measure(flood, class))?;
+            println!("{name:<12} {row}");
+        }
+    }
+    println!(
+        "\nfirst packets: CPU of QUIC's threads; lateness of a loop beside them p50/p99/max, us; periods more than 1 ms late"
+    );
+    for (name, class) in [
+        ("SCHED_FIFO 40", Class::RealTime),
+        ("nice 5", Class::Behind),
+    ] {
+        for (what, flood) in [("none", Flood::None), ("8,000/s", Flood::FirstPackets)] {
+            let runtime = self::runtime(class)?;
+            let stop = Arc::new(AtomicBool::new(false));
+            let beside = start_loop(stop.clone())?;
+            let (before, start) = (cpu_of("network"), Instant::now());
+            let row = runtime.block_on(measure(flood, class))?;
+            let cpu = cpu_of("network").saturating_sub(before).as_secs_f64();
+            let share = 100.0 * cpu / start.elapsed().as_secs_f64();
+            stop.store(true, Ordering::Relaxed);
+            let mut late = beside.join().map_err(|_| "the loop panicked")?;
+            late.sort_by(f64::total_cmp);
+            let missed = late.iter().filter(|late| **late > 1e3).count();
+            println!(
+                "{name:<14} {what:<8} {share:>5.1} % {:>7.0} / {:>7.0} / {:>7.0} {missed:>6} of {}\n  {row}",
+                quantile(&late, 0.5),
+                quantile(&late, 0.99),
+                quantile(&late, 1.0),
+                late.len()
+            );
+        }
     }
     Ok(())
 }
 
-async fn measure(flood: Flood) -> Result<String, Failure> {
+fn runtime(class: Class) -> Result<tokio::runtime::Runtime, Failure> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .thread_name("network")
+        .on_thread_start(move || match class {
+            Class::Normal => {}
+            Class::RealTime => system::real_time(40),
+            Class::Behind => system::nice(5),
+        })
+        .enable_all()
+        .build()?;
+    Ok(runtime)
+}
+
+/// How late each period of a working loop began, us.
+fn start_loop(stop: Arc<AtomicBool>) -> Result<thread::JoinHandle<Vec<f64>>, Failure> {
+    let work = move || {
+        system::nice(-10);
+        let mut late = Vec::with_capacity(64_000);
+        let mut due = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            due += PERIOD;
+            thread::sleep(due.saturating_duration_since(Instant::now()));
+            let began = Instant::now();
+            late.push(began.saturating_duration_since(due).as_secs_f64() * 1e6);
+            while began.elapsed() < WORK {
+                std::hint::spin_loop();
+            }
+            // What was missed is not made up for.
+            due = due.max(Instant::now() - PERIOD);
+        }
+        late
+    };
+    Ok(thread::Builder::new().name("loop".to_owned()).spawn(work)?)
+}
+
+/// What is asked of the scheduler; a refusal leaves the thread as it is.
+mod system {
+    #![allow(unsafe_code, reason = "the scheduler is asked by system calls")]
+
+    pub(super) fn real_time(priority: i32) {
+        let parameters = libc::sched_param {
+            sched_priority: priority,
+        };
+        // SAFETY: `parameters` is valid for the call; 0 names the calling thread.
+        unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) };
+    }
+
+    pub(super) fn nice(value: i32) {
+        // SAFETY: takes integers only; 0 names the calling thread.
+        unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, value) };
+    }
+}
+
+/// First packets of as many connections, each of which the server takes for a new one.
+fn first_packets(server: &ServerLink) -> Result<Vec<Vec<u8>>, Failure> {
+    let socket = UdpSocket::bind("127.0.0.1:0")?;
+    socket.set_read_timeout(Some(Duration::from_millis(500)))?;
+    let pinned = Arc::new(PinnedServer::new(server.pin()));
+    let config = transport::client_config(pinned, Duration::from_secs(5))?;
+    let endpoint = quinn::Endpoint::client(SocketAddr::from(([127, 0, 0, 1], 0)))?;
+    let mut packets = Vec::new();
+    for _ in 0..256 {
+        let connecting = endpoint.connect_with(config.clone(), socket.local_addr()?, "taut")?;
+        let mut packet = vec![0; 2048];
+        let length = socket.recv(&mut packet)?;
+        packet.truncate(length);
+        packets.push(packet);
+        drop(connecting);
+    }
+    Ok(packets)
+}
+
+/// Sends first packets at their rate, again and again, until it is stopped.
+fn start_first_packets(server: &ServerLink, stop: Arc<AtomicBool>) -> Result<Running, Failure> {
+    let packets = first_packets(server)?;
+    let (socket, to) = (UdpSocket::bind("127.0.0.2:0")?, server.quic_addr());
+    let count = Arc::new(AtomicU64::new(0));
+    let counted = count.clone();
+    let send = move || {
+        let per_period = FIRST_PACKETS / 1000;
+        let mut packets = packets.iter().cycle();
+        while !stop.load(Ordering::Relaxed) {
+            for packet in packets.by_ref().take(per_period as usize) {
+                if socket.send_to(packet, to).is_ok() {
+                    counted.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+            thread::sleep(PERIOD);
+        }
+    };
+    let thread = thread::Builder::new()
+        .name("flood".to_owned())
+        .spawn(send)?;
+    Ok((thread, count))
+}
+
+async fn measure(flood: Flood, class: Class) -> Result<String, Failure> {
     let key = ClusterKey::generate()?;
     let server = serve(ServerOptions::loopback(key.clone()), content()?).await?;
     let mut options =
@@ -72,12 +222,30 @@ async fn measure(flood: Flood) -> Result<String, Failure> {
         tokio::time::sleep(PERIOD).await;
     }
     let stop = Arc::new(AtomicBool::new(false));
-    let flooding = start(flood, &server, &client, stop.clone())?;
-    let (before, cpu_before, start) = (server.counters(), receiving_cpu(), Instant::now());
+    let mut receiver = server.device_receiver();
+    let of_receiver = stop.clone();
+    let own_socket = (class == Class::Behind)
+        .then(|| {
+            let read = move || {
+                system::real_time(85);
+                receiver.run(&|| of_receiver.load(Ordering::Relaxed));
+            };
+            thread::Builder::new()
+                .name("device-input".to_owned())
+                .spawn(read)
+        })
+        .transpose()?;
+    let flooding = match flood {
+        Flood::FirstPackets => Some(tokio::task::block_in_place(|| {
+            start_first_packets(&server, stop.clone())
+        })?),
+        _ => start(flood, &server, &client, stop.clone())?,
+    };
+    let (before, cpu_before, start) = (server.counters(), cpu_of("taut-udp"), Instant::now());
     let lost_before = client.counters().lost;
     let result = tokio::task::block_in_place(|| exchange(&server, &client));
     let (sent, round_trips) = result?;
-    let cpu = receiving_cpu().saturating_sub(cpu_before);
+    let cpu = cpu_of("taut-udp").saturating_sub(cpu_before);
     let elapsed = start.elapsed().as_secs_f64();
     tokio::time::sleep(Duration::from_millis(50)).await;
     let after = server.counters();
@@ -89,6 +257,9 @@ async fn measure(flood: Flood) -> Result<String, Failure> {
         }
         None => 0,
     };
+    if let Some(thread) = own_socket {
+        let _ = thread.join();
+    }
     let inputs = after.inputs - before.inputs + after.inputs_late - before.inputs_late;
     let of = |read: fn(&Counters) -> u64| read(&after) - read(&before);
     let row = format!(
@@ -163,6 +334,7 @@ fn start(
     // Whoever is on the path has seen the epoch.
     let epoch = server.epoch();
     let header = |sender| Header {
+        version: PROTOCOL_VERSION,
         kind: Kind::Input,
         epoch,
         sender,
@@ -172,7 +344,7 @@ fn start(
     };
     let mut datagram = vec![0xa5; HEADER_BYTES + 160 + TAG_BYTES];
     match flood {
-        Flood::None => return Ok(None),
+        Flood::None | Flood::FirstPackets => return Ok(None),
         Flood::Garbage => {}
         Flood::NoSession => datagram[..HEADER_BYTES].copy_from_slice(&header(999).to_bytes()),
         Flood::Forged => {
@@ -195,8 +367,8 @@ fn start(
     Ok(Some((thread, count)))
 }
 
-/// CPU time of the server's receiving thread so far; zero where the system does not tell.
-fn receiving_cpu() -> Duration {
+/// CPU time of the threads of this name so far; zero where the system does not tell.
+fn cpu_of(thread: &str) -> Duration {
     const TICK: Duration = Duration::from_millis(10); // USER_HZ is 100 on every Linux
     let mut ticks = 0;
     for task in std::fs::read_dir("/proc/self/task")
@@ -208,7 +380,7 @@ fn receiving_cpu() -> Duration {
         let Some((name, rest)) = stat.split_once(") ") else {
             continue;
         };
-        if name.ends_with("(taut-udp") {
+        if name.ends_with(&format!("({thread}")) {
             // user and system time: fields 14 and 15 of the line, 12 and 13 after the name
             let fields: Vec<u64> = rest
                 .split(' ')

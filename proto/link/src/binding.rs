@@ -8,6 +8,7 @@ use taut_proto::{
     key::EXPORTER_BYTES,
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
+use zeroize::Zeroizing;
 
 const PROOF_LABEL: &[u8] = b"EXPORTER-taut-proof-1";
 const HOT_LABEL: &[u8] = b"EXPORTER-taut-hot-1";
@@ -22,36 +23,38 @@ pub fn proof_binding(connection: &quinn::Connection) -> Result<[u8; EXPORTER_BYT
 /// Hot-plane keys of the server's end of `session`.
 pub(crate) fn server_keys(
     connection: &quinn::Connection,
+    version: u8,
     epoch: u32,
     session: u16,
 ) -> Result<(Sealer, Opener), LinkError> {
     let (down, up) = hot_material(connection)?;
     Ok((
-        Sealer::new(&down, epoch, SERVER_SENDER),
-        Opener::new(&up, epoch, session),
+        Sealer::new(&down, epoch, SERVER_SENDER).speaking(version),
+        Opener::new(&up, epoch, session).speaking(version),
     ))
 }
 
 /// Hot-plane keys of the client's end of `session`.
 pub(crate) fn client_keys(
     connection: &quinn::Connection,
+    version: u8,
     epoch: u32,
     session: u16,
 ) -> Result<(Sealer, Opener), LinkError> {
     let (down, up) = hot_material(connection)?;
     Ok((
-        Sealer::new(&up, epoch, session),
-        Opener::new(&down, epoch, SERVER_SENDER),
+        Sealer::new(&up, epoch, session).speaking(version),
+        Opener::new(&down, epoch, SERVER_SENDER).speaking(version),
     ))
 }
 
-type Material = [u8; KEY_MATERIAL_BYTES];
+type Material = Zeroizing<[u8; KEY_MATERIAL_BYTES]>;
 
 /// Server to client, client to server.
 fn hot_material(connection: &quinn::Connection) -> Result<(Material, Material), LinkError> {
-    let mut both = [[0; KEY_MATERIAL_BYTES]; 2];
+    let mut both = Zeroizing::new([[0; KEY_MATERIAL_BYTES]; 2]);
     export(connection, both.as_flattened_mut(), HOT_LABEL)?;
-    let [down, up] = both;
+    let [down, up] = both.map(Zeroizing::new);
     Ok((down, up))
 }
 

@@ -105,6 +105,10 @@ counters! {
         turned_away,
         /// Attempts to join that first had to prove their address.
         address_checks,
+        /// Attempts to join that lost their place to somebody else's before they had proven anything.
+        crowded_out,
+        /// Challenges sent to addresses that clients seem to have moved to.
+        path_challenges,
         /// What clients tried that their role may not.
         forbidden,
         /// Datagrams dropped unopened: of unknown sources beyond their rate, or of a client beyond its.

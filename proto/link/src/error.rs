@@ -1,7 +1,9 @@
 //! Why a link does not come about or fails; each text says what, where and what to do.
 
 use std::{io, net::SocketAddr, path::PathBuf};
-use taut_proto::{ServerPin, Untrusted, control::RefusalCode, credential::NotAllowed};
+use taut_proto::{
+    ServerPin, Untrusted, VersionRange, control::RefusalCode, credential::NotAllowed,
+};
 
 /// Why a link does not come about or fails.
 #[derive(Debug, thiserror::Error)]
@@ -94,10 +96,10 @@ pub enum LinkError {
     WrongVersion {
         /// What was given.
         server: String,
-        /// Version of the server.
+        /// Newest version of the server.
         theirs: u8,
-        /// Our version.
-        ours: u8,
+        /// What this program speaks.
+        ours: VersionRange,
     },
     /// The server has a reason of its own.
     #[error("the server at {server} refuses this node: {text}")]

@@ -3,7 +3,7 @@
 use quinn::{ConnectionError, ReadExactError, RecvStream, SendStream, VarInt};
 use std::time::Duration;
 use taut_proto::{
-    DecodeError, EncodeError, Printable,
+    DecodeError, EncodeError, Printable, VersionRange,
     control::{ControlMessage, LENGTH_BYTES},
 };
 
@@ -45,23 +45,25 @@ pub(crate) enum WriteMessageError {
     Encode(#[from] EncodeError),
 }
 
-/// Reads one message of at most `max` bytes. Memory grows with what arrives, up to `max`.
+/// Reads one message of at most `max` bytes by an end that speaks `ours`. Memory grows with what arrives, up to `max`.
 pub(crate) async fn read_message(
     stream: &mut RecvStream,
     max: usize,
+    ours: VersionRange,
 ) -> Result<ControlMessage, ReadMessageError> {
     let length = read_length(stream, max).await?;
-    read_body(stream, length).await
+    read_body(stream, length, ours).await
 }
 
 /// The same from a client that is in: it may be silent between messages, but must bring one to its end within `patience`.
 pub(crate) async fn read_whole_message(
     stream: &mut RecvStream,
     max: usize,
+    ours: VersionRange,
     patience: Duration,
 ) -> Result<ControlMessage, ReadMessageError> {
     let length = read_length(stream, max).await?;
-    match tokio::time::timeout(patience, read_body(stream, length)).await {
+    match tokio::time::timeout(patience, read_body(stream, length, ours)).await {
         Ok(read) => read,
         Err(_) => Err(ReadMessageError::Stalled),
     }
@@ -76,6 +78,7 @@ async fn read_length(stream: &mut RecvStream, max: usize) -> Result<usize, ReadM
 async fn read_body(
     stream: &mut RecvStream,
     length: usize,
+    ours: VersionRange,
 ) -> Result<ControlMessage, ReadMessageError> {
     let mut body = Vec::new();
     while body.len() < length {
@@ -88,7 +91,7 @@ async fn read_body(
             None => return Err(DecodeError::Truncated.into()),
         }
     }
-    Ok(ControlMessage::from_frame_body(&body)?)
+    Ok(ControlMessage::from_frame_body_of(&body, ours)?)
 }
 
 async fn read_exact(stream: &mut RecvStream, into: &mut [u8]) -> Result<(), ReadMessageError> {
@@ -99,17 +102,39 @@ async fn read_exact(stream: &mut RecvStream, into: &mut [u8]) -> Result<(), Read
     })
 }
 
-/// Writes one message.
+/// Writes one message of a session of this version.
 pub(crate) async fn write_message(
     stream: &mut SendStream,
     message: &ControlMessage,
+    version: u8,
 ) -> Result<(), WriteMessageError> {
-    let frame = message.to_frame()?;
+    let frame = message.to_frame_of(version)?;
     stream
         .write_all(&frame)
         .await
         .map_err(|error| WriteMessageError::Ended(peer_text(&error)))
 }
+
+/// Writes a frame that was made for all clients, under the version of this one's session.
+pub(crate) async fn write_frame(
+    stream: &mut SendStream,
+    frame: &[u8],
+    version: u8,
+) -> Result<(), WriteMessageError> {
+    let Some((head, [_, rest @ ..])) = frame.split_at_checked(VERSION_AT) else {
+        return Err(EncodeError::BufferFull.into()); // no frame is so short
+    };
+    for part in [head, &[version], rest] {
+        stream
+            .write_all(part)
+            .await
+            .map_err(|error| WriteMessageError::Ended(peer_text(&error)))?;
+    }
+    Ok(())
+}
+
+/// Where a frame's version stands: behind length and magic.
+const VERSION_AT: usize = LENGTH_BYTES + 2;
 
 /// Why a connection ended, for people; `peer` is "the server" or "the node".
 pub(crate) fn close_text(error: &ConnectionError, peer: &str) -> String {
@@ -171,18 +196,21 @@ mod tests {
         let (mut send, _) = theirs.open_bi().await.expect("open");
         send.write_all(&frame).await.expect("open");
         let (_, mut recv) = ours.accept_bi().await.expect("open");
-        let read = read_whole_message(&mut recv, 1000, patience).await;
+        let read = read_whole_message(&mut recv, 1000, VersionRange::SUPPORTED, patience).await;
         assert_eq!(read.expect("whole"), message);
 
         // Longer than the patience, then a whole message, then half of one.
-        let (read, ()) = tokio::join!(read_whole_message(&mut recv, 1000, patience), async {
-            tokio::time::sleep(2 * patience).await;
-            send.write_all(&frame).await.expect("open");
-        });
+        let (read, ()) = tokio::join!(
+            read_whole_message(&mut recv, 1000, VersionRange::SUPPORTED, patience),
+            async {
+                tokio::time::sleep(2 * patience).await;
+                send.write_all(&frame).await.expect("open");
+            }
+        );
         assert_eq!(read.expect("whole"), message);
         let half = &frame[..frame.len() / 2];
         send.write_all(half).await.expect("open");
-        let read = read_whole_message(&mut recv, 1000, patience).await;
+        let read = read_whole_message(&mut recv, 1000, VersionRange::SUPPORTED, patience).await;
         assert!(matches!(read, Err(ReadMessageError::Stalled)), "{read:?}");
     }
 }

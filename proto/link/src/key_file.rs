@@ -1,12 +1,14 @@
-//! Key files: the cluster key (64 hexadecimal digits) and credentials, readable by their owner only.
+//! Key files: the cluster key (64 hexadecimal digits) and credentials. What they hold is a secret on disk and in memory: nobody else may read the
+//! file or put another in its place, the text is wiped when it has been read, and no core dump of the program is written.
 
 use crate::LinkError;
 use std::{
     fs,
-    io::{Error, ErrorKind, Write},
+    io::{Error, ErrorKind, Read, Write},
     path::{Path, PathBuf},
 };
 use taut_proto::{ClusterKey, Credential, JoinKey, credential::MAX_KEY_TEXT_BYTES};
+use zeroize::Zeroizing;
 
 /// Permission bits that no secret may have: everything for others, writing for the group. Reading by the group is left, so that a file of
 /// root's can be read by a service through its group.
@@ -29,11 +31,12 @@ pub fn read_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
 
 /// Reads what a client joins with: the file of the cluster key, or of a credential.
 ///
-/// Refused, as ssh does, if others may read it or anybody but its owner may write it.
+/// Refused, as ssh does, unless it is a secret: see [`check_secret_file`].
 pub fn read_join_key(path: &Path) -> Result<JoinKey, LinkError> {
     let refuse = |reason: String| key_file(path, reason);
     let unreadable = |error: Error| refuse(format!("{error}; {}", remedy_to_read(error.kind())));
-    let metadata = fs::metadata(path).map_err(unreadable)?;
+    let file = fs::File::open(path).map_err(unreadable)?;
+    let metadata = file.metadata().map_err(unreadable)?;
     if metadata.is_dir() {
         return Err(refuse("it is a directory; name a file in it".to_owned()));
     }
@@ -43,31 +46,98 @@ pub fn read_join_key(path: &Path) -> Result<JoinKey, LinkError> {
             "it has {length} bytes, no key has so many; name a file that `taut keys` made"
         )));
     }
-    #[cfg(unix)]
+    check_secret(path, &metadata).map_err(refuse)?;
+    // Of its full size at once: what grows leaves copies behind.
+    let mut text = Zeroizing::new(String::with_capacity(MAX_KEY_TEXT_BYTES));
+    file.take(MAX_KEY_TEXT_BYTES as u64)
+        .read_to_string(&mut text)
+        .map_err(unreadable)?;
+    JoinKey::parse(&text).map_err(|error| refuse(error.to_string()))
+}
+
+/// Refuses a file of a secret that somebody else could read or replace: others have rights on it, it belongs to neither this account nor root,
+/// or others may write in its directory. The error says what to do.
+pub fn check_secret_file(path: &Path) -> Result<(), String> {
+    let metadata = fs::metadata(path).map_err(|error| error.to_string())?;
+    check_secret(path, &metadata)
+}
+
+#[cfg(unix)]
+fn check_secret(path: &Path, metadata: &fs::Metadata) -> Result<(), String> {
+    use std::os::unix::fs::MetadataExt;
+    /// Set on a directory such as /tmp: only the owner of a file may replace it.
+    const STICKY: u32 = 0o1000;
+    const OTHERS_WRITE: u32 = 0o002;
+    let mode = metadata.mode() & 0o777;
+    if mode & TOO_OPEN != 0 {
+        return Err(format!(
+            "its permissions {mode:04o} let others use it; chmod 600 {}",
+            path.display()
+        ));
+    }
+    #[allow(unsafe_code, reason = "the account is asked by a system call")]
+    // SAFETY: takes nothing and never fails.
+    let me = unsafe { libc::geteuid() };
+    let is_trusted = |owner: u32| owner == me || owner == 0;
+    if !is_trusted(metadata.uid()) {
+        return Err(format!(
+            "it belongs to user {}, who can change it: it must belong to this account (user {me}) or root; chown {me} {}",
+            metadata.uid(),
+            path.display()
+        ));
+    }
+    // Where the file itself is, if the path leads there by a link.
+    let real = path.canonicalize().map_err(|error| error.to_string())?;
+    let directory = real.parent().unwrap_or(Path::new("/"));
+    let about = fs::metadata(directory).map_err(|error| error.to_string())?;
+    let others_replace = about.mode() & OTHERS_WRITE != 0 && about.mode() & STICKY == 0;
+    if others_replace || !is_trusted(about.uid()) {
+        return Err(format!(
+            "others can put another file in its place, because its directory {} is theirs or open to them (user {}, mode {:04o}); move it to a directory of this account with mode 0755 or less",
+            directory.display(),
+            about.uid(),
+            about.mode() & 0o7777
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn check_secret(_path: &Path, _metadata: &fs::Metadata) -> Result<(), String> {
+    Ok(())
+}
+
+/// Keeps the memory of this process, in which keys are, out of core dumps and from other programs of this account (`ptrace`, `/proc/PID/mem`).
+/// For the start of a program; `false` where the system has no such thing.
+pub fn keep_memory_private() -> bool {
+    #[cfg(target_os = "linux")]
     {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = metadata.permissions().mode() & 0o777;
-        if mode & TOO_OPEN != 0 {
-            return Err(refuse(format!(
-                "its permissions {mode:04o} let others use it; chmod 600 {}",
-                path.display()
-            )));
+        let none = libc::rlimit {
+            rlim_cur: 0,
+            rlim_max: 0,
+        };
+        #[allow(unsafe_code, reason = "limits of the process are system calls")]
+        // SAFETY: `none` is valid for the call; the other takes numbers only.
+        unsafe {
+            let limited = libc::setrlimit(libc::RLIMIT_CORE, &raw const none) == 0;
+            limited && libc::prctl(libc::PR_SET_DUMPABLE, 0 as libc::c_ulong, 0, 0, 0) == 0
         }
     }
-    let text = fs::read_to_string(path).map_err(unreadable)?;
-    JoinKey::parse(&text).map_err(|error| refuse(error.to_string()))
+    #[cfg(not(target_os = "linux"))]
+    false
 }
 
 /// Makes a fresh key and its file, mode 0600. An existing file is an error: a key in use is never overwritten.
 pub fn create_key_file(path: &Path) -> Result<ClusterKey, LinkError> {
     let key = ClusterKey::generate().map_err(|error| key_file(path, error.to_string()))?;
-    write_secret(path, &format!("{}\n", key.to_hex()))?;
+    let text = Zeroizing::new(key.to_hex() + "\n");
+    write_secret(path, &text)?;
     Ok(key)
 }
 
 /// Writes a credential into a new file, mode 0600.
 pub fn write_credential_file(path: &Path, credential: &Credential) -> Result<(), LinkError> {
-    write_secret(path, &credential.to_text())
+    write_secret(path, &Zeroizing::new(credential.to_text()))
 }
 
 fn write_secret(path: &Path, text: &str) -> Result<(), LinkError> {
@@ -110,5 +180,52 @@ fn key_file(path: &Path, reason: String) -> LinkError {
     LinkError::KeyFile {
         path: PathBuf::from(path),
         reason,
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{PermissionsExt, chown};
+
+    fn reason(path: &Path) -> String {
+        match read_join_key(path) {
+            Err(LinkError::KeyFile { reason, .. }) => reason,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_key_that_somebody_else_could_replace_is_refused_with_what_to_do() {
+        let folder = tempfile::tempdir().expect("a directory");
+        let path = folder.path().join("cluster.key");
+        create_key_file(&path).expect("made");
+        assert!(read_join_key(&path).is_ok());
+        let set = |path: &Path, mode| {
+            fs::set_permissions(path, fs::Permissions::from_mode(mode)).expect("set");
+        };
+
+        set(&path, 0o604);
+        assert!(reason(&path).contains("chmod 600"));
+        set(&path, 0o600);
+
+        set(folder.path(), 0o777);
+        let text = reason(&path);
+        assert!(
+            text.contains("another file in its place") && text.contains("0777"),
+            "{text}"
+        );
+        set(folder.path(), 0o1777);
+        assert!(read_join_key(&path).is_ok(), "as in /tmp");
+        set(folder.path(), 0o755);
+
+        // Only root can give a file away.
+        if chown(&path, Some(4711), None).is_ok() {
+            let text = reason(&path);
+            assert!(
+                text.contains("user 4711") && text.contains("chown"),
+                "{text}"
+            );
+        }
     }
 }

@@ -19,6 +19,7 @@ pub mod counters;
 pub mod error;
 mod framing;
 pub mod key_file;
+mod lock;
 pub mod multicast;
 pub mod pinning;
 mod readiness;
@@ -35,11 +36,15 @@ pub use client::{
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};
 pub use error::LinkError;
-pub use key_file::{create_key_file, read_join_key, read_key_file, write_credential_file};
+pub use key_file::{
+    check_secret_file, create_key_file, keep_memory_private, read_join_key, read_key_file,
+    write_credential_file,
+};
 pub use multicast::MulticastOptions;
 pub use server::{
-    Broadcaster, ClientStatus, Content, DeviceInput, FloodLimits, FrameMaster, FrameReport,
-    HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink, ServerOptions, Spread, serve,
+    AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
+    FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink,
+    ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

@@ -4,14 +4,20 @@
 //! compares the key's fingerprint with the one that it was given (see [`crate::pinning`]) and takes no other. Then both ends prove their
 //! secret over this very connection's exporter (see [`crate::binding`]).
 
-use crate::{LinkError, pinning::PinnedServer};
+use crate::{LinkError, pinning::PinnedServer, server::AlsoKey};
 use quinn::{
     IdleTimeout, TransportConfig, VarInt,
     crypto::rustls::{QuicClientConfig, QuicServerConfig},
 };
-use rustls::{crypto::CryptoProvider, pki_types::PrivatePkcs8KeyDer};
+use rustls::{
+    crypto::{CryptoProvider, ring::sign::any_eddsa_type},
+    pki_types::PrivatePkcs8KeyDer,
+    server::{ClientHello, ResolvesServerCert},
+    sign::CertifiedKey,
+};
 use std::{sync::Arc, time::Duration};
-use taut_proto::{ClusterKey, pin::ed25519_pkcs8};
+use taut_proto::{ClusterKey, ServerPin, pin::ed25519_pkcs8};
+use zeroize::Zeroizing;
 
 /// Silence after which a peer counts as gone.
 pub(crate) const IDLE_TIMEOUT: Duration = Duration::from_secs(1);
@@ -34,30 +40,80 @@ const INITIAL_ROUND_TRIP: Duration = Duration::from_millis(100);
 const MAX_STREAMS: u32 = 32;
 /// Protocol name in TLS; the version is not in it, so that versions can refuse each other with a sentence.
 const ALPN: &[u8] = b"taut";
-/// Name that clients ask for; nothing depends on it.
-pub(crate) const SERVER_NAME: &str = "taut";
+/// Name in the certificate; nothing depends on it.
+const SERVER_NAME: &str = "taut";
+/// Digits of a fingerprint in the name that a client asks for: 128 bits.
+const NAMED_DIGITS: usize = 32;
+
+/// Name that a client asks for: which identity it trusts, where the server has two. It is sent clear, and a fingerprint is no secret.
+pub(crate) fn server_name(pin: ServerPin) -> String {
+    format!("{}.{SERVER_NAME}", &pin.to_hex()[..NAMED_DIGITS])
+}
+
+/// The server's own identity, and for a while that of a second cluster key.
+#[derive(Debug)]
+struct Identities {
+    own: Arc<CertifiedKey>,
+    also: Option<(String, Arc<CertifiedKey>, AlsoKey)>,
+}
+
+impl ResolvesServerCert for Identities {
+    fn resolve(&self, hello: ClientHello<'_>) -> Option<Arc<CertifiedKey>> {
+        let asked = hello.server_name();
+        let identity = match &self.also {
+            Some((name, identity, also)) if asked == Some(name.as_str()) && also.counts() => {
+                identity
+            }
+            _ => &self.own,
+        };
+        Some(identity.clone())
+    }
+}
+
+/// A self-signed certificate that says nothing but the public key of `key`.
+fn identity(key: &ClusterKey) -> Result<Arc<CertifiedKey>, LinkError> {
+    let failed = |reason: String| LinkError::System {
+        what: "make a TLS identity",
+        reason,
+    };
+    let pkcs8 = Zeroizing::new(ed25519_pkcs8(&key.identity_seed()));
+    let private = PrivatePkcs8KeyDer::from(pkcs8.as_slice());
+    let signing = rcgen::KeyPair::from_pkcs8_der_and_sign_algo(&private, &rcgen::PKCS_ED25519)
+        .map_err(|error| failed(error.to_string()))?;
+    let certificate = rcgen::CertificateParams::new([SERVER_NAME.to_owned()])
+        .and_then(|parameters| parameters.self_signed(&signing))
+        .map_err(|error| failed(error.to_string()))?;
+    let signing = any_eddsa_type(&private).map_err(|error| failed(error.to_string()))?;
+    let chain = vec![certificate.der().clone()];
+    Ok(Arc::new(CertifiedKey::new(chain, signing)))
+}
 
 /// QUIC settings of the server of `key`'s workbench.
 pub(crate) fn server_config(
     key: &ClusterKey,
+    also: Option<&AlsoKey>,
     idle_timeout: Duration,
 ) -> Result<quinn::ServerConfig, LinkError> {
     let failed = |reason: String| LinkError::System {
         what: "make a TLS identity",
         reason,
     };
-    let private = PrivatePkcs8KeyDer::from(ed25519_pkcs8(&key.identity_seed()));
-    let signing = rcgen::KeyPair::from_pkcs8_der_and_sign_algo(&private, &rcgen::PKCS_ED25519)
-        .map_err(|error| failed(error.to_string()))?;
-    let certificate = rcgen::CertificateParams::new([SERVER_NAME.to_owned()])
-        .and_then(|parameters| parameters.self_signed(&signing))
-        .map_err(|error| failed(error.to_string()))?;
+    let also = match also {
+        Some(also) => {
+            let name = server_name(also.key.server_pin());
+            Some((name, identity(&also.key)?, also.clone()))
+        }
+        None => None,
+    };
+    let identities = Identities {
+        own: identity(key)?,
+        also,
+    };
     let mut tls = rustls::ServerConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(|error| failed(error.to_string()))?
         .with_no_client_auth()
-        .with_single_cert(vec![certificate.der().clone()], private.into())
-        .map_err(|error| failed(error.to_string()))?;
+        .with_cert_resolver(Arc::new(identities));
     // Every session's keys come from a handshake of its own: nothing is resumed, nothing is sent before it is over.
     tls.send_tls13_tickets = 0;
     tls.alpn_protocols = vec![ALPN.to_vec()];

@@ -10,7 +10,7 @@ use std::{
 use support::*;
 use taut_link::{ClientLink, ClientOptions, Role, Roster, Transport};
 use taut_proto::{
-    Group, GroupSealer, Header, Kind, Payload,
+    Group, GroupSealer, Header, Kind, PROTOCOL_VERSION, Payload,
     group::{FLAG_GROUP, GroupSecret},
     header::MAX_DATAGRAM_BYTES,
 };
@@ -185,6 +185,7 @@ async fn the_server_takes_nothing_under_a_group_key() {
         Kind::Constraints,
     ] {
         let header = Header {
+            version: PROTOCOL_VERSION,
             kind,
             epoch,
             sender: bridge.session(),

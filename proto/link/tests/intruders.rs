@@ -14,7 +14,7 @@ use taut_link::{
     ServerPin, binding, connect, pinning::PinnedServer, transport,
 };
 use taut_proto::{
-    Header, Kind,
+    Header, Kind, PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
     header::{HEADER_BYTES, TAG_BYTES},
     limits::{JoinLimits, Rate},
@@ -201,6 +201,7 @@ fn claim() -> Claim<'static> {
 
 fn hello(claim: Claim<'_>, proof: [u8; 32]) -> Hello {
     Hello {
+        versions: VersionRange::SUPPORTED,
         node: claim.node.into(),
         role: claim.role,
         transport: Transport::Udp,
@@ -418,6 +419,7 @@ async fn forged_datagrams_of_an_unknown_source_are_opened_at_its_rate_only() {
     })
     .await;
     let header = Header {
+        version: PROTOCOL_VERSION,
         kind: Kind::Input,
         epoch: server.epoch(),
         sender: device.session(),

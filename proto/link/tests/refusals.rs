@@ -9,13 +9,13 @@ use std::{
 };
 use support::*;
 use taut_link::{
-    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, connect, pinning::PinnedServer,
-    serve, transport,
+    ClientOptions, LinkError, LinkEvent, Role, ServerOptions, binding, connect,
+    pinning::PinnedServer, serve, transport,
 };
 use taut_proto::{
-    PROTOCOL_VERSION,
+    PROTOCOL_VERSION, VersionRange,
     control::{ControlMessage, Hello, LENGTH_BYTES, RefusalCode, Transport},
-    proof::Grant,
+    proof::{Claim, Grant},
 };
 
 async fn error_of(options: ClientOptions) -> LinkError {
@@ -79,6 +79,7 @@ async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
 
 fn hello() -> Vec<u8> {
     let hello = ControlMessage::Hello(Hello {
+        versions: VersionRange::SUPPORTED,
         node: "stranger".into(),
         role: Role::Render,
         transport: Transport::Udp,
@@ -93,11 +94,20 @@ fn hello() -> Vec<u8> {
 async fn another_protocol_version_is_refused_and_counted() {
     let server = server().await;
     let mut frame = hello();
-    frame[LENGTH_BYTES + 2] = PROTOCOL_VERSION + 1;
+    // The range stands first in Hello.
+    frame[LENGTH_BYTES + 4] = PROTOCOL_VERSION + 1;
+    frame[LENGTH_BYTES + 5] = PROTOCOL_VERSION + 2;
     match answer_to(server.quic_addr(), &frame).await {
         ControlMessage::Refused(refusal) => {
             assert_eq!(refusal.code, RefusalCode::WrongVersion);
             assert_eq!(refusal.version, PROTOCOL_VERSION);
+            let both = format!(
+                "version {} to {}, this program speaks {}",
+                PROTOCOL_VERSION + 1,
+                PROTOCOL_VERSION + 2,
+                VersionRange::SUPPORTED
+            );
+            assert!(refusal.text.raw().contains(&both), "{}", refusal.text);
         }
         other => panic!("{other:?}"),
     }
@@ -163,6 +173,7 @@ async fn a_full_server_says_so() {
         ..ServerOptions::loopback(key('a'))
     })
     .await;
+    // The workbench's own node has its place; another one finds none.
     let _first = client(&server, Role::Render, "left").await;
     let error = error_of(options(&server, Role::Render, "right")).await;
     assert!(
@@ -175,6 +186,87 @@ async fn a_full_server_says_so() {
         ),
         "{error}"
     );
+}
+
+/// Whoever may be any observer fills the house; those whom the workbench cannot do without get in all the same.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_house_full_of_observers_has_room_for_device_tracker_operator_and_named_nodes() {
+    let server = server_with(ServerOptions {
+        max_clients: 8,
+        idle_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let mut inside = Vec::new();
+    let refusal = loop {
+        let name = format!("watcher-{}", inside.len());
+        match connect(options(&server, Role::Observer, &name)).await {
+            Ok(link) => inside.push(link),
+            Err(error) => break error,
+        }
+        assert!(inside.len() <= 8);
+    };
+    // 8 less device, tracker, operator and the one node of the workbench.
+    assert_eq!(inside.len(), 4);
+    assert!(
+        refusal.to_string().contains("raise max_clients"),
+        "{refusal}"
+    );
+    for (role, name) in [
+        (Role::Device, "bridge"),
+        (Role::Operator, "alice"),
+        (Role::Tracker, "head"),
+        (Role::Render, "left"),
+    ] {
+        inside.push(client(&server, role, name).await);
+    }
+    assert_eq!(server.clients().len(), 8);
+}
+
+/// A bridge that proves its key and then takes nothing: its place is free when its time to join is over.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_join_that_stalls_leaves_no_session_behind() {
+    let fail = |error: &dyn std::fmt::Display| -> ! { panic!("{error}") };
+    let server = server().await;
+    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
+    let mut config = transport::client_config(pinned, Duration::from_secs(5))
+        .unwrap_or_else(|error| fail(&error));
+    let mut narrow = quinn::TransportConfig::default();
+    narrow.stream_receive_window(quinn::VarInt::from_u32(16)); // less than a Welcome
+    config.transport_config(Arc::new(narrow));
+    let any = SocketAddr::from(([127, 0, 0, 1], 0));
+    let endpoint = quinn::Endpoint::client(any).unwrap_or_else(|error| fail(&error));
+    let connecting = endpoint
+        .connect_with(config, server.quic_addr(), "taut")
+        .unwrap_or_else(|error| fail(&error));
+    let connection = connecting.await.unwrap_or_else(|error| fail(&error));
+    let claim = Claim {
+        role: Role::Device,
+        node: "bridge",
+        grant: Grant::Master,
+    };
+    let bound = binding::proof_binding(&connection).unwrap_or_else(|error| fail(&error));
+    let secret = key('a').join_secret(claim.role, claim.node, claim.grant);
+    let hello = ControlMessage::Hello(Hello {
+        versions: VersionRange::SUPPORTED,
+        node: claim.node.into(),
+        role: claim.role,
+        transport: Transport::Udp,
+        rate_hz: 0,
+        proof: secret.client_proof(&bound, claim),
+        grant: claim.grant,
+    });
+    let frame = hello.to_frame().unwrap_or_else(|error| fail(&error));
+    let (mut send, _recv) = connection
+        .open_bi()
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    send.write_all(&frame)
+        .await
+        .unwrap_or_else(|error| fail(&error));
+    wait_until("its place", || server.clients().len() == 1).await;
+    wait_until("the end of its time", || server.clients().is_empty()).await;
+    client(&server, Role::Device, "bridge").await.close().await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,7 +1,8 @@
 //! Every control message.
 
 use taut_proto::{
-    ClientStats, ControlMessage, CouplingOffer, EventsTold, MeshHash, Refusal, Role, Transport,
+    ClientStats, ControlMessage, CouplingOffer, EventsTold, MeshHash, PROTOCOL_VERSION, Refusal,
+    Role, Transport, VersionRange,
     control::{
         ArmRequest, Bye, Hello, LogEvent, LogLevel, MeshHeader, MeshRequest, RefusalCode, StatesBy,
         Welcome,
@@ -22,6 +23,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         text: "taken".into(),
     };
     let hello = Hello {
+        versions: VersionRange::SUPPORTED,
         node: "left".into(),
         role: Role::Render,
         transport: Transport::QuicDatagram,
@@ -35,6 +37,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ..hello.clone()
     };
     let welcome = Welcome {
+        version: PROTOCOL_VERSION,
         proof: [4; 32],
         session: 2,
         epoch: 0xdead_beef,

@@ -5,6 +5,7 @@ use taut_proto::{
     Confirmation, HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
     confirmation::{MAX_CONFIRMED, SentState},
     events::EventAck,
+    path::PathToken,
     time::{TimeRequest, TimeResponse},
 };
 
@@ -73,6 +74,14 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("release", Payload::Release(release())),
         ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
         ("confirm", Payload::Confirm(confirmation)),
+        (
+            "path_challenge",
+            Payload::PathChallenge(PathToken { token: 0x0102 }),
+        ),
+        (
+            "path_response",
+            Payload::PathResponse(PathToken { token: 0x0102 }),
+        ),
     ]
 }
 
@@ -137,6 +146,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         any_arrive().prop_map(Payload::Arrive),
         any_release().prop_map(Payload::Release),
         any_confirmation().prop_map(Payload::Confirm),
+        any::<u64>().prop_map(|token| Payload::PathResponse(PathToken { token })),
     ]
 }
 

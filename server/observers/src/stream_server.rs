@@ -3,18 +3,20 @@
 //!
 //! Plain HTTP without TLS: it belongs on the loopback address, behind a tunnel, or, with a token, on a network that is trusted.
 //! Every line is written once, whoever reads it. An observer that does not keep up misses states (the newest is next) and, if
-//! it is far behind, events, which it is told; one that takes nothing for [`SEND_TIME`] is dropped.
+//! it is far behind, events, which it is told; one that takes nothing for [`SEND_TIME`] is dropped. Who has not asked yet has no place among the
+//! observers, only one of [`MAX_ASKING`] places to ask from, which a newcomer may take (see [`taut_proto::waiting`]).
 
 use std::io;
 use std::net::SocketAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
+use taut_proto::waiting::{Ticket, Waiting};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{broadcast, watch};
+use tokio::sync::{broadcast, oneshot, watch};
 use tokio::time::{sleep, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
@@ -30,11 +32,17 @@ use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
 /// The page at `/`: self-contained, it reads `/ws`.
 const PAGE: &str = include_str!("page.html");
 /// Longest that an observer may take for its request.
-const REQUEST_TIME: Duration = Duration::from_secs(5);
+const REQUEST_TIME: Duration = Duration::from_secs(2);
+/// Clients that may be asking at once.
+const MAX_ASKING: usize = 64;
+/// The same of one address: a browser asks for a page on some six connections.
+const MAX_ASKING_OF_ONE: usize = 16;
 /// Longest that an observer may take nothing of what is sent.
 const SEND_TIME: Duration = Duration::from_secs(5);
 /// Events that wait for a slow observer.
 const EVENT_LINES: usize = 256;
+/// Sentences for people.
+const TEXT: &str = "text/plain; charset=utf-8";
 /// Largest message of an observer; they have nothing to say.
 const MAX_INBOUND_BYTES: usize = 4096;
 /// What Prometheus is told that `/metrics` is.
@@ -75,6 +83,7 @@ pub struct StreamServer {
 struct Counts {
     observers: AtomicUsize,
     dropped: AtomicU64,
+    crowded_out: AtomicU64,
 }
 
 /// What every observer's task knows.
@@ -87,10 +96,18 @@ struct Shared {
     metrics: watch::Receiver<Option<Arc<str>>>,
     counts: Arc<Counts>,
     max_observers: usize,
+    asking: Arc<Mutex<Waiting<oneshot::Sender<()>>>>,
 }
 
 /// A place among the observers; dropped, it is free again.
 struct Place(Arc<Counts>);
+
+/// A place to ask from; dropped, it is free again. Whoever takes it ends `lost`.
+struct Asking {
+    places: Arc<Mutex<Waiting<oneshot::Sender<()>>>>,
+    ticket: Ticket,
+    lost: oneshot::Receiver<()>,
+}
 
 impl StreamServer {
     /// Opens the port and serves what `feed` has.
@@ -115,6 +132,7 @@ impl StreamServer {
             metrics: shown_metrics,
             counts: counts.clone(),
             max_observers: settings.max_observers,
+            asking: Arc::new(Mutex::new(Waiting::new(MAX_ASKING, MAX_ASKING_OF_ONE))),
         };
         let mut trail = EventLines::new(settings.naming);
         let service = Service::start("observers", runtime, move |_| async move {
@@ -152,10 +170,49 @@ impl StreamServer {
         self.counts.observers.load(Ordering::Relaxed)
     }
 
+    /// Clients that lost their place to ask from to others before they had asked.
+    #[must_use]
+    pub fn crowded_out(&self) -> u64 {
+        self.counts.crowded_out.load(Ordering::Relaxed)
+    }
+
     /// Observers that were given up because they took nothing.
     #[must_use]
     pub fn dropped(&self) -> u64 {
         self.counts.dropped.load(Ordering::Relaxed)
+    }
+}
+
+impl Shared {
+    /// A place to ask from; whoever asks longest of the address that asks most gives it up where there is none.
+    fn ask(&self, peer: SocketAddr) -> Asking {
+        let (place, lost) = oneshot::channel();
+        let mut places = self.asking.lock().unwrap_or_else(PoisonError::into_inner);
+        let (ticket, loser) = places.enter(peer.ip(), place);
+        if loser.is_some() {
+            self.counts.crowded_out.fetch_add(1, Ordering::Relaxed);
+        }
+        Asking {
+            places: self.asking.clone(),
+            ticket,
+            lost,
+        }
+    }
+
+    /// A place among the observers, if there is one.
+    fn observe(&self) -> Option<Place> {
+        let observers = &self.counts.observers;
+        let taken = observers.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |observers| {
+            (observers < self.max_observers).then_some(observers + 1)
+        });
+        taken.ok().map(|_| Place(self.counts.clone()))
+    }
+}
+
+impl Drop for Asking {
+    fn drop(&mut self) {
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        places.leave(self.ticket);
     }
 }
 
@@ -171,17 +228,10 @@ async fn accept(listener: TcpListener, shared: &Shared) {
             sleep(ACCEPT_PAUSE).await;
             continue;
         };
-        let observers = &shared.counts.observers;
-        let taken = observers.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |observers| {
-            (observers < shared.max_observers).then_some(observers + 1)
-        });
-        if taken.is_err() {
-            continue; // closed at once
-        }
-        let place = Place(shared.counts.clone());
+        let asking = shared.ask(peer);
         let shared = shared.clone();
         tokio::spawn(async move {
-            match observer(stream, &shared).await {
+            match observer(stream, &shared, asking).await {
                 Ok(()) => tracing::debug!("observer {peer} went"),
                 Err(End::Slow) => {
                     shared.counts.dropped.fetch_add(1, Ordering::Relaxed);
@@ -189,7 +239,6 @@ async fn accept(listener: TcpListener, shared: &Shared) {
                 }
                 Err(End::Gone) => {}
             }
-            drop(place);
         });
     }
 }
@@ -209,44 +258,25 @@ impl From<io::Error> for End {
     }
 }
 
-async fn observer(mut stream: TcpStream, shared: &Shared) -> Result<(), End> {
+async fn observer(mut stream: TcpStream, shared: &Shared, mut asking: Asking) -> Result<(), End> {
     // A socket that refuses this is merely later.
     let _ = stream.set_nodelay(true);
-    let wish = timeout(REQUEST_TIME, request(&mut stream, shared.token.as_deref()))
-        .await
-        .map_err(|_| End::Gone)??;
+    let asked = timeout(REQUEST_TIME, request(&mut stream, shared.token.as_deref()));
+    let wish = tokio::select! {
+        biased;
+        asked = asked => asked.map_err(|_| End::Gone)??,
+        _ = &mut asking.lost => return Err(End::Gone),
+    };
+    // Those who stay have a place of their own; a page or a line is sent to where it was asked from.
     match wish {
-        Err(refusal) => {
-            let (status, text) = refusal.text();
-            answer(
-                &mut stream,
-                status,
-                "text/plain; charset=utf-8",
-                &format!("{text}\n"),
-            )
-            .await
-        }
-        Ok(Wish::Page) => answer(&mut stream, "200 OK", "text/html; charset=utf-8", PAGE).await,
-        Ok(Wish::Hello) => {
-            let line = format!("{}\n", shared.hello);
-            answer(&mut stream, "200 OK", "application/json", &line).await
-        }
-        Ok(Wish::Metrics) => {
-            let text = shared.metrics.borrow().clone();
-            match text {
-                Some(text) => answer(&mut stream, "200 OK", METRICS_KIND, &text).await,
-                None => {
-                    let (status, why) = NOTHING_MEASURED;
-                    answer(&mut stream, status, "text/plain; charset=utf-8", why).await
-                }
-            }
-        }
         Ok(Wish::Lines) => {
+            let _place = settle(&mut stream, shared, asking).await?;
             let head = head("200 OK", "application/x-ndjson");
             send(stream.write_all(head.as_bytes())).await?;
             follow(Lines(stream), shared).await
         }
         Ok(Wish::WebSocket(key)) => {
+            let _place = settle(&mut stream, shared, asking).await?;
             let accept = derive_accept_key(key.as_bytes());
             let head = format!(
                 "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {accept}\r\n\r\n"
@@ -257,6 +287,54 @@ async fn observer(mut stream: TcpStream, shared: &Shared) -> Result<(), End> {
                 .max_frame_size(Some(MAX_INBOUND_BYTES));
             let socket = WebSocketStream::from_raw_socket(stream, Role::Server, Some(config)).await;
             follow(socket, shared).await
+        }
+        wish => tokio::select! {
+            biased;
+            answered = answer_at_once(&mut stream, wish, shared) => answered,
+            _ = &mut asking.lost => Err(End::Gone),
+        },
+    }
+}
+
+/// From asking to observing; where there is no place, that is told.
+async fn settle(stream: &mut TcpStream, shared: &Shared, asking: Asking) -> Result<Place, End> {
+    if let Some(place) = shared.observe() {
+        return Ok(place);
+    }
+    let (mut asking, status) = (asking, "503 Service Unavailable");
+    tokio::select! {
+        biased;
+        told = answer(stream, status, TEXT, "all places of observers are taken: see [observers] max_observers\n") => told?,
+        _ = &mut asking.lost => {}
+    }
+    Err(End::Gone)
+}
+
+/// What needs no place: the page, the first line, a refusal.
+async fn answer_at_once(
+    stream: &mut TcpStream,
+    wish: Result<Wish, Refusal>,
+    shared: &Shared,
+) -> Result<(), End> {
+    match wish {
+        Ok(Wish::Hello) => {
+            let line = format!("{}\n", shared.hello);
+            answer(stream, "200 OK", "application/json", &line).await
+        }
+        Ok(Wish::Metrics) => {
+            let text = shared.metrics.borrow().clone();
+            match text {
+                Some(text) => answer(stream, "200 OK", METRICS_KIND, &text).await,
+                None => {
+                    let (status, why) = NOTHING_MEASURED;
+                    answer(stream, status, TEXT, why).await
+                }
+            }
+        }
+        Ok(_) => answer(stream, "200 OK", "text/html; charset=utf-8", PAGE).await,
+        Err(refusal) => {
+            let (status, text) = refusal.text();
+            answer(stream, status, TEXT, &format!("{text}\n")).await
         }
     }
 }

@@ -258,3 +258,23 @@ fn garbage_and_too_many_are_sent_away() {
         Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
     }
 }
+
+/// 128 silent sockets were enough to keep everybody out of 128 places.
+#[test]
+fn silent_sockets_take_no_place_of_those_who_ask() {
+    let (_workbench, server) = serve(60.0, None, 2);
+    let silent: Vec<_> = (0..200)
+        .map(|_| TcpStream::connect(server.address()).expect("the server"))
+        .collect();
+    let mut readers = [get(&server, "/stream", ""), get(&server, "/stream", "")];
+    for reader in &mut readers {
+        assert_eq!(status(reader), "HTTP/1.1 200 OK");
+        assert_eq!(line(reader)["type"], "hello");
+    }
+    // A third finds no place and is told so; the page still comes.
+    assert!(status(&mut get(&server, "/stream", "")).contains("503"));
+    assert_eq!(status(&mut get(&server, "/", "")), "HTTP/1.1 200 OK");
+    assert_eq!(server.observers(), 2);
+    assert!(server.crowded_out() > 0);
+    drop(silent);
+}

@@ -187,7 +187,7 @@ fn outline(screen: &ScreenDescription, frame: &SceneFrame) -> MonitorScreen {
             .map(|corner| frame.point(&corner));
     let upper_right = lower_right + (upper_left - lower_left);
     MonitorScreen {
-        name: screen.name.clone(),
+        name: screen.name.to_string(),
         corners: [lower_left, lower_right, upper_right, upper_left],
     }
 }

@@ -46,7 +46,7 @@ impl Session {
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
         let ledger = RealtimeLedger::default();
-        let runtime = network_runtime(&ledger, setup.realtime.network_priority)?;
+        let runtime = network_runtime(&ledger)?;
         let picture = picture(&setup);
         let opening = opening(&setup);
         let scene_revision = setup.content.description.revision;
@@ -66,6 +66,7 @@ impl Session {
             udp: setup.link.udp,
             announced_udp_port: setup.link.announced_udp_port,
             multicast: setup.link.multicast,
+            also: setup.link.also,
             max_clients: setup.link.max_clients,
             frames: setup.link.frames,
             policy: setup.link.policy,
@@ -81,6 +82,7 @@ impl Session {
         let (looking_on, outlets) =
             LookingOn::start(&setup.looking_on, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
+        let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
         let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
@@ -187,6 +189,9 @@ impl Session {
             &setup.realtime,
         )?;
         session.start_frames(&setup.realtime)?;
+        if is_remote {
+            session.start_device_input(&setup.realtime)?;
+        }
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.start_service_manager()?;
         session.enforce(setup.realtime.policy)?;
@@ -214,14 +219,14 @@ impl Session {
     }
 }
 
-/// The threads that receive: device samples come this way, so they go before normal work.
-fn network_runtime(ledger: &RealtimeLedger, priority: u8) -> Result<Runtime, Failure> {
+/// The threads of QUIC. Strangers reach them, so they go behind normal work: whoever has proven nothing costs nobody a deadline.
+fn network_runtime(ledger: &RealtimeLedger) -> Result<Runtime, Failure> {
     let ledger = ledger.clone();
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(NETWORK_THREADS)
         .thread_name("network")
         .on_thread_start(move || {
-            ledger.schedule("network", Scheduling::Fifo(priority));
+            ledger.schedule("network", Scheduling::Behind);
         })
         .enable_all()
         .build()

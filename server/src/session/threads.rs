@@ -135,6 +135,23 @@ impl Session {
         )
     }
 
+    /// What the device behind the network sends, by a way that is its own.
+    pub(super) fn start_device_input(
+        &mut self,
+        realtime: &RealtimeSettings,
+    ) -> Result<(), Failure> {
+        let Some(mut receiver) = self.link.as_ref().map(ServerLink::device_receiver) else {
+            return Ok(());
+        };
+        let shutdown = self.shutdown.clone();
+        self.start_thread(
+            "device-input",
+            Scheduling::Fifo(realtime.device_input_priority),
+            None,
+            move || receiver.run(&|| shutdown.is_asked()),
+        )
+    }
+
     pub(super) fn start_haptics(
         &mut self,
         mut haptics: HapticsLoop,

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use taut_proto::{
-    Assembler, ConstraintPart, ControlMessage, Header, Kind, MeshBlob, Payload,
+    Assembler, ConstraintPart, ControlMessage, Header, Kind, MeshBlob, PROTOCOL_VERSION, Payload,
     control::{LENGTH_BYTES, MAX_FRAME_BYTES},
     header::{HEADER_BYTES, MAX_PAYLOAD_BYTES, TAG_BYTES},
 };
@@ -36,6 +36,7 @@ pub(crate) fn payload(bytes: &[u8]) {
 fn kind_of(code: u8) -> Option<Kind> {
     let mut datagram = [0; HEADER_BYTES + TAG_BYTES];
     let empty = Header {
+        version: PROTOCOL_VERSION,
         kind: Kind::Heartbeat,
         epoch: 0,
         sender: 0,

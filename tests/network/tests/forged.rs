@@ -9,7 +9,7 @@ use taut_network_tests::forge::{
     Attack, FORGERIES, Forger, Forgery, MAX_FORGED_BYTES, Seen, attack, payload_of_every_kind,
 };
 use taut_network_tests::relay::{Direction, Treatment, Waiting};
-use taut_proto::{DecodeError, Header, limits::Rate};
+use taut_proto::{Header, PROTOCOL_VERSION, limits::Rate};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -145,8 +145,8 @@ fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket(
         let payload = &payloads[number as usize / FORGERIES.len() % payloads.len()];
         let length = forger.forge(forgery, &seen, payload, &mut buffer);
         match Header::parse(&buffer[..length]) {
+            Ok(header) if header.version != PROTOCOL_VERSION => due.wrong_version += 1,
             Ok(_) => due.refused += 1,
-            Err(DecodeError::WrongVersion { .. }) => due.wrong_version += 1,
             Err(_) => due.garbage += 1,
         }
         thief

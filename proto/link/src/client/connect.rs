@@ -27,7 +27,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::{
-    Act, CouplingOffer, DecodeError, PROTOCOL_VERSION, Refusal, SceneDescription, Transport,
+    Act, CouplingOffer, DecodeError, Refusal, SceneDescription, Transport, VersionRange,
     control::{ControlMessage, Hello, MAX_FRAME_BYTES, RefusalCode, Welcome},
     proof::Claim,
 };
@@ -92,7 +92,8 @@ pub(crate) async fn connect_with(
         }
         Err(_) => return Err(unreachable()),
     };
-    let (sealer, opener) = binding::client_keys(&connection, welcome.epoch, welcome.session)?;
+    let (sealer, opener) =
+        binding::client_keys(&connection, welcome.version, welcome.epoch, welcome.session)?;
     let path = match options.transport {
         Transport::QuicDatagram => Path::Quic,
         Transport::Udp => Path::udp(SocketAddr::new(
@@ -107,6 +108,7 @@ pub(crate) async fn connect_with(
         GroupEnd::new(welcome.epoch, welcome.session),
         path,
         options.priority,
+        welcome.version,
     ));
     hot.clone().start()?;
     tokio::spawn(told::listen(hot.clone(), recv, options.rate_hz == 0));
@@ -177,6 +179,7 @@ async fn reach(
 ) -> Result<(Endpoint, Connection), LinkError> {
     let pinned = Arc::new(PinnedServer::new(options.key.pin()));
     let config = transport::client_config(pinned.clone(), options.idle_timeout)?;
+    let name = transport::server_name(pinned.pin());
     loop {
         let round = Instant::now();
         for address in addresses {
@@ -187,9 +190,7 @@ async fn reach(
             let Ok(endpoint) = Endpoint::client(any) else {
                 continue; // this machine has no such address family
             };
-            let Ok(connecting) =
-                endpoint.connect_with(config.clone(), *address, transport::SERVER_NAME)
-            else {
+            let Ok(connecting) = endpoint.connect_with(config.clone(), *address, &name) else {
                 continue;
             };
             let Ok(connected) = timeout(ATTEMPT, connecting).await else {
@@ -248,6 +249,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         grant,
     };
     let hello = Hello {
+        versions: options.versions,
         node: options.node.as_str().into(),
         role: options.role,
         transport: options.transport,
@@ -255,14 +257,22 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         proof: secret.client_proof(&binding, claim),
         grant,
     };
-    if write_message(&mut send, &ControlMessage::Hello(hello))
+    let hello = ControlMessage::Hello(hello);
+    if write_message(&mut send, &hello, options.versions.max())
         .await
         .is_err()
     {
         return Err(lost(connection.closed().await));
     }
-    let welcome = match expect(options, connection, &mut recv).await? {
-        ControlMessage::Welcome(welcome) => welcome,
+    let welcome = match expect(options, connection, &mut recv, options.versions).await? {
+        ControlMessage::Welcome(welcome) if options.versions.contains(welcome.version) => welcome,
+        ControlMessage::Welcome(welcome) => {
+            return Err(LinkError::WrongVersion {
+                server: options.server.clone(),
+                theirs: welcome.version,
+                ours: options.versions,
+            });
+        }
         ControlMessage::Refused(refusal) => return Err(refused(options, refusal)),
         other => {
             return Err(protocol(
@@ -277,7 +287,8 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
             server: options.server.clone(),
         });
     }
-    let description = match expect(options, connection, &mut recv).await? {
+    let agreed = VersionRange::only(welcome.version);
+    let description = match expect(options, connection, &mut recv, agreed).await? {
         ControlMessage::Scene(description) => description,
         other => {
             return Err(protocol(
@@ -287,7 +298,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         }
     };
     let coupling = match options.role.may(Act::GetWrenches) {
-        true => match expect(options, connection, &mut recv).await? {
+        true => match expect(options, connection, &mut recv, agreed).await? {
             ControlMessage::Coupling(offer) => Some(offer),
             other => {
                 return Err(protocol(
@@ -311,13 +322,14 @@ async fn expect(
     options: &ClientOptions,
     connection: &Connection,
     recv: &mut RecvStream,
+    spoken: VersionRange,
 ) -> Result<ControlMessage, LinkError> {
-    match read_message(recv, MAX_FRAME_BYTES).await {
+    match read_message(recv, MAX_FRAME_BYTES, spoken).await {
         Ok(message) => Ok(message),
         Err(ReadMessageError::Decode(DecodeError::WrongVersion { theirs, ours })) => {
             Err(LinkError::WrongVersion {
                 server: options.server.clone(),
-                theirs,
+                theirs: theirs.max(),
                 ours,
             })
         }
@@ -339,7 +351,7 @@ fn refused(options: &ClientOptions, refusal: Refusal) -> LinkError {
         RefusalCode::WrongVersion => LinkError::WrongVersion {
             server,
             theirs: refusal.version,
-            ours: PROTOCOL_VERSION,
+            ours: options.versions,
         },
         code => LinkError::Refused {
             server,

@@ -56,6 +56,8 @@ pub(crate) struct Hot {
     ended: OnceLock<ConnectionError>,
     /// Real-time priority of the threads of frames.
     pub(crate) priority: Option<u8>,
+    /// Version of the protocol that both ends agreed on.
+    pub(crate) version: u8,
     sealer: Sealer,
     path: Path,
     /// To the control stream.
@@ -92,9 +94,11 @@ impl Hot {
         group: GroupEnd,
         path: Path,
         priority: Option<u8>,
+        version: u8,
     ) -> Hot {
         Hot {
             priority,
+            version,
             inbound,
             group,
             connection,
@@ -167,7 +171,12 @@ impl Hot {
     fn receive(&self, datagram: &[u8], received: Instant) {
         match Header::parse(datagram) {
             Ok(header) if is_grouped(&header) => self.receive_grouped(datagram, received),
-            _ => self.inbound.receive(datagram, received),
+            _ => {
+                // The server asks whether this client is where a datagram of it came from.
+                if let Some(token) = self.inbound.receive(datagram, received) {
+                    self.send(&Payload::PathResponse(token));
+                }
+            }
         }
         self.acknowledge();
     }

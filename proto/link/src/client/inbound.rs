@@ -12,6 +12,7 @@ use taut_proto::{
     Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken, Payload,
     Role, SessionTime,
     confirmation::{Trust, Unconfirmed},
+    path::PathToken,
     seal::{OpenError, Opened, Opener},
     state::EventRecord,
 };
@@ -91,13 +92,16 @@ impl Inbound {
         moment.saturating_duration_since(self.start).as_nanos() as u64 // 584 years fit
     }
 
-    /// Takes one datagram in, or counts why not. What is not authentic has no effect.
-    pub(crate) fn receive(&self, datagram: &[u8], received: Instant) {
+    /// Takes one datagram in, or counts why not. What is not authentic has no effect. Returns a challenge of the server, to be answered.
+    pub(crate) fn receive(&self, datagram: &[u8], received: Instant) -> Option<PathToken> {
         let counters = &self.counters;
         let mut inner = self.lock();
         let opened = match inner.opener.open(datagram) {
             Ok(opened) => opened,
-            Err(error) => return self.count_refused(&error),
+            Err(error) => {
+                self.count_refused(&error);
+                return None;
+            }
         };
         counters.packets_received.one();
         let sequence = opened.header.sequence;
@@ -109,12 +113,17 @@ impl Inbound {
         inner.heard_ns = Some(local_ns);
         if let Payload::Release(release) = opened.payload {
             drop(inner);
-            return self.frames.release(release, opened.state_hash, local_ns);
+            self.frames.release(release, opened.state_hash, local_ns);
+            return None;
+        }
+        if let Payload::PathChallenge(token) = opened.payload {
+            return Some(token);
         }
         if let Payload::Hot(_) = opened.payload {
             self.frames.witness(opened.state_hash);
         }
         inner.take(opened, received, local_ns, counters, Provenance::Session);
+        None
     }
 
     /// Takes what the server said to the group.
@@ -320,6 +329,8 @@ impl Inner {
             | Payload::Head(_)
             | Payload::TimeRequest(_)
             | Payload::Arrive(_)
+            | Payload::PathChallenge(_) // under a group key: taken before under its own
+            | Payload::PathResponse(_)
             | Payload::EventAck(_) => counters.garbage.one(),
             Payload::Release(_) => {} // taken before
         }

@@ -69,7 +69,7 @@ impl ClientLink {
         send: SendStream,
     ) -> ClientLink {
         let (outbox, messages) = mpsc::channel(MAX_WAITING_MESSAGES);
-        tokio::spawn(write_reports(send, messages));
+        tokio::spawn(write_reports(send, messages, hot.version));
         hot.set_outbox(outbox.clone());
         ClientLink {
             server,
@@ -105,6 +105,11 @@ impl ClientLink {
         self.epoch
     }
 
+    /// Version of the protocol that both ends agreed on.
+    pub fn protocol_version(&self) -> u8 {
+        self.hot.version
+    }
+
     /// Silence on the hot plane after which the server gives a node up, and after which it is to be given up itself.
     pub fn node_timeout(&self) -> Duration {
         self.node_timeout
@@ -113,7 +118,7 @@ impl ClientLink {
     /// The mesh of `hash`, from memory, from the cache on disk, or from the server. Its hash has been checked.
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
         self.meshes
-            .get(&self.hot.connection, &self.server, hash)
+            .get(&self.hot.connection, self.hot.version, &self.server, hash)
             .await
     }
 
@@ -333,9 +338,13 @@ impl Drop for ClientLink {
 }
 
 /// Writes reports in order until the link or the stream ends; what has no encoding is skipped.
-async fn write_reports(mut send: SendStream, mut messages: mpsc::Receiver<ControlMessage>) {
+async fn write_reports(
+    mut send: SendStream,
+    mut messages: mpsc::Receiver<ControlMessage>,
+    version: u8,
+) {
     while let Some(message) = messages.recv().await {
-        match write_message(&mut send, &message).await {
+        match write_message(&mut send, &message, version).await {
             Ok(()) => {}
             Err(crate::framing::WriteMessageError::Encode(error)) => {
                 tracing::warn!("a {} message was not sent: {error}", message.name());

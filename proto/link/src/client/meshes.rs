@@ -13,7 +13,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use taut_proto::{
-    MeshBlob, MeshHash, SceneDescription,
+    MeshBlob, MeshHash, SceneDescription, VersionRange,
     control::{ControlMessage, MeshHeader, MeshRequest},
     mesh_blob::MAX_MESH_BYTES,
 };
@@ -54,6 +54,7 @@ impl Meshes {
     pub(crate) async fn get(
         &self,
         connection: &Connection,
+        version: u8,
         server: &str,
         hash: MeshHash,
     ) -> Result<Arc<MeshBlob>, LinkError> {
@@ -62,7 +63,10 @@ impl Meshes {
         }
         let mesh = match self.read_cached(hash).await {
             Some(mesh) => mesh,
-            None => self.fetch_checked(connection, server, hash).await?,
+            None => {
+                self.fetch_checked(connection, version, server, hash)
+                    .await?
+            }
         };
         let mesh = Arc::new(mesh);
         self.lock().insert(hash, mesh.clone());
@@ -94,10 +98,11 @@ impl Meshes {
     async fn fetch_checked(
         &self,
         connection: &Connection,
+        version: u8,
         server: &str,
         hash: MeshHash,
     ) -> Result<MeshBlob, LinkError> {
-        let bytes = fetch(connection, server, hash).await?;
+        let bytes = fetch(connection, version, server, hash).await?;
         self.counters.fetched.one();
         self.counters.fetched_bytes.add(bytes.len() as u64);
         let cache = self.cache.clone();
@@ -129,6 +134,7 @@ impl Meshes {
 
 async fn fetch(
     connection: &Connection,
+    version: u8,
     server: &str,
     hash: MeshHash,
 ) -> Result<Vec<u8>, LinkError> {
@@ -146,11 +152,12 @@ async fn fetch(
     write_message(
         &mut send,
         &ControlMessage::MeshRequest(MeshRequest { hash }),
+        version,
     )
     .await
     .map_err(|error| ended(peer_text(&error)))?;
     let _ = send.finish(); // fails only if the stream is gone, and then reading fails too
-    let answer = read_message(&mut recv, MAX_HEADER_BYTES)
+    let answer = read_message(&mut recv, MAX_HEADER_BYTES, VersionRange::only(version))
         .await
         .map_err(|error| ended(peer_text(&error)))?;
     let length = match answer {

@@ -5,7 +5,9 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand, state::RunState};
+use taut_proto::{
+    HotState, JoinKey, Role, Transport, VersionRange, WrenchCommand, state::RunState,
+};
 
 /// Longer than any server's own: QUIC takes the shorter one of both ends.
 const LONGEST_IDLE: Duration = Duration::from_secs(120);
@@ -17,6 +19,8 @@ pub struct ClientOptions {
     pub server: String,
     /// The cluster key, or a credential for this role and name.
     pub key: JoinKey,
+    /// Versions of the protocol that it speaks.
+    pub versions: VersionRange,
     /// What this client is.
     pub role: Role,
     /// Its name, unique in the workbench.
@@ -47,6 +51,7 @@ impl ClientOptions {
         ClientOptions {
             server: server.into(),
             key: key.into(),
+            versions: VersionRange::SUPPORTED,
             role,
             node: node.into(),
             transport: Transport::Udp,

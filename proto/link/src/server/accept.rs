@@ -3,38 +3,33 @@
 use super::{
     LinkEvent, downstream,
     gate::{act_of_message, demand},
-    joining::Joining,
+    joining::{Joining, Lost},
     receive::receive,
-    session::{Admitted, Session, lock},
+    session::{Admitted, Session},
     shared::{Admission, Refused, Shared},
 };
 use crate::{
     binding,
     framing::{
         CLOSE_BYE, CLOSE_PROTOCOL, CLOSE_REFUSED, CLOSE_REPLACED, ReadMessageError, close_text,
-        read_message, read_whole_message, write_message,
+        read_message, read_whole_message, write_frame, write_message,
     },
+    lock::lock,
 };
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
-    Act, DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport, Untrusted,
+    Act, DecodeError, Refusal, Role, Transport, Untrusted, VersionRange,
     control::{
         ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
         Welcome,
     },
-    limits::Attempt,
     membership::Pace,
-    proof::{Claim, Grant},
+    proof::{Claim, Grant, JoinSecret},
     revocation::ShutOut,
 };
-use tokio::{
-    sync::Semaphore,
-    time::{sleep, timeout},
-};
+use tokio::time::{sleep, timeout};
 
-/// Clients that may be joining at once; more are turned away before any cryptography.
-const MAX_JOINING: usize = 64;
 /// Clients joining at once above which an address must first prove that it receives what is sent to it (QUIC Retry): whoever names the
 /// addresses of others cannot keep them out.
 const CHECK_ADDRESSES_ABOVE: usize = 8;
@@ -60,16 +55,14 @@ const MAX_HELLO_BYTES: usize = 1024;
 
 /// Lets clients in until the endpoint closes.
 pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
-    let joining = Arc::new(Semaphore::new(MAX_JOINING));
     while let Some(incoming) = endpoint.accept().await {
-        let busy = MAX_JOINING - joining.available_permits() >= CHECK_ADDRESSES_ABOVE;
+        let busy = lock(&shared.waiting).len() >= CHECK_ADDRESSES_ABOVE;
         if busy && !incoming.remote_address_validated() && incoming.may_retry() {
             shared.counters.address_checks.one();
             let _ = incoming.retry(); // fails only where it may not be asked for
             continue;
         }
-        let attempt = Joining::begin(&shared, incoming.remote_address().ip());
-        let (Some(attempt), Ok(permit)) = (attempt, joining.clone().try_acquire_owned()) else {
+        let Some((attempt, lost)) = Joining::begin(&shared, incoming.remote_address().ip()) else {
             shared.counters.turned_away.one();
             shared.counters.refused.one();
             incoming.refuse();
@@ -77,12 +70,36 @@ pub(crate) async fn run(shared: Arc<Shared>, endpoint: quinn::Endpoint) {
         };
         let shared = shared.clone();
         tokio::spawn(async move {
-            let joined = timeout(JOIN_TIMEOUT, join(&shared, incoming, attempt)).await;
-            drop(permit);
-            if let Ok(Some((session, send, recv))) = joined {
-                attend(&shared, session, send, recv).await;
+            if let Some((entry, send, recv)) = joined(&shared, incoming, attempt, lost).await {
+                attend(&shared, entry, send, recv).await;
             }
         });
+    }
+}
+
+/// A client on the list; dropped, it is off it again. So a join that is given up on the way leaves no session behind.
+struct Entry {
+    shared: Arc<Shared>,
+    session: Arc<Session>,
+}
+
+impl Drop for Entry {
+    fn drop(&mut self) {
+        self.shared.sessions.remove(self.session.number);
+    }
+}
+
+/// Lets a client join within its time, and while nobody has taken its place.
+async fn joined(
+    shared: &Arc<Shared>,
+    incoming: quinn::Incoming,
+    attempt: Joining,
+    lost: Lost,
+) -> Option<(Entry, SendStream, RecvStream)> {
+    tokio::select! {
+        biased;
+        joined = timeout(JOIN_TIMEOUT, join(shared, incoming, attempt)) => joined.ok().flatten(),
+        Err(_) = lost => None,
     }
 }
 
@@ -91,14 +108,14 @@ async fn join(
     shared: &Arc<Shared>,
     incoming: quinn::Incoming,
     mut attempt: Joining,
-) -> Option<(Arc<Session>, SendStream, RecvStream)> {
+) -> Option<(Entry, SendStream, RecvStream)> {
     let connection = incoming.await.ok()?;
     let (mut send, mut recv) = connection.accept_bi().await.ok()?;
     let mut node = Untrusted::default();
-    let outcome = match read_message(&mut recv, MAX_HELLO_BYTES).await {
+    let outcome = match read_message(&mut recv, MAX_HELLO_BYTES, shared.versions).await {
         Ok(ControlMessage::Hello(hello)) => {
             node.clone_from(&hello.node);
-            admit(shared, &connection, hello)
+            admit(shared, &connection, hello, &mut attempt)
         }
         Ok(other) => Err((
             RefusalCode::BadHello,
@@ -111,31 +128,47 @@ async fn join(
         Err(error) => Err((RefusalCode::BadHello, error.to_string())),
     };
     let (session, welcome) = match outcome {
-        Ok(admitted) => {
-            attempt.came_to(Attempt::Proven);
-            admitted
-        }
+        Ok(admitted) => admitted,
         Err((code, text)) => {
             if code == RefusalCode::WrongKey {
-                attempt.came_to(Attempt::WrongProof);
+                attempt.wrong_proof();
             }
             drop(attempt); // it is over for the limits before the client has read why
             refuse(shared, &connection, send, node, code, text).await;
             return None;
         }
     };
-    let mut welcomed = write_message(&mut send, &ControlMessage::Welcome(welcome))
-        .await
-        .is_ok();
-    welcomed = welcomed && send.write_all(&shared.content.scene).await.is_ok();
+    let entry = Entry {
+        shared: shared.clone(),
+        session,
+    };
+    let (session, version) = (&entry.session, entry.session.version);
+    let welcome = ControlMessage::Welcome(welcome);
+    write_message(&mut send, &welcome, version).await.ok()?;
+    let content = &shared.content;
+    write_frame(&mut send, &content.scene, version).await.ok()?;
     if session.role.may(Act::GetWrenches) {
-        welcomed = welcomed && send.write_all(&shared.content.coupling).await.is_ok();
+        write_frame(&mut send, &content.coupling, version)
+            .await
+            .ok()?;
     }
-    if !welcomed {
-        shared.sessions.remove(session.number);
-        return None;
-    }
-    Some((session, send, recv))
+    Some((entry, send, recv))
+}
+
+/// The secret that the client has proven, and whether it is of the second cluster key.
+fn proven_secret(shared: &Shared, hello: &Hello, binding: &[u8; 32]) -> Option<(JoinSecret, bool)> {
+    let claim = Claim {
+        role: hello.role,
+        node: hello.node.raw(),
+        grant: hello.grant,
+    };
+    let also = shared.also.as_ref().filter(|also| also.counts());
+    let keys = [Some(&shared.key), also.map(|also| &also.key)];
+    keys.into_iter()
+        .flatten()
+        .map(|key| key.join_secret(claim.role, claim.node, claim.grant))
+        .zip([false, true])
+        .find(|(secret, _)| secret.verify_client(&hello.proof, binding, claim))
 }
 
 /// Checks a Hello and makes the session.
@@ -143,6 +176,7 @@ fn admit(
     shared: &Arc<Shared>,
     connection: &Connection,
     hello: Hello,
+    attempt: &mut Joining,
 ) -> Result<(Arc<Session>, Welcome), Refused> {
     let bad = |text: String| (RefusalCode::BadHello, text);
     let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
@@ -151,11 +185,13 @@ fn admit(
         node: hello.node.raw(),
         grant: hello.grant,
     };
-    let secret = shared.key.join_secret(claim.role, claim.node, claim.grant);
-    if !secret.verify_client(&hello.proof, &binding, claim) {
+    let Some((secret, by_also_key)) = proven_secret(shared, &hello, &binding) else {
         shared.counters.wrong_key.one();
         let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
         return Err((RefusalCode::WrongKey, text.to_owned()));
+    };
+    if !attempt.proven() {
+        return Err(bad("it came too late among many: try again".to_owned()));
     }
     // From here on the name is one that may be shown, whatever it is part of.
     let name = hello.node.raw();
@@ -165,6 +201,9 @@ fn admit(
         );
         return Err(bad(text));
     }
+    let Some(version) = shared.versions.highest_common(hello.versions) else {
+        return Err(bad("it speaks no version that is spoken here".to_owned())); // told when it was read
+    };
     let policy = lock(&shared.policy);
     policy.check(claim).map_err(|shut_out| {
         shared.counters.shut_out.one();
@@ -189,7 +228,7 @@ fn admit(
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
         shared.sessions.admit(name, hello.role, now_ns, |number| {
-            let keys = binding::server_keys(connection, shared.epoch, number)
+            let keys = binding::server_keys(connection, version, shared.epoch, number)
                 .map_err(|error| error.to_string())?;
             let admitted = Admitted {
                 number,
@@ -200,6 +239,9 @@ fn admit(
                 rate_hz: hello.rate_hz,
                 joined_ns: now_ns,
                 after_event: shared.discrete.newest(),
+                version,
+                is_newest: version == shared.versions.max(),
+                by_also_key,
             };
             Ok(Session::new(admitted, connection.clone(), keys))
         })?;
@@ -215,6 +257,7 @@ fn admit(
         });
     }
     let welcome = Welcome {
+        version,
         proof: secret.server_proof(&binding, claim),
         session: session.number,
         epoch: shared.epoch,
@@ -237,7 +280,7 @@ async fn refuse(
     tracing::info!(address = %connection.remote_address(), %node, ?code, "client refused: {text}");
     let refusal = Refusal {
         code,
-        version: PROTOCOL_VERSION,
+        version: shared.versions.max(),
         text: text.as_str().into(),
     };
     shared.tell(LinkEvent::Refused {
@@ -247,7 +290,8 @@ async fn refuse(
         text: text.clone(),
     });
     let told = async {
-        if write_message(&mut send, &ControlMessage::Refused(refusal))
+        let version = refusal.version;
+        if write_message(&mut send, &ControlMessage::Refused(refusal), version)
             .await
             .is_ok()
             && send.finish().is_ok()
@@ -262,22 +306,18 @@ async fn refuse(
 }
 
 /// The session from Welcome to the end.
-async fn attend(
-    shared: &Arc<Shared>,
-    session: Arc<Session>,
-    send: SendStream,
-    mut recv: RecvStream,
-) {
+async fn attend(shared: &Arc<Shared>, entry: Entry, send: SendStream, mut recv: RecvStream) {
+    let session = &entry.session;
     shared.counters.joined.one();
     tracing::info!(node = session.node, role = ?session.role, transport = ?session.transport, "client joined");
     shared.tell(LinkEvent::Joined(session.status(shared.clock.now_ns())));
 
     let connection = &session.connection;
     let reason = tokio::select! {
-        reason = read_control(shared, &session, &mut recv) => reason,
-        reason = serve_meshes(shared, &session) => reason,
-        reason = read_datagrams(shared, &session) => reason,
-        reason = downstream::tell(shared, &session, send) => reason,
+        reason = read_control(shared, session, &mut recv) => reason,
+        reason = serve_meshes(shared, session) => reason,
+        reason = read_datagrams(shared, session) => reason,
+        reason = downstream::tell(shared, session, send) => reason,
     };
     connection.close(CLOSE_BYE, b"");
     // A session that was replaced is gone already, and told.
@@ -294,7 +334,8 @@ async fn attend(
 async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream) -> String {
     let mut pace = Pace::new(MESSAGES_PER_SECOND, MESSAGE_BURST);
     loop {
-        let message = read_whole_message(recv, MAX_FRAME_BYTES, MESSAGE_TIMEOUT).await;
+        let spoken = VersionRange::only(session.version);
+        let message = read_whole_message(recv, MAX_FRAME_BYTES, spoken, MESSAGE_TIMEOUT).await;
         at_pace(shared, &mut pace).await;
         let message = match message {
             Ok(message) => message,
@@ -364,17 +405,19 @@ async fn serve_meshes(shared: &Arc<Shared>, session: &Session) -> String {
                 if let Err(reason) = demand(shared, session, Act::GetMeshes) {
                     return reason;
                 }
-                let shared = shared.clone();
+                let (shared, version) = (shared.clone(), session.version);
                 // Ends with the connection; the number of streams is limited by the transport.
-                tokio::spawn(async move { serve_mesh(&shared, send, recv).await });
+                tokio::spawn(async move { serve_mesh(&shared, version, send, recv).await });
             }
             Err(error) => return close_text(&error, "the node"),
         }
     }
 }
 
-async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream) {
-    let request = timeout(JOIN_TIMEOUT, read_message(&mut recv, MAX_HELLO_BYTES)).await;
+async fn serve_mesh(shared: &Shared, version: u8, mut send: SendStream, mut recv: RecvStream) {
+    let spoken = VersionRange::only(version);
+    let reading = read_message(&mut recv, MAX_HELLO_BYTES, spoken);
+    let request = timeout(JOIN_TIMEOUT, reading).await;
     let Ok(Ok(ControlMessage::MeshRequest(request))) = request else {
         return; // dropping the stream resets it
     };
@@ -385,10 +428,8 @@ async fn serve_mesh(shared: &Shared, mut send: SendStream, mut recv: RecvStream)
         hash: request.hash,
         length: mesh.map_or(0, |bytes| bytes.len() as u32), // MAX_MESH_BYTES is far below 2^32
     };
-    if write_message(&mut send, &ControlMessage::MeshHeader(header))
-        .await
-        .is_err()
-    {
+    let header = ControlMessage::MeshHeader(header);
+    if write_message(&mut send, &header, version).await.is_err() {
         return;
     }
     if let Some(bytes) = mesh
@@ -416,7 +457,7 @@ async fn write_paced(shared: &Shared, send: &mut SendStream, bytes: &[u8]) -> Re
 }
 
 /// Hot plane over QUIC; a client on UDP sends none here.
-async fn read_datagrams(shared: &Shared, session: &Session) -> String {
+async fn read_datagrams(shared: &Shared, session: &Arc<Session>) -> String {
     loop {
         match session.connection.read_datagram().await {
             Ok(datagram) if session.transport == Transport::QuicDatagram => {

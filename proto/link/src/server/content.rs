@@ -2,9 +2,7 @@
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
-use taut_proto::{
-    CouplingOffer, MeshBlob, MeshHash, SceneDescription, Untrusted, control::ControlMessage,
-};
+use taut_proto::{CouplingOffer, MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
 
 /// What clients fetch at join.
 #[derive(Clone, Debug)]
@@ -23,7 +21,7 @@ pub(crate) struct EncodedContent {
     pub(crate) coupling: Vec<u8>,
     pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
     /// Names of the workbench's render nodes.
-    pub(crate) nodes: Vec<Untrusted>,
+    pub(crate) nodes: Vec<String>,
 }
 
 impl Content {
@@ -48,7 +46,7 @@ impl Content {
             .description
             .nodes
             .iter()
-            .map(|node| node.name.clone())
+            .map(|node| node.name.raw().to_owned())
             .collect();
         let scene = ControlMessage::Scene(self.description)
             .to_frame()

@@ -3,7 +3,7 @@
 //! Writer: the link, whoever receives the datagram (one lock among the receivers). Reader: the haptics loop, wait-free, by triple buffer.
 //! Rate: that of the device, 1 kHz. A stale value means a silent bridge: the reader's watchdog compares `received_ns` with its clock.
 
-use std::sync::{Mutex, PoisonError};
+use crate::lock::{Mutex, lock};
 use taut_proto::InputSample;
 
 /// Newest device reading of the bridge, for the haptics loop.
@@ -49,7 +49,7 @@ impl InputWriter {
         if input.sample.pose.to_isometry().is_none() {
             return Taken::NoPose;
         }
-        let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut inner = lock(&self.inner);
         if let Some((session, index)) = inner.newest
             && session == input.session
             && index >= input.sample.index

@@ -1,7 +1,7 @@
 //! What the server tells a client on its control stream after the join: the group, and discrete events.
 
 use super::{session::Session, shared::Shared};
-use crate::framing::{WriteMessageError, close_text, peer_text, write_message};
+use crate::framing::{WriteMessageError, close_text, write_frame, write_message};
 use quinn::SendStream;
 use taut_proto::{EventsTold, control::ControlMessage};
 
@@ -18,23 +18,23 @@ async fn write(
     session: &Session,
     mut send: SendStream,
 ) -> Result<(), WriteMessageError> {
-    let ended = |error: quinn::WriteError| WriteMessageError::Ended(peer_text(&error));
     let (mut group, mut events) = (shared.group.follow(), shared.discrete.follow());
     let mut newest = session.after_event;
     let entry = EventsTold {
         after: newest,
         records: Vec::new(),
     };
-    write_message(&mut send, &ControlMessage::Events(entry)).await?;
+    let version = session.version;
+    write_message(&mut send, &ControlMessage::Events(entry), version).await?;
     loop {
         let told = group.borrow_and_update().clone();
         // Before its first own group, the newest one may be that of the others.
         if let Some(told) = told.filter(|told| told.group.member(session.number).is_some()) {
-            send.write_all(&told.frame).await.map_err(ended)?;
+            write_frame(&mut send, &told.frame, version).await?;
         }
         // Until the group changes again.
         loop {
-            newest = tell_events(shared, newest, &mut events, &mut send).await?;
+            newest = tell_events(shared, newest, &mut events, &mut send, version).await?;
             tokio::select! {
                 changed = group.changed() => match changed {
                     Ok(()) => break,
@@ -55,6 +55,7 @@ async fn tell_events(
     mut newest: u32,
     events: &mut tokio::sync::watch::Receiver<u32>,
     send: &mut SendStream,
+    version: u8,
 ) -> Result<u32, WriteMessageError> {
     events.mark_unchanged();
     loop {
@@ -63,6 +64,6 @@ async fn tell_events(
             return Ok(newest);
         };
         newest = last.id;
-        write_message(send, &ControlMessage::Events(told)).await?;
+        write_message(send, &ControlMessage::Events(told), version).await?;
     }
 }

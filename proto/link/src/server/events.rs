@@ -2,11 +2,8 @@
 //!
 //! Written by the broadcaster, read by the writers of the streams; both hold the lock for a copy of a few records and across no system call.
 
-use super::session::lock;
-use std::sync::{
-    Mutex,
-    atomic::{AtomicBool, Ordering},
-};
+use crate::lock::{Mutex, lock};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use taut_proto::{EventOutbox, EventsTold, HotState, events::is_newer};
 use tokio::sync::watch;
 
@@ -14,7 +11,10 @@ pub(crate) struct EventHub {
     outbox: Mutex<EventOutbox>,
     /// Whether states repeat anything: saves the lock where nothing happens.
     repeats: AtomicBool,
-    newest: watch::Sender<u32>,
+    /// Number of the newest event; written by the broadcaster, which takes no lock of the runtime's.
+    newest: AtomicU32,
+    /// The same for those who follow, a moment later.
+    told: watch::Sender<u32>,
 }
 
 impl Default for EventHub {
@@ -22,7 +22,8 @@ impl Default for EventHub {
         EventHub {
             outbox: Mutex::default(),
             repeats: AtomicBool::new(false),
-            newest: watch::Sender::new(0),
+            newest: AtomicU32::new(0),
+            told: watch::Sender::new(0),
         }
     }
 }
@@ -51,14 +52,21 @@ impl EventHub {
             pushed.then(|| outbox.newest())
         };
         if let Some(newest) = newest {
-            self.newest.send_replace(newest);
+            self.newest.store(newest, Ordering::Release);
         }
         Some(sent)
     }
 
     /// Changes when there are new events.
     pub(crate) fn follow(&self) -> watch::Receiver<u32> {
-        self.newest.subscribe()
+        self.told.subscribe()
+    }
+
+    /// Tells those who follow; called by a task of the runtime, again and again.
+    pub(crate) fn publish(&self) {
+        let newest = self.newest.load(Ordering::Acquire);
+        self.told
+            .send_if_modified(|told| std::mem::replace(told, newest) != newest);
     }
 
     /// Number of the newest event.
@@ -68,7 +76,7 @@ impl EventHub {
 
     /// Whether there was an event of this number, or none since; where it is asked for often, no lock.
     pub(crate) fn has_told(&self, number: u32) -> bool {
-        !is_newer(number, *self.newest.borrow())
+        !is_newer(number, self.newest.load(Ordering::Acquire))
     }
 
     /// What a client that has all up to `after` is to be told.

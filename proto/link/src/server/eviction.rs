@@ -3,8 +3,8 @@
 //! Nodes that others wait for (they draw, or hold the device) are gone after half a second; a node that was only stopped finds its session
 //! closed and joins again. Those who merely watch are left to QUIC, which forgives a pause of a second: nobody waits for them.
 
-use super::{LinkEvent, session::Session, shared::Shared};
-use crate::framing::CLOSE_EVICTED;
+use super::{AlsoKey, LinkEvent, session::Session, shared::Shared};
+use crate::framing::{CLOSE_EVICTED, CLOSE_REFUSED};
 use std::{sync::Weak, time::Duration};
 use taut_proto::{
     Role,
@@ -32,6 +32,7 @@ pub(crate) async fn run(shared: Weak<Shared>, limits: SilenceLimits) {
             return;
         };
         look(&shared, limits, &mut watched);
+        end_also_key(&shared);
     }
 }
 
@@ -73,6 +74,25 @@ fn look(shared: &Shared, limits: SilenceLimits, watched: &mut Vec<Watched>) {
             }),
             Liveness::Dead => evict(shared, session, silence),
             _ => {}
+        }
+    }
+}
+
+/// Whoever is in by the second cluster key has to join again when its time is over.
+fn end_also_key(shared: &Shared) {
+    if shared.also.as_ref().is_none_or(AlsoKey::counts) {
+        return;
+    }
+    for session in shared.sessions.all().iter() {
+        if session.by_also_key && shared.sessions.remove(session.number) {
+            let reason = "the time of its cluster key is over: give it a credential of the new one";
+            tracing::info!(node = session.node, "shut out: {reason}");
+            session.connection.close(CLOSE_REFUSED, reason.as_bytes());
+            shared.counters.shut_out.one();
+            shared.tell(LinkEvent::Left {
+                status: session.status(shared.clock.now_ns()),
+                reason: reason.to_owned(),
+            });
         }
     }
 }

@@ -1,15 +1,8 @@
 //! The frames thread: releases frames when their time has come, twice, to every node that takes part.
 
-use super::{
-    LinkEvent,
-    frames::Frames,
-    session::{Session, lock},
-    shared::Shared,
-};
-use std::{
-    sync::{Arc, PoisonError},
-    time::Duration,
-};
+use super::{LinkEvent, frames::Frames, session::Session, shared::Shared};
+use crate::lock::lock;
+use std::{sync::Arc, thread, time::Duration};
 use taut_proto::{
     Kind, Transport,
     barrier::{FrameSkew, MAX_MEMBERS, NodeState, REPEAT_NS},
@@ -58,6 +51,7 @@ impl FrameMaster {
         let Some(frames) = &shared.frames else {
             return;
         };
+        frames.lead();
         while !is_over() && !shared.is_stopping() {
             self.follow_sessions(frames);
             if self.wait(frames) {
@@ -117,11 +111,9 @@ impl FrameMaster {
             Duration::from_nanos(wake_ns.saturating_sub(now_ns)).min(STOP_CHECK)
         });
         if !nap.is_zero() {
-            leading = frames
-                .changed
-                .wait_timeout(leading, nap)
-                .unwrap_or_else(PoisonError::into_inner)
-                .0;
+            drop(leading);
+            thread::park_timeout(nap); // returns at once if it was woken since
+            leading = lock(&frames.master);
         }
         let now_ns = clock.now_ns();
         if leading.master.wake_ns().is_none_or(|wake| now_ns < wake) {
@@ -132,7 +124,7 @@ impl FrameMaster {
         let newest = lock(&frames.newest);
         if newest.length == 0 {
             drop((newest, leading));
-            std::thread::sleep(FIRST_STATE_CHECK);
+            thread::sleep(FIRST_STATE_CHECK);
             return false;
         }
         let Some((head, old)) = leading.master.poll(now_ns, newest.tag) else {

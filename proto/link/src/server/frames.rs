@@ -6,10 +6,14 @@
 use super::{
     LinkEvent,
     frame_report::{FrameReport, Recorder},
-    session::{Sent, Session, lock},
+    session::{Sent, Session},
     shared::Shared,
 };
-use std::sync::{Condvar, Mutex, TryLockError};
+use crate::lock::{Mutex, lock};
+use std::{
+    sync::Arc,
+    thread::{self, Thread},
+};
 use taut_proto::{
     Kind,
     barrier::{Answer, Arrive, FrameSkew, Master, MasterSettings, Newest},
@@ -24,8 +28,8 @@ const FIRST_TERM: u64 = 1;
 
 pub(crate) struct Frames {
     pub(super) master: Mutex<Leading>,
-    /// The master's wake-up time may have come nearer.
-    pub(super) changed: Condvar,
+    /// The frames thread, to be woken when the master's time may have come nearer.
+    leader: Mutex<Option<Arc<Thread>>>,
     pub(super) newest: Mutex<EncodedState>,
     pub(super) recorder: Mutex<Recorder>,
 }
@@ -56,7 +60,7 @@ impl Frames {
                 sent_bytes: 0,
                 shown: Vec::with_capacity(MAX_SHOWN),
             }),
-            changed: Condvar::new(),
+            leader: Mutex::new(None),
             newest: Mutex::new(EncodedState {
                 tag: Newest::default(),
                 bytes: [0; MAX_PAYLOAD_BYTES],
@@ -66,12 +70,23 @@ impl Frames {
         }
     }
 
+    /// The calling thread leads from now on.
+    pub(super) fn lead(&self) {
+        *lock(&self.leader) = Some(Arc::new(thread::current()));
+    }
+
+    /// Ends the sleep of who leads: one system call at most.
+    fn wake(&self) {
+        let leader = lock(&self.leader).clone();
+        if let Some(leader) = leader {
+            leader.unpark();
+        }
+    }
+
     /// Takes the state that is broadcast now. Never waits.
     pub(crate) fn offer(&self, payload: &[u8], tag: Newest) {
-        let mut newest = match self.newest.try_lock() {
-            Ok(newest) => newest,
-            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return, // being read: the next state comes in a millisecond
+        let Some(mut newest) = self.newest.try_lock() else {
+            return; // being read: the next state comes in a millisecond
         };
         if let Some(place) = newest.bytes.get_mut(..payload.len()) {
             place.copy_from_slice(payload);
@@ -99,7 +114,7 @@ impl Frames {
         payload[..bytes].copy_from_slice(&leading.sent[..bytes]);
         drop(leading);
         if sooner {
-            self.changed.notify_one();
+            self.wake();
         }
         if bytes > 0 {
             let mut buffer = [0; MAX_DATAGRAM_BYTES];

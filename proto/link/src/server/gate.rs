@@ -8,7 +8,10 @@ use taut_proto::{Act, ControlMessage, Payload};
 /// What a client does by a datagram; `None` for what only a server sends.
 pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
     match payload {
-        Payload::TimeRequest(_) | Payload::Heartbeat | Payload::EventAck(_) => Some(Act::KeepPath),
+        Payload::TimeRequest(_)
+        | Payload::Heartbeat
+        | Payload::EventAck(_)
+        | Payload::PathResponse(_) => Some(Act::KeepPath),
         Payload::Input(_) => Some(Act::GiveInput),
         Payload::Head(_) => Some(Act::GiveHead),
         Payload::Arrive(_) => Some(Act::KeepFrames),
@@ -17,7 +20,8 @@ pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_)
-        | Payload::Confirm(_) => None,
+        | Payload::Confirm(_)
+        | Payload::PathChallenge(_) => None,
     }
 }
 

@@ -3,14 +3,18 @@
 //! One task looks at the sessions [`POLL_PERIOD`] by period: what changed meanwhile is one change. Each session's writer ([`super::downstream`])
 //! takes the newest from a watch, so that a member whose stream is slow skips what is old already.
 
-use super::{session::lock, shared::Shared};
-use crate::{LinkError, MulticastOptions, multicast};
+use super::shared::Shared;
+use crate::{
+    LinkError, MulticastOptions,
+    lock::{Mutex, lock},
+    multicast,
+};
 use ring::rand::{SecureRandom, SystemRandom};
 use std::{
     io,
     net::SocketAddr,
     sync::{
-        Arc, Mutex,
+        Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
     time::Duration,
@@ -165,6 +169,7 @@ pub(crate) async fn run(shared: Arc<Shared>) {
             .iter()
             .any(|session| session.may_listen());
         shared.group.tend(listeners, shared.clock.now_ns());
+        shared.discrete.publish();
         tokio::time::sleep(POLL_PERIOD).await;
     }
 }
@@ -173,7 +178,7 @@ fn roster(shared: &Shared) -> Vec<GroupMember> {
     let sessions = shared.sessions.all();
     let mut members: Vec<_> = sessions
         .iter()
-        .filter(|session| is_member(session.role))
+        .filter(|session| is_member(session.role) && session.is_newest())
         .map(|session| GroupMember {
             sender: session.number,
             node: session.node.as_str().into(),

@@ -3,8 +3,7 @@
 //! Writer: the link, whoever receives the datagram (one lock among the receivers). Readers: broadcaster and monitor, wait-free, by a triple
 //! buffer each. Rate: that of the tracker. A stale value means a silent tracker: the reader compares `received_ns` with its clock.
 
-use super::session::lock;
-use std::sync::Mutex;
+use crate::lock::{Mutex, lock};
 use taut_proto::HeadSample;
 
 /// Readers of the head: broadcaster and monitor.

@@ -1,8 +1,13 @@
 //! Attempts to join, under the limits of `taut_proto::limits`: before TLS, and with the outcome noted whatever ends it.
 
-use super::{session::lock, shared::Shared};
+use super::shared::Shared;
+use crate::lock::lock;
 use std::{net::IpAddr, sync::Arc};
-use taut_proto::limits::{Attempt, JoinGuard, JoinLimits, Rate, UnknownSources};
+use taut_proto::{
+    limits::{Attempt, JoinGuard, JoinLimits, Rate, UnknownSources},
+    waiting::Ticket,
+};
+use tokio::sync::oneshot;
 
 /// Limits against floods. The defaults are generous for a workbench; see `docs/security.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,32 +47,64 @@ impl FloodLimits {
     }
 }
 
+/// Attempts under way at once. Who comes beyond it takes the place of the oldest of the address that has the most: see [`taut_proto::waiting`].
+pub(crate) const MAX_JOINING: usize = 64;
+
 /// One attempt; dropping it ends it, so that a task that is given up leaves no trace.
 pub(crate) struct Joining {
     shared: Arc<Shared>,
     address: IpAddr,
     outcome: Attempt,
+    /// Its place among those who have not proven anything.
+    ticket: Ticket,
 }
+
+/// Held among those who wait; dropped by whoever takes the place.
+pub(crate) type Place = oneshot::Sender<()>;
+/// Fails when the place is lost.
+pub(crate) type Lost = oneshot::Receiver<()>;
 
 impl Joining {
     /// `None` if `address` may not try now.
-    pub(crate) fn begin(shared: &Arc<Shared>, address: IpAddr) -> Option<Joining> {
-        lock(&shared.joins)
-            .begin(address, shared.clock.now_ns())
-            .then(|| Joining {
-                shared: shared.clone(),
-                address,
-                outcome: Attempt::Ended,
-            })
+    pub(crate) fn begin(shared: &Arc<Shared>, address: IpAddr) -> Option<(Joining, Lost)> {
+        if !lock(&shared.joins).begin(address, shared.clock.now_ns()) {
+            return None;
+        }
+        let (place, lost) = oneshot::channel();
+        let (ticket, loser) = lock(&shared.waiting).enter(address, place);
+        if loser.is_some() {
+            shared.counters.crowded_out.one();
+        }
+        let attempt = Joining {
+            shared: shared.clone(),
+            address,
+            outcome: Attempt::Ended,
+            ticket,
+        };
+        Some((attempt, lost))
     }
 
-    pub(crate) fn came_to(&mut self, outcome: Attempt) {
-        self.outcome = outcome;
+    /// It proved its secret; `false` if it had lost its place before.
+    pub(crate) fn proven(&mut self) -> bool {
+        self.outcome = Attempt::Proven;
+        self.leave()
+    }
+
+    /// Gives its place back; `false` if somebody else has taken it.
+    fn leave(&self) -> bool {
+        let place = lock(&self.shared.waiting).leave(self.ticket);
+        // Said, not dropped: it is over, but not lost.
+        place.is_some_and(|place| place.send(()).is_ok())
+    }
+
+    pub(crate) fn wrong_proof(&mut self) {
+        self.outcome = Attempt::WrongProof;
     }
 }
 
 impl Drop for Joining {
     fn drop(&mut self) {
+        self.leave();
         let now_ns = self.shared.clock.now_ns();
         lock(&self.shared.joins).end(self.address, self.outcome, now_ns);
     }

@@ -1,23 +1,27 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, FrameMaster, FrameReport, HEAD_READERS,
-    HeadOutput, LinkEvent, ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FrameMaster, FrameReport,
+    HEAD_READERS, HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
+    device_receiver::DevicePaths,
     events::EventHub,
     eviction,
     frames::Frames,
     group::{self, GroupHub},
     head_input::head_inputs,
+    joining::MAX_JOINING,
+    places::Places,
+    quic_outbox::{self, QuicSender},
     receive,
     sent_states::SentStates,
-    session::lock,
     shared::{MESH_BURST_BYTES, MESH_BYTES_PER_SECOND, Sessions, Shared},
 };
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock,
     counters::CounterCells,
     framing::{CLOSE_REFUSED, CLOSE_STOPPING},
+    lock::{Mutex, lock},
     transport,
 };
 use ring::rand::{SecureRandom, SystemRandom};
@@ -25,7 +29,7 @@ use std::{
     io,
     net::{SocketAddr, UdpSocket},
     sync::{
-        Arc, Mutex, OnceLock,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
         mpsc::{self, Receiver},
     },
@@ -33,7 +37,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::membership::{Pace, SilenceLimits};
-use taut_proto::{JoinPolicy, ServerPin};
+use taut_proto::{JoinPolicy, ServerPin, waiting::Waiting};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -42,6 +46,9 @@ const MAX_EVENTS: usize = 1024;
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
 /// How often a stopped server looks whether its port is free.
 const FREE_CHECK: Duration = Duration::from_millis(1);
+
+/// What a thread of the network does until the server stops.
+type ThreadBody = fn(&Arc<Shared>);
 
 /// A running server. Dropping it stops it at once; [`ServerLink::shutdown`] also waits until the clients have heard.
 pub struct ServerLink {
@@ -52,11 +59,12 @@ pub struct ServerLink {
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
     heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
-    udp_thread: Mutex<Option<JoinHandle<()>>>,
+    threads: Mutex<Vec<JoinHandle<()>>>,
     eviction: tokio::task::JoinHandle<()>,
 }
 
-/// Listens and lets clients in, on the current tokio runtime and one thread named `taut-udp`.
+/// Listens and lets clients in, on the current tokio runtime and two threads, `taut-udp` and `taut-quic`, of the calling
+/// thread's class.
 ///
 /// Fails if an address cannot be had, or if `content` names a mesh that it does not hold; nothing is left running then.
 pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLink, LinkError> {
@@ -73,6 +81,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         quinn::EndpointConfig::default(),
         Some(transport::server_config(
             &options.key,
+            options.also.as_ref(),
             options.idle_timeout,
         )?),
         quic_socket,
@@ -88,6 +97,9 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let (heads, head_outputs) = head_inputs();
     let shared = Arc::new(Shared {
         key: options.key,
+        also: options.also,
+        versions: options.versions,
+        waiting: Mutex::new(Waiting::new(MAX_JOINING, MAX_JOINING)),
         policy: Mutex::new(options.policy),
         joins: Mutex::new(options.limits.guard()),
         unknown: Mutex::new(options.limits.unknown()),
@@ -95,10 +107,14 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         clock: options.clock,
         node_timeout: options.node_timeout,
         epoch,
+        sessions: Sessions::new(Places::new(
+            options.max_clients,
+            &content.nodes,
+            options.frames.is_some(),
+        )),
         content,
         udp_port: options.announced_udp_port.unwrap_or(udp_address.port()),
         udp,
-        sessions: Sessions::new(options.max_clients),
         counters: CounterCells::default(),
         events: events_in,
         arm: OnceLock::new(),
@@ -108,13 +124,23 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         group,
         mesh_pace: Mutex::new(Pace::new(MESH_BYTES_PER_SECOND, MESH_BURST_BYTES)),
         discrete: EventHub::default(),
+        device_paths: DevicePaths::default(),
+        quic_sender: QuicSender::default(),
         stopping: AtomicBool::new(false),
     });
-    let of_thread = shared.clone();
-    let udp_thread = std::thread::Builder::new()
-        .name("taut-udp".to_owned())
-        .spawn(move || receive::run_udp(&of_thread))
-        .map_err(|error| system("start the state thread", &error))?;
+    let bodies: [(_, ThreadBody); 2] = [
+        ("taut-udp", receive::run_udp),
+        ("taut-quic", quic_outbox::run),
+    ];
+    let mut threads = Vec::new();
+    for (name, body) in bodies {
+        let shared = shared.clone();
+        let thread = std::thread::Builder::new()
+            .name(name.to_owned())
+            .spawn(move || body(&shared))
+            .map_err(|error| system("start a thread of the network", &error))?;
+        threads.push(thread);
+    }
     tokio::spawn(accept::run(shared.clone(), endpoint.clone()));
     tokio::spawn(group::run(shared.clone()));
     let node_timeout_ns = u64::try_from(options.node_timeout.as_nanos()).unwrap_or(u64::MAX);
@@ -128,7 +154,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
         heads: Mutex::new(Some(head_outputs)),
-        udp_thread: Mutex::new(Some(udp_thread)),
+        threads: Mutex::new(threads),
         eviction,
     })
 }
@@ -168,6 +194,11 @@ impl ServerLink {
     pub fn frame_master(&self) -> Option<FrameMaster> {
         let leads = self.shared.frames.is_some();
         leads.then(|| FrameMaster::new(self.shared.clone()))
+    }
+
+    /// The reader of the device's own path, for a thread of the real-time class. Without it the device is read like everybody else.
+    pub fn device_receiver(&self) -> DeviceReceiver {
+        DeviceReceiver::new(self.shared.clone())
     }
 
     /// How the frames of the render nodes went; `None` where they are not locked.
@@ -252,12 +283,13 @@ impl ServerLink {
             tracing::debug!("some clients did not hear that the server stops");
         }
         self.shared.stopping.store(true, Ordering::Relaxed);
-        let thread = lock(&self.udp_thread).take();
-        if let Some(thread) = thread {
+        let threads = std::mem::take(&mut *lock(&self.threads));
+        self.shared.quic_sender.wake();
+        for thread in threads {
             // Ends within one wait of the thread.
             let joined = tokio::task::spawn_blocking(move || thread.join()).await;
             if !matches!(joined, Ok(Ok(()))) {
-                tracing::error!("the state thread panicked");
+                tracing::error!("a thread of the network panicked");
             }
         }
         let addresses = [self.quic_addr(), self.udp_addr()];

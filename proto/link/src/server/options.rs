@@ -4,11 +4,28 @@ use super::FloodLimits;
 use crate::{DEFAULT_QUIC_PORT, DEFAULT_UDP_PORT, MulticastOptions, SessionClock};
 use std::{
     net::{Ipv4Addr, SocketAddr},
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 use taut_proto::{
-    ClusterKey, CouplingOffer, JoinPolicy, barrier::MasterSettings, membership::SilenceLimits,
+    ClusterKey, CouplingOffer, JoinPolicy, VersionRange, barrier::MasterSettings,
+    membership::SilenceLimits,
 };
+
+/// A second cluster key, old or next, that counts for a stated time: credentials can be handed out while the workbench runs.
+#[derive(Clone, Debug)]
+pub struct AlsoKey {
+    /// The key: its credentials open this server, and trust it.
+    pub key: ClusterKey,
+    /// Until when, by the system's clock. Whoever is in by it then has to join again.
+    pub until: SystemTime,
+}
+
+impl AlsoKey {
+    /// Whether it counts now.
+    pub fn counts(&self) -> bool {
+        SystemTime::now() < self.until
+    }
+}
 
 /// How to serve. Port 0 takes any free port.
 #[derive(Clone, Debug)]
@@ -23,11 +40,16 @@ pub struct ServerOptions {
     pub multicast: Option<MulticastOptions>,
     /// The cluster key: the server's identity and every credential follow from it.
     pub key: ClusterKey,
+    /// Another cluster key that counts for a while.
+    pub also: Option<AlsoKey>,
+    /// Versions of the protocol that are spoken.
+    pub versions: VersionRange,
     /// Who is let in, of those who can prove something.
     pub policy: JoinPolicy,
     /// Limits against floods.
     pub limits: FloodLimits,
-    /// Most clients at a time.
+    /// Most clients at a time; never fewer than those with a place of their own: device bridge, tracker, an operator and the workbench's
+    /// render nodes. The others share what is left.
     pub max_clients: usize,
     /// Silence on the control plane after which a client counts as gone and its name is free, and the server for a client that named no
     /// shorter one.
@@ -52,6 +74,8 @@ impl ServerOptions {
             announced_udp_port: None,
             multicast: None,
             key,
+            also: None,
+            versions: VersionRange::SUPPORTED,
             policy: JoinPolicy::default(),
             limits: FloodLimits::default(),
             max_clients: 32,

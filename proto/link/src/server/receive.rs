@@ -7,10 +7,10 @@ use super::{
     DeviceInput, HeadInput,
     device_input::Taken,
     gate::{act_of_datagram, permits},
-    session::{Session, lock},
+    session::Session,
     shared::Shared,
 };
-use crate::readiness::wait_readable;
+use crate::{lock::lock, readiness::wait_readable};
 use std::{
     net::SocketAddr,
     sync::{Arc, atomic::Ordering},
@@ -44,6 +44,9 @@ fn receive_udp(shared: &Shared, datagram: &[u8], from: SocketAddr, now_ns: u64) 
         Ok(header) => header,
         Err(error) => return count_bad_header(shared, error),
     };
+    if !shared.versions.contains(header.version) {
+        return shared.counters.wrong_version.one();
+    }
     if header.epoch != shared.epoch {
         return shared.counters.forged.one();
     }
@@ -59,13 +62,14 @@ fn receive_udp(shared: &Shared, datagram: &[u8], from: SocketAddr, now_ns: u64) 
 /// Takes one datagram of `session` in, or counts why not. What is not authentic has no effect.
 pub(crate) fn receive(
     shared: &Shared,
-    session: &Session,
+    session: &Arc<Session>,
     datagram: &[u8],
     from: Option<SocketAddr>,
     now_ns: u64,
 ) {
     let counters = &shared.counters;
-    let opened = match session.open(datagram, from, now_ns) {
+    let known_at = session.udp_address();
+    let (opened, challenge) = match session.open(datagram, from, now_ns) {
         Ok(opened) => opened,
         Err(OpenError::Header(error)) => return count_bad_header(shared, error),
         // A group key proves a member, not this one: nothing under it is opened here.
@@ -78,6 +82,14 @@ pub(crate) fn receive(
         return counters.flooded.one();
     }
     counters.packets_received.one();
+    match (challenge, from) {
+        (Some(token), Some(from)) => session.challenge(token, from, shared),
+        // Its first path, from where its control plane comes.
+        (None, Some(from)) if known_at.is_none() && session.is_at(from) => {
+            shared.device_paths.moved(session, from, shared);
+        }
+        _ => {}
+    }
     let Some(act) = act_of_datagram(&opened.payload) else {
         return counters.garbage.one(); // a client has no business sending these
     };
@@ -114,6 +126,14 @@ pub(crate) fn receive(
             // Of an event that there was not: it would end what is repeated for the others.
             false => counters.garbage.one(),
         },
+        Payload::PathResponse(answer) => {
+            if let Some(from) = from
+                && session.take_answer(from, answer)
+            {
+                tracing::info!(node = session.node, "client receives at {from} now");
+                shared.device_paths.moved(session, from, shared);
+            }
+        }
         Payload::Input(sample) => {
             let input = DeviceInput {
                 sample,
@@ -144,7 +164,8 @@ pub(crate) fn receive(
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_)
-        | Payload::Confirm(_) => {}
+        | Payload::Confirm(_)
+        | Payload::PathChallenge(_) => {}
     }
 }
 

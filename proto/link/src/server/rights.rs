@@ -1,10 +1,7 @@
 //! What the gate remembers of one session: how much it sends, and what it tried without being allowed to.
 
-use super::session::lock;
-use std::sync::{
-    Mutex,
-    atomic::{AtomicU16, Ordering},
-};
+use crate::lock::{Mutex, lock};
+use std::sync::atomic::{AtomicU16, Ordering};
 use taut_proto::{Act, Role, limits::TokenBucket};
 
 pub(crate) struct Rights {

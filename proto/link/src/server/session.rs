@@ -1,13 +1,13 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-use super::{ClientStatus, LinkEvent, rights::Rights, shared::Shared};
-use crate::counters::Cell;
+pub(crate) use crate::lock::lock;
+
+use super::{ClientStatus, LinkEvent, quic_outbox::QuicOutbox, rights::Rights, shared::Shared};
+use crate::{counters::Cell, lock::Mutex};
+use ring::rand::{SecureRandom, SystemRandom};
 use std::{
     net::SocketAddr,
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
+    sync::atomic::{AtomicBool, AtomicU64, Ordering},
 };
 use taut_proto::{
     ClientStats, Kind, Payload, Role, Transport,
@@ -15,6 +15,7 @@ use taut_proto::{
     events::is_newer,
     group::is_member,
     pace::Pace,
+    path::{ClientPath, PathToken},
     proof::{Claim, Grant},
     seal::{DatagramBuffer, OpenError, Opened, Opener, Sealer},
 };
@@ -26,7 +27,14 @@ pub(crate) struct Session {
     grant: Grant,
     pub(crate) transport: Transport,
     pub(crate) rate_hz: u32,
+    /// Version of the protocol that both ends agreed on, and whether it is the newest of the server.
+    pub(crate) version: u8,
+    is_newest: bool,
+    /// Whether it proved a secret of the second cluster key.
+    pub(crate) by_also_key: bool,
     pub(crate) connection: quinn::Connection,
+    /// Where the control plane came from at join.
+    control: SocketAddr,
     pub(crate) joined_ns: u64,
     /// What the gate remembers of it.
     pub(crate) rights: Rights,
@@ -34,7 +42,9 @@ pub(crate) struct Session {
     pub(crate) after_event: u32,
     sealer: Sealer,
     opener: Mutex<Opener>,
-    udp_address: Mutex<Option<SocketAddr>>,
+    path: Mutex<ClientPath>,
+    /// For a client that takes its datagrams over QUIC.
+    quic_outbox: Option<QuicOutbox>,
     last_heard_ns: AtomicU64,
     /// Session time of the state from which on the next one is due, ns.
     due_ns: AtomicU64,
@@ -70,6 +80,9 @@ pub(crate) struct Admitted {
     pub(crate) rate_hz: u32,
     pub(crate) joined_ns: u64,
     pub(crate) after_event: u32,
+    pub(crate) version: u8,
+    pub(crate) is_newest: bool,
+    pub(crate) by_also_key: bool,
 }
 
 impl Session {
@@ -85,13 +98,18 @@ impl Session {
             grant: admitted.grant,
             transport: admitted.transport,
             rate_hz: admitted.rate_hz,
+            version: admitted.version,
+            is_newest: admitted.is_newest,
+            by_also_key: admitted.by_also_key,
+            control: connection.remote_address(),
             connection,
             joined_ns: admitted.joined_ns,
             rights: Rights::new(admitted.role),
             after_event: admitted.after_event,
             sealer,
             opener: Mutex::new(opener),
-            udp_address: Mutex::new(None),
+            path: Mutex::default(),
+            quic_outbox: (admitted.transport == Transport::QuicDatagram).then(QuicOutbox::default),
             last_heard_ns: AtomicU64::new(admitted.joined_ns),
             due_ns: AtomicU64::new(0),
             acknowledged: AtomicU64::new(0),
@@ -149,26 +167,59 @@ impl Session {
         buffer: &mut DatagramBuffer,
         shared: &Shared,
     ) -> Sent {
-        if self.transport == Transport::Udp {
-            let Some(address) = self.udp_address() else {
-                return Sent::NoPath;
-            };
-            let sealed = self.sealer.seal_bytes(kind, payload, buffer).ok();
-            return match sealed {
-                Some(datagram) => self.send_sealed(datagram, address, shared),
-                None => self.count(None, shared),
-            };
-        }
-        let sealed = self.sealer.seal_bytes(kind, payload, buffer).ok();
-        let sent = sealed.and_then(|datagram| {
-            // QUIC takes it all the same, and drops the oldest for it.
-            if self.connection.datagram_send_buffer_space() < datagram.len() {
-                self.note_full(shared);
+        let address = match (self.udp_address(), &self.quic_outbox) {
+            (None, None) => return Sent::NoPath,
+            (address, _) => address,
+        };
+        let sealed = self.sealer.seal_bytes(kind, payload, buffer);
+        match (sealed, &self.quic_outbox, address) {
+            (Ok(datagram), Some(outbox), _) => {
+                if !outbox.put(datagram) {
+                    self.note_full(shared);
+                }
+                shared.quic_sender.wake();
+                Sent::Yes
             }
-            let given = self.connection.send_datagram(datagram.to_vec().into());
-            given.ok().map(|()| datagram.len())
-        });
-        self.count(sent, shared)
+            (Ok(datagram), None, Some(address)) => self.send_sealed(datagram, address, shared),
+            _ => self.count(None, shared),
+        }
+    }
+
+    /// Where its datagrams wait for QUIC, if that is how it takes them.
+    pub(crate) fn quic_outbox(&self) -> Option<&QuicOutbox> {
+        self.quic_outbox.as_ref()
+    }
+
+    /// Hands a sealed datagram to QUIC, whose locks belong to the normal class.
+    pub(crate) fn send_over_quic(&self, datagram: &[u8], shared: &Shared) {
+        // QUIC takes it all the same, and drops the oldest for it.
+        if self.connection.datagram_send_buffer_space() < datagram.len() {
+            self.note_full(shared);
+        }
+        let given = self.connection.send_datagram(datagram.to_vec().into());
+        self.count(given.ok().map(|()| datagram.len()), shared);
+    }
+
+    /// Asks whoever is at `to` whether this client is there.
+    pub(crate) fn challenge(&self, token: PathToken, to: SocketAddr, shared: &Shared) {
+        let mut buffer = [0; taut_proto::header::MAX_DATAGRAM_BYTES];
+        if let Ok(datagram) = self
+            .sealer
+            .seal(&Payload::PathChallenge(token), &mut buffer)
+        {
+            shared.counters.path_challenges.one();
+            let _ = self.send_sealed(datagram, to, shared); // counted
+        }
+    }
+
+    /// Takes the answer to a challenge from there; whether the client is there from now on.
+    pub(crate) fn take_answer(&self, from: SocketAddr, answer: PathToken) -> bool {
+        lock(&self.path).answer(from, answer)
+    }
+
+    /// Whether it speaks the newest version of the server: the group's datagrams are of that one.
+    pub(crate) fn is_newest(&self) -> bool {
+        self.is_newest
     }
 
     /// Seals an encoded payload, to be sent by [`Session::send_sealed`]: where it goes, and its bytes. `None` where there is no such way (yet).
@@ -245,7 +296,10 @@ impl Session {
 
     /// Whether the group's states are for this client: it is a member, over UDP, and wants all of them.
     pub(crate) fn may_listen(&self) -> bool {
-        is_member(self.role) && self.transport == Transport::Udp && self.rate_hz == 0
+        is_member(self.role)
+            && self.is_newest
+            && self.transport == Transport::Udp
+            && self.rate_hz == 0
     }
 
     /// Whether it says that it hears the group.
@@ -271,22 +325,22 @@ impl Session {
         self.sealer.roll_by_time(now_ns);
     }
 
-    /// Opens a datagram; if authentic, notes the sign of life and where it came from.
+    /// Opens a datagram; if authentic, notes the sign of life and where it came from. With the challenge that is due to that address, if one is.
     pub(crate) fn open(
         &self,
         datagram: &[u8],
         from: Option<SocketAddr>,
         now_ns: u64,
-    ) -> Result<Opened, OpenError> {
+    ) -> Result<(Opened, Option<PathToken>), OpenError> {
         let opened = lock(&self.opener).open(datagram)?;
         self.last_heard_ns.fetch_max(now_ns, Ordering::Relaxed);
         // Only the newest datagram may move the path: a late one tells where the client was.
-        if let Some(from) = from
-            && opened.header.sequence >= opened.expected
-        {
-            *lock(&self.udp_address) = Some(from);
-        }
-        Ok(opened)
+        let is_newest = opened.header.sequence >= opened.expected;
+        let is_answer = matches!(opened.payload, Payload::PathResponse(_));
+        let challenge = from
+            .filter(|_| is_newest && !is_answer && self.transport == Transport::Udp)
+            .and_then(|from| lock(&self.path).hear(from, self.control.ip(), now_ns, draw_token));
+        Ok((opened, challenge))
     }
 
     /// Notes that the client has all events up to `newest`.
@@ -306,14 +360,14 @@ impl Session {
         (noted != 0).then_some((noted >> 32) as u32)
     }
 
-    /// Where its states go, once its first authentic datagram came; for UDP only.
+    /// Where its states go, once it has shown that it receives there; for UDP only.
     pub(crate) fn udp_address(&self) -> Option<SocketAddr> {
-        *lock(&self.udp_address)
+        lock(&self.path).proven()
     }
 
-    /// Whether its newest datagram came from there.
+    /// Whether it is known to receive there.
     pub(crate) fn is_at(&self, from: SocketAddr) -> bool {
-        *lock(&self.udp_address) == Some(from)
+        self.udp_address() == Some(from)
     }
 
     /// Session time of the last authentic datagram, ns; `None` if there was none yet.
@@ -368,7 +422,9 @@ fn is_full(error: &std::io::Error) -> bool {
     no_buffers || error.kind() == std::io::ErrorKind::WouldBlock
 }
 
-/// The lock, whoever panicked while holding it: no datum here can be left half-changed.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// What nobody can guess; `None` where the system gives no random numbers.
+fn draw_token() -> Option<u64> {
+    let mut bytes = [0; 8];
+    SystemRandom::new().fill(&mut bytes).ok()?;
+    Some(u64::from_le_bytes(bytes))
 }

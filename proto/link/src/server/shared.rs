@@ -1,31 +1,31 @@
 //! What the tasks and threads of a server share.
 
 use super::{
-    LinkEvent,
-    content::EncodedContent,
-    device_input::InputWriter,
-    events::EventHub,
-    frames::Frames,
-    group::GroupHub,
-    head_input::HeadWriter,
-    sent_states::SentStates,
-    session::{Session, lock},
+    LinkEvent, content::EncodedContent, device_input::InputWriter, device_receiver::DevicePaths,
+    events::EventHub, frames::Frames, group::GroupHub, head_input::HeadWriter, joining::Place,
+    options::AlsoKey, places::Places, quic_outbox::QuicSender, sent_states::SentStates,
+    session::Session,
 };
-use crate::{SessionClock, counters::CounterCells};
+use crate::{
+    SessionClock,
+    counters::CounterCells,
+    lock::{Mutex, lock},
+};
 use std::{
     net::UdpSocket,
     sync::{
-        Arc, Mutex, OnceLock,
+        Arc, OnceLock,
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::SyncSender,
     },
     time::Duration,
 };
 use taut_proto::{
-    ClusterKey, JoinPolicy, Role,
+    ClusterKey, JoinPolicy, Role, VersionRange,
     control::RefusalCode,
     limits::{JoinGuard, UnknownSources},
     membership::{Pace, SilenceLimits},
+    waiting::Waiting,
 };
 
 /// Takes an operator's wish for force, or for none.
@@ -33,9 +33,14 @@ pub(crate) type ArmTaker = Box<dyn Fn(bool) + Send + Sync>;
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
+    /// Another one that counts for a while.
+    pub(crate) also: Option<AlsoKey>,
+    pub(crate) versions: VersionRange,
     /// Who may be in. Held while a client is admitted, so that none slips in by the one before.
     pub(crate) policy: Mutex<JoinPolicy>,
     pub(crate) joins: Mutex<JoinGuard>,
+    /// Those who have not proven anything yet.
+    pub(crate) waiting: Mutex<Waiting<Place>>,
     pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,
     /// Silence after which a node is gone, and after which it gives this server up.
@@ -57,6 +62,8 @@ pub(crate) struct Shared {
     /// How fast meshes go to all clients together.
     pub(crate) mesh_pace: Mutex<Pace>,
     pub(crate) discrete: EventHub,
+    pub(crate) device_paths: DevicePaths,
+    pub(crate) quic_sender: QuicSender,
     pub(crate) stopping: AtomicBool,
 }
 
@@ -83,7 +90,7 @@ impl Shared {
 pub(crate) struct Sessions {
     list: Mutex<Listed>,
     generation: AtomicU64,
-    max_clients: usize,
+    places: Places,
 }
 
 /// A client that is let in.
@@ -102,15 +109,14 @@ struct Listed {
 }
 
 impl Sessions {
-    pub(crate) fn new(max_clients: usize) -> Sessions {
+    pub(crate) fn new(places: Places) -> Sessions {
         Sessions {
             list: Mutex::new(Listed {
                 sessions: Arc::new([]),
                 last_number: 0,
             }),
             generation: AtomicU64::new(0),
-            // Session numbers are 1 ..= u16::MAX.
-            max_clients: max_clients.min(usize::from(u16::MAX)),
+            places,
         }
     }
 
@@ -183,17 +189,14 @@ impl Sessions {
                 .iter()
                 .filter(|session| Some(session.number) != gone)
         };
-        if staying().count() >= self.max_clients {
-            let text = format!(
-                "it has its {} clients already: stop one, or raise its limit",
-                self.max_clients
-            );
-            return Err((RefusalCode::Full, text));
-        }
+        let present = staying().map(|session| (session.role, session.node.as_str()));
+        self.places
+            .check(present, (role, node))
+            .map_err(|text| (RefusalCode::Full, text))?;
         let mut number = list.last_number;
         loop {
             number = number.checked_add(1).unwrap_or(1);
-            // Ends: there are more numbers than clients.
+            // Ends: there are more numbers than places.
             if list.sessions.iter().all(|session| session.number != number) {
                 break;
             }

@@ -25,6 +25,6 @@ pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use spec::{
-    Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,
-    Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
+    AlsoKeyFile, Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
+    RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
 };

@@ -2,17 +2,20 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddrV4};
 
-use taut_proto::JoinPolicy;
+use taut_proto::{JoinPolicy, barrier::MAX_MEMBERS};
 
 use super::admission::admission;
+use super::frames::{FrameSwap, Frames};
 use super::parts::{Files, MAX_RATE, bind, port};
-use super::spec::{Network, TransportKind};
+use super::spec::{AlsoKeyFile, Network, TransportKind};
 use crate::document::{Range, Section};
 
 /// Group of states where the file names none: of this site (RFC 2365).
 const DEFAULT_GROUP: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(239, 255, 72, 87), 4859);
 /// Most clients.
 const MAX_CLIENTS: i64 = 256;
+/// Places beside those of the render nodes: device bridge, tracker, operator.
+const SINGLE_PLACES: usize = 3;
 /// Silence after which a node counts as gone, s: ten of its signs of life.
 const NODE_TIMEOUT: f64 = 0.5;
 /// Longest that may be asked for, s.
@@ -65,6 +68,61 @@ fn multicast(
     (group, interface.unwrap_or(Ipv4Addr::LOCALHOST))
 }
 
+/// `also_key` and until when it counts: both or neither.
+fn also_key(section: &Section<'_>, files: &Files<'_>) -> Option<AlsoKeyFile> {
+    let file = files.path(section, "also_key");
+    let until = section.text("also_key_until").and_then(|text| {
+        let time = humantime::parse_rfc3339(text).ok();
+        if time.is_none() {
+            let at = section.get("also_key_until").map_or(section.at(), |node| &node.at);
+            section.complain(at, format!("`also_key_until` in {} is \"{text}\", which is no time; write one in UTC such as \"2030-01-31T12:00:00Z\"", section.name()));
+        }
+        time
+    });
+    match (file, until) {
+        (Some(file), Some(until)) => Some(AlsoKeyFile { file, until }),
+        (Some(_), None) if !section.has("also_key_until") => {
+            section.complain(
+                section.at(),
+                format!("{} has `also_key`, but does not say until when it counts; write also_key_until = \"2030-01-31T12:00:00Z\"", section.name()),
+            );
+            None
+        }
+        (None, Some(_)) => {
+            section.complain(
+                section.at(),
+                format!("{} has `also_key_until` without `also_key`; name the file of that key, or take it out", section.name()),
+            );
+            None
+        }
+        _ => None,
+    }
+}
+
+/// Whether everybody whom the workbench names finds room.
+pub(super) fn places(root: &Section<'_>, network: &Network, nodes: usize, frames: &Frames) {
+    let at = root.get("network").map_or(root.at(), |node| &node.at);
+    let needed = nodes + SINGLE_PLACES;
+    if network.max_clients < needed {
+        root.complain(
+            at,
+            format!(
+                "`max_clients` is {}, but device, tracker, an operator and {nodes} render nodes have places of their own; write {needed} or more, and one for each observer",
+                network.max_clients
+            ),
+        );
+    }
+    if nodes > MAX_MEMBERS && frames.swap != FrameSwap::Off {
+        let at = root.get("nodes").map_or(root.at(), |node| &node.at);
+        root.complain(
+            at,
+            format!(
+                "there are {nodes} render nodes, but the frames of at most {MAX_MEMBERS} are kept together; leave some out, or write swap = \"off\" in [frames]"
+            ),
+        );
+    }
+}
+
 pub(super) fn network(
     section: Option<Section<'_>>,
     root: &Section<'_>,
@@ -80,6 +138,7 @@ pub(super) fn network(
             multicast_group: DEFAULT_GROUP,
             multicast_interface: Ipv4Addr::LOCALHOST,
             key_file: None,
+            also_key: None,
             broadcast_rate: 1000.0,
             max_clients: 16,
             admission: JoinPolicy::default(),
@@ -119,6 +178,7 @@ pub(super) fn network(
         multicast_group,
         multicast_interface,
         key_file: files.path(&section, "key_file"),
+        also_key: also_key(&section, files),
         broadcast_rate: section.number_or("broadcast_rate", Range::PositiveUpTo(MAX_RATE), 1000.0),
         max_clients: section
             .integer("max_clients", 1, MAX_CLIENTS)

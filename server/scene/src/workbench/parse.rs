@@ -13,11 +13,10 @@ use super::load::Workbench;
 use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::monitoring::monitoring;
-use super::network::network;
+use super::network::{network, places};
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
-use super::scale::places;
 use super::spec::Device;
 use super::viewer::{show, viewer};
 use crate::document::{Document, Section};
@@ -66,6 +65,9 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let dynamics = table(&root, "dynamics", dynamics).flatten();
     let network = network(root.section("network"), &root, &files);
     let frames = table(&root, "frames", frames).unwrap_or_default();
+    if let Some(network) = &network {
+        places(&root, network, nodes.len(), &frames);
+    }
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
@@ -74,9 +76,6 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
-    if let Some(network) = &network {
-        places(&root, &nodes, network, &frames);
-    }
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.

@@ -2,6 +2,7 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddrV4};
 use std::path::PathBuf;
+use std::time::SystemTime;
 
 use god_object::Pose;
 use nalgebra::Point3;
@@ -211,6 +212,8 @@ pub struct Network {
     pub multicast_interface: Ipv4Addr,
     /// The cluster key; `None` leaves it to `--key` or TAUT_KEY_FILE.
     pub key_file: Option<PathBuf>,
+    /// A second cluster key that counts for a while.
+    pub also_key: Option<AlsoKeyFile>,
     /// Poses per second to each render node.
     pub broadcast_rate: f64,
     /// Most clients at a time.
@@ -219,6 +222,15 @@ pub struct Network {
     pub admission: JoinPolicy,
     /// Silence after which a render node or a bridge counts as gone, s.
     pub node_timeout: f64,
+}
+
+/// A second cluster key, old or next.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlsoKeyFile {
+    /// Its file.
+    pub file: PathBuf,
+    /// Until when it counts.
+    pub until: SystemTime,
 }
 
 /// The rerun stream.

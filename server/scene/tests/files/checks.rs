@@ -203,7 +203,7 @@ fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
     let report = workbench_with(40, &[room]);
     let text = report.to_string();
     assert!(
-        !report.is_good() && text.contains("32 at most swap together"),
+        !report.is_good() && text.contains("at most 32 are kept together"),
         "{text}"
     );
     let off = ("swap = \"scheduled\"", "swap = \"off\"");

@@ -170,3 +170,38 @@ fn roles_and_revoked_credentials_are_read_and_faults_have_their_line() {
         assert!(error.contains(part), "{keys}: {error}");
     }
 }
+
+#[test]
+fn a_second_cluster_key_needs_its_time_and_both_are_read() {
+    let with = |keys: &str| with_admission(&format!("max_clients = 16\n{keys}"));
+    assert_eq!(with("").expect("valid").network.also_key, None);
+    let workbench = with("also_key = \"old.key\"\nalso_key_until = \"2030-01-31T12:00:00Z\"");
+    let also = workbench.expect("valid").network.also_key.expect("read");
+    assert!(also.file.ends_with("old.key"));
+    let since = also
+        .until
+        .duration_since(std::time::UNIX_EPOCH)
+        .expect("after 1970");
+    assert_eq!(since.as_secs(), 1_896_091_200);
+    for (keys, says) in [
+        ("also_key = \"old.key\"", "until when"),
+        (
+            "also_key_until = \"2030-01-31T12:00:00Z\"",
+            "without `also_key`",
+        ),
+        (
+            "also_key = \"old.key\"\nalso_key_until = \"tomorrow\"",
+            "no time",
+        ),
+    ] {
+        let error = with(keys).expect_err(keys);
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn a_house_that_is_too_small_for_the_workbench_is_a_fault() {
+    let error = with_admission("max_clients = 4").expect_err("two nodes and three others");
+    assert!(error.contains("write 5 or more"), "{error}");
+    assert!(with_admission("max_clients = 5").is_ok());
+}

@@ -9,7 +9,7 @@ use taut_link::proto::group::{GroupSealer, SERVER_SENDER};
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::proof::Claim;
 use taut_link::proto::seal::{KEY_MATERIAL_BYTES, Sealer};
-use taut_link::proto::{Group, JoinKey, Payload};
+use taut_link::proto::{Group, JoinKey, Payload, VersionRange};
 use taut_link::{Role, ServerLink, Transport, binding, pinning::PinnedServer, transport};
 
 use crate::bench::BenchError;
@@ -54,6 +54,7 @@ impl Liar {
         let (grant, secret) = key.secret_for(role, node).map_err(failed)?;
         let claim = Claim { role, node, grant };
         let hello = ControlMessage::Hello(Hello {
+            versions: VersionRange::SUPPORTED,
             node: node.into(),
             role,
             transport: Transport::Udp,

@@ -1,0 +1,230 @@
+//! Two releases meet: they agree on a version, or part by name, at both ends.
+
+mod support;
+
+use std::{net::SocketAddr, sync::Arc, time::Duration};
+use support::{
+    relay::{Impairment, Waiting},
+    *,
+};
+use taut_link::{
+    ClientLink, ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, connect,
+    pinning::PinnedServer, transport,
+};
+use taut_proto::{
+    PROTOCOL_VERSION, VersionRange,
+    control::{ControlMessage, LENGTH_BYTES, RefusalCode},
+};
+
+/// The first messages of the release before versions were negotiated.
+const VERSION_3: &str = include_str!("../../tests/golden_version_3.txt");
+const NEXT: u8 = PROTOCOL_VERSION + 1;
+
+fn must<T, E: std::fmt::Display>(result: Result<T, E>) -> T {
+    result.unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn range(min: u8, max: u8) -> VersionRange {
+    VersionRange::new(min, max).expect("a range")
+}
+
+fn kept(name: &str) -> Vec<u8> {
+    let line = VERSION_3
+        .lines()
+        .find_map(|line| line.strip_prefix(&format!("message/{name} ")))
+        .expect("kept");
+    (0..line.len() / 2)
+        .map(|i| u8::from_str_radix(&line[2 * i..2 * i + 2], 16).expect("digits"))
+        .collect()
+}
+
+async fn joined(options: ClientOptions) -> ClientLink {
+    must(connect(options).await)
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_of_n_to_n_plus_1_and_a_client_of_n_plus_1_to_n_plus_2_speak_n_plus_1() {
+    let waiting = Waiting::new();
+    let server = server_with(ServerOptions {
+        versions: range(PROTOCOL_VERSION, NEXT),
+        announced_udp_port: Some(waiting.port()),
+        idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
+        ..ServerOptions::loopback(key('a'))
+    })
+    .await;
+    let relay = waiting.start(server.udp_addr(), Impairment::default(), 1);
+    let newer = |role, name: &str| ClientOptions {
+        versions: range(NEXT, NEXT + 1),
+        ..options(&server, role, name)
+    };
+    let render = joined(newer(Role::Render, "left")).await;
+    let device = joined(newer(Role::Device, "bridge")).await;
+    let quic = joined(ClientOptions {
+        transport: Transport::QuicDatagram,
+        ..newer(Role::Observer, "watcher")
+    })
+    .await;
+    // One of this release beside them is served in its own version.
+    let older = joined(options(&server, Role::Observer, "older")).await;
+    for (link, version) in [
+        (&render, NEXT),
+        (&device, NEXT),
+        (&quic, NEXT),
+        (&older, PROTOCOL_VERSION),
+    ] {
+        assert_eq!(link.protocol_version(), version);
+    }
+    // Scene, coupling, meshes and events came; states come, by both ways.
+    let mesh = render.description().god_object.mesh;
+    must(render.mesh(mesh).await);
+    assert!(device.coupling().is_some());
+    let mut broadcaster = server.broadcaster();
+    let mut tick = 0;
+    let mut got = [false; 4];
+    wait_until("states", || {
+        tick += 1;
+        broadcaster.send(&state(tick));
+        for (link, got) in [&render, &device, &quic, &older].into_iter().zip(&mut got) {
+            let mut states = Vec::new();
+            link.drain_states(&mut states);
+            *got |= !states.is_empty();
+        }
+        got == [true; 4]
+    })
+    .await;
+    let sent = relay.upstream();
+    for version in [NEXT, PROTOCOL_VERSION] {
+        assert!(
+            sent.iter().any(|datagram| datagram[2] == version),
+            "{version}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_a_common_version_both_ends_name_both() {
+    let server = server().await;
+    let newer = ClientOptions {
+        versions: range(NEXT, NEXT + 1),
+        ..options(&server, Role::Render, "left")
+    };
+    let error = match connect(newer).await {
+        Err(error @ LinkError::WrongVersion { .. }) => error.to_string(),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("let in"),
+    };
+    let own = VersionRange::SUPPORTED.to_string();
+    assert!(
+        error.contains(&format!("speaks protocol version {own}")),
+        "{error}"
+    );
+    assert!(
+        error.contains(&format!("this program speaks {}", range(NEXT, NEXT + 1))),
+        "{error}"
+    );
+    event(&server, "refusal", |event| {
+        matches!(event, LinkEvent::Refused { code: RefusalCode::WrongVersion, text, .. }
+            if text.contains(&format!("version {}", range(NEXT, NEXT + 1))) && text.contains(&format!("speaks {own}")))
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_node_of_the_release_before_is_told_in_words_that_it_can_read() {
+    let server = server().await;
+    let pinned = Arc::new(PinnedServer::new(key('a').server_pin()));
+    let config = must(transport::client_config(pinned, Duration::from_secs(5)));
+    let endpoint = must(quinn::Endpoint::client(SocketAddr::from((
+        [127, 0, 0, 1],
+        0,
+    ))));
+    let connection = must(must(endpoint.connect_with(config, server.quic_addr(), "taut")).await);
+    let (mut send, mut recv) = must(connection.open_bi().await);
+    must(send.write_all(&kept("hello")).await);
+    let answer = must(recv.read_to_end(4096).await);
+    // Magic, a version that it does not look at, Refused, wrong version, the server's newest, a sentence.
+    assert_eq!(
+        answer[LENGTH_BYTES..LENGTH_BYTES + 2],
+        kept("refused")[LENGTH_BYTES..LENGTH_BYTES + 2]
+    );
+    assert_eq!(
+        answer[LENGTH_BYTES + 3..LENGTH_BYTES + 6],
+        [0, 1, PROTOCOL_VERSION]
+    );
+    event(&server, "refusal", |event| {
+        matches!(event, LinkEvent::Refused { code: RefusalCode::WrongVersion, text, .. }
+            if text.contains("speaks protocol version 3") && text.contains(&format!("speaks {PROTOCOL_VERSION}")))
+    })
+    .await;
+}
+
+/// A server of the release before: its identity, and the refusal that it gives to a Hello of another version.
+fn server_of_version_3() -> SocketAddr {
+    let private = rustls::pki_types::PrivatePkcs8KeyDer::from(taut_proto::pin::ed25519_pkcs8(
+        &key('a').identity_seed(),
+    ));
+    let signing = must(rcgen::KeyPair::from_pkcs8_der_and_sign_algo(
+        &private,
+        &rcgen::PKCS_ED25519,
+    ));
+    let parameters = must(rcgen::CertificateParams::new(["taut".to_owned()]));
+    let certificate = must(parameters.self_signed(&signing));
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let builder = rustls::ServerConfig::builder_with_provider(provider);
+    let mut tls = must(
+        must(builder.with_protocol_versions(&[&rustls::version::TLS13]))
+            .with_no_client_auth()
+            .with_single_cert(vec![certificate.der().clone()], private.into()),
+    );
+    tls.alpn_protocols = vec![b"taut".to_vec()];
+    let crypto = must(quinn::crypto::rustls::QuicServerConfig::try_from(tls));
+    let any = SocketAddr::from(([127, 0, 0, 1], 0));
+    let config = quinn::ServerConfig::with_crypto(Arc::new(crypto));
+    let endpoint = must(quinn::Endpoint::server(config, any));
+    let address = must(endpoint.local_addr());
+    tokio::spawn(async move {
+        let connection = must(endpoint.accept().await.expect("a client").await);
+        let (mut send, mut recv) = must(connection.accept_bi().await);
+        let mut head = [0; LENGTH_BYTES + 4];
+        must(recv.read_exact(&mut head).await);
+        assert_eq!(head[LENGTH_BYTES + 2..], [PROTOCOL_VERSION, 1], "a Hello");
+        let text = format!(
+            "the peer speaks protocol version {PROTOCOL_VERSION}, this program speaks 3: install the same release on both"
+        );
+        let mut refused = vec![0x57, 0x48, 3, 0, 1, 3];
+        refused.extend(u16::try_from(text.len()).expect("short").to_le_bytes());
+        refused.extend(text.as_bytes());
+        let length = u32::try_from(refused.len()).expect("short").to_le_bytes();
+        must(send.write_all(&[&length[..], &refused].concat()).await);
+        let _ = send.finish();
+        connection.closed().await;
+    });
+    address
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_server_of_the_release_before_is_named_with_both_versions() {
+    // The layout that the fake server writes is the kept one.
+    let Ok(ControlMessage::Refused(_)) =
+        ControlMessage::from_frame_body(&kept("refused")[LENGTH_BYTES..])
+    else {
+        panic!("the kept refusal cannot be read");
+    };
+    let mut options = ClientOptions::new(
+        server_of_version_3().to_string(),
+        key('a'),
+        Role::Render,
+        "left",
+    );
+    options.connect_timeout = PATIENCE;
+    match connect(options).await {
+        Err(error @ LinkError::WrongVersion { theirs: 3, .. }) => {
+            let text = error.to_string();
+            let both = format!("version 3, this program speaks {}", VersionRange::SUPPORTED);
+            assert!(text.contains(&both), "{text}");
+        }
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("let in"),
+    }
+}
