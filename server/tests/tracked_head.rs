@@ -106,7 +106,10 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
     let (_, observer) = credential(Role::Observer);
     let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
     runtime.block_on(async {
-        let options = ClientOptions::new(&server, observer, Role::Observer, "web");
+        let options = ClientOptions {
+            connect_timeout: PATIENCE,
+            ..ClientOptions::new(&server, observer, Role::Observer, "web")
+        };
         let observer = connect(options)
             .await
             .unwrap_or_else(|error| panic!("{error}"));
@@ -121,7 +124,10 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
         head_at(&observer, 0.0).await;
 
         // The roles that this workbench does not let in, although the key could make them.
-        let options = ClientOptions::new(&server, key.clone(), Role::Operator, "o");
+        let options = ClientOptions {
+            connect_timeout: PATIENCE,
+            ..ClientOptions::new(&server, key.clone(), Role::Operator, "o")
+        };
         match connect(options).await {
             Err(LinkError::Refused { text, .. }) => assert!(text.raw().contains("network.roles")),
             Err(other) => panic!("{other}"),
@@ -148,7 +154,10 @@ fn a_tracker_that_stays_moves_the_head_of_the_next_session_too() {
     let runtime = tokio::runtime::Runtime::new().unwrap_or_else(|error| panic!("{error}"));
     let watch = async || {
         let observer = key.credential(Role::Observer, Holder::AnyNode, 1);
-        let options = ClientOptions::new(&server, observer, Role::Observer, "web");
+        let options = ClientOptions {
+            connect_timeout: PATIENCE,
+            ..ClientOptions::new(&server, observer, Role::Observer, "web")
+        };
         let observer = connect(options)
             .await
             .unwrap_or_else(|error| panic!("{error}"));

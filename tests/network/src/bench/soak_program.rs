@@ -238,7 +238,7 @@ impl Cast {
         let force = number(&report["max_force_n"]);
         self.result.largest_force_n = self.result.largest_force_n.max(force);
         // NaN, where the report has no such number, is none.
-        if !(age_ms <= ZERO_FORCE_MS + late_ms + 1.0) {
+        if age_ms.is_nan() || age_ms > ZERO_FORCE_MS + late_ms + 1.0 {
             log.broke(&format!(
                 "a force outlived its input by {age_ms} ms, the loop late by {late_ms} ms"
             ))?;
