@@ -51,7 +51,7 @@ fn input(index: u64) -> Payload {
 
 fn fullest() -> HotState {
     HotState {
-        sample_time_ns: u64::MAX,
+        sample_time_ns: 1 << 61,
         tick: u64::MAX,
         scene_revision: u32::MAX,
         run: RunState::Fault,
