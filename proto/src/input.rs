@@ -7,6 +7,8 @@ use crate::{PoseF64, codec::wire_struct};
 pub struct InputSample {
     /// When it was read: session time as the bridge knows it, ns; 0 while its clock is not locked.
     pub sample_time_ns: u64,
+    /// Largest error of that time, as the bridge's clock filter knows it, ns.
+    pub clock_uncertainty_ns: u64,
     /// Number of the reading, strictly increasing; the newest wins.
     pub index: u64,
     /// Device in the scene frame.
@@ -30,6 +32,7 @@ pub const INPUT_AT_EDGE: u16 = 2;
 
 wire_struct!(InputSample {
     sample_time_ns,
+    clock_uncertainty_ns,
     index,
     pose,
     velocity,

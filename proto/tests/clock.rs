@@ -275,6 +275,9 @@ fn clocks_that_drift_faster_than_assumed_are_found_out_and_followed() {
     let now = 2000 * 50 * MS;
     let time = filter.session_time(now).expect("locked");
     let error = error_ns(&filter, &server, now).unsigned_abs();
-    assert!(error > MS && error <= time.uncertainty_ns + 200_000, "{error}");
+    assert!(
+        error > MS && error <= time.uncertainty_ns + 200_000,
+        "{error}"
+    );
     assert_eq!(filter.steps(), 0);
 }

@@ -38,6 +38,7 @@ fn sealed(sealer: &Sealer, payload: &Payload) -> Vec<u8> {
 fn input(index: u64) -> Payload {
     Payload::Input(InputSample {
         sample_time_ns: 5,
+        clock_uncertainty_ns: 7,
         index,
         pose: PoseF64::IDENTITY,
         velocity: [0.5; 6],

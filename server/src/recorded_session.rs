@@ -150,12 +150,9 @@ impl RecordedSession {
         let time = force.time.as_secs_f64();
         let set = self.god_object.constraint_set();
         let before = thread_cpu_time();
-        let output = self.coupling.answer(
-            time,
-            force.device_sequence,
-            &force.device_pose,
-            set,
-        );
+        let output = self
+            .coupling
+            .answer(time, force.device_sequence, &force.device_pose, set);
         let took = thread_cpu_time().saturating_sub(before).as_secs_f64() * 1e6;
         self.seen.forces += 1;
         self.seen.force_us.push(took);

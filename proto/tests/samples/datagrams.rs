@@ -15,6 +15,7 @@ use super::values::{finite64, pose64};
 pub fn datagrams() -> Vec<(&'static str, Payload)> {
     let input = InputSample {
         sample_time_ns: 1_000_000_000,
+        clock_uncertainty_ns: 250_000,
         index: 41,
         pose: PoseF64 {
             position: [0.5, 0.25, -0.125],
@@ -28,7 +29,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
     };
     let wrench = WrenchCommand {
         time_ns: 1_000_000_500,
-        input_index: 41,
+        origin_ns: 999_500_000,
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
         flags: 0,
     };
@@ -68,25 +69,37 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         prop::collection::vec(finite64(), 6)
             .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
     };
-    let input = (any::<(u64, u64, u16, u16, u64)>(), pose64(), six(), six()).prop_map(
-        |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
-            Payload::Input(InputSample {
-                sample_time_ns,
-                index,
+    let input = (
+        any::<(u64, u64, u64, u16, u16, u64)>(),
+        pose64(),
+        six(),
+        six(),
+    )
+        .prop_map(
+            |(
+                (sample_time_ns, clock_uncertainty_ns, index, buttons, flags, set_sequence),
                 pose,
                 velocity,
-                buttons,
-                flags,
                 rendered,
-                set_sequence,
-            })
-        },
-    );
+            )| {
+                Payload::Input(InputSample {
+                    sample_time_ns,
+                    clock_uncertainty_ns,
+                    index,
+                    pose,
+                    velocity,
+                    buttons,
+                    flags,
+                    rendered,
+                    set_sequence,
+                })
+            },
+        );
     let wrench =
-        (any::<(u64, u64, u16)>(), six()).prop_map(|((time_ns, input_index, flags), wrench)| {
+        (any::<(u64, u64, u16)>(), six()).prop_map(|((time_ns, origin_ns, flags), wrench)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
-                input_index,
+                origin_ns,
                 wrench,
                 flags,
             })

@@ -67,7 +67,13 @@ fn a_texture_goes_with_its_obstacle() {
         textures.place(0, place);
         textures.place(7, &Pose::translation(9.0, 0.0, 0.0)); // none of the world's
         let still = Vector6::zeros();
-        textures.tilt(&wrench, &Pose::identity(), &still, true, [contact].into_iter())
+        textures.tilt(
+            &wrench,
+            &Pose::identity(),
+            &still,
+            true,
+            [contact].into_iter(),
+        )
     };
     let stood = tilt(&Pose::identity(), contact_at(0.5e-3));
     let gone = tilt(&Pose::translation(0.3e-3, 0.0, 0.0), contact_at(0.8e-3));

@@ -92,9 +92,12 @@ impl CouplingLoop {
         }
 
         let before = thread_cpu_time();
-        let output = self
-            .coupling
-            .answer(now.as_secs_f64(), device.sample, &device.pose, &contacts.set);
+        let output = self.coupling.answer(
+            now.as_secs_f64(),
+            device.sample,
+            &device.pose,
+            &contacts.set,
+        );
         let took = thread_cpu_time().saturating_sub(before);
         self.cpu_time += took;
         self.statistics.force.record_time(took);
