@@ -8,7 +8,7 @@
 //!
 //! A ramp begins when its row is first seen here and lasts its time here, whatever the network did; so no step of the force depends on two clocks.
 //! A set is as old as the device reading that it answers: the way up, the server's part and the way down, all of it. When it arrived says
-//! nothing, and neither does its coming again.
+//! nothing. A body at rest has one set for many readings: its number stays, and the newest reading that it answers counts.
 //!
 //! [`SetHead::made_ns`]: taut_link::proto::constraints::SetHead::made_ns
 //! [`SetHead::device_ns`]: taut_link::proto::constraints::SetHead::device_ns
@@ -70,7 +70,8 @@ impl EdgeCoupler {
 
     /// Takes a whole set that answers the device's reading of `origin`, on the clock of [`Self::step`]'s `now`.
     ///
-    /// The same set again changes nothing but whether the server pauses: it grows no younger. A set older than the present one changes nothing.
+    /// The same set again may answer a newer reading, as a body at rest does, and say whether the server pauses; of itself it grows no younger.
+    /// A set older than the present one changes nothing.
     ///
     /// # Errors
     /// [`BrokenSet`]: the one before stays.
@@ -82,8 +83,8 @@ impl EdgeCoupler {
         if !known || wire.head.sequence > self.set.sequence {
             read_set(wire, &mut self.next)?;
             std::mem::swap(&mut self.set, &mut self.next);
-            self.origin = Some(origin);
         }
+        self.origin = self.origin.max(Some(origin));
         self.paused = wire.head.flags & SET_PAUSED != 0;
         Ok(())
     }
@@ -210,20 +211,21 @@ mod tests {
     }
 
     #[test]
-    fn newer_sets_replace_repeats_grow_no_younger_and_older_ones_change_nothing() {
+    fn newer_sets_replace_repeats_are_as_old_as_what_they_answer_and_older_ones_change_nothing() {
         let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
         let pose = Pose::translation(0.0, 0.0, 0.015);
-        let mut state = |set: &proto::ConstraintSet, time| {
-            coupler.take(set, (time - 1) * MS).expect("a set");
+        let mut state = |set: &proto::ConstraintSet, answers, time| {
+            coupler.take(set, answers * MS).expect("a set");
             let felt = coupler
                 .step(time * MS, &at(time * MS, pose))
                 .expect("a set");
             (felt.sequence, felt.origin)
         };
-        assert_eq!(state(&floor(4, 0), 2), (4, MS));
-        assert_eq!(state(&floor(3, 0), 3), (4, MS));
-        assert_eq!(state(&floor(4, 0), 4), (4, MS));
-        assert_eq!(state(&floor(5, 0), 5), (5, 4 * MS));
+        assert_eq!(state(&floor(4, 0), 1, 2), (4, MS));
+        assert_eq!(state(&floor(3, 0), 2, 3), (4, MS));
+        assert_eq!(state(&floor(4, 0), 1, 4), (4, MS), "repeated");
+        assert_eq!(state(&floor(4, 0), 3, 4), (4, 3 * MS), "still true then");
+        assert_eq!(state(&floor(5, 0), 4, 5), (5, 4 * MS));
     }
 
     #[test]

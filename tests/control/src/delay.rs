@@ -42,8 +42,10 @@ pub const ZERO_AFTER: Duration = SafetySettings::ZERO_AFTER;
 pub struct Growth {
     /// From when on.
     pub begin: Duration,
-    /// Delay of the way up and of the way down per time that passes, s/s.
-    pub rates: [f64; 2],
+    /// Whether the way up and the way down are delayed.
+    pub ways: [bool; 2],
+    /// Time in which the delay doubles, from a millisecond on.
+    pub doubling: Duration,
     /// Largest delay.
     pub most: Duration,
 }
@@ -52,13 +54,18 @@ impl Growth {
     /// A network that stays as it is.
     pub const NONE: Self = Self {
         begin: Duration::ZERO,
-        rates: [0.0; 2],
+        ways: [false; 2],
+        doubling: Duration::from_secs(1),
         most: Duration::ZERO,
     };
 
     fn delay_ns(&self, now: Duration, way: usize) -> u64 {
-        let grown = now.saturating_sub(self.begin).mul_f64(self.rates[way]);
-        grown.min(self.most).as_nanos() as u64
+        if !self.ways[way] {
+            return 0;
+        }
+        let elapsed = now.saturating_sub(self.begin).as_secs_f64();
+        let grown = 1e-3 * ((elapsed / self.doubling.as_secs_f64()).exp2() - 1.0);
+        (grown.min(self.most.as_secs_f64()) * 1e9) as u64
     }
 }
 

@@ -8,13 +8,14 @@ use taut_control_tests::edge::Mode;
 
 /// What may be given beyond what is given without delay, J.
 const MORE: f64 = 0.02;
-const DURATION: Duration = Duration::from_secs(13);
+const DURATION: Duration = Duration::from_secs(19);
 
-/// 2 s after 10 s, on the ways named.
-fn growing(up: f64, down: f64) -> Growth {
+/// A millisecond more at first, twice that after 1.5 s, 2 s after 16 s.
+fn growing(up: bool, down: bool) -> Growth {
     Growth {
         begin: Duration::from_secs(2),
-        rates: [0.2 * up, 0.2 * down],
+        ways: [up, down],
+        doubling: Duration::from_millis(1500),
         most: Duration::from_secs(2),
     }
 }
@@ -29,9 +30,9 @@ fn keeps_its_promise(name: &str, rubbing: &Rubbing, mode: Mode) {
     assert!(usual.largest[1] > 1.0, "{usual:?}");
     assert!(!usual.told.contains(&EventKind::ForceStale), "{usual:?}");
     for (ways, growth) in [
-        ("both", growing(1.0, 1.0)),
-        ("up", growing(1.0, 0.0)),
-        ("down", growing(0.0, 1.0)),
+        ("both", growing(true, true)),
+        ("up", growing(true, false)),
+        ("down", growing(false, true)),
     ] {
         let attacked = run(rubbing, mode, growth, DURATION);
         println!(
