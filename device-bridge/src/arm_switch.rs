@@ -63,7 +63,7 @@ pub fn listen_at_console(switch: &Arc<ArmSwitch>) {
                 let Ok(line) = line else { return };
                 match wish_of(&line) {
                     Some(wish) => typed.wish(wish),
-                    None => eprintln!("type `arm` for force, `off` for none"),
+                    None => taut_log::say("type `arm` for force, `off` for none"),
                 }
             }
         });

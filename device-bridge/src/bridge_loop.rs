@@ -14,7 +14,7 @@ use taut_link::proto::{InputSample, PoseF64, SessionTime, WrenchCommand};
 use crate::device::DeviceFault;
 use crate::edge::EdgeCoupler;
 use crate::own_stamps::OwnStamps;
-use crate::port::{Command, DevicePort, Events};
+use crate::port::{Command, CommandSource, DevicePort, Events};
 use crate::report::Durations;
 
 /// The newest command, and when the device was read for what it comes from.
@@ -114,11 +114,11 @@ impl BridgeLoop {
 
     /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
     /// is computed here.
-    pub fn begin_session(&mut self, edge: Option<EdgeCoupler>) {
+    pub fn begin_session(&mut self, source: CommandSource, edge: Option<EdgeCoupler>) {
         self.newest = None;
         self.stamps = OwnStamps::default();
         self.edge = edge.map(Box::new);
-        self.port.restart();
+        self.port.restart(source);
     }
 
     /// Whether constraint sets are wanted.
@@ -389,7 +389,7 @@ mod tests {
         for tick in 1..=1000 {
             let _ = bridge.tick(ms(tick), session(tick), Some(at_once(tick, 5.0)));
         }
-        bridge.begin_session(None);
+        bridge.begin_session(CommandSource::Other, None);
         // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
         // limit, and what comes ramps in.
         let mut lowest = f64::INFINITY;

@@ -8,8 +8,9 @@ use taut_link::Transport;
 
 use crate::bridge::{BridgeError, run};
 use crate::choice::{DeviceChoice, drivers_help};
+use crate::console;
 use crate::devices::HandPreset;
-use crate::port::{Passivity, PassivitySettings, Rearm, SafetySettings};
+use crate::port::{ContactBound, Passivity, PassivitySettings, Rearm, SafetySettings};
 
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
@@ -121,7 +122,12 @@ pub struct SafetyArgs {
     #[arg(long, value_name = "NM/MS", default_value_t = SafetySettings::TORQUE_RATE * 1e-3)]
     pub torque_slew: f64,
 
-    /// Who arms at the start and after a fault: automatic or manual (console, button). Without it a simulated hand and a trace arm by
+    /// Stiffest contact that is felt as it is met, in N/m: what the device's motion explains of a change of the force, beside --force-slew. 0
+    /// explains nothing; the device's own limit holds too.
+    #[arg(long, value_name = "N/M", default_value_t = ContactBound::default().stiffness)]
+    pub contact_stiffness: f64,
+
+    /// Who arms at the start, after a fault and after an outage: automatic or manual (console, button). Without it a simulated hand and a trace arm by
     /// themselves, and any other device waits for a person.
     #[arg(long, value_name = "WHO", value_parser = parse_rearm)]
     pub rearm: Option<Rearm>,
@@ -148,6 +154,10 @@ impl SafetyArgs {
             max_torque: self.max_torque,
             force_rate: self.force_slew * 1e3,
             torque_rate: self.torque_slew * 1e3,
+            contact: ContactBound {
+                stiffness: self.contact_stiffness,
+                ..ContactBound::default()
+            },
             period: Duration::from_secs_f64(rate_hz.recip()),
             rearm: self.rearm.unwrap_or(if nobody_is_hurt {
                 Rearm::Automatic
@@ -216,7 +226,7 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
     let (report, code) = match run(args) {
         Ok(report) => (Some(report), ExitCode::SUCCESS),
         Err(error) => {
-            eprintln!("taut: {error}");
+            taut_log::say(&format!("taut: {error}"));
             let code = ExitCode::from(error.exit_code());
             match error {
                 BridgeError::ServerLost { report, .. } => (Some(*report), code),
@@ -227,11 +237,13 @@ pub fn execute(args: &BridgeArgs) -> ExitCode {
     if let Some(report) = report {
         if args.json {
             match serde_json::to_string_pretty(&report) {
-                Ok(text) => println!("{text}"),
-                Err(error) => eprintln!("the report cannot be written as JSON: {error}"),
+                Ok(text) => drop(console::report(text)),
+                Err(error) => {
+                    taut_log::say(&format!("the report cannot be written as JSON: {error}"));
+                }
             }
         } else {
-            print!("{report}");
+            console::report(report.to_string());
         }
     }
     code

@@ -1,9 +1,10 @@
 //! The device loop of a bridge: ticks at absolute deadlines, in a thread of its own.
 //!
 //! The loop neither logs nor waits for another thread: what it notices goes into a bounded queue, and what
-//! does not fit is dropped (the counts of the report stay complete). Its one system call besides the clock is the
-//! sending of a reading.
+//! does not fit is dropped (the counts of the report stay complete). What ends it or takes the force away it looks up itself, in flags that the system's
+//! signals and the operator's wishes set. Its one system call besides the clock is the sending of a reading.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::SyncSender;
@@ -18,11 +19,15 @@ use crate::device::DeviceFault;
 use crate::port::SafetyEvent;
 use crate::realtime::{self, Awake, RealtimeGrant, Ticker, monotonic_now};
 use crate::report::Durations;
+use crate::signals::EndFlag;
 
 /// The device loop: the only thread that touches the device.
 pub(crate) struct DeviceLoop {
     pub(crate) link: Arc<ClientLink>,
+    /// Set when the session is over.
     pub(crate) end: Arc<AtomicBool>,
+    /// Set when the whole bridge is to end.
+    pub(crate) asked: EndFlag,
     pub(crate) wishes: Arc<ArmSwitch>,
     pub(crate) notices: SyncSender<SafetyEvent>,
     pub(crate) period: Duration,
@@ -32,12 +37,33 @@ pub(crate) struct DeviceLoop {
 }
 
 impl DeviceLoop {
+    /// Ticks until the end, and leads the force down.
+    ///
+    /// # Panics
+    /// As a tick did, once the force is down.
     pub(crate) fn run(&mut self, bridge: &mut BridgeLoop) {
         let _awake = self.request_realtime();
         let mut ticker = Ticker::new(self.period);
+        let ticked = catch_unwind(AssertUnwindSafe(|| self.tick_on(bridge, &mut ticker)));
+        // Whatever ended it: nothing is left on the hand, and nothing drops at once.
+        let released = catch_unwind(AssertUnwindSafe(|| {
+            while !bridge.port_mut().release_step(monotonic_now()) {
+                self.totals.missed += ticker.wait();
+            }
+        }));
+        if let Err(cause) = ticked.and(released) {
+            resume_unwind(cause);
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.end.load(Ordering::Relaxed) || self.asked.is_asked()
+    }
+
+    fn tick_on(&mut self, bridge: &mut BridgeLoop, ticker: &mut Ticker) {
         let mut last = None;
         let mut set = ConstraintSet::new();
-        while !self.end.load(Ordering::Relaxed) {
+        while !self.is_over() {
             self.totals.missed += ticker.wait();
             let now = monotonic_now();
             self.totals.first_tick.get_or_insert(now);
@@ -64,10 +90,6 @@ impl DeviceLoop {
             if bridge.fault() == Some(DeviceFault::Ended) {
                 break;
             }
-        }
-        // Nothing is left on the hand, and nothing drops at once.
-        while !bridge.port_mut().release_step(monotonic_now()) {
-            self.totals.missed += ticker.wait();
         }
     }
 

@@ -8,6 +8,7 @@
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
+//! - [`console`], [`signals`]: people and the system, heard and told without waiting.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
 //! - [`run`]: a bridge, from arguments to report.
 
@@ -16,6 +17,7 @@ mod bridge;
 mod bridge_loop;
 mod choice;
 mod cli;
+pub mod console;
 mod device;
 mod device_loop;
 mod devices;
@@ -25,6 +27,7 @@ mod placement;
 mod port;
 pub mod realtime;
 mod report;
+pub mod signals;
 mod simulated_strings;
 mod trace_file;
 mod vrpn;
@@ -50,9 +53,9 @@ pub use devices::{
 };
 pub use placement::Placement;
 pub use port::{
-    ArmingState, Command, DevicePort, EnergyObserver, EventKind, Events, MAX_EVENTS_PER_TICK,
-    Passivity, PassivitySettings, Reading, Rearm, SafetyEvent, SafetySettings, TickReport,
-    UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
+    ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
+    Events, MAX_EVENTS_PER_TICK, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
+    SafetySettings, TickReport, UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
 };
 pub use report::{BridgeReport, Quantiles};
 pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};

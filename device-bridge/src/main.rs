@@ -1,6 +1,5 @@
 //! `taut-bridge`: the device side alone, for a machine that needs nothing else of taut.
 
-use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -15,12 +14,8 @@ struct Cli {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .init();
-    taut_bridge::execute(&cli.bridge)
+    taut_log::start("info");
+    let code = taut_bridge::execute(&cli.bridge);
+    taut_log::flush();
+    code
 }

@@ -11,8 +11,8 @@ use taut_bridge::{TrackerFeed, TrackerState, VrpnMode, VrpnSource};
 use taut_vrpn::message::{Header, append, first};
 use taut_vrpn::{ButtonStates, PoseReport, cookie, description};
 
-/// Anything takes this long at most.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_secs(60);
 const POSE: i32 = 4;
 const STATES: i32 = 5;
 const PONG: i32 = 6;

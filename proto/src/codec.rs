@@ -3,7 +3,7 @@
 //! | on the wire        | as                                                        |
 //! |--------------------|-----------------------------------------------------------|
 //! | integers, floats   | fixed size, little-endian                                 |
-//! | `String`, `Vec`    | u16 count, then the bytes or the elements                 |
+//! | `Untrusted`, `Vec` | u16 count, then the bytes or the elements                 |
 //! | `ArrayVec`         | u8 count, then the elements                               |
 //! | `Option`           | u8 0 or 1, then the value                                 |
 //! | enums              | u8 tag, then the fields                                   |
@@ -12,6 +12,7 @@
 //! the length of the input, whatever a count claims; a count larger than the bytes left is refused at once.
 //! A number that is not finite is refused in both directions: no NaN reaches a device or a picture.
 
+use crate::Untrusted;
 use arrayvec::ArrayVec;
 use bincode::{
     Decode, Encode,
@@ -52,6 +53,12 @@ pub enum EncodeError {
         /// Length allowed.
         max: usize,
     },
+    /// A number is out of its range.
+    #[error("a message holds {number} out of its range: mend the value before it is sent")]
+    OutOfRange {
+        /// Message and field.
+        number: &'static str,
+    },
     /// The value does not fit the buffer or the limit of the message.
     #[error("a message does not fit its buffer: send less")]
     BufferFull,
@@ -72,6 +79,14 @@ pub enum DecodeError {
     /// A number is NaN or infinite.
     #[error("a message holds a number that is not finite: the sender is broken")]
     NotFinite,
+    /// A number is out of its range.
+    #[error("a message holds {number} out of its range ({range}): the sender is broken")]
+    OutOfRange {
+        /// Message and field.
+        number: &'static str,
+        /// The range, for people.
+        range: &'static str,
+    },
     /// A count is above its limit or above the bytes left.
     #[error(
         "a message claims {what} of {len}, more than the {max} possible: the sender or the network is broken"
@@ -118,6 +133,8 @@ pub enum DecodeError {
 
 /// A value with one layout on the wire.
 pub trait Wire: Sized {
+    /// Whether it is a number, which has a range wherever it is a field of a message ([`crate::range`]).
+    const IS_NUMBER: bool = false;
     /// Appends the value.
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError>;
     /// Takes the value from the front.
@@ -244,6 +261,7 @@ impl Sink for Target<'_> {
 macro_rules! wire_number {
     ($($kind:ty),*) => { $(
         impl Wire for $kind {
+            const IS_NUMBER: bool = true;
             fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
                 to.put(*self)
             }
@@ -258,6 +276,7 @@ wire_number!(u8, i16, u16, i32, u32, u64);
 macro_rules! wire_float {
     ($($kind:ty),*) => { $(
         impl Wire for $kind {
+            const IS_NUMBER: bool = true;
             fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
                 if !self.is_finite() {
                     return Err(EncodeError::NotFinite);
@@ -303,6 +322,7 @@ impl<const N: usize> Wire for [u8; N] {
 macro_rules! wire_array {
     ($($kind:ty),*) => { $(
         impl<const N: usize> Wire for [$kind; N] {
+            const IS_NUMBER: bool = true;
             fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
                 self.iter().try_for_each(|element| element.write(to))
             }
@@ -318,20 +338,23 @@ macro_rules! wire_array {
 }
 wire_array!(u16, f32, f64);
 
-impl Wire for String {
+/// All text: `String` itself has no decoder, so that nobody formats what a peer wrote by accident.
+impl Wire for Untrusted {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        to.put(count("text", self.len(), MAX_TEXT_BYTES)?)?;
-        to.put_bytes(self.as_bytes())
+        to.put(count("text", self.raw().len(), MAX_TEXT_BYTES)?)?;
+        to.put_bytes(self.raw().as_bytes())
     }
     fn read(from: &mut Reader<'_>) -> Result<Self, DecodeError> {
         let len = from.take_count("text", MAX_TEXT_BYTES)?;
         let mut bytes = vec![0; len];
         from.take_bytes(&mut bytes)?;
-        String::from_utf8(bytes).map_err(|_| DecodeError::NotText)
+        let text = String::from_utf8(bytes).map_err(|_| DecodeError::NotText)?;
+        Ok(Untrusted::from(text))
     }
 }
 
 impl<T: Wire> Wire for Vec<T> {
+    const IS_NUMBER: bool = T::IS_NUMBER;
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
         to.put(count("list", self.len(), MAX_LIST)?)?;
         self.iter().try_for_each(|element| element.write(to))
@@ -347,6 +370,7 @@ impl<T: Wire> Wire for Vec<T> {
 }
 
 impl<T: Wire> Wire for Option<T> {
+    const IS_NUMBER: bool = T::IS_NUMBER;
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
         self.is_some().write(to)?;
         self.iter().try_for_each(|value| value.write(to))
@@ -387,7 +411,7 @@ pub(crate) fn read_elements<T: Wire, const N: usize>(
     Ok(list)
 }
 
-/// Layout of a struct: its fields in the order given.
+/// Layout of a struct: its fields in the order given. Of what is checked where it is used: see [`wire_ranged`].
 macro_rules! wire_struct {
     ($name:ty { $($field:ident),* $(,)? }) => {
         impl $crate::codec::Wire for $name {
@@ -402,6 +426,48 @@ macro_rules! wire_struct {
     };
 }
 pub(crate) use wire_struct;
+
+/// Layout of a message: its fields in the order given, every number `in` its range. A number without one does not compile.
+macro_rules! wire_ranged {
+    ($name:ident { $($field:ident $(in $bounds:path)?),* $(,)? }) => {
+        impl $name {
+            /// Its numbers and what each may be.
+            pub const NUMBERS: &'static [$crate::range::Number] = &[ $( $(
+                $crate::range::Number::new(concat!(stringify!($name), ".", stringify!($field)), $bounds),
+            )? )* ];
+        }
+        impl $crate::codec::Wire for $name {
+            fn write(&self, to: &mut $crate::codec::Writer<'_>) -> Result<(), $crate::EncodeError> {
+                $( $crate::codec::wire_ranged!(@write $name self to $field $(in $bounds)?); )*
+                Ok(())
+            }
+            fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
+                Ok(Self { $( $field: $crate::codec::wire_ranged!(@read $name from $field $(in $bounds)?), )* })
+            }
+        }
+    };
+    (@write $name:ident $self:ident $to:ident $field:ident in $bounds:path) => {
+        const { $crate::range::Number::new(concat!(stringify!($name), ".", stringify!($field)), $bounds) }
+            .write(&$self.$field, $to)?
+    };
+    (@write $name:ident $self:ident $to:ident $field:ident) => {
+        $crate::codec::write_plain(&$self.$field, $to)?
+    };
+    (@read $name:ident $from:ident $field:ident in $bounds:path) => {
+        const { $crate::range::Number::new(concat!(stringify!($name), ".", stringify!($field)), $bounds) }
+            .read($from)?
+    };
+    (@read $name:ident $from:ident $field:ident) => {
+        $crate::codec::Wire::read($from)?
+    };
+}
+pub(crate) use wire_ranged;
+
+/// Writes what is no number.
+pub(crate) fn write_plain<T: Wire>(value: &T, to: &mut Writer<'_>) -> Result<(), EncodeError> {
+    const { assert!(!T::IS_NUMBER, "a number of a message has a range") };
+    value.write(to)
+}
 
 /// Layout of an enum without fields: one byte.
 macro_rules! wire_tag {

@@ -14,6 +14,7 @@ use crate::{
     DecodeError, EncodeError, PoseF64,
     codec::{Reader, Wire, Writer, read_elements},
     header::MAX_PAYLOAD_BYTES,
+    range::{COUNT, LENGTH, NAME, Number, SIZE, TIME, UNIT},
 };
 use arrayvec::ArrayVec;
 
@@ -171,6 +172,40 @@ impl Default for SetHead {
     }
 }
 
+const SEQUENCE: Number = Number::new("SetHead.sequence", COUNT);
+const MADE: Number = Number::new("SetHead.made_ns", TIME);
+const DEVICE: Number = Number::new("SetHead.device_ns", TIME);
+const ROWS_IN_SET: Number = Number::new("ConstraintPart.rows_in_set", crate::range::SET_ROWS);
+const PART: Number = Number::new("ConstraintPart.part", crate::range::SET_PART);
+const PARTS: Number = Number::new("ConstraintPart.parts", crate::range::SET_PARTS);
+const FIRST_ROW: Number = Number::new("ConstraintPart.first_row", crate::range::SET_ROWS);
+const OBSTACLE: Number = Number::new("ConstraintRow.obstacle", NAME);
+const FEATURE: Number = Number::new("ConstraintRow.feature", NAME);
+const ARM: Number = Number::new("ConstraintRow.arm", LENGTH);
+const NORMAL: Number = Number::new("ConstraintRow.normal", UNIT);
+const GAP: Number = Number::new("ConstraintRow.gap", LENGTH);
+const CAME: Number = Number::new("ConstraintRow.came", LENGTH);
+const DIRECTION: Number = Number::new("ConstraintRow.direction", UNIT);
+const CENTRE: Number = Number::new("ConstraintRow.centre", LENGTH);
+const RADIUS: Number = Number::new("ConstraintRow.radius", SIZE);
+
+impl SetHead {
+    /// Its numbers and what each may be. [`NO_SET`] is none of them: it does not travel.
+    pub const NUMBERS: &'static [Number] = &[SEQUENCE, MADE, DEVICE];
+}
+
+impl ConstraintPart {
+    /// Its numbers and what each may be.
+    pub const NUMBERS: &'static [Number] = &[ROWS_IN_SET, PART, PARTS, FIRST_ROW];
+}
+
+impl ConstraintRow {
+    /// Its numbers and what each may be.
+    pub const NUMBERS: &'static [Number] = &[
+        OBSTACLE, FEATURE, ARM, NORMAL, GAP, CAME, DIRECTION, CENTRE, RADIUS,
+    ];
+}
+
 /// Bits of a row's `has` byte.
 mod has {
     pub(super) const SEPARATION: u8 = 0b0111;
@@ -204,16 +239,18 @@ impl RowSeparation {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
         match self {
             RowSeparation::OfObstacle | RowSeparation::OfBody => Ok(()),
-            RowSeparation::OfEdges(along) => along.iter().try_for_each(|edge| edge.write(to)),
-            RowSeparation::OfBall(radius) => radius.write(to),
+            RowSeparation::OfEdges(along) => {
+                along.iter().try_for_each(|edge| DIRECTION.write(edge, to))
+            }
+            RowSeparation::OfBall(radius) => RADIUS.write(radius, to),
             RowSeparation::OfRim(center, axis, radius) => {
-                center.write(to)?;
-                axis.write(to)?;
-                radius.write(to)
+                CENTRE.write(center, to)?;
+                DIRECTION.write(axis, to)?;
+                RADIUS.write(radius, to)
             }
             RowSeparation::OfRods(along, radii) => {
-                along.iter().try_for_each(|rod| rod.write(to))?;
-                radii.write(to)
+                along.iter().try_for_each(|rod| DIRECTION.write(rod, to))?;
+                RADIUS.write(radii, to)
             }
         }
     }
@@ -222,10 +259,17 @@ impl RowSeparation {
         Ok(match code {
             0 => RowSeparation::OfObstacle,
             1 => RowSeparation::OfBody,
-            2 => RowSeparation::OfEdges([Wire::read(from)?, Wire::read(from)?]),
-            3 => RowSeparation::OfBall(Wire::read(from)?),
-            4 => RowSeparation::OfRim(Wire::read(from)?, Wire::read(from)?, Wire::read(from)?),
-            5 => RowSeparation::OfRods([Wire::read(from)?, Wire::read(from)?], Wire::read(from)?),
+            2 => RowSeparation::OfEdges([DIRECTION.read(from)?, DIRECTION.read(from)?]),
+            3 => RowSeparation::OfBall(RADIUS.read(from)?),
+            4 => RowSeparation::OfRim(
+                CENTRE.read(from)?,
+                DIRECTION.read(from)?,
+                RADIUS.read(from)?,
+            ),
+            5 => RowSeparation::OfRods(
+                [DIRECTION.read(from)?, DIRECTION.read(from)?],
+                RADIUS.read(from)?,
+            ),
             tag => {
                 return Err(DecodeError::UnknownTag {
                     what: "separation",
@@ -255,10 +299,10 @@ impl Wire for ConstraintRow {
                 max: 15,
             });
         }
-        self.obstacle.write(to)?;
+        OBSTACLE.write(&self.obstacle, to)?;
         (body | obstacle << 4).write(to)?;
-        self.on_body.index.write(to)?;
-        self.on_obstacle.index.write(to)?;
+        FEATURE.write(&self.on_body.index, to)?;
+        FEATURE.write(&self.on_obstacle.index, to)?;
         let mut has = self.separation.code();
         if self.shading_normal.is_some() {
             has |= has::SHADING_NORMAL;
@@ -267,28 +311,28 @@ impl Wire for ConstraintRow {
             has |= has::CAME;
         }
         has.write(to)?;
-        self.arm.write(to)?;
-        self.normal.write(to)?;
-        self.gap.write(to)?;
+        ARM.write(&self.arm, to)?;
+        NORMAL.write(&self.normal, to)?;
+        GAP.write(&self.gap, to)?;
         if self.came != 0.0 {
-            self.came.write(to)?;
+            CAME.write(&self.came, to)?;
         }
         if let Some(normal) = &self.shading_normal {
-            normal.write(to)?;
+            NORMAL.write(normal, to)?;
         }
         self.separation.write(to)
     }
 
     fn read(from: &mut Reader<'_>) -> Result<ConstraintRow, DecodeError> {
-        let obstacle = Wire::read(from)?;
+        let obstacle = OBSTACLE.read(from)?;
         let kinds = u8::read(from)?;
         let on_body = RowFeature {
             kind: kinds & 0x0f,
-            index: Wire::read(from)?,
+            index: FEATURE.read(from)?,
         };
         let on_obstacle = RowFeature {
             kind: kinds >> 4,
-            index: Wire::read(from)?,
+            index: FEATURE.read(from)?,
         };
         let has = u8::read(from)?;
         if has & !has::KNOWN != 0 {
@@ -297,19 +341,19 @@ impl Wire for ConstraintRow {
                 tag: has,
             });
         }
-        let arm = Wire::read(from)?;
-        let normal = Wire::read(from)?;
-        let gap = Wire::read(from)?;
+        let arm = ARM.read(from)?;
+        let normal = NORMAL.read(from)?;
+        let gap = GAP.read(from)?;
         let mut came = 0.0;
         if has & has::CAME != 0 {
-            came = f32::read(from)?;
+            came = CAME.read(from)?;
             // A zero is not sent: one value, one encoding.
             if came == 0.0 {
                 return Err(DecodeError::Inconsistent { what: "came" });
             }
         }
         let shading_normal = if has & has::SHADING_NORMAL != 0 {
-            Some(Wire::read(from)?)
+            Some(NORMAL.read(from)?)
         } else {
             None
         };
@@ -329,14 +373,14 @@ impl Wire for ConstraintRow {
 
 impl Wire for ConstraintPart {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        self.head.sequence.write(to)?;
-        self.head.made_ns.write(to)?;
-        self.head.device_ns.write(to)?;
+        SEQUENCE.write(&self.head.sequence, to)?;
+        MADE.write(&self.head.made_ns, to)?;
+        DEVICE.write(&self.head.device_ns, to)?;
         self.head.pose.write(to)?;
-        self.rows_in_set.write(to)?;
-        self.part.write(to)?;
-        self.parts.write(to)?;
-        self.first_row.write(to)?;
+        ROWS_IN_SET.write(&self.rows_in_set, to)?;
+        PART.write(&self.part, to)?;
+        PARTS.write(&self.parts, to)?;
+        FIRST_ROW.write(&self.first_row, to)?;
         (self.rows.len() as u8).write(to)?; // MAX_PART_ROWS is far below 256
         self.head.flags.write(to)?;
         self.rows.iter().try_for_each(|row| row.write(to))
@@ -344,16 +388,16 @@ impl Wire for ConstraintPart {
 
     fn read(from: &mut Reader<'_>) -> Result<ConstraintPart, DecodeError> {
         let mut head = SetHead {
-            sequence: Wire::read(from)?,
-            made_ns: Wire::read(from)?,
-            device_ns: Wire::read(from)?,
+            sequence: SEQUENCE.read(from)?,
+            made_ns: MADE.read(from)?,
+            device_ns: DEVICE.read(from)?,
             pose: Wire::read(from)?,
             flags: 0,
         };
-        let rows_in_set = u16::read(from)?;
-        let part = u8::read(from)?;
-        let parts = u8::read(from)?;
-        let first_row = u16::read(from)?;
+        let rows_in_set: u16 = ROWS_IN_SET.read(from)?;
+        let part: u8 = PART.read(from)?;
+        let parts: u8 = PARTS.read(from)?;
+        let first_row: u16 = FIRST_ROW.read(from)?;
         let count = u8::read(from)?;
         head.flags = Wire::read(from)?;
         if head.flags & !KNOWN_SET_FLAGS != 0 {
@@ -363,10 +407,7 @@ impl Wire for ConstraintPart {
             });
         }
         let last_row = usize::from(first_row) + usize::from(count);
-        let in_place = part < parts
-            && usize::from(parts) <= MAX_PARTS
-            && last_row <= usize::from(rows_in_set)
-            && usize::from(rows_in_set) <= MAX_SET_ROWS;
+        let in_place = part < parts && last_row <= usize::from(rows_in_set);
         if !in_place {
             return Err(DecodeError::Inconsistent {
                 what: "place in the set",

@@ -21,9 +21,10 @@ pub use crate::role::Role;
 
 use crate::{
     ClientStats, CouplingOffer, DecodeError, EncodeError, EventsTold, Group, MeshHash,
-    PROTOCOL_VERSION, SceneDescription,
-    codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_struct, wire_tag},
+    PROTOCOL_VERSION, SceneDescription, Untrusted,
+    codec::{self, MAX_VALUE_BYTES, Reader, Wire, Writer, wire_ranged, wire_tag},
     proof::Grant,
+    range::{MESH_BYTES, NAME, PORT, RATE, SESSION, SMALL, TIME, TIMEOUT},
     version::MAGIC,
 };
 
@@ -75,7 +76,7 @@ pub enum RefusalCode {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
     /// Name of the node, unique among the clients.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// How it wants its states.
@@ -113,7 +114,7 @@ pub struct Refusal {
     /// Protocol version of the server.
     pub version: u8,
     /// Why and what to do, for people: one sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// Asks for a mesh.
@@ -149,7 +150,7 @@ pub struct LogEvent {
     /// Weight.
     pub level: LogLevel,
     /// One sentence.
-    pub text: String,
+    pub text: Untrusted,
 }
 
 /// An operator wants force at the device, or none.
@@ -164,13 +165,15 @@ pub struct ArmRequest {
 pub struct StatesBy {
     /// From the group, or by unicast.
     pub multicast: bool,
+    /// It leaves the group because a member sealed a state in the server's name.
+    pub forged: bool,
 }
 
 /// Last words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bye {
     /// Why, one sentence.
-    pub reason: String,
+    pub reason: Untrusted,
 }
 
 /// Everything that is said on a control stream.
@@ -294,30 +297,33 @@ wire_messages! {
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
 wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
-wire_struct!(Hello {
+wire_ranged!(Hello {
     node,
     role,
     transport,
-    rate_hz,
+    rate_hz in RATE,
     proof,
     grant
 });
-wire_struct!(Welcome {
+wire_ranged!(Welcome {
     proof,
-    session,
-    epoch,
-    udp_port,
-    session_time_ns,
-    node_timeout_ms
+    session in SESSION,
+    epoch in NAME,
+    udp_port in PORT,
+    session_time_ns in TIME,
+    node_timeout_ms in TIMEOUT
 });
-wire_struct!(Refusal {
+wire_ranged!(Refusal {
     code,
-    version,
+    version in SMALL,
     text
 });
-wire_struct!(MeshRequest { hash });
-wire_struct!(MeshHeader { hash, length });
-wire_struct!(LogEvent { level, text });
-wire_struct!(Bye { reason });
-wire_struct!(ArmRequest { arm });
-wire_struct!(StatesBy { multicast });
+wire_ranged!(MeshRequest { hash });
+wire_ranged!(MeshHeader {
+    hash,
+    length in MESH_BYTES
+});
+wire_ranged!(LogEvent { level, text });
+wire_ranged!(Bye { reason });
+wire_ranged!(ArmRequest { arm });
+wire_ranged!(StatesBy { multicast, forged });

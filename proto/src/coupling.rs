@@ -4,7 +4,7 @@
 //! sets follow as datagrams, see [`crate::constraints`].
 
 use crate::{
-    DecodeError, EncodeError, PoseF64,
+    DecodeError, EncodeError, PoseF64, Untrusted,
     codec::{Reader, Wire, Writer, wire_struct, wire_tag},
 };
 
@@ -18,7 +18,7 @@ pub enum CouplingOffer {
     /// At the server alone.
     AtServer {
         /// Why: one sentence, for people.
-        reason: String,
+        reason: Untrusted,
     },
     /// Beside the device, too.
     AtEdge(EdgeCoupling),

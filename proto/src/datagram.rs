@@ -1,8 +1,8 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample, Kind,
-    WrenchCommand,
+    Confirmation, ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample,
+    Kind, WrenchCommand,
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,
@@ -38,6 +38,8 @@ pub enum Payload {
     Constraints(ConstraintPart),
     /// Where the viewer's head is.
     Head(HeadSample),
+    /// Which states the server sent lately.
+    Confirm(Confirmation),
 }
 
 impl Payload {
@@ -55,6 +57,7 @@ impl Payload {
             Payload::Wrench(_) => Kind::Wrench,
             Payload::Constraints(_) => Kind::Constraints,
             Payload::Head(_) => Kind::Head,
+            Payload::Confirm(_) => Kind::Confirm,
         }
     }
 
@@ -72,6 +75,7 @@ impl Payload {
             Payload::Wrench(value) => encode_into(value, buffer),
             Payload::Constraints(value) => encode_into(value, buffer),
             Payload::Head(value) => encode_into(value, buffer),
+            Payload::Confirm(value) => encode_into(value, buffer),
         }
     }
 
@@ -90,6 +94,7 @@ impl Payload {
             Kind::Wrench => Payload::Wrench(decode(bytes)?),
             Kind::Constraints => Payload::Constraints(decode(bytes)?),
             Kind::Head => Payload::Head(decode(bytes)?),
+            Kind::Confirm => Payload::Confirm(decode(bytes)?),
         })
     }
 }

@@ -7,7 +7,8 @@
 //! the client takes only the very next one.
 
 use crate::{
-    codec::wire_struct,
+    codec::wire_ranged,
+    range::WRAPS,
     state::{EventRecord, MAX_EVENTS},
 };
 use arrayvec::ArrayVec;
@@ -218,5 +219,10 @@ impl EventInbox {
     }
 }
 
-wire_struct!(EventsTold { after, records });
-wire_struct!(EventAck { newest });
+wire_ranged!(EventsTold {
+    after in WRAPS,
+    records
+});
+wire_ranged!(EventAck {
+    newest in WRAPS
+});

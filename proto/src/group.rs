@@ -15,9 +15,10 @@
 //! take the one before for [`PREVIOUS_NS`] more. Who comes understands the others when that time is over: the generation before is not for it.
 
 use crate::{
-    DecodeError, EncodeError, Header, Kind, Payload, Role,
-    codec::{Reader, Wire, Writer, wire_struct},
+    DecodeError, EncodeError, Header, Kind, Payload, Role, Untrusted,
+    codec::{Reader, Wire, Writer, wire_ranged},
     derive::Root,
+    range::{COUNT_32, SESSION},
     seal::{DatagramBuffer, KEY_MATERIAL_BYTES, OpenError, Opened, Opener, SealError, Sealer},
 };
 use arrayvec::ArrayVec;
@@ -59,7 +60,7 @@ pub struct GroupMember {
     /// Session number: `sender` in datagram headers.
     pub sender: u16,
     /// Name of the node.
-    pub node: String,
+    pub node: Untrusted,
     /// What it is.
     pub role: Role,
     /// Where its hot plane listens, as the server sees it; `None` before its first datagram, and for QUIC datagrams.
@@ -114,7 +115,8 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         | Kind::Input
         | Kind::Head
         | Kind::Wrench
-        | Kind::Constraints => false,
+        | Kind::Constraints
+        | Kind::Confirm => false,
     }
 }
 
@@ -364,14 +366,14 @@ impl Wire for SocketAddr {
     }
 }
 
-wire_struct!(GroupMember {
-    sender,
+wire_ranged!(GroupMember {
+    sender in SESSION,
     node,
     role,
     address
 });
-wire_struct!(Group {
-    generation,
+wire_ranged!(Group {
+    generation in COUNT_32,
     secret,
     members,
     multicast

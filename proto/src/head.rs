@@ -1,6 +1,10 @@
 //! HEAD payload: where a tracker sees the viewer's head, upstream to the server.
 
-use crate::{PoseF64, codec::wire_struct};
+use crate::{
+    PoseF64,
+    codec::wire_ranged,
+    range::{COUNT, TIME},
+};
 
 /// One reading of the tracker on the viewer's head.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,8 +17,8 @@ pub struct HeadSample {
     pub pose: PoseF64,
 }
 
-wire_struct!(HeadSample {
-    sample_time_ns,
-    index,
+wire_ranged!(HeadSample {
+    sample_time_ns in TIME,
+    index in COUNT,
     pose
 });

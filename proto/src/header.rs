@@ -48,6 +48,8 @@ pub enum Kind {
     Constraints,
     /// [`crate::HeadSample`], head tracker to server.
     Head,
+    /// [`crate::Confirmation`], server to a client that hears the group.
+    Confirm,
 }
 
 impl Kind {
@@ -64,6 +66,7 @@ impl Kind {
             Kind::Wrench => 9,
             Kind::Constraints => 10,
             Kind::Head => 11,
+            Kind::Confirm => 12,
         }
     }
 
@@ -80,6 +83,7 @@ impl Kind {
             9 => Ok(Kind::Wrench),
             10 => Ok(Kind::Constraints),
             11 => Ok(Kind::Head),
+            12 => Ok(Kind::Confirm),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

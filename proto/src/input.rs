@@ -1,6 +1,10 @@
 //! INPUT payload: what the device bridge read, upstream to the haptics loop.
 
-use crate::{PoseF64, codec::wire_struct};
+use crate::{
+    PoseF64,
+    codec::wire_ranged,
+    range::{BITS, COUNT, FORCE, TIME, VELOCITY},
+};
 
 /// One reading of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,14 +34,14 @@ pub const INPUT_FAULT: u16 = 1;
 /// [`InputSample::flags`]: the bridge couples by itself and wants constraint sets instead of wrenches.
 pub const INPUT_AT_EDGE: u16 = 2;
 
-wire_struct!(InputSample {
-    sample_time_ns,
-    clock_uncertainty_ns,
-    index,
+wire_ranged!(InputSample {
+    sample_time_ns in TIME,
+    clock_uncertainty_ns in TIME,
+    index in COUNT,
     pose,
-    velocity,
-    buttons,
-    flags,
-    rendered,
-    set_sequence
+    velocity in VELOCITY,
+    buttons in BITS,
+    flags in BITS,
+    rendered in FORCE,
+    set_sequence in COUNT
 });

@@ -1,7 +1,8 @@
 //! Whether a client takes its states from multicast or by itself: decided at the client, by what it hears.
 //!
 //! A client begins with unicast, and listens. When it hears the group steadily it tells the server to leave the unicast away; when the group falls silent while the
-//! server lives, it asks for unicast again, and tries multicast later: a switch that drops groups costs [`SILENCE_NS`], once.
+//! server lives, it asks for unicast again, and tries multicast later: a switch that drops groups costs [`SILENCE_NS`], once. What it hears is believed for
+//! a moment only: see [`crate::confirmation`].
 
 /// Silence on the group after which a client goes back to unicast, ns. The server says something at least every 50 ms.
 pub const SILENCE_NS: u64 = 100_000_000;
@@ -34,6 +35,8 @@ pub struct MulticastWatch {
     since_ns: u64,
     not_before_ns: u64,
     retry_ns: u64,
+    /// A member forges the server's states.
+    is_forged: bool,
 }
 
 impl Default for MulticastWatch {
@@ -45,6 +48,7 @@ impl Default for MulticastWatch {
             since_ns: 0,
             not_before_ns: 0,
             retry_ns: FIRST_RETRY_NS,
+            is_forged: false,
         }
     }
 }
@@ -66,7 +70,8 @@ impl MulticastWatch {
         match self.path {
             StatePath::Multicast if self.is_silent(now_ns) && alive => Some(StatePath::Unicast),
             StatePath::Unicast
-                if self.steady >= PROOF
+                if !self.is_forged
+                    && self.steady >= PROOF
                     && !self.is_silent(now_ns)
                     && now_ns >= self.not_before_ns =>
             {
@@ -89,6 +94,16 @@ impl MulticastWatch {
         }
         self.path = path;
         self.since_ns = now_ns;
+    }
+
+    /// A member sealed a state in the server's name: the group is not tried again before its keys change.
+    pub fn forged(&mut self) {
+        self.is_forged = true;
+    }
+
+    /// The group has other keys, and perhaps other members.
+    pub fn rekeyed(&mut self) {
+        self.is_forged = false;
     }
 
     /// How states come, as asked last.

@@ -1,6 +1,9 @@
 //! Poses on the wire: position in m, unit quaternion w x y z; world_from_body of the body's own frame.
 
-use crate::codec::wire_struct;
+use crate::{
+    codec::wire_ranged,
+    range::{LENGTH, UNIT},
+};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 /// Largest deviation of a received quaternion's norm from 1 that is taken for rounding; beyond it the pose is refused.
@@ -24,8 +27,14 @@ pub struct PoseF64 {
     pub rotation: [f64; 4],
 }
 
-wire_struct!(PoseF32 { position, rotation });
-wire_struct!(PoseF64 { position, rotation });
+wire_ranged!(PoseF32 {
+    position in LENGTH,
+    rotation in UNIT
+});
+wire_ranged!(PoseF64 {
+    position in LENGTH,
+    rotation in UNIT
+});
 
 impl PoseF32 {
     /// At the origin, unrotated.

@@ -1,15 +1,16 @@
 //! Scene description: everything a client needs to draw, except the meshes, which it asks for by hash.
 
 use crate::{
-    MeshHash, PoseF64,
-    codec::{wire_struct, wire_tag},
+    MeshHash, PoseF64, Untrusted,
+    codec::{wire_ranged, wire_tag},
+    range::{ANGLE, COLOUR, LENGTH, NAME, PIXELS, PUPILS, SCALE, SHARE, SIZE},
 };
 
 /// What a client learns at join, before the first state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneDescription {
     /// Name of the scene.
-    pub name: String,
+    pub name: Untrusted,
     /// Revision; [`crate::HotState::scene_revision`] refers to it.
     pub revision: u32,
     /// The god-object.
@@ -47,7 +48,7 @@ impl SceneDescription {
     #[must_use]
     pub fn of_body(name: &str, god_object: BodyDescription) -> Self {
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             revision: 1,
             god_object,
             obstacles: Vec::new(),
@@ -71,7 +72,7 @@ impl SceneDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyDescription {
     /// Name, unique in the scene.
-    pub name: String,
+    pub name: Untrusted,
     /// Mesh, in the body's own frame.
     pub mesh: MeshHash,
     /// Body in the scene frame at start.
@@ -84,7 +85,7 @@ pub struct BodyDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScreenDescription {
     /// Name, unique in the workbench.
-    pub name: String,
+    pub name: Untrusted,
     /// Lower left corner as the viewer sees it.
     pub lower_left: [f64; 3],
     /// Lower right corner.
@@ -97,16 +98,16 @@ pub struct ScreenDescription {
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeDescription {
     /// Name that the node gives in its Hello.
-    pub name: String,
+    pub name: Untrusted,
     /// Names of the screens that it draws.
-    pub screens: Vec<String>,
+    pub screens: Vec<Untrusted>,
     /// How it shows two eyes.
     pub stereo: Stereo,
     /// Its window.
     pub window: WindowDescription,
     /// Which monitors its windows cover, in the order of the windows: an output's name such as DP-1, or its number from 0.
     /// Windows past the end take the monitors that follow.
-    pub monitors: Vec<String>,
+    pub monitors: Vec<Untrusted>,
 }
 
 /// How two eyes reach a screen.
@@ -148,49 +149,49 @@ pub struct ShowOptions {
     pub hud: bool,
 }
 
-wire_struct!(SceneDescription {
+wire_ranged!(SceneDescription {
     name,
-    revision,
+    revision in NAME,
     god_object,
     obstacles,
-    reference_point,
+    reference_point in LENGTH,
     scene_origin,
-    display_scale,
+    display_scale in SCALE,
     screens,
     nodes,
     viewer,
-    eye_separation,
-    near,
-    far,
-    separation_scale,
-    nearest_disparity,
+    eye_separation in PUPILS,
+    near in SIZE,
+    far in SIZE,
+    separation_scale in SHARE,
+    nearest_disparity in ANGLE,
     show,
 });
-wire_struct!(BodyDescription {
+wire_ranged!(BodyDescription {
     name,
     mesh,
     pose,
-    colour
+    colour in COLOUR
 });
-wire_struct!(ScreenDescription {
+wire_ranged!(ScreenDescription {
     name,
-    lower_left,
-    lower_right,
-    upper_left
+    lower_left in LENGTH,
+    lower_right in LENGTH,
+    upper_left in LENGTH
 });
-wire_struct!(NodeDescription {
+wire_ranged!(NodeDescription {
     name,
     screens,
     stereo,
     window,
     monitors
 });
-wire_struct!(WindowDescription {
-    width,
-    height,
+wire_ranged!(WindowDescription {
+    width in PIXELS,
+    height in PIXELS,
     fullscreen
 });
-wire_struct!(ShowOptions {
+wire_ranged!(ShowOptions {
     ghost,
     contacts,
     force,

@@ -14,9 +14,12 @@
 
 use crate::{
     DecodeError, EncodeError, PoseF32,
-    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_struct},
+    codec::{Reader, Wire, Writer, encode_into, read_elements, wire_ranged},
     header::MAX_PAYLOAD_BYTES,
     octahedral::{normal_from_octahedral, octahedral_from_normal},
+    range::{
+        AGE_US, BITS, COUNT, COUNT_32, FORCE, LENGTH, NAME, Number, PUPILS, TIME, VELOCITY, WRAPS,
+    },
 };
 use arrayvec::ArrayVec;
 
@@ -272,37 +275,64 @@ impl RunState {
     }
 }
 
-wire_struct!(HeadState {
+wire_ranged!(HeadState {
     pose,
-    age_us,
-    eye_separation,
-    flags
+    age_us in AGE_US,
+    eye_separation in PUPILS,
+    flags in BITS
 });
-wire_struct!(ToolState {
+wire_ranged!(ToolState {
     god_object,
     device,
-    linear_velocity,
-    angular_velocity,
-    force,
-    torque,
-    buttons,
-    flags,
-    id
+    linear_velocity in VELOCITY,
+    angular_velocity in VELOCITY,
+    force in FORCE,
+    torque in FORCE,
+    buttons in BITS,
+    flags in BITS,
+    id in NAME
 });
-wire_struct!(BodyState { id, flags, pose });
-wire_struct!(EventRecord { id, tick, code });
+wire_ranged!(BodyState {
+    id in NAME,
+    flags in BITS,
+    pose
+});
+wire_ranged!(EventRecord {
+    id in WRAPS,
+    tick in WRAPS,
+    code in NAME
+});
+
+const SAMPLE_TIME: Number = Number::new("HotState.sample_time_ns", TIME);
+const TICK: Number = Number::new("HotState.tick", COUNT);
+const REVISION: Number = Number::new("HotState.scene_revision", NAME);
+const CONSTRAINT_AGE: Number = Number::new("HotState.constraint_age_us", COUNT_32);
+const PAIR: Number = Number::new("ContactState.pair", NAME);
+const POINT: Number = Number::new("ContactState.point", LENGTH);
+const CONTACT_FORCE: Number = Number::new("ContactState.force", FORCE);
+const GAP: Number = Number::new("ContactState.gap", LENGTH);
+
+impl HotState {
+    /// Its numbers and what each may be.
+    pub const NUMBERS: &'static [Number] = &[SAMPLE_TIME, TICK, REVISION, CONSTRAINT_AGE];
+}
+
+impl ContactState {
+    /// Its numbers and what each may be; any normal on the wire is one.
+    pub const NUMBERS: &'static [Number] = &[PAIR, POINT, CONTACT_FORCE, GAP];
+}
 
 impl Wire for HotState {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        self.sample_time_ns.write(to)?;
-        self.tick.write(to)?;
-        self.scene_revision.write(to)?;
+        SAMPLE_TIME.write(&self.sample_time_ns, to)?;
+        TICK.write(&self.tick, to)?;
+        REVISION.write(&self.scene_revision, to)?;
         for len in [self.tools.len(), self.bodies.len(), self.contacts.len()] {
             (len as u8).write(to)?; // capacities are far below 256
         }
         // Four bits each: one byte for the run state and the number of events.
         (self.run.code() | (self.events.len() as u8) << 4).write(to)?;
-        self.constraint_age_us.write(to)?;
+        CONSTRAINT_AGE.write(&self.constraint_age_us, to)?;
         self.head.write(to)?;
         self.tools.iter().try_for_each(|tool| tool.write(to))?;
         self.bodies.iter().try_for_each(|body| body.write(to))?;
@@ -313,9 +343,9 @@ impl Wire for HotState {
     }
 
     fn read(from: &mut Reader<'_>) -> Result<HotState, DecodeError> {
-        let sample_time_ns = Wire::read(from)?;
-        let tick = Wire::read(from)?;
-        let scene_revision = Wire::read(from)?;
+        let sample_time_ns = SAMPLE_TIME.read(from)?;
+        let tick = TICK.read(from)?;
+        let scene_revision = REVISION.read(from)?;
         let [tools, bodies, contacts, packed] = <[u8; 4]>::read(from)?;
         let run = RunState::from_code(packed & 0x0f)?;
         Ok(HotState {
@@ -323,7 +353,7 @@ impl Wire for HotState {
             tick,
             scene_revision,
             run,
-            constraint_age_us: Wire::read(from)?,
+            constraint_age_us: CONSTRAINT_AGE.read(from)?,
             head: Wire::read(from)?,
             tools: read_elements(from, tools)?,
             bodies: read_elements(from, bodies)?,
@@ -335,22 +365,22 @@ impl Wire for HotState {
 
 impl Wire for ContactState {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        self.pair.write(to)?;
-        self.point.write(to)?;
+        PAIR.write(&self.pair, to)?;
+        POINT.write(&self.point, to)?;
         let [u, v] = octahedral_from_normal(self.normal).ok_or(EncodeError::NotFinite)?;
         u.write(to)?;
         v.write(to)?;
-        self.force.write(to)?;
-        self.gap.write(to)
+        CONTACT_FORCE.write(&self.force, to)?;
+        GAP.write(&self.gap, to)
     }
 
     fn read(from: &mut Reader<'_>) -> Result<ContactState, DecodeError> {
         Ok(ContactState {
-            pair: Wire::read(from)?,
-            point: Wire::read(from)?,
+            pair: PAIR.read(from)?,
+            point: POINT.read(from)?,
             normal: normal_from_octahedral([Wire::read(from)?, Wire::read(from)?]),
-            force: Wire::read(from)?,
-            gap: Wire::read(from)?,
+            force: CONTACT_FORCE.read(from)?,
+            gap: GAP.read(from)?,
         })
     }
 }

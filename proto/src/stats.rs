@@ -1,6 +1,9 @@
 //! What a client reports about itself, about once per second.
 
-use crate::codec::wire_struct;
+use crate::{
+    codec::wire_ranged,
+    range::{COUNT, MEASURED, NAME, TIME},
+};
 
 /// A client's report; counts are since it joined, ages are over the time since its last report.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,20 +47,23 @@ pub struct DrawnState {
     pub state_hash: u64,
 }
 
-wire_struct!(ClientStats {
-    frames,
-    fps,
-    pose_age_ms_p50,
-    pose_age_ms_p99,
-    pose_age_ms_max,
-    drawn_age_ms_p50,
-    drawn_age_ms_p99,
-    drawn_age_ms_max,
-    swap_skew_ms_p50,
-    swap_skew_ms_max,
-    packets_lost,
-    packets_received,
-    clock_uncertainty_ns,
+wire_ranged!(ClientStats {
+    frames in COUNT,
+    fps in MEASURED,
+    pose_age_ms_p50 in MEASURED,
+    pose_age_ms_p99 in MEASURED,
+    pose_age_ms_max in MEASURED,
+    drawn_age_ms_p50 in MEASURED,
+    drawn_age_ms_p99 in MEASURED,
+    drawn_age_ms_max in MEASURED,
+    swap_skew_ms_p50 in MEASURED,
+    swap_skew_ms_max in MEASURED,
+    packets_lost in COUNT,
+    packets_received in COUNT,
+    clock_uncertainty_ns in TIME,
     drawn,
 });
-wire_struct!(DrawnState { tick, state_hash });
+wire_ranged!(DrawnState {
+    tick in COUNT,
+    state_hash in NAME
+});

@@ -9,7 +9,7 @@
 //!
 //! All in ns: of the session at the server, since any fixed moment at the client.
 
-use crate::codec::wire_struct;
+use crate::{codec::wire_ranged, range::TIME};
 
 /// Client to server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +29,11 @@ pub struct TimeResponse {
     pub server_sent: u64,
 }
 
-wire_struct!(TimeRequest { client_sent });
-wire_struct!(TimeResponse {
-    client_sent,
-    server_received,
-    server_sent
+wire_ranged!(TimeRequest {
+    client_sent in TIME
+});
+wire_ranged!(TimeResponse {
+    client_sent in TIME,
+    server_received in TIME,
+    server_sent in TIME
 });

@@ -1,6 +1,9 @@
 //! WRENCH payload: what the user is to feel, downstream to the device bridge.
 
-use crate::codec::wire_struct;
+use crate::{
+    codec::wire_ranged,
+    range::{BITS, FORCE, TIME},
+};
 
 /// One command to the device. A bridge gives zero force once the reading that the newest command was computed from is too old.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,9 +24,9 @@ pub const WRENCH_PAUSED: u16 = 1;
 /// [`WrenchCommand::flags`]: the bridge couples by itself; what goes to it is constraint sets, not this.
 pub const WRENCH_AT_EDGE: u16 = 2;
 
-wire_struct!(WrenchCommand {
-    time_ns,
-    origin_ns,
-    wrench,
-    flags
+wire_ranged!(WrenchCommand {
+    time_ns in TIME,
+    origin_ns in TIME,
+    wrench in FORCE,
+    flags in BITS
 });

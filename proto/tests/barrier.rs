@@ -5,18 +5,22 @@ mod barrier_support;
 use barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
-    ARRIVE_PERIOD_NS, Arrive, Drawn, FARTHEST_AHEAD, FRAMES_LEFT_OUT, HUSH_NS, LEAD_NS, MAX_MISSES,
-    Master, MasterSettings, Newest, Node, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS,
-    SLOWEST_ARRIVE_NS, SUCCESSION_NS, Succession, Swap, TERMS_LEFT_OUT, Turn,
+    ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, FARTHEST_AHEAD, HUSH_NS, LEAD_NS, MAX_MEMBERS,
+    MAX_MISSES, MOST_REIGNS_AHEAD, Master, MasterSettings, Newest, Node, NodeState,
+    PROBATION_FRAMES, RECLAIM_NS, ReleaseHead, SILENCE_NS, SLOWEST_ARRIVE_NS, SUCCESSION_NS,
+    SWAP_TOLD_NS, Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
 };
 
 const MS: u64 = 1_000_000;
 const PERIOD: u64 = 16_666_667;
+/// Ten frames per second at least.
+const SLOWEST: u64 = 100 * MS;
 
 fn settings(swap: Swap) -> MasterSettings {
     MasterSettings {
         swap,
         period_ns: PERIOD,
+        slowest_ns: SLOWEST,
     }
 }
 
@@ -119,17 +123,21 @@ fn a_late_node_costs_one_deadline_and_none_until_it_is_back() {
 }
 
 #[test]
-fn a_dead_node_is_out_after_ten_frames_and_a_silent_one_after_half_a_second() {
+fn a_dead_node_is_left_after_ten_frames_and_out_after_half_a_second() {
     let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2]);
     let died = last;
-    let mut frames = 0;
+    let (mut frames, mut left) = (0, None);
     while master.members().count() == 2 {
         let _ = master.arrive(last + MS, 1, &arrived(released(&master) + 1));
         last = release_when_due(&mut master);
         frames += 1;
+        if left.is_none() && state_of(&master, 2) == Some(NodeState::FreeRunning) {
+            left = Some(frames);
+        }
     }
-    assert!(frames <= MAX_MISSES && last - died < SILENCE_NS);
-    assert_eq!(master.counts().evicted, 1);
+    assert_eq!(left, Some(MAX_MISSES));
+    assert!((SILENCE_NS..SILENCE_NS + 2 * PERIOD).contains(&(last - died)));
+    assert_eq!((master.counts().evicted, master.counts().freed), (1, 1));
 
     // One that never drew a frame is not late, but silent.
     let (mut master, mut last) = in_step(Swap::Immediate, &[1]);
@@ -142,22 +150,140 @@ fn a_dead_node_is_out_after_ten_frames_and_a_silent_one_after_half_a_second() {
     assert!((SILENCE_NS..SILENCE_NS + 2 * PERIOD).contains(&(last - died)));
 }
 
-#[test]
-fn a_node_that_is_made_for_slow_frames_slows_everybody_but_not_beyond_a_second() {
-    let (mut master, _) = in_step(Swap::Immediate, &[1]);
-    let slow = |period_us| Arrive {
+fn state_of(master: &Master, session: u16) -> Option<NodeState> {
+    let mut members = master.members();
+    members.find(|m| m.session == session).map(|m| m.state)
+}
+
+/// One frame of a wall: node 1 draws in 5 ms, node 2 says so where `second` has something to say. The time of the next release.
+fn frame_of_wall(master: &mut Master, last: u64, second: Option<(u64, Arrive)>) -> u64 {
+    let frame = released(master) + 1;
+    let _ = master.arrive(last + 5 * MS, 1, &arrived(frame));
+    if let Some((after, arrive)) = second {
+        let _ = master.arrive(last + after, 2, &arrive);
+    }
+    release_when_due(master)
+}
+
+fn made_for(period_us: u32, arrive: Arrive) -> Arrive {
+    Arrive {
         period_us,
-        ..Arrive::default()
-    };
-    let _ = master.arrive(2000 * MS, 2, &slow(100_000));
+        ..arrive
+    }
+}
+
+#[test]
+fn a_node_slows_the_others_while_it_draws_and_not_below_the_least_rate() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1]);
+    // It joins: nothing of it counts before it draws.
+    let joining = made_for(100_000, Arrive::default());
+    let last = frame_of_wall(&mut master, last, Some((MS, joining)));
+    assert_eq!(master.period_ns(), PERIOD);
+    let drawn = made_for(100_000, arrived(released(&master) + 1));
+    frame_of_wall(&mut master, last, Some((MS, drawn)));
     assert_eq!(
         (master.period_ns(), master.patience_ns()),
         (100 * MS, 150 * MS)
     );
-    let _ = master.arrive(2000 * MS, 2, &slow(u32::MAX));
-    assert_eq!(master.period_ns(), 1000 * MS);
-    master.leave(2);
-    assert_eq!(master.period_ns(), PERIOD);
+    // Slower than that it is left to itself, at its first word.
+    let slower = made_for(100_001, Arrive::default());
+    let _ = master.arrive(2000 * MS, 2, &slower);
+    assert_eq!(state_of(&master, 2), Some(NodeState::FreeRunning));
+    assert_eq!((master.period_ns(), master.counts().freed), (PERIOD, 1));
+}
+
+#[test]
+fn a_node_below_the_least_rate_changes_nothing_for_the_wall_and_stays_a_member() {
+    let (mut master, start) = in_step(Swap::Immediate, &[1]);
+    let (mut last, mut drawing) = (start, None);
+    let (mut shown, mut gaps) = (0, Vec::new());
+    let _ = master.arrive(last, 2, &made_for(2_000_000, Arrive::default()));
+    for _ in 0..600 {
+        // A frame every two seconds, alive in between.
+        let (begun, frame) = *drawing.get_or_insert((last, released(&master) + 1));
+        let second = (last - begun >= 2000 * MS).then(|| {
+            (drawing, shown) = (None, shown + 1);
+            (MS, made_for(2_000_000, arrived(frame)))
+        });
+        master.hear(2, last);
+        let now = frame_of_wall(&mut master, last, second);
+        gaps.push(now - last);
+        last = now;
+    }
+    assert_eq!(shown, 4, "it takes part in its way");
+    assert!(gaps.iter().all(|gap| *gap == PERIOD), "{gaps:?}");
+    assert_eq!(state_of(&master, 2), Some(NodeState::FreeRunning));
+    let counts = master.counts();
+    assert_eq!((counts.freed, counts.evicted, counts.lapses), (1, 0, 0));
+}
+
+#[test]
+fn a_node_that_is_slower_than_it_says_is_left_after_thirty_frames_and_comes_back_by_itself() {
+    let (mut master, mut last) = in_step(Swap::Immediate, &[1, 2]);
+    let mut frames_until = |wanted: NodeState, takes: u64| {
+        let mut drawing: Option<(u64, u64)> = None;
+        for frames in 1..200 {
+            let (begun, frame) = *drawing.get_or_insert((last, released(&master) + 1));
+            let done = begun + takes;
+            // Whatever it draws is told when it is done, be it frames later.
+            let second = (done < last + PERIOD).then(|| {
+                drawing = None;
+                (
+                    done.saturating_sub(last).max(MS),
+                    made_for(16_667, arrived(frame)),
+                )
+            });
+            master.hear(2, last);
+            last = frame_of_wall(&mut master, last, second);
+            if state_of(&master, 2) == Some(wanted) {
+                return frames;
+            }
+        }
+        panic!("never {wanted:?}");
+    };
+    // It draws in 50 ms from now on.
+    assert_eq!(frames_until(NodeState::Late, 50 * MS), 1);
+    assert_eq!(
+        frames_until(NodeState::FreeRunning, 50 * MS),
+        PROBATION_FRAMES
+    );
+    // In 5 ms again.
+    let back = frames_until(NodeState::Synced, 5 * MS);
+    let most = PROBATION_FRAMES + WARM_UP_FRAMES + 2;
+    assert!((PROBATION_FRAMES..=most).contains(&back), "{back}");
+    assert_eq!(master.counts().lapses, 1, "it cost one deadline");
+}
+
+#[test]
+fn nodes_that_never_come_into_step_hold_the_others_up_for_a_while_and_no_longer() {
+    // A fast one joins some that are made for what they cannot do.
+    let (mut master, mut last) = in_step(Swap::Immediate, &[1]);
+    for session in [2, 3] {
+        let slow = made_for(100_000, Arrive::default());
+        let _ = master.arrive(last, session, &slow);
+        let first = made_for(100_000, arrived(released(&master) + 1));
+        let _ = master.arrive(last + MS, session, &first);
+    }
+    let start = last;
+    let mut held = 0;
+    while last - start < 10_000 * MS {
+        for session in [2, 3] {
+            master.hear(session, last);
+        }
+        let now = frame_of_wall(&mut master, last, None);
+        held += u32::from(now - last > PERIOD);
+        last = now;
+    }
+    assert!(held <= PROBATION_FRAMES, "{held} slow frames");
+    let states: Vec<_> = master.members().map(|m| m.state).collect();
+    assert_eq!(
+        states,
+        [
+            NodeState::Synced,
+            NodeState::FreeRunning,
+            NodeState::FreeRunning
+        ]
+    );
 }
 
 #[test]
@@ -247,6 +373,22 @@ fn a_frame_that_nobody_began_is_refused() {
 }
 
 #[test]
+fn the_thirty_third_node_is_told_apart() {
+    let sessions: Vec<u16> = (1..=MAX_MEMBERS as u16).collect();
+    let (mut master, last) = in_step(Swap::Immediate, &sessions);
+    let (answer, _) = master.arrive(last, 99, &Arrive::default());
+    assert_eq!(
+        (answer, master.members().count()),
+        (Answer::Full, MAX_MEMBERS)
+    );
+    master.leave(7);
+    assert_eq!(
+        master.arrive(last, 99, &Arrive::default()).0,
+        Answer::Repeat
+    );
+}
+
+#[test]
 fn a_node_that_hears_nothing_draws_on_its_own_again() {
     let mut node = Node::new(1, 0);
     assert_eq!(node.turn(0), Turn::Free);
@@ -278,7 +420,7 @@ fn a_node_that_hears_nothing_draws_on_its_own_again() {
 }
 
 /// An ARRIVE of the reign of a node.
-fn of_reign(term: u32, frame: u64) -> Arrive {
+fn of_reign(term: u64, frame: u64) -> Arrive {
     Arrive {
         term,
         frame,
@@ -313,23 +455,80 @@ fn the_server_takes_the_frames_back_from_a_node_that_led_meanwhile() {
 fn a_node_that_claims_reign_after_reign_moves_the_server_once_a_second_and_never_to_the_end_of_numbers()
  {
     let (mut master, now) = in_step(Swap::Immediate, &[1, 2]);
-    let mut claim = |now, term| {
-        let _ = master.arrive(now, 1, &of_reign(term, u64::MAX));
+    let mut claim = |now, term, ahead| {
+        let frame = released(&master).saturating_add(ahead);
+        let (answer, _) = master.arrive(now, 1, &of_reign(term, frame));
         let _ = release_when_due(&mut master);
         let newest = master.newest().expect("released");
-        (newest.term, newest.frame)
+        (answer, newest.term, newest.frame)
     };
-    let (term, first) = claim(now, 7);
+    let (_, term, first) = claim(now, 7, FARTHEST_AHEAD);
     assert_eq!(term, 7 + TERMS_LEFT_OUT);
-    let (term, next) = claim(now + RECLAIM_NS - 1, 1000);
+    let (_, term, next) = claim(now + RECLAIM_NS - 1, 1000, 0);
     assert_eq!((term, next), (7 + TERMS_LEFT_OUT, first + 1), "too soon");
-    let (term, far) = claim(now + RECLAIM_NS, u32::MAX);
-    assert_eq!(term, u32::MAX);
-    assert!(far <= next + FARTHEST_AHEAD + FRAMES_LEFT_OUT + 1);
-    // Of equal reigns the server's is followed, so that nothing is above it now.
-    let (term, _) = claim(now + 3 * RECLAIM_NS, u32::MAX);
-    assert_eq!(term, u32::MAX);
+    // What no reign can be is refused, and changes nothing: neither the term nor the frame.
+    let known = term;
+    for (term, ahead) in [
+        (known + MOST_REIGNS_AHEAD + 1, 0),
+        (u64::from(u32::MAX), 0),
+        (u64::MAX, 0),
+        (known + 1, FARTHEST_AHEAD + 1),
+        (known + 1, u64::MAX),
+    ] {
+        let (answer, after, _) = claim(now + 2 * RECLAIM_NS, term, ahead);
+        assert_eq!((answer, after), (Answer::Refused, known));
+    }
+    let (_, term, _) = claim(now + 2 * RECLAIM_NS, known + MOST_REIGNS_AHEAD, 0);
+    assert_eq!(term, known + MOST_REIGNS_AHEAD + TERMS_LEFT_OUT);
     assert_eq!(master.counts().reclaimed, 2);
+}
+
+#[test]
+fn after_every_claim_that_counts_a_node_can_lead_still() {
+    let (mut master, mut now) = in_step(Swap::Immediate, &[1, 2]);
+    for _ in 0..100 {
+        now += RECLAIM_NS;
+        let term = released_term(&master) + MOST_REIGNS_AHEAD;
+        let _ = master.arrive(now, 1, &of_reign(term, released(&master)));
+        let _ = release_when_due(&mut master);
+    }
+    let of_server = master.newest().expect("released").clone();
+    let mut heir = Succession::new(1, now);
+    heir.release(now, &of_server);
+    let Successor::Stand { term, first } = heir.poll(now + SUCCESSION_NS) else {
+        panic!("it is its turn");
+    };
+    let own = ReleaseHead {
+        term,
+        master: 1,
+        frame: first,
+        ..of_server.clone()
+    };
+    assert!(own.rank() > of_server.rank(), "its frames are followed");
+    let mut other = Succession::new(2, now);
+    other.release(now, &of_server);
+    assert!(other.may_follow(now + SUCCESSION_NS, 1, &own));
+}
+
+fn released_term(master: &Master) -> u64 {
+    master.newest().map_or(0, |newest| newest.term)
+}
+
+#[test]
+fn a_swap_that_cannot_have_been_is_not_measured() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
+    let shown = released(&master);
+    let told = |ns| Arrive {
+        swapped_frame: shown,
+        swapped_ns: ns,
+        ..arrived(shown + 1)
+    };
+    let now = last + 5 * MS;
+    assert_eq!(master.arrive(now, 1, &told(last)).1, None);
+    let impossible = now + SWAP_TOLD_NS + 1;
+    assert_eq!(master.arrive(now, 2, &told(impossible)).1, None);
+    release_when_due(&mut master);
+    assert_eq!(master.newest().map(|newest| newest.skew_ns), Some(0));
 }
 
 #[test]
@@ -361,7 +560,15 @@ fn a_member_is_followed_only_while_the_server_is_silent() {
     // Only for itself, and not so far ahead that nobody could follow it any more.
     assert!(!heir.may_follow(silent, 3, &of_member(2, 1094)));
     assert!(!heir.may_follow(silent, 0, &of_server));
-    assert!(!heir.may_follow(silent, 2, &of_member(u32::MAX, 1094)));
+    assert!(!heir.may_follow(silent, 2, &of_member(u64::from(u32::MAX), 1094)));
+    let slower = ReleaseHead {
+        period_us: of_server.period_us + 1,
+        ..of_member(2, 1094)
+    };
+    assert!(
+        !heir.may_follow(silent, 2, &slower),
+        "frames grow no slower"
+    );
     assert!(!heir.may_follow(silent, 2, &of_member(2, u64::MAX)));
 }
 

@@ -43,7 +43,7 @@ pub(crate) fn find_node<'a>(
             [] => "none".to_owned(),
             nodes => nodes
                 .iter()
-                .map(|n| n.name.as_str())
+                .map(|n| n.name.to_string())
                 .collect::<Vec<_>>()
                 .join(", "),
         },
@@ -91,7 +91,7 @@ pub(crate) fn stage(
             id,
             mesh,
             scale: 1.0,
-            pose: pose(&described.pose, &described.name)?,
+            pose: pose(&described.pose, &described.name.to_string())?,
             colour: [red, green, blue],
         })
     };
@@ -102,8 +102,8 @@ pub(crate) fn stage(
             .iter()
             .find(|screen| screen.name == *name);
         let described = found.ok_or_else(|| RenderError::UnknownScreen {
-            node: node.name.clone(),
-            screen: name.clone(),
+            node: node.name.to_string(),
+            screen: name.to_string(),
         })?;
         stage_screen(described, node, overrides)
     });
@@ -155,12 +155,12 @@ fn stage_screen(
     .map(Point3::from);
     let screen = Screen::from_corners(lower_left, lower_right, upper_left).map_err(|source| {
         RenderError::BadScreen {
-            screen: described.name.clone(),
+            screen: described.name.to_string(),
             source,
         }
     })?;
     Ok(StageScreen {
-        name: described.name.clone(),
+        name: described.name.to_string(),
         pixels: pixels(&screen, node, overrides),
         screen,
         stereo: overrides.stereo.unwrap_or(match node.stereo {

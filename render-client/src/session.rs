@@ -31,6 +31,8 @@ pub(crate) struct Session {
     server: String,
     node: String,
     received: Vec<ReceivedState>,
+    /// How often states by multicast were found false, as far as the timeline knows.
+    withdrawn: u64,
     /// States lost and received in earlier sessions.
     earlier: (u64, u64),
     /// When the node began to join.
@@ -118,6 +120,7 @@ impl Session {
             server,
             node,
             received: Vec::new(),
+            withdrawn: 0,
             earlier: (0, 0),
             began,
             stop,
@@ -170,12 +173,21 @@ impl Session {
 
     /// The monitors that the node's windows cover, in order: names or numbers.
     pub(crate) fn monitors(&self) -> Vec<String> {
-        description::find_node(self.link.description(), &self.node)
-            .map_or_else(|_| Vec::new(), |node| node.monitors.clone())
+        description::find_node(self.link.description(), &self.node).map_or_else(
+            |_| Vec::new(),
+            |node| {
+                let names = node.monitors.iter();
+                names.map(|name| name.raw().to_owned()).collect()
+            },
+        )
     }
 
     /// Moves the states that have arrived to the timeline.
     pub(crate) fn take_states(&mut self, timeline: &mut Timeline) {
+        let withdrawn = self.link.states_withdrawn();
+        if std::mem::replace(&mut self.withdrawn, withdrawn) != withdrawn {
+            timeline.clear(); // some of what it holds may be nobody's
+        }
         self.link.drain_states(&mut self.received);
         for state in self
             .received

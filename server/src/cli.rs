@@ -134,6 +134,12 @@ pub struct ServeArgs {
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
+    /// Append a line of JSON with everything measured so far to this file, again and again; - is standard output
+    #[arg(long, value_name = "FILE|-")]
+    pub metrics_json: Option<PathBuf>,
+    /// Time between two such lines
+    #[arg(long, value_name = "S", value_parser = positive_seconds, default_value_t = 10.0, requires = "metrics_json")]
+    pub metrics_period: f64,
 }
 
 /// `taut replay`.

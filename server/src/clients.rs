@@ -3,6 +3,7 @@
 //! A client reports about once a second. Its distributions here are made of those reports: the median of the seconds' medians, the
 //! largest of the seconds' 99th percentiles, and the largest of all for p99.9 and max.
 
+use taut_link::proto::barrier::MAX_MEMBERS;
 use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
 
 use crate::report::ClientReport;
@@ -73,7 +74,7 @@ impl ClientLedger {
                 node,
                 text,
                 ..
-            } => Some(if node.is_empty() {
+            } => Some(if node == "" {
                 format!("a client at {address} was refused: {text}")
             } else {
                 format!("{node} at {address} was refused: {text}")
@@ -87,6 +88,18 @@ impl ClientLedger {
                 None
             }
             LinkEvent::Log { node, event } => Some(format!("{node}: {}", event.text)),
+            LinkEvent::FreeRunning { node, free: true } => Some(format!(
+                "{node} runs free: it draws fewer frames than the least rate, or than it says (--fps); the others do not wait for it"
+            )),
+            LinkEvent::FreeRunning { node, free: false } => {
+                Some(format!("{node} is in step with the others again"))
+            }
+            LinkEvent::NoPlace { node } => Some(format!(
+                "{node} swaps on its own: {MAX_MEMBERS} nodes swap together already, and there is no place for more"
+            )),
+            LinkEvent::StatesForged { node } => Some(format!(
+                "{node} says that a member of the multicast group forges this server's states: it takes them by unicast until the membership changes; look at who is in"
+            )),
             LinkEvent::Arm { node, arm: true } => Some(format!("{node} asks for force")),
             LinkEvent::Arm { node, arm: false } => Some(format!("{node} asks for no force")),
         }
@@ -177,6 +190,7 @@ impl ClientRecord {
             pose_age_ms: of_ages(&self.pose_ages),
             drawn_age_ms: of_ages(&self.drawn_ages),
             swap_skew_us: None, // the barrier's own measure: `frames::FramesReport::new`
+            free_running: false, // the same
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,
         }
@@ -199,6 +213,7 @@ mod tests {
             session: 1,
             node: node.into(),
             role,
+            grant: taut_link::proto::proof::Grant::Master,
             transport: Transport::QuicDatagram,
             rate_hz: 0,
             address: ([127, 0, 0, 1], 1000).into(),

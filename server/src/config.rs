@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use taut_bridge::{
-    InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
+    ContactBound, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
     ValidationSettings,
 };
 use taut_link::{ClusterKey, MulticastOptions};
@@ -27,7 +27,7 @@ use crate::monitor::MonitorSettings;
 use crate::realtime::RealtimePolicy;
 use crate::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
 use crate::shared::contact_snapshot::MAX_MOVING;
-use crate::stability::{declared, judge};
+use crate::stability::{declared, judge, stiffnesses};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
@@ -107,7 +107,7 @@ pub fn session_setup(
         frames: frames::settings(&workbench.frames),
         node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
-    let safety = safety(workbench, &built.settings);
+    let safety = safety(workbench, &built.settings, &built.world.body);
     let recording = overrides
         .recording
         .as_ref()
@@ -181,8 +181,21 @@ fn head(viewer: &Viewer) -> HeadSource {
     }
 }
 
+/// The stiffest contact of the scene: what the port lets the device's motion explain.
+fn contact_bound(scene: &god_object::Settings, body: &god_object::Body) -> ContactBound {
+    let [along, about] = stiffnesses(scene, body);
+    ContactBound {
+        stiffness: along,
+        radius_of_gyration: (about / along).sqrt(),
+    }
+}
+
 /// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
-fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings {
+fn safety(
+    workbench: &Workbench,
+    scene: &god_object::Settings,
+    body: &god_object::Body,
+) -> SafetySettings {
     let wanted = &workbench.safety;
     let nobody_is_hurt = matches!(
         workbench.device,
@@ -212,6 +225,7 @@ fn safety(workbench: &Workbench, scene: &god_object::Settings) -> SafetySettings
         max_torque: within(wanted.max_torque, scene.torque_limit),
         force_rate: wanted.force_slew * 1e3,
         torque_rate: wanted.torque_slew * 1e3,
+        contact: contact_bound(scene, body),
         ramp_in: Duration::from_secs_f64(wanted.ramp_in),
         period: HAPTICS_PERIOD,
         rearm,

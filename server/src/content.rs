@@ -33,7 +33,7 @@ pub fn content(
             meshes.push((hash, blob));
         }
         bodies.push(BodyDescription {
-            name: body.name.clone(),
+            name: body.name.as_str().into(),
             mesh: hash,
             pose: PoseF64::from_isometry(&body.pose),
             colour: if index == 0 {
@@ -51,7 +51,7 @@ pub fn content(
     let god_object = bodies.remove(0);
     let viewer = &workbench.viewer;
     let description = SceneDescription {
-        name: scene.name.clone(),
+        name: scene.name.as_str().into(),
         revision: FIRST_REVISION,
         god_object,
         obstacles: bodies,
@@ -99,7 +99,7 @@ fn array(point: &Point3<f64>) -> [f64; 3] {
 
 fn screen(screen: &taut_scene::Screen) -> ScreenDescription {
     ScreenDescription {
-        name: screen.name.clone(),
+        name: screen.name.as_str().into(),
         lower_left: array(&screen.lower_left),
         lower_right: array(&screen.lower_right),
         upper_left: array(&screen.upper_left),
@@ -108,8 +108,12 @@ fn screen(screen: &taut_scene::Screen) -> ScreenDescription {
 
 fn node(node: &taut_scene::Node) -> NodeDescription {
     NodeDescription {
-        name: node.name.clone(),
-        screens: node.screens.clone(),
+        name: node.name.as_str().into(),
+        screens: node
+            .screens
+            .iter()
+            .map(|name| name.as_str().into())
+            .collect(),
         stereo: match node.stereo {
             taut_scene::Stereo::Mono => Stereo::Mono,
             taut_scene::Stereo::SideBySide => Stereo::SideBySide,
@@ -122,6 +126,11 @@ fn node(node: &taut_scene::Node) -> NodeDescription {
             height: node.window.height,
             fullscreen: node.window.fullscreen,
         },
-        monitors: node.window.monitors.clone(),
+        monitors: node
+            .window
+            .monitors
+            .iter()
+            .map(|name| name.as_str().into())
+            .collect(),
     }
 }

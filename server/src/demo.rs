@@ -7,6 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use taut_bridge::DeviceChoice;
+use taut_bridge::signals::EndFlag;
 use taut_scene::{Device, HeadTracking, Scene, Workbench};
 
 use crate::children::{NamedChild, wait_or_kill};
@@ -21,7 +22,6 @@ use crate::report::SessionReport;
 use crate::serve::{announce, watch};
 use crate::session::Session;
 use crate::setup::{DeviceSource, SessionSetup};
-use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
 /// Children have this long to end by themselves once the server closed.
@@ -103,8 +103,9 @@ pub fn run(
         *max_age = MOUSE_MAX_AGE;
     }
     take_free_ports(&mut setup, terminal);
-    let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
+    let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
+    session.end_with(&end);
     announce(&session, terminal);
 
     let mut children = Vec::new();
@@ -125,7 +126,7 @@ pub fn run(
         terminal.say("this program was built without drawing; the demo goes on without it");
     }
 
-    watch(&mut session, &mut signal, args.duration, terminal, |_| {
+    watch(&mut session, args.duration, terminal, |_| {
         for child in &mut children {
             if let Some(status) = child.newly_ended()
                 && !status.success()
@@ -141,6 +142,7 @@ pub fn run(
     // One that is still joining would complain.
     children.iter().for_each(NamedChild::mute);
     let ended = session.stop(terminal);
+    end.let_signals_kill();
     for name in wait_or_kill(children, GRACE) {
         terminal.say(&format!(
             "taut: {name} did not end by itself and was killed"

@@ -23,6 +23,7 @@ pub fn settings(wanted: &Frames) -> Option<MasterSettings> {
     Some(MasterSettings {
         swap,
         period_ns: (NANOSECONDS_PER_SECOND / wanted.rate) as u64,
+        slowest_ns: (NANOSECONDS_PER_SECOND / wanted.least_rate) as u64,
     })
 }
 
@@ -37,8 +38,11 @@ pub struct FramesReport {
     pub compared: u64,
     /// Of these, other than the released one.
     pub mismatches: u64,
-    /// Nodes that were let go for silence or missed frames.
+    /// Nodes that were let go for silence.
     pub evicted: u64,
+    /// Times that a node was left to swap on its own: it draws fewer frames than the least rate, or than it says.
+    #[serde(default)]
+    pub freed: u64,
     /// Last swap call of a frame less the first, over the nodes that had drawn it in time; `null` until two swapped one together.
     pub swap_skew_us: Option<Distribution>,
     /// From the moment at which a frame could be shown to its last swap call.
@@ -53,6 +57,7 @@ impl FramesReport {
         for client in clients {
             let own = measured.nodes.iter().find(|(node, _)| *node == client.node);
             client.swap_skew_us = own.and_then(|(_, skew)| distribution(skew, 1.0));
+            client.free_running = measured.free_running.contains(&client.node);
         }
         let counts = &measured.counts;
         Self {
@@ -61,6 +66,7 @@ impl FramesReport {
             compared: counts.compared,
             mismatches: counts.mismatches,
             evicted: counts.evicted,
+            freed: counts.freed,
             swap_skew_us: distribution(&measured.skew, 1.0),
             overhead_us: distribution(&measured.overhead, 1.0),
             pose_age_ms: distribution(&measured.age, MILLISECONDS_PER_MICROSECOND),
@@ -75,6 +81,13 @@ impl fmt::Display for FramesReport {
             "{} released, {} without a node that was waited for; {} pictures of another state in {} compared",
             self.released, self.lapses, self.mismatches, self.compared
         )?;
+        if self.freed > 0 {
+            write!(
+                f,
+                "; {} times a node was left to swap on its own",
+                self.freed
+            )?;
+        }
         if let Some(skew) = &self.swap_skew_us {
             write!(
                 f,
@@ -114,6 +127,7 @@ mod tests {
             overhead: spread(100.0),
             age: spread(18_000.0),
             nodes: vec![("table".into(), spread(5.0))],
+            free_running: vec!["front".into()],
             ..FrameReport::default()
         };
         let client = |node: &str| ClientReport {
@@ -123,6 +137,7 @@ mod tests {
         let mut clients = [client("front"), client("table")];
         let report = FramesReport::new(&measured, &mut clients);
         assert_eq!(clients[0].swap_skew_us, None);
+        assert!(clients[0].free_running && !clients[1].free_running);
         assert_eq!(clients[1].swap_skew_us.map(|skew| skew.max), Some(20.0));
         assert_eq!(report.swap_skew_us.map(|skew| skew.p50), Some(10.0));
         assert_eq!(report.pose_age_ms.map(|age| age.p99), Some(36.0));
@@ -133,10 +148,12 @@ mod tests {
         let frames = Frames {
             swap: FrameSwap::Scheduled,
             rate: 50.0,
+            least_rate: 20.0,
         };
         let wanted = MasterSettings {
             swap: Swap::Scheduled,
             period_ns: 20_000_000,
+            slowest_ns: 50_000_000,
         };
         assert_eq!(settings(&frames), Some(wanted));
         let off = FrameSwap::Off;

@@ -16,6 +16,7 @@
 
 pub mod admission;
 pub mod arm;
+pub mod audit;
 pub mod broadcast;
 pub mod checker;
 pub mod children;
@@ -39,6 +40,7 @@ pub mod key;
 pub mod keys;
 pub mod looking_on;
 pub mod loops;
+pub mod metrics;
 pub mod monitor;
 pub mod realtime;
 pub mod record;
@@ -48,6 +50,7 @@ pub mod rendering;
 pub mod replay;
 pub mod report;
 pub mod serve;
+pub mod service_manager;
 pub mod session;
 pub mod setup;
 pub mod shared;

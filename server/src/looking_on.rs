@@ -161,6 +161,30 @@ impl LookingOn {
         self.stream.as_ref().map(StreamServer::address)
     }
 
+    /// Makes this the newest text at `/metrics`.
+    pub fn publish_metrics(&self, text: String) {
+        if let Some(stream) = &self.stream {
+            stream.publish_metrics(text);
+        }
+    }
+
+    /// Whether anybody can read metrics here.
+    pub fn shows_metrics(&self) -> bool {
+        self.stream.is_some()
+    }
+
+    /// Those who read the JSON lines.
+    pub fn stream_observers(&self) -> u64 {
+        self.stream
+            .as_ref()
+            .map_or(0, |stream| stream.observers() as u64)
+    }
+
+    /// Those of them that were given up because they took nothing.
+    pub fn stream_observers_dropped(&self) -> u64 {
+        self.stream.as_ref().map_or(0, StreamServer::dropped)
+    }
+
     /// One line for each way to look on.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
@@ -173,7 +197,7 @@ impl LookingOn {
         }
         if let Some(address) = self.stream() {
             lines.push(format!(
-                "observers: http://{address}/ and ws://{address}/ws"
+                "observers: http://{address}/, ws://{address}/ws and http://{address}/metrics"
             ));
         }
         #[cfg(feature = "zenoh")]

@@ -1,6 +1,5 @@
 //! The binary `taut`: one sub-command per role.
 
-use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -12,37 +11,30 @@ use taut::cli::{
 };
 use taut::failure::{EXIT_BAD_INPUT, EXIT_FAILED, Failure};
 use taut::report::{ReplayReport, SessionReport};
-use taut::signals::BlockingEndSignal;
+use taut::shutdown::Shutdown;
 use taut::terminal::Terminal;
 use taut::{
     arm, demo, doctor, doctor_device, keys, record, recorded_session, rendering, replay, serve,
     track,
 };
-use tracing_subscriber::EnvFilter;
-
-/// Variable that sets what is logged, in the form of tracing's `EnvFilter`.
-const LOG_VARIABLE: &str = "TAUT_LOG";
+use taut_bridge::console;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = EnvFilter::try_from_env(LOG_VARIABLE).unwrap_or_else(|_| EnvFilter::new("warn"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .init();
-    match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
+    taut_log::start("warn");
+    let code = match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("taut: {error:#}");
+            taut_log::say(&format!("taut: {error:#}"));
             ExitCode::from(
                 error
                     .downcast_ref::<Failure>()
                     .map_or(EXIT_FAILED, Failure::exit_code),
             )
         }
-    }
+    };
+    taut_log::flush();
+    code
 }
 
 fn run(command: Command) -> Result<ExitCode> {
@@ -72,7 +64,7 @@ fn end_session(
     if json {
         print_json(&report)?;
     } else {
-        println!("{report}");
+        console::report(report.to_string());
     }
     match failure {
         Some(failure) => Err(failure.into()),
@@ -95,9 +87,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
 
 /// A session computed again must come to the same: a difference is a failure.
 fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
-    let interrupted = BlockingEndSignal::listen()
-        .and_then(BlockingEndSignal::into_request)
-        .map_err(Failure::failed)?;
+    let interrupted = Shutdown::by_signals()?;
     let report = recorded_session::run(directory, args.out.as_deref(), args.timings, &interrupted)?;
     if args.json {
         print_json(&report)?;
@@ -186,9 +176,8 @@ fn track_command(args: &TrackArgs) -> Result<ExitCode> {
 }
 
 fn print_json(value: &impl Serialize) -> Result<()> {
-    println!(
-        "{}",
-        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?
-    );
+    let text =
+        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?;
+    console::report(text);
     Ok(())
 }

@@ -84,9 +84,9 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         )));
     }
     if lost > 0 {
-        eprintln!(
+        taut_log::say(&format!(
             "taut: {lost} samples were lost on the way; record on the haptic PC itself, or with --transport quic"
-        );
+        ));
     }
     let rows = trace.rows;
     trace.file.finish().map_err(cannot_write)?;
@@ -136,16 +136,16 @@ impl Recorder {
                     self.lost += self.link.counters().lost;
                     self.link = link;
                     self.trace.next_session();
-                    eprintln!(
+                    taut_log::say(&format!(
                         "taut: joined again; the trace has a gap after {:.3} s",
                         self.trace.last_time_s
-                    );
+                    ));
                 }
                 Some(Renewal::Session { link, .. }) => {
-                    eprintln!(
+                    taut_log::say(&format!(
                         "taut: the server came back with another scene (\"{}\"): the trace ends where it went",
                         link.description().name
-                    );
+                    ));
                     link.leave().await;
                     return Ok(());
                 }

@@ -29,7 +29,6 @@ use crate::finished_file::FinishedFile;
 use crate::realtime::thread_cpu_time;
 use crate::report::{ReplayReport, WorkReport};
 use crate::shutdown::Shutdown;
-use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 use crate::timing::distribution_of;
 
@@ -73,9 +72,7 @@ pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
         replay = replay.with_fidelity(plan);
     }
 
-    let interrupted = BlockingEndSignal::listen()
-        .and_then(BlockingEndSignal::into_request)
-        .map_err(Failure::failed)?;
+    let interrupted = Shutdown::by_signals()?;
     let cannot_write = |error: io::Error| {
         Failure::BadInput(format!(
             "{}: the answer cannot be written ({error}); check the path, its permissions and the free space",

@@ -3,17 +3,18 @@
 use std::path::Path;
 use std::time::Duration;
 
+use taut_bridge::signals::EndFlag;
 use taut_link::ClusterKey;
-use taut_scene::{FidelityPlan, Workbench};
+use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
 
 use crate::admission::AdmissionWatch;
 use crate::cli::ServeArgs;
 use crate::config::{Overrides, session_setup};
 use crate::failure::Failure;
 use crate::key;
+use crate::metrics::{self, MetricsLines};
 use crate::report::SessionReport;
 use crate::session::Session;
-use crate::signals::BlockingEndSignal;
 use crate::terminal::Terminal;
 
 /// Time between two looks at network, children and clock; also of the status line.
@@ -25,6 +26,8 @@ pub fn run(
     terminal: &Terminal,
 ) -> Result<(SessionReport, Option<Failure>), Failure> {
     let workbench = Workbench::load(&args.config)?;
+    taut_log::use_directives(&directives(workbench.log));
+    let mut metrics = MetricsOutlets::open(args)?;
     let key = workbench_key(args.key.as_deref(), &workbench)?;
     let overrides = Overrides {
         scene: args.scene.clone(),
@@ -37,20 +40,82 @@ pub fn run(
         recording: args.recording.clone(),
     };
     let setup = session_setup(&workbench, key, &overrides)?;
-    let mut signal = BlockingEndSignal::listen().map_err(Failure::failed)?;
+    let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
+    session.end_with(&end);
     taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
     let mut admission = AdmissionWatch::new(&args.config);
-    watch(
-        &mut session,
-        &mut signal,
-        args.duration,
-        terminal,
-        |session| admission.follow(session, terminal),
-    );
+    watch(&mut session, args.duration, terminal, |session| {
+        admission.follow(session, terminal);
+        metrics.follow(session);
+    });
     terminal.end_status();
-    Ok(session.stop(terminal))
+    let ended = session.stop(terminal);
+    end.let_signals_kill();
+    Ok(ended)
+}
+
+/// What is logged, as `tracing` takes it.
+fn directives(log: Log) -> String {
+    let word = |level| match level {
+        LogLevel::Off => "off",
+        LogLevel::Error => "error",
+        LogLevel::Warn => "warn",
+        LogLevel::Info => "info",
+        LogLevel::Debug => "debug",
+        LogLevel::Trace => "trace",
+    };
+    format!(
+        "{},{}={}",
+        word(log.level),
+        taut_log::AUDIT_TARGET,
+        word(log.audit)
+    )
+}
+
+/// Where metrics go while the session runs.
+struct MetricsOutlets {
+    lines: Option<MetricsLines>,
+    line_period: Duration,
+    /// Ages of the session when the next are due.
+    next: Duration,
+    next_line: Duration,
+}
+
+impl MetricsOutlets {
+    fn open(args: &ServeArgs) -> Result<Self, Failure> {
+        let lines = args.metrics_json.as_deref().map(MetricsLines::start);
+        Ok(Self {
+            lines: lines.transpose()?,
+            line_period: Duration::from_secs_f64(args.metrics_period),
+            next: Duration::ZERO,
+            next_line: Duration::ZERO,
+        })
+    }
+
+    fn follow(&mut self, session: &Session) {
+        let age = session.age();
+        let (page, line) = (age >= self.next, age >= self.next_line);
+        let (page, line) = (
+            page && session.looking_on().shows_metrics(),
+            line && self.lines.is_some(),
+        );
+        if !page && !line {
+            return;
+        }
+        let metrics = session.metrics();
+        if page {
+            self.next = age + metrics::PERIOD;
+            if let Ok(text) = metrics.text() {
+                session.looking_on().publish_metrics(text);
+            }
+        }
+        if let Some(lines) = self.lines.as_ref().filter(|_| line) {
+            self.next_line = age + self.line_period;
+            lines.write(&metrics);
+        }
+    }
 }
 
 /// The key of the command line, else of the workbench file, else of the environment.
@@ -85,10 +150,9 @@ pub fn announce(session: &Session, terminal: &Terminal) {
     }
 }
 
-/// Lets the session run until `duration` is over, the signal is given, or something breaks; `each` is called at every look.
+/// Lets the session run until `duration` is over or its end is asked for; `each` is called at every look.
 pub fn watch(
     session: &mut Session,
-    signal: &mut BlockingEndSignal,
     duration: Option<f64>,
     terminal: &Terminal,
     mut each: impl FnMut(&mut Session),
@@ -98,7 +162,8 @@ pub fn watch(
         let left = end.map_or(LOOK_PERIOD, |end| {
             end.saturating_sub(session.age()).min(LOOK_PERIOD)
         });
-        if signal.wait(left) || session.is_ending() {
+        std::thread::sleep(left);
+        if session.is_ending() {
             return;
         }
         session.follow_network(terminal);

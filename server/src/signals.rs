@@ -1,8 +1,5 @@
-//! The user's wish to end: Ctrl-C, or the system's SIGTERM.
-
-use std::time::Duration;
-
-use crate::shutdown::Shutdown;
+//! The user's wish to end, for a task that waits for it: Ctrl-C, or the system's SIGTERM. What holds a force looks at a flag instead,
+//! [`taut_bridge::signals`].
 
 /// Listens from its creation on: a signal before [`EndSignal::given`] is awaited is not lost.
 #[derive(Debug)]
@@ -39,47 +36,5 @@ impl EndSignal {
         if tokio::signal::ctrl_c().await.is_err() {
             std::future::pending::<()>().await;
         }
-    }
-}
-
-/// The same for a thread that is not in a tokio runtime.
-#[derive(Debug)]
-pub struct BlockingEndSignal {
-    runtime: tokio::runtime::Runtime,
-    signal: EndSignal,
-}
-
-impl BlockingEndSignal {
-    /// Starts to listen.
-    pub fn listen() -> std::io::Result<Self> {
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()?;
-        let signal = {
-            let _inside = runtime.enter();
-            EndSignal::listen()?
-        };
-        Ok(Self { runtime, signal })
-    }
-
-    /// Waits for the signal, at most `time`; whether it was given.
-    pub fn wait(&mut self, time: Duration) -> bool {
-        let given = self.signal.given();
-        self.runtime
-            .block_on(async { tokio::time::timeout(time, given).await.is_ok() })
-    }
-
-    /// Turns it into a request that can be looked at without waiting.
-    pub fn into_request(mut self) -> std::io::Result<Shutdown> {
-        let shutdown = Shutdown::default();
-        let asked = shutdown.clone();
-        // The thread ends with the process.
-        std::thread::Builder::new()
-            .name("signals".into())
-            .spawn(move || {
-                self.runtime.block_on(self.signal.given());
-                asked.ask();
-            })?;
-        Ok(shutdown)
     }
 }

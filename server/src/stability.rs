@@ -171,7 +171,7 @@ pub fn judge(
 }
 
 /// `K_t` and `K_r`.
-fn stiffnesses(settings: &Settings, body: &Body) -> [f64; 2] {
+pub(crate) fn stiffnesses(settings: &Settings, body: &Body) -> [f64; 2] {
     let along = settings.stiffness(body.mass);
     let moment = match settings.rotation_metric {
         RotationMetric::Inertia => SymmetricEigen::new(body.inertia).eigenvalues.max(),

@@ -96,6 +96,12 @@ impl Histogram {
         }
     }
 
+    /// How many values were recorded.
+    pub fn count(&self) -> u64 {
+        let counts = self.counts.iter();
+        counts.map(|count| count.load(Ordering::Relaxed)).sum()
+    }
+
     /// The count recorded last.
     pub fn newest(&self) -> u64 {
         self.newest.load(Ordering::Relaxed)

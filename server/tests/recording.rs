@@ -13,10 +13,10 @@ use taut::terminal::Terminal;
 use taut_link::ClusterKey;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
-/// How long a session runs: the simulated hand touches before.
+/// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
-/// A busy machine may take longer until the loops have turned that often.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Updates that a recording must hold to be worth something.
 const UPDATES: u64 = 200;
 
@@ -45,10 +45,16 @@ fn record(scene: &str, directory: &Path) {
         Err(error) => panic!("{error}"),
     };
     let begun = Instant::now();
-    while begun.elapsed() < RUN && !session.is_ending() {
+    // The recorder writes to the files while it records: a busy machine may take longer for as many rows.
+    let rows = |name: &str| {
+        let text = std::fs::read_to_string(directory.join(name)).unwrap_or_default();
+        text.lines().count() as u64
+    };
+    let enough = || rows("updates.csv") > 2 * UPDATES && rows("forces.csv") > 2 * UPDATES;
+    while (begun.elapsed() < RUN || !enough()) && !session.is_ending() {
+        assert!(begun.elapsed() < PATIENCE, "too few rows");
         std::thread::sleep(Duration::from_millis(20));
     }
-    assert!(begun.elapsed() < PATIENCE);
     let (_, failure) = session.stop(&Terminal::standard_error());
     assert_eq!(failure, None);
 }

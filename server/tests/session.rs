@@ -20,8 +20,8 @@ use taut_link::{
 };
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
-/// Much longer than a session takes to notice; the machine may be busy.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn setup() -> SessionSetup {
     let Ok(key) = ClusterKey::generate() else {
@@ -58,7 +58,8 @@ fn setup_of(scene: &str, key: ClusterKey) -> SessionSetup {
 /// A driver with a bug.
 struct Buggy {
     inner: Box<dyn Device>,
-    breaks_at: Duration,
+    /// Samples that it still gives.
+    good_reads: u32,
     written: Arc<Mutex<Option<Vector6>>>,
 }
 
@@ -68,10 +69,8 @@ impl Device for Buggy {
     }
 
     fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
-        assert!(
-            now < self.breaks_at,
-            "the driver breaks, as this test wants"
-        );
+        assert!(self.good_reads > 0, "the driver breaks, as this test wants");
+        self.good_reads -= 1;
         self.inner.read(now)
     }
 
@@ -92,7 +91,7 @@ fn a_loop_that_breaks_ends_the_session_without_force_and_says_why() {
     };
     setup.device = DeviceSource::Local(Box::new(Buggy {
         inner,
-        breaks_at: Duration::from_millis(700),
+        good_reads: 300,
         written: Arc::clone(&written),
     }));
     let Ok(session) = Session::start(setup) else {
@@ -200,8 +199,12 @@ fn who_asks_for_force_is_told_when_the_session_ends_before_it_answers() {
     assert!(told, "it was never told");
 }
 
-/// What an operator's client receives of a session until its god-object loop has run for `session_s`.
-fn received(session: &Session, key: ClusterKey, session_s: f64) -> Vec<ReceivedState> {
+/// What an operator's client receives of a session until it has seen `enough`.
+fn received(
+    session: &Session,
+    key: ClusterKey,
+    enough: impl Fn(&[ReceivedState]) -> bool,
+) -> Vec<ReceivedState> {
     let Some(server) = session.quic_address() else {
         panic!("no address");
     };
@@ -221,11 +224,16 @@ fn received(session: &Session, key: ClusterKey, session_s: f64) -> Vec<ReceivedS
         };
         let plate = &link.description().obstacles[1];
         assert_eq!(
-            (plate.name.as_str(), plate.pose.position[2]),
+            (plate.name.raw(), plate.pose.position[2]),
             ("plate", -0.005)
         );
         let begun = Instant::now();
-        while session.age().as_secs_f64() < session_s && begun.elapsed() < PATIENCE {
+        while !enough(&states) {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "never seen, in {} states",
+                states.len()
+            );
             tokio::time::sleep(Duration::from_millis(20)).await;
             link.drain_states(&mut states);
         }
@@ -242,12 +250,21 @@ fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
     let Ok(session) = Session::start(setup_of("moving-plate", key.clone())) else {
         panic!("the session does not start");
     };
-    let states = received(&session, key, 3.2);
+    // The plate goes round and round: whatever a busy machine misses comes again.
+    let states = received(&session, key, |states| {
+        let lifted = |state: &ReceivedState| {
+            let tool = state.state.tools.first();
+            tool.is_some_and(|tool| tool.god_object.position[2] > 0.040)
+        };
+        let rises = |state: &ReceivedState| {
+            let body = state.state.bodies.first();
+            body.is_some_and(|body| (-0.0049..0.0299).contains(&body.pose.position[2]))
+        };
+        states.len() > 200 && states.iter().any(lifted) && states.iter().any(rises)
+    });
     let (report, failure) = session.stop(&Terminal::standard_error());
     assert!(failure.is_none());
 
-    let mut offsets = Vec::new();
-    let mut highest: f64 = 0.0;
     for received in &states {
         let state = &received.state;
         let (Some(tool), [body]) = (state.tools.first(), state.bodies.as_slice()) else {
@@ -269,31 +286,10 @@ fn clients_see_a_plate_rise_under_the_body_and_never_into_it() {
         let z = plate.translation.z;
         assert!(plate.translation.vector.xy().norm() == 0.0);
         assert!((-0.005 - 1e-8..0.030 + 1e-8).contains(&z), "at {z}");
-        highest = highest.max(god_object.translation.z);
-        let rises = z > -0.0049 && z < 0.0299;
-        if rises {
-            // The trace is there 1 s after its beginning, and 10 s later for each metre.
-            let trace_s = 1.0 + (z + 0.005) / 0.1;
-            offsets.push(state.sample_time_ns as f64 * 1e-9 - trace_s);
-        }
     }
-    assert!(
-        states.len() > 200 && offsets.len() > 20,
-        "{} states",
-        states.len()
-    );
-    assert!(highest > 0.040, "the body was lifted to {highest} m only");
-    // All at the same distance in time from the trace, but for what a busy machine makes of it.
-    offsets.sort_by(f64::total_cmp);
-    let spread = offsets[offsets.len() / 2] - offsets[0];
-    assert!(
-        spread < 0.1,
-        "half of the poses are more than {spread} s late"
-    );
-
-    assert!(report.penetration_checks > 20);
+    // When the plate is where, and its work: `moving_obstacle.rs`, under a virtual clock.
+    assert!(report.penetration_checks > 0);
     assert_eq!(report.penetrations, 0);
-    assert!(report.energy_from_obstacles_j > 0.0, "the plate did work");
 }
 
 /// One line of the stream of observers, until `wanted` takes one.

@@ -26,10 +26,11 @@ const JOIN_LIMIT: Duration = Duration::from_secs(60);
 const PICTURES: usize = 30;
 /// Frames that the server must know of.
 const TOLD_FRAMES: u64 = 10;
-/// Longest silence that counts as undisturbed: a debug build on a busy machine, where states come every millisecond.
-const UNDISTURBED: Duration = Duration::from_millis(500);
-/// By how much a silence may be longer than the longest of the same run before anything happened: what a machine does that is starved by others.
-const AS_BEFORE: u32 = 3;
+/// Longest silence that counts as undisturbed, where states come every millisecond: more than a busy machine starves a thread for, and less than
+/// any time after which somebody is given up, so that who waited for one that is gone is told from who did not.
+const UNDISTURBED: Duration = Duration::from_secs(3);
+/// States that each client must get after something happened.
+const GOES_ON: u64 = 200;
 
 /// A client in this process: takes every state until it is told to stop.
 struct Client {
@@ -48,6 +49,9 @@ impl Client {
     ) -> ClientOptions {
         ClientOptions {
             transport,
+            // A busy machine may starve a client for longer than a workbench would forgive.
+            connect_timeout: JOIN_LIMIT,
+            idle_timeout: Duration::from_secs(4),
             ..ClientOptions::new(server.quic.clone(), workbench.key(), Role::Render, node)
         }
     }
@@ -91,6 +95,13 @@ impl Client {
         self.felt.load(Ordering::Relaxed)
     }
 
+    /// Waits for the states after something happened; how many there were before it.
+    fn goes_on(&self, before: u64) {
+        wait_for("states", JOIN_LIMIT, || {
+            (self.link.counters().states >= before + GOES_ON).then_some(())
+        });
+    }
+
     /// Everything that arrived.
     fn leave(self) -> Vec<ReceivedState> {
         assert_eq!(self.link.is_closed(), None);
@@ -115,18 +126,14 @@ fn force(received: &ReceivedState) -> f32 {
         .sqrt()
 }
 
-/// Longest time without a state among those that came when it is `wanted`.
-fn longest_silence(states: &[ReceivedState], wanted: impl Fn(Instant) -> bool) -> Duration {
-    let came: Vec<Instant> = states
-        .iter()
-        .map(|state| state.received)
-        .filter(|moment| wanted(*moment))
+/// Longest time without a state from this moment on.
+fn longest_silence(states: &[ReceivedState], from: Instant) -> Duration {
+    let moments = states.iter().map(|state| state.received);
+    let came: Vec<Instant> = std::iter::once(from)
+        .chain(moments.filter(|moment| *moment >= from))
         .collect();
-    assert!(came.len() > 100, "only {} states then", came.len());
-    came.windows(2)
-        .map(|two| two[1] - two[0])
-        .max()
-        .unwrap_or_default()
+    let gaps = came.windows(2).map(|two| two[1] - two[0]);
+    gaps.max().unwrap_or(Duration::MAX)
 }
 
 #[test]
@@ -201,11 +208,17 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
         });
     }
 
-    // One is killed without a goodbye; after it the others go on for three seconds.
+    // One is killed without a goodbye; after it the others go on, also when the server has given it up.
     assert!(victim.is_running(), "the recorder ended by itself");
+    let counts = [&early, &over_quic, &late].map(|client| client.link.counters().states);
     victim.kill();
     let killed = Instant::now();
-    std::thread::sleep(Duration::from_secs(3));
+    std::thread::sleep(UNDISTURBED + Duration::from_millis(500));
+    for (client, before) in [&early, &over_quic, &late].into_iter().zip(counts) {
+        client.goes_on(before);
+    }
+    // The hand goes round again and again: whatever was missed of it comes.
+    wait_for("a force", JOIN_LIMIT, || early.saw_force().then_some(()));
     assert!(server.process.is_running());
 
     let (early, over_quic, late) = (early.leave(), over_quic.leave(), late.leave());
@@ -226,15 +239,14 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
                 .all(|two| two[0].state.sample_time_ns <= two[1].state.sample_time_ns),
             "{name} saw time run back"
         );
-        let before = longest_silence(states, |moment| moment < killed);
-        let silence = longest_silence(states, |moment| moment >= killed);
+        let silence = longest_silence(states, killed);
         println!(
-            "{name}: {} states, longest silence {silence:?}, before that {before:?}",
+            "{name}: {} states, longest silence {silence:?}",
             states.len()
         );
         assert!(
-            silence < UNDISTURBED.max(AS_BEFORE * before),
-            "{name} heard nothing for {silence:?}, and for {before:?} while nobody had gone"
+            silence < UNDISTURBED,
+            "{name} heard nothing for {silence:?}"
         );
     }
     let reference = god_objects(&early);
@@ -246,7 +258,7 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
                 common += 1;
             }
         }
-        assert!(common > 1000, "{name} shares only {common} ticks");
+        assert!(common > 50, "{name} shares only {common} ticks");
     }
     assert!(
         early
@@ -275,7 +287,7 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
     // The server offers the coupling to its bridge, so constraint sets arrive in place of wrenches.
     assert_eq!(report["coupling"], "edge");
     assert!(
-        report["sets"].as_u64() > Some(1000),
+        report["sets"].as_u64() > Some(50),
         "{} sets",
         report["sets"]
     );
@@ -284,7 +296,7 @@ fn everybody_sees_the_same_world_and_nobody_is_disturbed_by_those_who_go() {
         drawing.interrupt();
         assert!(drawing.end(END_LIMIT).status.success());
     } else {
-        println!("skipped: the render node, because there is no adapter");
+        taut_test_kit::left_out("the render node, because there is no adapter");
     }
     let report = server.stop();
     assert_eq!(report["penetrations"], 0);
@@ -321,12 +333,11 @@ fn garbage_is_counted_and_harmless() {
         Client::options(&workbench, &server, "client", Transport::Udp),
     );
 
-    // What a second without garbage is like on this machine now.
-    let joined = Instant::now();
-    wait_for("a second of states", JOIN_LIMIT, || {
-        (joined.elapsed() > Duration::from_secs(1)).then_some(())
-    });
+    client.goes_on(0);
     const DATAGRAMS: u32 = 600;
+    /// As many as a socket's buffer holds for sure; then the server is given time to take them.
+    const AT_A_TIME: u32 = 60;
+    let begun = Instant::now();
     let socket = UdpSocket::bind("127.0.0.1:0").expect("a socket");
     let mut state = 7_u32;
     for number in 0..DATAGRAMS {
@@ -347,19 +358,14 @@ fn garbage_is_counted_and_harmless() {
             &server.udp
         };
         let _ = socket.send_to(&bytes, to); // a full buffer loses some, as the network does
-        std::thread::sleep(Duration::from_micros(200));
+        if number % AT_A_TIME == 0 {
+            client.goes_on(client.link.counters().states);
+        }
     }
-    let sent = Instant::now();
-    wait_for("a second of states after the garbage", JOIN_LIMIT, || {
-        (sent.elapsed() > Duration::from_secs(1)).then_some(())
-    });
+    client.goes_on(client.link.counters().states);
     let states = client.leave();
-    let silence = longest_silence(&states, |moment| moment >= sent);
-    let before = longest_silence(&states, |moment| moment < sent);
-    assert!(
-        silence < UNDISTURBED.max(AS_BEFORE * before),
-        "nothing for {silence:?}, and for {before:?} before"
-    );
+    let silence = longest_silence(&states, begun);
+    assert!(silence < UNDISTURBED, "nothing for {silence:?}");
     let faulty = |received: &&ReceivedState| received.state.run == RunState::Fault;
     assert_eq!(states.iter().filter(faulty).count(), 0);
     let report = server.stop();

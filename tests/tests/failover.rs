@@ -118,7 +118,7 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
     let mut workbench = TestWorkbench::new(PROGRAM);
     workbench.log = Some("warn,taut=info");
     if let Err(why) = workbench.adapter() {
-        println!("skipped: {why}");
+        taut_test_kit::left_out(why);
         return;
     }
     workbench.set("scene", "sphere-on-plane");

@@ -16,7 +16,7 @@ const FRAMES_LIMIT: Duration = Duration::from_secs(60);
 fn frames_of_two_nodes(swap: &str) -> Option<serde_json::Value> {
     let mut workbench = TestWorkbench::new(PROGRAM);
     if let Err(reason) = workbench.adapter() {
-        println!("skipped: {reason}");
+        taut_test_kit::left_out(reason);
         return None;
     }
     workbench.set("scene", "sphere-on-plane");

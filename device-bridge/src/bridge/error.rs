@@ -60,6 +60,9 @@ pub enum BridgeError {
     /// The server cannot be joined.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// Nobody would hear the user's wish to end.
+    #[error("signals cannot be listened to ({0}); end other programs or raise the limits")]
+    Signals(std::io::Error),
     /// The server's scene has no valid start pose.
     #[error(
         "the server's scene has a start pose that is no pose; check the scene with `taut check`"
@@ -124,7 +127,8 @@ impl BridgeError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Thread { .. } | Self::LoopBroke | Self::NeverJoined { .. } => 1,
+            Self::Thread { .. } | Self::Signals(_) => 1,
+            Self::LoopBroke | Self::NeverJoined { .. } => 1,
             Self::ServerLost { .. } | Self::OtherScene { .. } => 1,
             _ => 2,
         }

@@ -2,13 +2,14 @@
 //!
 //! | thread | does |
 //! |--------|------|
-//! | caller's | watches: link, signals, duration; tells what happens |
-//! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines |
+//! | caller's | watches: link, duration; tells what happens |
+//! | `taut-bridge-dev` | the device loop: [`BridgeLoop::tick`] at absolute deadlines; looks at the flags of signals and of the arm switch itself |
 //! | `taut-bridge-net` | the link's sockets (tokio) |
 //! | `console` | what is typed, where standard input is a terminal: `arm`, `off` |
+//! | `lines` | writes to the terminal, [`taut_log`] |
 //!
 //! The force never depends on the watching thread: when commands stop, the safety stage of the device loop
-//! has the force at zero 120 ms later, whatever else goes on.
+//! has the force at zero 120 ms later, whatever else goes on. Where that thread breaks down, the device loop ends with it.
 
 mod error;
 mod over;
@@ -23,7 +24,7 @@ use taut_link::proto::SceneDescription;
 use taut_link::{ClientOptions, RejoinPolicy, Rejoiner};
 
 pub use error::BridgeError;
-use over::{Over, stop_on_signal};
+use over::Over;
 use sessions::Run;
 use setup::{behind_port, build_loop, client_options, prepare};
 
@@ -35,6 +36,7 @@ use crate::device_loop::Totals;
 use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
+use crate::signals::EndFlag;
 
 /// How often the watching thread looks.
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
@@ -46,16 +48,18 @@ const WATCH_PERIOD: Duration = Duration::from_millis(20);
 /// [`BridgeError`]: bad input is found before anything is started.
 pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let (options, motion) = prepare(args)?;
-    let stop = Arc::new(AtomicBool::new(false));
+    let end = EndFlag::listen().map_err(BridgeError::Signals)?;
     let wishes = Arc::default();
     arm_switch::listen_at_console(&wishes);
-    run_loop(args, options, stop, wishes, |scene| {
+    let outcome = run_loop(args, options, end.clone(), wishes, |scene| {
         build_loop(args, &motion, scene)
-    })
+    });
+    end.let_signals_kill();
+    outcome
 }
 
 /// Runs a bridge on a device that the caller makes, once the scene is known, until `stop` is set or as [`run`] ends.
-/// `--device`, `--hand` and `--path` of `args` are not looked at.
+/// `--device`, `--hand` and `--path` of `args` are not looked at; signals and the console are the caller's.
 ///
 /// # Errors
 /// [`BridgeError`].
@@ -65,8 +69,7 @@ pub fn run_device(
     make: impl FnOnce(Placement) -> Box<dyn Device>,
 ) -> Result<BridgeReport, BridgeError> {
     let options = client_options(args)?;
-    // The console is the caller's.
-    run_loop(args, options, stop, Arc::default(), |scene| {
+    run_loop(args, options, EndFlag::of(stop), Arc::default(), |scene| {
         let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
         let device = make(placement);
         Ok(behind_port(
@@ -81,7 +84,7 @@ pub fn run_device(
 fn run_loop(
     args: &BridgeArgs,
     options: ClientOptions,
-    stop: Arc<AtomicBool>,
+    end: EndFlag,
     wishes: Arc<ArmSwitch>,
     build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
 ) -> Result<BridgeReport, BridgeError> {
@@ -94,12 +97,11 @@ fn run_loop(
             what: "the network",
             cause,
         })?;
-    runtime.spawn(stop_on_signal(Arc::clone(&stop)));
 
     let deadline = args
         .duration
         .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds));
-    let over = Over { stop, deadline };
+    let over = Over { end, deadline };
     let mut rejoiner = Rejoiner::new(options, policy(args));
     let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
         return Err(BridgeError::NeverJoined {
@@ -112,6 +114,7 @@ fn run_loop(
         safety: *bridge.port().settings(),
         wishes,
         args,
+        epoch: None,
         scene: first.description().clone(),
         rejoiner,
         runtime,

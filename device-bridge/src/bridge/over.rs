@@ -1,22 +1,21 @@
 //! When a bridge is to end: asked for by a signal or its caller, or because its time is over.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::WATCH_PERIOD;
 use crate::realtime::monotonic_now;
+use crate::signals::EndFlag;
 
 /// When the bridge is to end.
 pub(super) struct Over {
-    pub(super) stop: Arc<AtomicBool>,
+    pub(super) end: EndFlag,
     /// On the monotonic clock.
     pub(super) deadline: Option<Duration>,
 }
 
 impl Over {
     pub(super) fn is_asked(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.end.is_asked()
     }
 
     pub(super) fn is_now(&self) -> bool {
@@ -38,21 +37,4 @@ impl Over {
             () = ended => None,
         }
     }
-}
-
-pub(super) async fn stop_on_signal(stop: Arc<AtomicBool>) {
-    #[cfg(unix)]
-    {
-        use tokio::signal::unix::{SignalKind, signal};
-        let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-            return;
-        };
-        tokio::select! {
-            _ = tokio::signal::ctrl_c() => {}
-            _ = terminate.recv() => {}
-        }
-    }
-    #[cfg(not(unix))]
-    let _ = tokio::signal::ctrl_c().await;
-    stop.store(true, Ordering::Relaxed);
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use taut_link::proto::control::LogLevel;
@@ -19,11 +19,40 @@ use crate::cli::{BridgeArgs, CouplingChoice};
 use crate::device::DeviceFault;
 use crate::device_loop::{DeviceLoop, Totals};
 use crate::edge::EdgeCoupler;
-use crate::port::{SafetyEvent, SafetySettings};
+use crate::port::{CommandSource, SafetyEvent, SafetySettings};
 use crate::report::BridgeReport;
 
 /// Notices that may wait to be told; more are dropped, the counts in the report are complete.
 const NOTICES: usize = 64;
+
+/// The thread of the device loop. It ends with this, also where this thread breaks down: no loop goes on that nobody watches, and a process that
+/// returns from `main` takes no loop with it that holds a force.
+struct LoopThread<T> {
+    end: Arc<AtomicBool>,
+    thread: Option<JoinHandle<T>>,
+}
+
+impl<T> LoopThread<T> {
+    fn is_finished(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
+    /// Asks the loop to end, and waits until the force is gone; nothing where the loop broke down.
+    fn end(mut self) -> Option<T> {
+        self.join()
+    }
+
+    fn join(&mut self) -> Option<T> {
+        self.end.store(true, Ordering::Relaxed);
+        self.thread.take()?.join().ok()
+    }
+}
+
+impl<T> Drop for LoopThread<T> {
+    fn drop(&mut self) {
+        let _ = self.join(); // there is nobody to give it to
+    }
+}
 
 /// Why a session ended.
 enum SessionEnd {
@@ -41,6 +70,8 @@ pub(super) struct Run<'a> {
     pub(super) args: &'a BridgeArgs,
     /// Of the first session: the device was placed in it.
     pub(super) scene: SceneDescription,
+    /// Incarnation of the server that commanded last.
+    pub(super) epoch: Option<u32>,
     pub(super) rejoiner: Rejoiner,
     pub(super) runtime: tokio::runtime::Runtime,
     pub(super) over: Over,
@@ -108,7 +139,7 @@ impl Run<'_> {
             }
             Some(Ok(link)) => Err(BridgeError::OtherScene {
                 server: self.args.server.clone(),
-                scene: link.description().name.clone(),
+                scene: link.description().name.to_string(),
             }),
         }
     }
@@ -122,17 +153,25 @@ impl Run<'_> {
         let link = Arc::new(link);
         let end_loop = Arc::new(AtomicBool::new(false));
         let (sender, notices) = sync_channel(NOTICES);
+        let period = Duration::from_secs_f64(1.0 / self.args.rate);
         let mut device_loop = DeviceLoop {
             link: Arc::clone(&link),
             end: Arc::clone(&end_loop),
+            asked: self.over.end.clone(),
             wishes: Arc::clone(&self.wishes),
             notices: sender,
-            period: Duration::from_secs_f64(1.0 / self.args.rate),
+            period,
             priority: self.args.priority,
             core: self.args.core,
             totals: std::mem::replace(&mut self.totals, Totals::new()),
         };
-        bridge.begin_session(edge_coupler(self.args.coupling, link.coupling())?);
+        let source = match self.epoch.replace(link.epoch()) {
+            Some(epoch) if epoch == link.epoch() => CommandSource::Same,
+            _ => CommandSource::Other,
+        };
+        let edge = edge_coupler(self.args.coupling, link.coupling())?
+            .map(|coupler| coupler.within(period));
+        bridge.begin_session(source, edge);
         let thread = thread::Builder::new()
             .name("taut-bridge-dev".to_owned())
             .spawn(move || {
@@ -143,6 +182,10 @@ impl Run<'_> {
                 what: "the device loop",
                 cause,
             })?;
+        let thread = LoopThread {
+            end: end_loop,
+            thread: Some(thread),
+        };
 
         let dead_after = self.rejoiner.policy().dead_after;
         let mut watch = LinkWatch::new(Instant::now(), dead_after.unwrap_or(link.node_timeout()));
@@ -159,8 +202,7 @@ impl Run<'_> {
             let settings = self.safety;
             thread::sleep(settings.hold + settings.ramp_out);
         }
-        end_loop.store(true, Ordering::Relaxed);
-        let (bridge, totals) = thread.join().map_err(|_| BridgeError::LoopBroke)?;
+        let (bridge, totals) = thread.end().ok_or(BridgeError::LoopBroke)?;
         self.totals = totals;
         tell(&link, &notices);
 
@@ -273,11 +315,37 @@ fn edge_coupler(
         }
         (Some(CouplingChoice::Edge), Some(CouplingOffer::AtServer { reason })) => {
             Err(BridgeError::NoEdge {
-                reason: reason.clone(),
+                reason: reason.to_string(),
             })
         }
         (Some(CouplingChoice::Edge), None) => Err(BridgeError::NoEdge {
             reason: "it says nothing of another way".to_owned(),
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_watcher_that_breaks_down_takes_the_device_loop_with_it() {
+        let (end, ended) = (Arc::<AtomicBool>::default(), Arc::<AtomicBool>::default());
+        let (of_loop, told) = (Arc::clone(&end), Arc::clone(&ended));
+        let broke = std::panic::catch_unwind(move || {
+            let thread = thread::Builder::new().spawn(move || {
+                while !of_loop.load(Ordering::Relaxed) {
+                    thread::sleep(Duration::from_millis(1));
+                }
+                told.store(true, Ordering::Relaxed);
+            });
+            let _thread = LoopThread {
+                end,
+                thread: thread.ok(),
+            };
+            panic!("on purpose");
+        });
+        assert!(broke.is_err());
+        assert!(ended.load(Ordering::Relaxed), "the loop goes on");
     }
 }

@@ -24,8 +24,11 @@ const STATE_RATE_HZ: u32 = 1;
 /// Sway of a hand that was given no path: 20 mm to either side, a cycle in 8 s.
 const SWAY: (f64, f64) = (0.02, 8.0);
 
-/// Rates that a device loop can hold, in Hz.
-const RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=10_000.0;
+/// Rates that a device loop can hold, in Hz. One that is slower cannot take a force away within what is promised: its last write holds too long.
+const RATES_HZ: std::ops::RangeInclusive<f64> = 100.0..=10_000.0;
+
+/// Stiffer than any wall that a loop of 1 kHz renders, N/m.
+const MAX_CONTACT_STIFFNESS: f64 = 20_000.0;
 
 /// What moves the device: read and checked before anything is started.
 pub(super) enum Motion {
@@ -54,7 +57,7 @@ pub(super) fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), Brid
         "--rate",
         args.rate,
         RATES_HZ.contains(&args.rate),
-        "1 to 10000 Hz",
+        "100 to 10000 Hz",
     )?;
     for (option, value) in [
         ("--max-force", args.safety.max_force),
@@ -69,6 +72,13 @@ pub(super) fn prepare(args: &BridgeArgs) -> Result<(ClientOptions, Motion), Brid
             "a number above 0, at most 1000",
         )?;
     }
+    let stiffness = args.safety.contact_stiffness;
+    in_range(
+        "--contact-stiffness",
+        stiffness,
+        (0.0..=MAX_CONTACT_STIFFNESS).contains(&stiffness),
+        "0 to 20000 N/m",
+    )?;
     if let Some(seconds) = args.duration {
         let valid = (0.0..=1e9).contains(&seconds);
         in_range("--duration", seconds, valid, "0 to 1e9 s")?;

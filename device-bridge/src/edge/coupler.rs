@@ -23,6 +23,7 @@ use taut_link::proto::constraints::SET_PAUSED;
 
 use super::offer::{OfferError, world_of};
 use super::sets::{BrokenSet, read_set};
+use super::work::{most_rows, most_visits};
 use crate::device::DeviceSample;
 
 /// A force beside the device.
@@ -49,6 +50,7 @@ pub struct EdgeCoupler {
     /// When the device was read that the set answers; `None` before the first set.
     origin: Option<Duration>,
     paused: bool,
+    most_rows: usize,
 }
 
 impl EdgeCoupler {
@@ -65,7 +67,17 @@ impl EdgeCoupler {
             next: ConstraintSet::with_capacity(capacity),
             origin: None,
             paused: false,
+            most_rows: usize::MAX,
         })
+    }
+
+    /// The same for a loop of this period: sets and forces that would take longer than it has time for are refused. Without it only the method's own limits
+    /// hold.
+    #[must_use]
+    pub fn within(mut self, period: Duration) -> Self {
+        self.most_rows = most_rows(period);
+        self.coupling.limit_work(most_visits(period));
+        self
     }
 
     /// Takes a whole set that answers the device's reading of `origin`, on the clock of [`Self::step`]'s `now`.
@@ -81,6 +93,12 @@ impl EdgeCoupler {
             return Ok(());
         }
         if !known || wire.head.sequence > self.set.sequence {
+            if wire.rows.len() > self.most_rows {
+                return Err(BrokenSet::TooManyRows {
+                    rows: wire.rows.len(),
+                    most: self.most_rows,
+                });
+            }
             read_set(wire, &mut self.next)?;
             std::mem::swap(&mut self.set, &mut self.next);
         }
@@ -190,6 +208,47 @@ mod tests {
             velocity: Vector6::zeros(),
             buttons: 0,
         }
+    }
+
+    /// Facets of a cone that the body is pressed into: every one of them may hold it.
+    fn cone(rows: u32) -> proto::ConstraintSet {
+        let mut set = floor(1, 0);
+        let facet = set.rows[0];
+        set.rows.clear();
+        for number in 0..rows {
+            let angle = f64::from(number) * 2.399_963; // the golden angle: spread evenly, in no order
+            let (sin, cos) = angle.sin_cos();
+            set.rows.push(ConstraintRow {
+                obstacle: (number % 2) as u16,
+                normal: [0.6 * cos as f32, 0.6 * sin as f32, 0.8],
+                gap: -1e-4 * (f64::from(number) * 0.61).fract() as f32,
+                ..facet
+            });
+        }
+        set
+    }
+
+    #[test]
+    fn a_set_that_takes_longer_than_a_period_is_refused_and_a_force_is_none() {
+        let pose = Pose::translation(0.002, 0.001, 0.01);
+        let new = || EdgeCoupler::new(&offer()).expect("an offer");
+        let mut slow = new().within(MS);
+        assert_eq!(slow.take(&cone(1024), MS), Ok(()));
+        let felt = slow.step(MS, &at(MS, pose)).expect("a set");
+        assert!(felt.solved && felt.wrench.norm() > 1.0, "{felt:?}");
+        let mut fast = new().within(MS / 4);
+        let refused = BrokenSet::TooManyRows {
+            rows: 1024,
+            most: 625,
+        };
+        assert_eq!(fast.take(&cone(1024), MS), Err(refused));
+        assert_eq!(fast.step(MS, &at(MS, pose)), None);
+        // No time at all: no force, and no step that goes on for ever.
+        let mut none = new();
+        none.coupling.limit_work(1024);
+        assert_eq!(none.take(&cone(1024), MS), Ok(()));
+        let felt = none.step(MS, &at(MS, pose)).expect("a set");
+        assert!(!felt.solved && felt.wrench == Vector6::zeros(), "{felt:?}");
     }
 
     #[test]

@@ -21,6 +21,7 @@ mod coupler;
 mod offer;
 mod sets;
 mod settings;
+mod work;
 
 pub use ahead::{device_ahead, device_predicted};
 pub use coupler::{EdgeCoupler, EdgeWrench};

@@ -34,7 +34,9 @@ pub enum OfferError {
 /// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it cannot.
 #[must_use]
 pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> CouplingOffer {
-    let at_server = |reason: String| CouplingOffer::AtServer { reason };
+    let at_server = |reason: String| CouplingOffer::AtServer {
+        reason: reason.into(),
+    };
     let settings = match to_wire(settings) {
         Ok(settings) => settings,
         Err(reason) => return at_server(reason.to_string()),

@@ -24,6 +24,16 @@ pub enum BrokenSet {
     /// A normal is not of unit length.
     #[error("a constraint set has a normal that is none; install the same release on both sides")]
     Normal,
+    /// More rows than a period leaves time for.
+    #[error(
+        "a constraint set has {rows} rows, but the device loop's period leaves time for {most}; lower max_constraints in the scene, or the bridge's --rate"
+    )]
+    TooManyRows {
+        /// What came.
+        rows: usize,
+        /// What may come.
+        most: usize,
+    },
     /// A feature of a kind that this release does not know.
     #[error(
         "a constraint set names a feature of an unknown kind; install the same release on both sides"

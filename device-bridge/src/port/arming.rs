@@ -7,7 +7,7 @@
 //!      │                      fresh again after a silence           │  │   input late or bad  │  │ fresh again
 //!      │          ┌─────────────────────────────────────────────────┘  ▼                      ▼  │ in time
 //!      │          │                                                 Holding ◄─────────────────────
-//!      │ zero, disarmed by somebody                                    │ older than the hold
+//!      │ zero: disarmed, or nobody asked after an outage               │ older than the hold
 //!      └──────────┤                                                    ▼
 //!              Fading ◄────────────────────────────────────────────────┘
 //!                 │ zero, after a fault
@@ -18,11 +18,28 @@
 //! | name in code | unit | meaning |
 //! |--------------|------|---------|
 //! | `gain`       | –    | share of the wrench that is let through, in [0, 1] |
+//! | `OUTAGE`     | s    | silence after which a person arms, where persons do |
+//!
+//! **Outage.** Where a person arms ([`Rearm::Manual`]), commands that come again within [`OUTAGE`] from where they came before ramp in by
+//! themselves: the person who armed has felt the gap. After a longer one, or from another process, nobody knows any more what the hand does and
+//! where the god-object stands, so a person arms.
 
 use std::time::Duration;
 
 use super::event::EventKind;
 use super::settings::{Rearm, SafetySettings};
+
+/// Longest time without good commands after which those that come ramp in by themselves where a person arms.
+pub(super) const OUTAGE: Duration = Duration::from_secs(1);
+
+/// Who commands after a [`restart`](super::DevicePort::restart).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandSource {
+    /// Who did before: the same process, heard by another connection.
+    Same,
+    /// Another process: it knows nothing of what was felt.
+    Other,
+}
 
 /// Where the port stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -87,6 +104,8 @@ pub(super) struct Situation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Cause {
     Silence,
+    /// Silence after which a person arms.
+    Outage,
     Request,
     Fault,
 }
@@ -109,6 +128,8 @@ pub(super) struct Arming {
     automatic: bool,
     configured: bool,
     last: Option<Duration>,
+    /// When commands were good last, while there was force.
+    commanded: Option<Duration>,
     was_held: bool,
 }
 
@@ -125,6 +146,7 @@ impl Arming {
             automatic: settings.rearm == Rearm::Automatic,
             configured: settings.rearm == Rearm::Automatic,
             last: None,
+            commanded: None,
             was_held: false,
         }
     }
@@ -144,13 +166,16 @@ impl Arming {
         on_the_way_down && self.cause == Cause::Fault
     }
 
-    /// The commands come from somebody else from now on: what there was is gone, and new ones ramp in from zero.
-    pub(super) fn restart(&mut self) {
+    /// The commands come by another way from now on: what there was is gone, and new ones ramp in from zero, if nobody has to be asked.
+    pub(super) fn restart(&mut self, source: CommandSource) {
         if self.state.is_off() || self.cause_lasts() {
             return;
         }
         self.state = ArmingState::Fading;
-        self.cause = Cause::Silence;
+        self.cause = match source {
+            CommandSource::Other if !self.automatic => Cause::Outage,
+            _ => Cause::Silence,
+        };
         self.gain = 0.0;
         self.fade.gain = 0.0;
     }
@@ -185,6 +210,7 @@ impl Arming {
         } else if situation.disarm {
             told[0] = Some(EventKind::Disarmed);
         }
+        self.watch_outage(now, situation);
         if self.blame(now, settings, situation) {
             told[1] = Some(EventKind::Arming);
         }
@@ -225,9 +251,23 @@ impl Arming {
             self.cause = Cause::Silence;
             self.gain = 0.0;
             self.automatic = self.configured;
+            self.commanded = None;
             return Some(EventKind::Arming);
         }
         situation.asked.then_some(EventKind::ArmRefused)
+    }
+
+    /// Finds out whether a person has to be asked, because commands were missing for too long; be it that they are missing still, or that nobody
+    /// called the port meanwhile.
+    fn watch_outage(&mut self, now: Duration, situation: &Situation) {
+        let silent = now.saturating_sub(*self.commanded.get_or_insert(now));
+        if silent > OUTAGE && !self.automatic && !self.cause_lasts() {
+            self.begin_fading(now);
+            self.cause = Cause::Outage;
+        }
+        if situation.stale_since.is_none() {
+            self.commanded = Some(now);
+        }
     }
 
     /// Takes the gravest of what is wrong. Whether all is well again after the force had begun to fade.
@@ -304,7 +344,11 @@ impl Arming {
                 self.state = ArmingState::Disarmed;
                 None
             }
-            // Fresh inputs ramp it in again, whoever armed it before.
+            Cause::Outage => {
+                self.state = ArmingState::Disarmed;
+                Some(EventKind::RearmNeeded)
+            }
+            // Fresh inputs ramp it in again, whoever armed it before, unless they come too late.
             Cause::Silence => None,
         }
     }

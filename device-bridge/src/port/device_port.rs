@@ -4,16 +4,17 @@ use std::time::Duration;
 
 use nalgebra::{Point3, Vector6};
 
-use super::arming::{Arming, ArmingState, Situation};
+use super::arming::{Arming, ArmingState, CommandSource, Situation};
 use super::buttons::Buttons;
 use super::clamp::{Clamped, clamp};
 use super::energy::EnergyObserver;
 use super::event::{EventKind, Events, Spell, Teller, kind_of_fault};
+use super::motion::Motion;
 use super::passivity::PassivityController;
 use super::settings::SafetySettings;
 use super::slew::{SlewLimit, Slewed};
 use super::validation::{SampleCheck, Verdict, at_rest};
-use super::watchdog::{Command, Freshness, LATE, Missing, freshness};
+use super::watchdog::{Command, Freshness, Missing, freshness};
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Pose};
 
 /// What the device says in a tick.
@@ -51,6 +52,7 @@ pub struct DevicePort {
     arming: Arming,
     controller: PassivityController,
     slew: SlewLimit,
+    motion: Motion,
     energy: EnergyObserver,
     spells: Spells,
     teller: Teller,
@@ -104,7 +106,8 @@ impl DevicePort {
             check: SampleCheck::new(settings.validation, reference_point, settings.period),
             arming: Arming::new(&settings),
             controller: PassivityController::new(settings.passivity),
-            slew: SlewLimit::new(settings.force_rate, settings.torque_rate, settings.period),
+            slew: SlewLimit::new(&settings),
+            motion: Motion::default(),
             energy: EnergyObserver::new(reference_point),
             spells: Spells::default(),
             teller: Teller::default(),
@@ -183,11 +186,11 @@ impl DevicePort {
         self.disarm_asked = true;
     }
 
-    /// The commands come from somebody else from now on: the force ramps in from zero again.
-    pub fn restart(&mut self) {
+    /// The commands come by another way from now on: the force ramps in from zero again, unless a person has to arm first.
+    pub fn restart(&mut self, source: CommandSource) {
         self.last_command = None;
         self.held = Vector6::zeros();
-        self.arming.restart();
+        self.arming.restart(source);
     }
 
     /// One period: reads the device, asks `command` for the newest command (`None` before the first), makes it safe, writes it.
@@ -203,6 +206,7 @@ impl DevicePort {
             self.teller
                 .tell(EventKind::PortStalled, passed.as_secs_f64());
         }
+        self.motion.fade(passed);
         let reading = self.sense(now);
         let command = command(&reading);
         let wrench = self.render(now, passed, command);
@@ -223,10 +227,10 @@ impl DevicePort {
     /// Lets the force come down by one period's share without reading the device; whether it is zero. For the end of a
     /// loop: call it once per period until it is true.
     pub fn release_step(&mut self, now: Duration) -> bool {
-        let wrench = self.slew.step(now, &Vector6::zeros()).wrench;
+        let wrench = self.slew.step(now, &Vector6::zeros(), 0.0).wrench;
         self.device.write(now, &wrench);
         self.energy.hold(&wrench);
-        self.arming.restart();
+        self.arming.restart(CommandSource::Same);
         wrench == Vector6::zeros()
     }
 
@@ -249,6 +253,12 @@ impl DevicePort {
                     self.last_good = Some(now);
                 }
                 self.work = self.energy.measure(&sample.pose);
+                self.motion.follow(
+                    sample.time,
+                    self.energy.travel(),
+                    self.settings.period,
+                    self.settings.contact.radius_of_gyration,
+                );
                 if self.fault.take().is_some() {
                     self.teller.tell(EventKind::DeviceBack, 0.0);
                 }
@@ -257,6 +267,7 @@ impl DevicePort {
             Verdict::Bad(fault) => {
                 self.sample.velocity = Vector6::zeros();
                 self.energy.skip();
+                self.motion.forget();
                 if let DeviceFault::Lost { age } = fault {
                     // What was lost is older than its last arrival.
                     let good = now.saturating_sub(age);
@@ -307,7 +318,12 @@ impl DevicePort {
         );
         let damped = shared + damping.wrench * gain;
         let safe = clamp(&damped, settings.max_force, settings.max_torque).wrench;
-        let slewed = self.slew.step(now, &safe);
+        // A force that comes, goes away or is held is led by the port: only one in full answers the motion.
+        let speed = match self.arming.state() {
+            ArmingState::Armed => self.motion.speed(),
+            _ => 0.0,
+        };
+        let slewed = self.slew.step(now, &safe, speed);
 
         self.tell_limits(now, &limited, &slewed, damping.debt);
         slewed.wrench
@@ -316,12 +332,8 @@ impl DevicePort {
     /// Tells which limits begin to act.
     fn tell_limits(&mut self, now: Duration, limited: &Clamped, slewed: &Slewed, debt: f64) {
         let felt = self.arming.gain() > 0.0;
-        // A tick that comes early allows little: what a whole period would have allowed is nothing to tell.
-        let period = self.settings.period.as_secs_f64();
-        let (force_step, torque_step) = (
-            self.settings.force_rate * period,
-            self.settings.torque_rate * period,
-        );
+        // A force that comes or goes away is slow on purpose; why it does is told by itself.
+        let armed = self.arming.state() == ArmingState::Armed;
         let spells = &mut self.spells;
         let acting = [
             (
@@ -337,12 +349,12 @@ impl DevicePort {
             (
                 &mut spells.force_slew,
                 EventKind::ForceSlewLimited,
-                slewed.force_asked.filter(|asked| *asked > force_step),
+                slewed.force_asked.filter(|_| armed),
             ),
             (
                 &mut spells.torque_slew,
                 EventKind::TorqueSlewLimited,
-                slewed.torque_asked.filter(|asked| *asked > torque_step),
+                slewed.torque_asked.filter(|_| armed),
             ),
             (
                 &mut spells.passivity,
@@ -407,14 +419,14 @@ impl DevicePort {
             }
             self.last_command = origin;
         }
-        let late_command = now.saturating_sub(self.last_news) > LATE;
+        let late_command = now.saturating_sub(self.last_news) > self.settings.late();
         // The force is as old as the older of the two that it rests on.
         let newest = |seen: Option<Duration>| seen.unwrap_or(now);
         let is_fault = self.fault.is_some() || !finite;
         let fault_since = is_fault.then(|| newest(self.last_good).min(newest(self.last_command)));
         let late_sample = self
             .last_good
-            .is_some_and(|seen| now.saturating_sub(seen) > LATE);
+            .is_some_and(|seen| now.saturating_sub(seen) > self.settings.late());
         let down = self.last_good.map(|_| self.sample.buttons);
         let (held, pressed) = self.buttons.step(down);
         let situation = Situation {
@@ -427,5 +439,15 @@ impl DevicePort {
             disarm: std::mem::take(&mut self.disarm_asked),
         };
         (situation, taken)
+    }
+}
+
+impl Drop for DevicePort {
+    /// The last word to the device, whatever ends the port: a loop that broke down and could not lead the force down leaves none all the same.
+    fn drop(&mut self) {
+        if *self.slew.rendered() != Vector6::zeros() {
+            let now = self.last_tick.unwrap_or_default();
+            self.device.write(now, &Vector6::zeros());
+        }
     }
 }

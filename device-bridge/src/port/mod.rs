@@ -7,13 +7,14 @@
 //! | arming          | [`arming`], [`buttons`] | whether there is force: ramps in, holds, ramps out |
 //! | passivity       | [`passivity`] | damps energy away, on request |
 //! | clamp           | [`clamp`] | limits the norms of force and torque |
-//! | slew            | [`slew`] | limits their change, whatever the stages before have done |
+//! | slew            | [`slew`], [`motion`] | limits their change, whatever the stages before have done |
 //! | energy          | [`energy`] | measures the work done on the hand |
 //!
 //! [`DevicePort`] (in [`device_port`]) owns the device, so nothing else can write to it. **What holds of every write,** whatever device, network
-//! and loops do: it is finite; its norms are within the limits; it differs from the last one by at most the slew rate
-//! times one period; and it is zero from 120 ms (hold, ramp-out and a margin for a late loop) after the last good input on. A port that is not called can
-//! keep no promise: a device needs a watchdog of its own for that.
+//! and loops do: it is finite; its norms are within the limits; it differs from the last one by at most the slew
+//! rate times the time since, beside what the device's own motion explains; and it is zero from 120 ms (hold, ramp-out and a margin for a late
+//! loop) after the last good input on. A port that is not called can keep no promise: a device needs a watchdog of its own for that. One that is dropped
+//! leaves no force behind.
 //!
 //! Readings of the clock are arguments; a tick neither allocates nor waits.
 
@@ -23,18 +24,19 @@ mod clamp;
 mod device_port;
 mod energy;
 mod event;
+mod motion;
 mod passivity;
 mod settings;
 mod slew;
 mod validation;
 mod watchdog;
 
-pub use arming::ArmingState;
+pub use arming::{ArmingState, CommandSource};
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
 pub use event::{EventKind, Events, MAX_EVENTS_PER_TICK, SafetyEvent, kind_of_fault};
 pub use passivity::{Passivity, PassivitySettings};
-pub use settings::{Rearm, SafetySettings};
+pub use settings::{ContactBound, Rearm, SafetySettings};
 pub use validation::{UNIT_TOLERANCE, ValidationSettings};
 pub use watchdog::Command;
 

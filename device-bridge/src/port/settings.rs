@@ -13,10 +13,12 @@ pub struct SafetySettings {
     pub max_force: f64,
     /// Largest norm of the torque, N m.
     pub max_torque: f64,
-    /// Fastest change of the rendered force, N/s. Contact of stiffness K at speed v changes it by K v.
+    /// Fastest change of the rendered force that the device's motion does not explain, N/s.
     pub force_rate: f64,
-    /// Fastest change of the rendered torque, N m/s.
+    /// The same for the torque, N m/s.
     pub torque_rate: f64,
+    /// What the device's motion explains.
+    pub contact: ContactBound,
     /// Age up to which the newest good input (sample of the device, command) is rendered in full.
     pub hold: Duration,
     /// Age of the constraints that a command rests on from which the force fades.
@@ -25,7 +27,7 @@ pub struct SafetySettings {
     pub ramp_out: Duration,
     /// Time from no force to full force on arming.
     pub ramp_in: Duration,
-    /// Time between two ticks: a tick that comes late earns no more change of the force than this.
+    /// Time between two ticks that are on time.
     pub period: Duration,
     /// Who arms.
     pub rearm: Rearm,
@@ -39,7 +41,32 @@ pub struct SafetySettings {
     pub passivity: PassivitySettings,
 }
 
-/// Who arms at the start and after a fault. After a mere silence of commands the force ramps in by itself in both cases.
+/// The stiffest contact that this port renders, by its own knowledge: of the scene, of the device, of whoever started it. Never by what the
+/// commands say.
+///
+/// In a contact of stiffness K the coupling is a projection, which never makes a distance longer: a device that moves by `d` changes the force by at
+/// most `K d` and the torque by at most `K r d`, where `d^2` is the square of the displacement of the reference point plus `r^2` times that of the
+/// angle, and `r` the radius of gyration of the metric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactBound {
+    /// K, N/m. Zero: motion explains nothing.
+    pub stiffness: f64,
+    /// r, m.
+    pub radius_of_gyration: f64,
+}
+
+impl Default for ContactBound {
+    /// 1000 N/m and 0.1 m: the stiffness of an ordinary contact, and the lever of the torque's limits.
+    fn default() -> Self {
+        Self {
+            stiffness: 1000.0,
+            radius_of_gyration: 0.1,
+        }
+    }
+}
+
+/// Who arms at the start, after a fault and after an outage: more than a second without good commands, or another process that commands. After a
+/// shorter silence the force ramps in by itself in both cases.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rearm {
     /// The port itself, once its inputs are in order: for devices that cannot hurt anybody, and for runs without people.
@@ -50,7 +77,7 @@ pub enum Rearm {
 }
 
 impl SafetySettings {
-    /// 0.5 N/ms: a contact of 1000 N/m may be met at 0.5 m/s before the limit acts.
+    /// 0.5 N/ms, beside what the device's motion explains.
     pub const FORCE_RATE: f64 = 500.0;
     /// 0.05 N m/ms: what 0.5 N/ms do at a lever of 0.1 m.
     pub const TORQUE_RATE: f64 = 50.0;
@@ -58,33 +85,58 @@ impl SafetySettings {
     pub const ZERO_AFTER: Duration = Duration::from_millis(120);
     /// Age up to which the last force is held.
     pub const HOLD: Duration = Duration::from_millis(20);
-    /// What is kept of the promise for a loop that ticks late and a device that is slow to take a wrench: five periods at 1 kHz.
-    pub const MARGIN: Duration = Duration::from_millis(5);
-    /// The rest: time from full force to none, 95 ms.
-    pub const RAMP_OUT: Duration = Self::ZERO_AFTER
-        .saturating_sub(Self::HOLD)
-        .saturating_sub(Self::MARGIN);
+    /// What is kept of the promise for a loop that ticks late and a device that is slow to take a wrench.
+    pub const LATENESS: Duration = Duration::from_millis(4);
+    /// The rest at 1 kHz, without the period for which the last write holds: time from full force to none, 95 ms. A slower loop has less.
+    pub const RAMP_OUT: Duration = Self::ramp_out_at(Duration::from_millis(1));
+    /// Longest time that one write may use up of the slew limit: a loop that was late makes no larger step than this.
+    pub const LONGEST_STEP: Duration = Duration::from_millis(2);
+
+    /// Time from full force to none that a loop of this period has.
+    #[must_use]
+    pub const fn ramp_out_at(period: Duration) -> Duration {
+        Self::ZERO_AFTER
+            .saturating_sub(Self::HOLD)
+            .saturating_sub(Self::LATENESS)
+            .saturating_sub(period)
+    }
 
     /// The same with limits that are not above those of the device.
     #[must_use]
     pub fn within(mut self, limits: &DeviceLimits) -> Self {
         self.max_force = self.max_force.min(limits.max_force);
         self.max_torque = self.max_torque.min(limits.max_torque);
+        self.contact.stiffness = self.contact.stiffness.min(limits.max_stiffness);
         self
     }
 
-    /// The same with limits from which the force can come down in `ramp_out` without breaking the slew limit: only so can both
-    /// promises be kept at once.
+    /// The same with a ramp-out that its period leaves time for, and with limits from which the force can come down in it without breaking the slew
+    /// limit: only so can both promises be kept at once.
     pub(super) fn that_can_fade(mut self) -> Self {
-        let time = self.ramp_out.as_secs_f64();
+        self.ramp_out = self.ramp_out.min(Self::ramp_out_at(self.period));
+        // A write uses up one period at most, and not all of a long one.
+        let time = if self.period > Self::LONGEST_STEP {
+            let writes = self.ramp_out.as_nanos() / self.period.as_nanos();
+            Self::LONGEST_STEP.as_secs_f64() * writes as f64 // some dozens
+        } else {
+            self.ramp_out.as_secs_f64()
+        };
         self.max_force = self.max_force.min(self.force_rate * time);
         self.max_torque = self.max_torque.min(self.torque_rate * time);
         self
     }
+
+    /// Age of the newest input from which on the last force is said to be held: longer than any gap of a loop that works.
+    pub(super) fn late(&self) -> Duration {
+        LATE.max(2 * self.period)
+    }
 }
 
+/// See [`SafetySettings::late`]: at 1 kHz.
+const LATE: Duration = Duration::from_millis(5);
+
 impl Default for SafetySettings {
-    /// 20 N, 0.5 N m; 0.5 N/ms, 0.05 N m/ms; hold 20 ms, out in 95 ms, in over 0.5 s; constraints of 100 ms; 1 kHz;
+    /// 20 N, 0.5 N m; 0.5 N/ms, 0.05 N m/ms beside contacts of 1000 N/m; hold 20 ms, out in 95 ms, in over 0.5 s; constraints of 100 ms; 1 kHz;
     /// automatic, without buttons.
     fn default() -> Self {
         Self {
@@ -92,6 +144,7 @@ impl Default for SafetySettings {
             max_torque: 0.5,
             force_rate: Self::FORCE_RATE,
             torque_rate: Self::TORQUE_RATE,
+            contact: ContactBound::default(),
             hold: Self::HOLD,
             max_constraint_age: Duration::from_millis(100),
             ramp_out: Self::RAMP_OUT,

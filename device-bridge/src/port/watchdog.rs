@@ -73,9 +73,6 @@ pub(super) enum Freshness {
     },
 }
 
-/// Longer than any period of a loop that works: from here on the last force is said to be held.
-pub(super) const LATE: Duration = Duration::from_millis(5);
-
 /// How fresh `command` is at `now`.
 pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySettings) -> Freshness {
     let ahead = command.origin.saturating_sub(now);
@@ -121,8 +118,13 @@ pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySetti
 
 /// Age from which the largest force and torque come down by the slew limit until nothing may be felt any more.
 fn longest_in_full(settings: &SafetySettings) -> Duration {
-    let down =
-        (settings.max_force / settings.force_rate).max(settings.max_torque / settings.torque_rate);
+    // A write of a slow loop uses up less than its period of the slew limit.
+    let share = settings
+        .period
+        .div_duration_f64(SafetySettings::LONGEST_STEP);
+    let down = (settings.max_force / settings.force_rate)
+        .max(settings.max_torque / settings.torque_rate)
+        * share.max(1.0);
     let end = settings.hold.saturating_add(settings.ramp_out);
     // Negative and NaN: no time is known to be enough.
     Duration::try_from_secs_f64(down).map_or(Duration::ZERO, |down| end.saturating_sub(down))

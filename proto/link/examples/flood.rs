@@ -253,7 +253,7 @@ fn content() -> Result<Content, Failure> {
     let description = SceneDescription::of_body(
         "flood",
         BodyDescription {
-            name: "body".to_owned(),
+            name: "body".into(),
             mesh: MeshHash::of(&mesh.encode()?),
             pose: PoseF64::IDENTITY,
             colour: [1.0; 4],

@@ -27,7 +27,7 @@ fn content() -> Result<(Content, usize), Error> {
     let mesh = MeshBlob::new(Positions::F64(positions), faces, None)?;
     let bytes = mesh.encode()?;
     let body = BodyDescription {
-        name: "strip".to_owned(),
+        name: "strip".into(),
         mesh: MeshHash::of(&bytes),
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],

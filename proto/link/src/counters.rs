@@ -8,6 +8,14 @@ macro_rules! counters {
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         pub struct $name { $($(#[$field_doc])* pub $field: u64,)* }
 
+        impl $name {
+            /// All, by name.
+            #[must_use]
+            pub fn named(&self) -> Vec<(&'static str, u64)> {
+                vec![$((stringify!($field), self.$field),)*]
+            }
+        }
+
         #[derive(Debug, Default)]
         pub(crate) struct $cells { $(pub(crate) $field: Cell,)* }
 
@@ -135,6 +143,10 @@ counters! {
         multicast_heard,
         /// Times that the multicast group fell silent and states came by unicast again.
         multicast_lost,
+        /// Times that a member was found to forge the server's states.
+        states_forged,
+        /// Times that the group was left because the server did not confirm what came by it.
+        states_unconfirmed,
         /// Datagrams sent.
         packets_sent,
         /// Datagrams that the system did not take.

@@ -1,7 +1,7 @@
 //! Why a link does not come about or fails; each text says what, where and what to do.
 
 use std::{io, net::SocketAddr, path::PathBuf};
-use taut_proto::{ServerPin, control::RefusalCode, credential::NotAllowed};
+use taut_proto::{ServerPin, Untrusted, control::RefusalCode, credential::NotAllowed};
 
 /// Why a link does not come about or fails.
 #[derive(Debug, thiserror::Error)]
@@ -107,7 +107,7 @@ pub enum LinkError {
         /// Why, for programs.
         code: RefusalCode,
         /// Why, for people.
-        text: String,
+        text: Untrusted,
     },
     /// What comes is no taut.
     #[error("the server at {server} does not speak taut: {reason}; check the port")]

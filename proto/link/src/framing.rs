@@ -3,7 +3,7 @@
 use quinn::{ConnectionError, ReadExactError, RecvStream, SendStream, VarInt};
 use std::time::Duration;
 use taut_proto::{
-    DecodeError, EncodeError,
+    DecodeError, EncodeError, Printable,
     control::{ControlMessage, LENGTH_BYTES},
 };
 
@@ -82,7 +82,7 @@ async fn read_body(
         let chunk = stream
             .read_chunk(length - body.len(), true)
             .await
-            .map_err(|error| ReadMessageError::Ended(error.to_string()))?;
+            .map_err(|error| ReadMessageError::Ended(peer_text(&error)))?;
         match chunk {
             Some(chunk) => body.extend_from_slice(&chunk.bytes),
             None => return Err(DecodeError::Truncated.into()),
@@ -95,7 +95,7 @@ async fn read_exact(stream: &mut RecvStream, into: &mut [u8]) -> Result<(), Read
     stream.read_exact(into).await.map_err(|error| match error {
         ReadExactError::FinishedEarly(0) => ReadMessageError::Ended("the peer is done".to_owned()),
         ReadExactError::FinishedEarly(_) => DecodeError::Truncated.into(),
-        ReadExactError::ReadError(error) => ReadMessageError::Ended(error.to_string()),
+        ReadExactError::ReadError(error) => ReadMessageError::Ended(peer_text(&error)),
     })
 }
 
@@ -108,21 +108,26 @@ pub(crate) async fn write_message(
     stream
         .write_all(&frame)
         .await
-        .map_err(|error| WriteMessageError::Ended(error.to_string()))
+        .map_err(|error| WriteMessageError::Ended(peer_text(&error)))
 }
 
 /// Why a connection ended, for people; `peer` is "the server" or "the node".
 pub(crate) fn close_text(error: &ConnectionError, peer: &str) -> String {
     match error {
         ConnectionError::ApplicationClosed(close) if !close.reason.is_empty() => {
-            String::from_utf8_lossy(&close.reason).into_owned()
+            Printable(&String::from_utf8_lossy(&close.reason)).to_string()
         }
         ConnectionError::ApplicationClosed(_) => format!("{peer} left"),
         ConnectionError::TimedOut => format!("{peer} fell silent"),
         ConnectionError::LocallyClosed => "closed on this side".to_owned(),
         ConnectionError::Reset => format!("{peer} was restarted"),
-        other => format!("{peer} is lost: {other}"),
+        other => format!("{peer} is lost: {}", peer_text(other)),
     }
+}
+
+/// What QUIC says of a connection, in which the peer may have had its say: TLS alerts and reasons of closing carry its text.
+pub(crate) fn peer_text(error: &impl std::fmt::Display) -> String {
+    Printable(&error.to_string()).to_string()
 }
 
 #[cfg(test)]
@@ -160,7 +165,7 @@ mod tests {
         let (theirs, ours, _endpoints) = pair().await;
         let patience = Duration::from_millis(300);
         let message = ControlMessage::Bye(Bye {
-            reason: "done".to_owned(),
+            reason: "done".into(),
         });
         let frame = message.to_frame().expect("encodes");
         let (mut send, _) = theirs.open_bi().await.expect("open");

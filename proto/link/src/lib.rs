@@ -28,8 +28,9 @@ pub mod transport;
 
 pub use client::{
     ClientLink, ClientOptions, FrameGate, FrameStatus, FrameTurn, GaveUp, GroupReceiver,
-    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, ReceivedState, ReceivedWrench,
-    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, SessionEnd, SupervisedLink, connect,
+    LinkHealth, LinkWatch, MESH_CACHE_BYTES, MeshCache, Provenance, ReceivedState, ReceivedWrench,
+    RejoinPolicy, Rejoiner, ReleasedState, Renewal, Roster, ServerState, SessionEnd,
+    SupervisedLink, connect,
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};
@@ -42,8 +43,8 @@ pub use server::{
 };
 pub use taut_proto as proto;
 pub use taut_proto::{
-    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Role, ServerPin,
-    Transport,
+    Act, ClientStats, ClusterKey, Credential, Holder, JoinKey, JoinPolicy, Printable, Role,
+    ServerPin, Transport, Untrusted,
 };
 
 /// Default port of the control plane.

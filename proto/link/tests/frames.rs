@@ -43,6 +43,7 @@ impl Leader {
             frames: swap.map(|swap| MasterSettings {
                 swap,
                 period_ns: PERIOD.as_nanos() as u64,
+                slowest_ns: 1_000_000_000,
             }),
             ..ServerOptions::loopback(key('a'))
         })
@@ -174,6 +175,24 @@ impl Drop for Screen {
     }
 }
 
+/// Waits until so many frames were shown by more than one node. A starved machine leaves a node behind now and then.
+async fn show_together(shown: &Shown, at_least: usize) {
+    wait_until("frames of both", || {
+        let shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+        shown.values().filter(|states| states.len() > 1).count() >= at_least
+    })
+    .await;
+}
+
+/// Waits until the server has compared so many reports of what nodes drew.
+async fn compare(leader: &Leader, at_least: u64) {
+    wait_until("reports", || {
+        let report = leader.server.frame_report().unwrap_or_default();
+        report.counts.compared >= at_least
+    })
+    .await;
+}
+
 /// Equal frames showed equal states and had one plan, and enough of them were shown by more than one node.
 fn assert_equal_frames(shown: &Shown, at_least: usize) {
     let shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
@@ -197,23 +216,23 @@ async fn in_step(swap: Swap) {
     let table = Screen::start(&leader, Role::Render, "table", 7, &shown).await;
     front.show(40).await;
     table.show(40).await;
+    show_together(&shown, 30).await;
+    compare(&leader, 80).await;
     // Both are waited for once they have arrived in time for a while, however busy the machine is.
     wait_until("step", || {
         let report = leader.server.frame_report().unwrap_or_default();
-        report.skew.count >= 10
+        report.nodes.len() == 2 && report.nodes.iter().all(|(_, skew)| skew.count >= 10)
     })
     .await;
     drop((front, table));
     assert_equal_frames(&shown, 30);
     let report = leader.server.frame_report().unwrap_or_default();
     assert_eq!(report.counts.mismatches, 0, "{report:?}");
-    assert!(report.counts.compared >= 80, "{report:?}");
     let names: Vec<_> = report.nodes.iter().map(|(name, _)| name.as_str()).collect();
     assert!(
         names.contains(&"front") && names.contains(&"table"),
         "{report:?}"
     );
-    assert!(report.nodes.iter().all(|(_, skew)| skew.count >= 10));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -241,6 +260,8 @@ async fn a_bad_network_costs_time_but_never_truth() {
     let table = Screen::start(&leader, Role::Render, "table", 5, &shown).await;
     front.show(80).await;
     table.show(80).await;
+    show_together(&shown, 50).await;
+    compare(&leader, 160).await;
     drop((front, table));
     assert!(
         leader
@@ -251,7 +272,6 @@ async fn a_bad_network_costs_time_but_never_truth() {
     assert_equal_frames(&shown, 50);
     let report = leader.server.frame_report().unwrap_or_default();
     assert_eq!(report.counts.mismatches, 0, "{report:?}");
-    assert!(report.counts.compared >= 160, "{report:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -275,13 +295,14 @@ async fn a_node_that_stops_is_left_behind_and_taken_in_again() {
     let before = counts();
     table.paused.store(true, Ordering::SeqCst);
     front.show(30).await;
-    wait_until("eviction", || counts().evicted > before.evicted).await;
+    wait_until("it runs free", || counts().freed > before.freed).await;
     let stopped_at = table.frames();
     front.show(10).await;
     assert!(table.frames() <= stopped_at + 1);
 
     table.paused.store(false, Ordering::SeqCst);
     table.show(20).await;
+    show_together(&shown, 20).await;
     drop((front, table));
     assert_equal_frames(&shown, 20);
     assert_eq!(counts().mismatches, 0);

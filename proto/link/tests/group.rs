@@ -19,7 +19,7 @@ fn names(roster: &Roster) -> Vec<&str> {
     roster
         .members
         .iter()
-        .map(|member| member.node.as_str())
+        .map(|member| member.node.raw())
         .collect()
 }
 

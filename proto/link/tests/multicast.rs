@@ -11,7 +11,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::JoinHandle,
-    time::Duration,
+    time::{Duration, Instant},
 };
 use support::*;
 use taut_link::{
@@ -176,16 +176,26 @@ async fn one_datagram_serves_all_who_hear_the_group() {
     .await
     .unwrap_or_else(|error| panic!("{error}"));
 
-    let mut tick = until_path(&server, 1, &["left", "right"], true).await;
-    let unicast_before: u64 = unicast_states(&server, &["left", "right"]);
-    let multicast_before = server.counters().multicast_sent;
-    for client in [&left, &right, &bridge, &far] {
-        drain(client);
-        tick = take(&server, client, tick, 100).await;
+    let mut tick = 1;
+    let start = Instant::now();
+    loop {
+        tick = until_path(&server, tick, &["left", "right"], true).await;
+        let lost = || [&left, &right].map(|client| client.counters().multicast_lost);
+        let (lost_before, unicast_before) = (lost(), unicast_states(&server, &["left", "right"]));
+        let multicast_before = server.counters().multicast_sent;
+        for client in [&left, &right, &bridge, &far] {
+            drain(client);
+            tick = take(&server, client, tick, 100).await;
+        }
+        assert!(server.counters().multicast_sent >= multicast_before + 400);
+        // A time response now and then, but no states. A starved machine makes a group silent, or takes long for the few states.
+        if lost() == lost_before
+            && unicast_states(&server, &["left", "right"]) < unicast_before + 200
+        {
+            break;
+        }
+        assert!(start.elapsed() < PATIENCE, "states come by unicast");
     }
-    assert!(server.counters().multicast_sent >= multicast_before + 400);
-    // A time response now and then, but no states.
-    assert!(unicast_states(&server, &["left", "right"]) < unicast_before + 200);
     assert!(left.counters().multicast_heard > 100 && right.counters().multicast_heard > 100);
     let of_others = [&bridge, &far, &rare].map(|client| client.counters().multicast_heard);
     assert_eq!(of_others, [0; 3]);

@@ -79,7 +79,7 @@ async fn answer_to(server: SocketAddr, frame: &[u8]) -> ControlMessage {
 
 fn hello() -> Vec<u8> {
     let hello = ControlMessage::Hello(Hello {
-        node: "stranger".to_owned(),
+        node: "stranger".into(),
         role: Role::Render,
         transport: Transport::Udp,
         rate_hz: 0,
@@ -158,6 +158,8 @@ async fn a_second_node_of_one_name_is_refused_and_the_first_stays() {
 async fn a_full_server_says_so() {
     let server = server_with(ServerOptions {
         max_clients: 1,
+        idle_timeout: FORGIVING,
+        node_timeout: FORGIVING,
         ..ServerOptions::loopback(key('a'))
     })
     .await;

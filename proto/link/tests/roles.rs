@@ -2,7 +2,6 @@
 
 mod support;
 
-use std::time::Duration;
 use support::*;
 use taut_link::{
     Act, ClientLink, ClientOptions, Credential, Holder, JoinPolicy, LinkError, LinkEvent, Role,
@@ -225,7 +224,7 @@ async fn there_is_one_tracker_at_a_time() {
     match error_of(options(&server, Role::Tracker, "another")).await {
         LinkError::Refused { code, text, .. } => {
             assert_eq!(code, RefusalCode::TrackerTaken);
-            assert!(text.contains("head tracker \"tracker\""), "{text}");
+            assert!(text.raw().contains("head tracker \"tracker\""), "{text}");
         }
         other => panic!("{other}"),
     }
@@ -275,7 +274,7 @@ async fn a_revoked_credential_and_a_closed_role_stay_outside_and_a_new_issue_com
                 code: found, text, ..
             } => {
                 assert_eq!(found, code, "{text}");
-                assert!(text.contains("network."), "{text}");
+                assert!(text.raw().contains("network."), "{text}");
             }
             other => panic!("{name}: {other}"),
         }
@@ -322,12 +321,15 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
             .all(|client| client.udp_address.is_some())
     })
     .await;
-    for index in 0..2_000 {
-        flooding.send_input(&input(index));
-        if index % 100 == 0 {
-            tokio::time::sleep(Duration::from_millis(1)).await;
+    let mut flood = 0;
+    wait_until("being cut", || {
+        for _ in 0..200 {
+            flood += 1;
+            flooding.send_input(&input(flood));
         }
-    }
+        server.counters().flooded > 0
+    })
+    .await;
     // One that the full buffer of the socket did not take is followed by the next, as a device's are.
     let mut index = 0;
     wait_until("a reading of the device", || {
@@ -337,8 +339,7 @@ async fn who_floods_is_cut_to_his_rate_and_the_others_go_on() {
     })
     .await;
     let counters = server.counters();
-    assert!(counters.flooded > 0, "{counters:?}");
-    assert!(counters.forbidden < 2_000, "{counters:?}");
+    assert!(counters.forbidden < flood, "{counters:?}");
     assert_eq!(flooding.is_closed(), None);
     assert_eq!(device.is_closed(), None);
 }

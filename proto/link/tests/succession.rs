@@ -73,6 +73,7 @@ impl Leader {
             frames: Some(MasterSettings {
                 swap: Swap::Immediate,
                 period_ns: PERIOD.as_nanos() as u64,
+                slowest_ns: 1_000_000_000,
             }),
             ..ServerOptions::loopback(key('a'))
         };
@@ -141,7 +142,7 @@ fn until(what: &str, mut done: impl FnMut() -> bool) {
     let start = Instant::now();
     while !done() {
         assert!(
-            start.elapsed() < 3 * PATIENCE,
+            start.elapsed() < 2 * PATIENCE,
             "{what}: did not happen in time"
         );
         std::thread::sleep(Duration::from_millis(5));

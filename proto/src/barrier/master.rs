@@ -4,26 +4,29 @@
 //! |--------|---------------|------|--------------------------------------------------------------------|
 //! | P      | `period_ns`   | ns   | time between two frames: the workbench's, or the slowest node's own |
 //! | D      | `patience_ns` | ns   | drawing time after which nobody is waited for                      |
+//! | L      | `slowest_ns`  | ns   | longest P: the workbench's least rate                              |
 //!
 //! Frame N is released when its time has come and every node that is waited for has arrived, and at the latest D after it could be begun,
-//! D = max(1.5 P, min(2 P, 25 ms)). Where no node is waited for, because all are new or were late, all are, up to 250 ms: nobody is held up
+//! D = max(1.5 P, min(2 P, 25 ms)). Where no node is waited for, because all are new or were late, all are, up to D of L: nobody is held up
 //! who was in step, and slow nodes find together.
+//!
+//! A node that is made for fewer frames than the least rate, and one that is not in step within [`PROBATION_FRAMES`] or misses [`MAX_MISSES`], runs free:
+//! it draws the newest state whenever it can, is not waited for, and sets nobody's pace, until it has drawn as many frames in a row as fast as it says.
 
 use super::{
-    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MAX_MISSES,
-    MemberStatus, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, TERMS_LEFT_OUT,
+    Arrive, FARTHEST_AHEAD, FRAMES_LEFT_OUT, FrameSkew, LEAD_NS, MAX_MEMBERS, MOST_REIGNS_AHEAD,
+    MemberStatus, NodeState, RECLAIM_NS, ReleaseHead, SILENCE_NS, SWAP_TOLD_NS, TERMS_LEFT_OUT,
     member::Member,
     skew::{OpenFrame, Swaps},
+    succession::near,
 };
-use crate::group::SERVER_SENDER;
+use crate::{group::SERVER_SENDER, range::MAX_PERIOD_US};
 use arrayvec::ArrayVec;
 
 /// Longest that a frame waits for a node that is behind, whatever the period is, ns.
 const MAX_PATIENCE_NS: u64 = 25_000_000;
-/// Longest that a frame waits where nobody is in step, ns.
-const LOOSE_PATIENCE_NS: u64 = 250_000_000;
-/// Longest period that a node may ask for, ns: nobody holds the others up for longer.
-const MAX_PERIOD_NS: u64 = 1_000_000_000;
+/// Longest period of frames, ns.
+const MAX_PERIOD_NS: u64 = MAX_PERIOD_US as u64 * 1000;
 /// Released frames whose state is remembered, to compare with what nodes say they drew.
 const REMEMBERED: usize = 64;
 /// Changes kept for who takes them.
@@ -46,6 +49,8 @@ pub struct MasterSettings {
     pub swap: Swap,
     /// Shortest time between two, ns.
     pub period_ns: u64,
+    /// Longest time between two that a slow node brings about, ns: one that is made for less runs free. One below `period_ns` is that.
+    pub slowest_ns: u64,
 }
 
 /// The newest state, one of which the next frame is drawn from.
@@ -65,8 +70,10 @@ pub enum Answer {
     Counted,
     /// The node missed a RELEASE: send it the newest again, to it alone.
     Repeat,
-    /// It names a frame that nobody began, or there are [`MAX_MEMBERS`] already: it has no effect.
+    /// It names a frame that nobody began or a reign that nobody can have begun: it has no effect.
     Refused,
+    /// There are [`MAX_MEMBERS`] already: the node swaps on its own.
+    Full,
 }
 
 /// What became of a node.
@@ -89,8 +96,10 @@ pub struct Counts {
     pub compared: u64,
     /// Of these, other than the released one.
     pub mismatches: u64,
-    /// Nodes that are out for silence or for missing frames.
+    /// Nodes that are out for silence.
     pub evicted: u64,
+    /// Times that a node was left to swap on its own.
+    pub freed: u64,
     /// ARRIVEs that were refused.
     pub refused: u64,
     /// Reigns of nodes that the server ended.
@@ -114,7 +123,7 @@ pub struct Master {
     /// When the last node arrived at the open frame.
     arrival_ns: u64,
     /// Term and frame number that the next RELEASE goes on from: nodes led meanwhile.
-    reclaim: Option<(u32, u64)>,
+    reclaim: Option<(u64, u64)>,
     /// When that was found last, ns.
     reclaimed_ns: Option<u64>,
     /// Frame number and state of the newest frames that were begun.
@@ -127,7 +136,7 @@ pub struct Master {
 
 impl Master {
     /// A master without nodes, whose first RELEASE is of frame `first`.
-    pub fn new(settings: MasterSettings, master: u16, term: u32, first: u64) -> Master {
+    pub fn new(settings: MasterSettings, master: u16, term: u64, first: u64) -> Master {
         Master {
             settings,
             newest: ReleaseHead {
@@ -167,8 +176,7 @@ impl Master {
         arrive: &Arrive,
     ) -> (Answer, Option<FrameSkew>) {
         let Some(index) = self.find_or_admit(now_ns, session) else {
-            self.counts.refused += 1;
-            return (Answer::Refused, None);
+            return (Answer::Full, None);
         };
         let begun = self.counts.released > 0;
         let open = self.newest.frame + 1;
@@ -180,8 +188,12 @@ impl Master {
         let member = &mut self.members[index];
         member.heard_ns = member.heard_ns.max(now_ns);
         member.period_us = arrive.period_us;
+        self.free_the_slow(index);
         if foreign {
-            self.reclaim(now_ns, arrive);
+            if !self.reclaim(now_ns, arrive) {
+                self.counts.refused += 1;
+                return (Answer::Refused, None);
+            }
             // It knows no frame of this reign: the newest RELEASE tells it where we are.
             let answer = if begun {
                 Answer::Repeat
@@ -190,19 +202,19 @@ impl Master {
             };
             return (answer, None);
         }
-        let skew = self
-            .swaps
-            .tell(session, arrive.swapped_frame, arrive.swapped_ns);
+        let told_ns = self.told(now_ns, arrive);
+        let skew = self.swaps.tell(session, arrive.swapped_frame, told_ns);
         if let Some(skew) = &skew {
             self.skew_ns = u32::try_from(skew.skew_ns).unwrap_or(u32::MAX);
         }
-        if arrive.frame > member.arrived {
+        if arrive.frame > self.members[index].arrived {
             let in_time = arrive.frame == open && now_ns <= self.opened_ns + self.patience_ns()
                 || arrive.frame + 1 == open && now_ns <= self.last_deadline_ns;
             self.compare(arrive);
+            let patience_ns = self.patience_for(&self.members[index]);
             let member = &mut self.members[index];
             let before = member.state;
-            member.arrive(arrive, in_time);
+            member.arrive(now_ns, arrive, in_time, patience_ns);
             if member.state != before {
                 let to = Some(member.state);
                 self.tell(session, to);
@@ -256,7 +268,7 @@ impl Master {
         let open = self.newest.frame + 1;
         let counts = |m: &Member| match self.in_step {
             true => m.is_waited_for(),
-            false => m.state != NodeState::Joining,
+            false => m.sets_the_pace(),
         };
         let missing = |m: &Member| counts(m) && m.arrived < open;
         let due_ns = self.due_ns.saturating_sub(self.lead_ns());
@@ -287,20 +299,55 @@ impl Master {
         (!self.changes.is_empty()).then(|| self.changes.remove(0))
     }
 
-    /// P: the workbench's period, or the longest that a node is made for.
+    /// P: the workbench's period, or the longest that a node is made for which sets the pace.
     pub fn period_ns(&self) -> u64 {
-        let own = |m: &Member| (u64::from(m.period_us) * 1000).min(MAX_PERIOD_NS);
-        let slowest = self.members.iter().map(own).max().unwrap_or(0);
-        self.settings.period_ns.max(slowest)
+        let paced = self.members.iter().filter(|m| m.sets_the_pace());
+        let slowest = paced.map(own_ns).max().unwrap_or(0);
+        self.settings.period_ns.min(MAX_PERIOD_NS).max(slowest)
     }
 
-    /// D, longer while nobody is in step.
+    /// L.
+    fn slowest_ns(&self) -> u64 {
+        let slowest_ns = self.settings.slowest_ns.max(self.settings.period_ns);
+        slowest_ns.min(MAX_PERIOD_NS)
+    }
+
+    /// D, that of L while nobody is in step.
     pub fn patience_ns(&self) -> u64 {
-        let period = self.period_ns();
-        let patience = (period + period / 2).max((2 * period).min(MAX_PATIENCE_NS));
-        match self.in_step {
-            true => patience,
-            false => patience.max(LOOSE_PATIENCE_NS),
+        patience_of(match self.in_step {
+            true => self.period_ns(),
+            false => self.slowest_ns(),
+        })
+    }
+
+    /// What a frame of this node may take by what it says of itself; 0 where that is below the least rate.
+    fn patience_for(&self, member: &Member) -> u64 {
+        match own_ns(member) <= self.slowest_ns() {
+            true => patience_of(own_ns(member).max(self.settings.period_ns)),
+            false => 0,
+        }
+    }
+
+    /// Leaves a node to itself that says it is slower than the least rate.
+    fn free_the_slow(&mut self, index: usize) {
+        let slowest_ns = self.slowest_ns();
+        let member = &mut self.members[index];
+        let runs = member.state == NodeState::FreeRunning;
+        if own_ns(member) > slowest_ns && !runs {
+            let session = member.session;
+            member.run_free();
+            self.counts.freed += 1;
+            self.tell(session, Some(NodeState::FreeRunning));
+        }
+    }
+
+    /// When the swap was called, as the node tells it; 0 if it does not know, or if that cannot be.
+    fn told(&self, now_ns: u64, arrive: &Arrive) -> u64 {
+        let lately = now_ns.abs_diff(arrive.swapped_ns) <= SWAP_TOLD_NS;
+        // Where a node leads, its clock is not the session's, and nobody asks.
+        match lately || self.newest.master != SERVER_SENDER {
+            true => arrive.swapped_ns,
+            false => 0,
         }
     }
 
@@ -327,17 +374,24 @@ impl Master {
         }
     }
 
-    /// The server was silent, and a node led: from its next RELEASE on the server does again, in a reign above all.
-    fn reclaim(&mut self, now_ns: u64, arrive: &Arrive) {
-        let lately = self.reclaimed_ns.is_some_and(|at| now_ns < at + RECLAIM_NS);
-        if self.newest.master != SERVER_SENDER || arrive.term <= self.newest.term || lately {
-            return;
+    /// The server was silent, and a node led: from its next RELEASE on the server does again, in a reign above all. `false` if the node claims what
+    /// cannot be.
+    fn reclaim(&mut self, now_ns: u64, arrive: &Arrive) -> bool {
+        if self.newest.master != SERVER_SENDER || arrive.term <= self.newest.term {
+            return true;
         }
-        let ahead = arrive.frame.saturating_sub(self.newest.frame);
-        let frame = self.newest.frame + ahead.min(FARTHEST_AHEAD) + FRAMES_LEFT_OUT;
-        self.reclaim = Some((arrive.term.saturating_add(TERMS_LEFT_OUT), frame));
-        self.reclaimed_ns = Some(now_ns);
-        self.counts.reclaimed += 1;
+        if !near(self.newest.term, arrive.term, MOST_REIGNS_AHEAD)
+            || !near(self.newest.frame, arrive.frame, FARTHEST_AHEAD)
+        {
+            return false;
+        }
+        if self.reclaimed_ns.is_none_or(|at| now_ns >= at + RECLAIM_NS) {
+            let frame = self.newest.frame.max(arrive.frame) + FRAMES_LEFT_OUT;
+            self.reclaim = Some((arrive.term + TERMS_LEFT_OUT, frame));
+            self.reclaimed_ns = Some(now_ns);
+            self.counts.reclaimed += 1;
+        }
+        true
     }
 
     /// Compares what was drawn with what was released for that frame, while that is known.
@@ -371,6 +425,7 @@ impl Master {
             }
         }
         self.drop_the_dead(now_ns);
+        self.free_those_behind();
         for &session in &late {
             let Some(member) = self.members.iter_mut().find(|m| m.session == session) else {
                 continue;
@@ -424,26 +479,47 @@ impl Master {
         })
     }
 
-    /// Lets nodes go that were silent or missed too many frames.
+    /// Lets nodes go that were silent.
     fn drop_the_dead(&mut self, now_ns: u64) {
-        let mut gone = ArrayVec::<u16, MAX_MEMBERS>::new();
-        for member in &mut self.members {
-            // Who has not drawn a frame yet may take its time, as long as it is alive.
-            let counts = member.state != NodeState::Joining && !member.arrived_lately;
-            member.misses = if counts { member.misses + 1 } else { 0 };
-            member.arrived_lately = false;
-            let silent = now_ns.saturating_sub(member.heard_ns) > SILENCE_NS;
-            if silent || member.misses >= MAX_MISSES {
-                gone.push(member.session);
-            }
-        }
+        let silent = |m: &&Member| now_ns.saturating_sub(m.heard_ns) > SILENCE_NS;
+        let gone: ArrayVec<u16, MAX_MEMBERS> = self
+            .members
+            .iter()
+            .filter(silent)
+            .map(|m| m.session)
+            .collect();
         for session in gone {
             self.leave(session);
             self.counts.evicted += 1;
         }
     }
 
+    /// Leaves nodes to themselves that missed too many frames, or did not come into step in time.
+    fn free_those_behind(&mut self) {
+        let mut freed = ArrayVec::<u16, MAX_MEMBERS>::new();
+        for member in &mut self.members {
+            if member.count_release() {
+                member.run_free();
+                freed.push(member.session);
+            }
+        }
+        for session in freed {
+            self.counts.freed += 1;
+            self.tell(session, Some(NodeState::FreeRunning));
+        }
+    }
+
     fn tell(&mut self, session: u16, to: Option<NodeState>) {
         let _ = self.changes.try_push(Change { session, to });
     }
+}
+
+/// The period that a node is made for, ns.
+fn own_ns(member: &Member) -> u64 {
+    u64::from(member.period_us) * 1000
+}
+
+/// D of a period.
+fn patience_of(period_ns: u64) -> u64 {
+    (period_ns + period_ns / 2).max((2 * period_ns).min(MAX_PATIENCE_NS))
 }

@@ -1,6 +1,6 @@
 //! One node as the master sees it.
 
-use super::{Arrive, RECOVERY_FRAMES, WARM_UP_FRAMES};
+use super::{Arrive, MAX_MISSES, PROBATION_FRAMES, RECOVERY_FRAMES, WARM_UP_FRAMES};
 
 /// How far a node is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,6 +13,8 @@ pub enum NodeState {
     Synced,
     /// It was waited for in vain; the others do not wait until it is back on time.
     Late,
+    /// It is slower than the least rate, or than it says: it swaps on its own, and nothing of it counts for the others.
+    FreeRunning,
 }
 
 /// What the master knows of a node.
@@ -45,12 +47,16 @@ pub(super) struct Member {
     knows_time: bool,
     /// When it was heard last: session time, ns.
     pub(super) heard_ns: u64,
-    /// Frames in a row at which it arrived in time.
+    /// When it arrived at a frame last: session time, ns.
+    arrived_ns: u64,
+    /// Frames in a row at which it arrived in time; of one that runs free, frames that it drew as fast as it says.
     on_time: u32,
     /// Releases in a row without an arrival between them.
-    pub(super) misses: u32,
+    misses: u32,
+    /// Releases in a row for which it was new or late.
+    probation: u32,
     /// It arrived, at whatever frame, since the last release.
-    pub(super) arrived_lately: bool,
+    arrived_lately: bool,
 }
 
 impl Member {
@@ -65,14 +71,23 @@ impl Member {
             period_us: 0,
             knows_time: false,
             heard_ns: now_ns,
+            arrived_ns: now_ns,
             on_time: 0,
             misses: 0,
+            probation: 0,
             arrived_lately: false,
         }
     }
 
-    /// Takes the arrival at a frame that it has not arrived at yet.
-    pub(super) fn arrive(&mut self, arrive: &Arrive, in_time: bool) {
+    /// Takes the arrival at a frame that it has not arrived at yet. `patience_ns`: what a frame may take at the rate that the node says it is made for;
+    /// 0 where that is below the least rate.
+    pub(super) fn arrive(&mut self, now_ns: u64, arrive: &Arrive, in_time: bool, patience_ns: u64) {
+        let took_ns = now_ns.saturating_sub(self.arrived_ns);
+        self.arrived_ns = now_ns;
+        let in_time = match self.state {
+            NodeState::FreeRunning => took_ns <= patience_ns,
+            _ => in_time,
+        };
         self.arrived = arrive.frame;
         self.missed = arrive.missed;
         self.draw_us = arrive.draw_us;
@@ -83,8 +98,42 @@ impl Member {
             NodeState::Joining => NodeState::WarmUp,
             NodeState::WarmUp if self.on_time >= WARM_UP_FRAMES => NodeState::Synced,
             NodeState::Late if self.on_time >= RECOVERY_FRAMES => NodeState::Synced,
+            NodeState::FreeRunning if self.on_time >= PROBATION_FRAMES => {
+                self.on_time = 0;
+                NodeState::WarmUp
+            }
             state => state,
         };
+        if self.is_waited_for() {
+            self.probation = 0;
+        }
+    }
+
+    /// From now on it swaps on its own.
+    pub(super) fn run_free(&mut self) {
+        self.state = NodeState::FreeRunning;
+        (self.on_time, self.misses, self.probation) = (0, 0, 0);
+    }
+
+    /// Counts a release; whether the node is too slow to be counted on from now on. Who has not drawn a frame yet may take its time, as long as it
+    /// is alive.
+    pub(super) fn count_release(&mut self) -> bool {
+        let arrived = std::mem::take(&mut self.arrived_lately);
+        if matches!(self.state, NodeState::Joining | NodeState::FreeRunning) {
+            return false;
+        }
+        self.misses = if arrived { 0 } else { self.misses + 1 };
+        self.probation = if self.is_waited_for() {
+            0
+        } else {
+            self.probation + 1
+        };
+        self.misses >= MAX_MISSES || self.probation >= PROBATION_FRAMES
+    }
+
+    /// Whether frames go no faster than this node may: it draws them, or did a moment ago.
+    pub(super) fn sets_the_pace(&self) -> bool {
+        !matches!(self.state, NodeState::Joining | NodeState::FreeRunning)
     }
 
     /// The frame is released without it.

@@ -1,10 +1,11 @@
 //! ARRIVE and RELEASE as they travel.
 //!
-//! Fullest RELEASE: 39 bytes and two for each of 32 members, then the state of 996: 1099 of [`crate::header::MAX_PAYLOAD_BYTES`].
+//! Fullest RELEASE: 43 bytes and two for each of 32 members, then the state of 996: 1103 of [`crate::header::MAX_PAYLOAD_BYTES`].
 
 use crate::{
     DecodeError, EncodeError, HotState,
-    codec::{Reader, Wire, Writer, read_elements, wire_struct},
+    codec::{Reader, Wire, Writer, read_elements, wire_ranged},
+    range::{BITS, COUNT, COUNT_32, NAME, NODE_PERIOD, Number, PERIOD, SENDER, TIME},
 };
 use arrayvec::ArrayVec;
 
@@ -12,7 +13,7 @@ use arrayvec::ArrayVec;
 pub const MAX_MEMBERS: usize = 32;
 
 /// Bytes of a [`ReleaseHead`] before the number of members.
-const FIXED_BYTES: usize = 38;
+const FIXED_BYTES: usize = 42;
 
 /// ARRIVE payload, node to master: a frame is drawn.
 ///
@@ -20,7 +21,7 @@ const FIXED_BYTES: usize = 38;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Arrive {
     /// [`ReleaseHead::term`] that the node follows; 0 for none.
-    pub term: u32,
+    pub term: u64,
     /// The frame; 0 says that the node has none yet and wants to take part.
     pub frame: u64,
     /// When it was drawn: session time, ns.
@@ -41,17 +42,17 @@ pub struct Arrive {
     pub period_us: u32,
 }
 
-wire_struct!(Arrive {
-    term,
-    frame,
-    ready_ns,
-    state_hash,
-    state_time_ns,
-    missed,
-    swapped_frame,
-    swapped_ns,
-    draw_us,
-    period_us
+wire_ranged!(Arrive {
+    term in COUNT,
+    frame in COUNT,
+    ready_ns in TIME,
+    state_hash in NAME,
+    state_time_ns in TIME,
+    missed in COUNT_32,
+    swapped_frame in COUNT,
+    swapped_ns in TIME,
+    draw_us in COUNT_32,
+    period_us in NODE_PERIOD
 });
 
 /// What a RELEASE says beside the state.
@@ -59,7 +60,7 @@ wire_struct!(Arrive {
 pub struct ReleaseHead {
     /// Number of the master's reign: 1 is the server's, each successor adds one. Of two masters the higher term is followed, then the lower
     /// `master`.
-    pub term: u32,
+    pub term: u64,
     /// Session number of the master; 0 is the server.
     pub master: u16,
     /// The frame that is to be shown; strictly increasing within a term.
@@ -89,7 +90,7 @@ pub struct Release {
 
 impl ReleaseHead {
     /// Term, then the lower master: which of two masters is followed.
-    pub fn rank(&self) -> (u32, u16) {
+    pub fn rank(&self) -> (u64, u16) {
         (self.term, u16::MAX - self.master)
     }
 
@@ -111,32 +112,57 @@ impl ReleaseHead {
     }
 }
 
+const TERM: Number = Number::new("ReleaseHead.term", COUNT);
+const MASTER: Number = Number::new("ReleaseHead.master", SENDER);
+const FRAME: Number = Number::new("ReleaseHead.frame", COUNT);
+const SWAP: Number = Number::new("ReleaseHead.swap_ns", TIME);
+const FRAME_PERIOD: Number = Number::new("ReleaseHead.period_us", PERIOD);
+const SKEW: Number = Number::new("ReleaseHead.skew_ns", COUNT_32);
+const MEMBER_BITS: Number = Number::new("ReleaseHead.waited, late", BITS);
+const MEMBER: Number = Number::new("ReleaseHead.members", NAME);
+
+impl ReleaseHead {
+    /// Its numbers and what each may be.
+    pub const NUMBERS: &'static [Number] = &[
+        TERM,
+        MASTER,
+        FRAME,
+        SWAP,
+        FRAME_PERIOD,
+        SKEW,
+        MEMBER_BITS,
+        MEMBER,
+    ];
+}
+
 impl Wire for ReleaseHead {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {
-        self.term.write(to)?;
-        self.master.write(to)?;
-        self.frame.write(to)?;
-        self.swap_ns.write(to)?;
-        self.period_us.write(to)?;
-        self.skew_ns.write(to)?;
-        self.waited.write(to)?;
-        self.late.write(to)?;
+        TERM.write(&self.term, to)?;
+        MASTER.write(&self.master, to)?;
+        FRAME.write(&self.frame, to)?;
+        SWAP.write(&self.swap_ns, to)?;
+        FRAME_PERIOD.write(&self.period_us, to)?;
+        SKEW.write(&self.skew_ns, to)?;
+        MEMBER_BITS.write(&self.waited, to)?;
+        MEMBER_BITS.write(&self.late, to)?;
         (self.members.len() as u8).write(to)?; // at most MAX_MEMBERS
         self.members.iter().try_for_each(|member| member.write(to))
     }
 
     fn read(from: &mut Reader<'_>) -> Result<ReleaseHead, DecodeError> {
-        let term = Wire::read(from)?;
-        let master = Wire::read(from)?;
-        let frame = Wire::read(from)?;
-        let swap_ns = Wire::read(from)?;
-        let period_us = Wire::read(from)?;
-        let skew_ns = Wire::read(from)?;
-        let waited = Wire::read(from)?;
-        let late = Wire::read(from)?;
+        let term = TERM.read(from)?;
+        let master = MASTER.read(from)?;
+        let frame = FRAME.read(from)?;
+        let swap_ns = SWAP.read(from)?;
+        let period_us = FRAME_PERIOD.read(from)?;
+        let skew_ns = SKEW.read(from)?;
+        let waited: u32 = MEMBER_BITS.read(from)?;
+        let late: u32 = MEMBER_BITS.read(from)?;
         let count = Wire::read(from)?;
         let members: ArrayVec<u16, MAX_MEMBERS> = read_elements(from, count)?;
-        if members.windows(2).any(|pair| pair[0] >= pair[1]) {
+        // Nobody is waited for, or late, who is not there.
+        let of_nobody = u64::from(waited | late) >> members.len() != 0;
+        if of_nobody || members.windows(2).any(|pair| pair[0] >= pair[1]) {
             return Err(DecodeError::Inconsistent {
                 what: "members of a frame",
             });
@@ -155,7 +181,7 @@ impl Wire for ReleaseHead {
     }
 }
 
-wire_struct!(Release { head, state });
+wire_ranged!(Release { head, state });
 
 /// The bytes of the state in the payload of a RELEASE, for its fingerprint; empty if the payload is no RELEASE.
 pub fn state_bytes(payload: &[u8]) -> &[u8] {

@@ -44,7 +44,10 @@ pub const REPEAT_NS: u64 = 200_000;
 pub const WARM_UP_FRAMES: u32 = 5;
 /// Frames that a late node arrives at in time before the others wait for it again: one that is now and then in time costs nothing.
 pub const RECOVERY_FRAMES: u32 = 3;
-/// Frames in a row without a sign of a node after which it is out.
+/// Frames in a row within which a node that is new or was late comes to be waited for; who does not swaps on its own. As many in a row, each as soon
+/// as the node says it may, bring it back.
+pub const PROBATION_FRAMES: u32 = 30;
+/// Frames in a row at which a node did not arrive after which it swaps on its own.
 pub const MAX_MISSES: u32 = 10;
 /// Silence after which a node is out, ns.
 pub const SILENCE_NS: u64 = 500_000_000;
@@ -60,7 +63,12 @@ pub const RECLAIM_NS: u64 = 1_000_000_000;
 /// Frame numbers that a new reign leaves out: more than any RELEASE that it may have missed.
 pub const FRAMES_LEFT_OUT: u64 = 1024;
 /// Reigns that the server leaves out when it takes the frames back: more than nodes may have begun meanwhile, so that no two masters have one term.
-pub const TERMS_LEFT_OUT: u32 = 64;
+pub const TERMS_LEFT_OUT: u64 = 64;
+/// Most reigns that a node may say it is ahead of the known one: more than any cluster begins while one of its nodes hears nothing, and with
+/// [`RECLAIM_NS`] too few to come near the end of the numbers in the life of a workbench.
+pub const MOST_REIGNS_AHEAD: u64 = 1024;
+/// Longest that a swap may lie in the past when it is told, ns; one that lies further, or in the future, is not believed.
+pub const SWAP_TOLD_NS: u64 = 10_000_000_000;
 /// Farthest that a node may say the frames are ahead of those that are known: a year of 120 frames per second.
 pub const FARTHEST_AHEAD: u64 = 1 << 32;
 /// Silence of all masters after which a node draws on its own, ns.

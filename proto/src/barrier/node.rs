@@ -11,7 +11,7 @@
 use super::{
     ARRIVE_PERIOD_NS, Arrive, FREE_NS, HUSH_NS, JOIN_PERIOD_NS, ReleaseHead, SLOWEST_ARRIVE_NS,
 };
-use crate::group::SERVER_SENDER;
+use crate::{group::SERVER_SENDER, range::MAX_NODE_PERIOD_US};
 
 /// What a node is to do now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,8 +55,8 @@ pub struct Drawn {
 enum Phase {
     Free,
     Ready,
-    Drawing { frame: u64, rank: (u32, u16) },
-    Waiting { frame: u64, rank: (u32, u16) },
+    Drawing { frame: u64, rank: (u64, u16) },
+    Waiting { frame: u64, rank: (u64, u16) },
 }
 
 /// One node. Times are ns on any clock of the node that does not fall.
@@ -83,7 +83,7 @@ impl Node {
     pub fn new(session: u16, period_us: u32) -> Node {
         Node {
             session,
-            period_us,
+            period_us: period_us.min(MAX_NODE_PERIOD_US),
             phase: Phase::Free,
             newest: None,
             quiet_since_ns: 0,

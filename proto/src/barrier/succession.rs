@@ -7,13 +7,11 @@
 //!
 //! Source: Garcia-Molina 1982 (bully election), with time-outs instead of messages.
 
-use super::{FARTHEST_AHEAD, FRAMES_LEFT_OUT, ReleaseHead, SUCCESSION_NS};
+use super::{FARTHEST_AHEAD, FRAMES_LEFT_OUT, MOST_REIGNS_AHEAD, ReleaseHead, SUCCESSION_NS};
 use crate::group::SERVER_SENDER;
 
 /// Turns that fit into the silence before the first: 50 ms from one to the next by default. A RELEASE of the earlier one is there long before.
 const TURNS_PER_SILENCE: u64 = 3;
-/// Most reigns that a member may say it is ahead: one datagram must not use the numbers up.
-const MOST_REIGNS_AHEAD: u32 = 1024;
 
 /// What a node is to do about the master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +22,7 @@ pub enum Successor {
     /// Be the master from now on, in this term, from this frame on, with the state held from the last RELEASE.
     Stand {
         /// Of its RELEASEs.
-        term: u32,
+        term: u64,
         /// Of its first RELEASE.
         first: u64,
     },
@@ -40,7 +38,7 @@ pub struct Succession {
     silence_ns: u64,
     heard_ns: u64,
     newest: Option<ReleaseHead>,
-    reign: Option<u32>,
+    reign: Option<u64>,
 }
 
 impl Succession {
@@ -62,8 +60,8 @@ impl Succession {
         self
     }
 
-    /// Whether a RELEASE that `sender` sent as a member may count: it names its sender as master, the numbers are near those that are known, and the
-    /// server has been silent for most of the time after which a node may stand. While the server is heard, no member releases anything.
+    /// Whether a RELEASE that `sender` sent as a member may count: it names its sender as master, the numbers are near those that are known, frames are
+    /// no slower than they were, and the server has been silent for most of the time after which a node may stand. While the server is heard, no member releases anything.
     pub fn may_follow(&self, now_ns: u64, sender: u16, head: &ReleaseHead) -> bool {
         let Some(newest) = &self.newest else {
             return false; // never part of anything
@@ -72,8 +70,9 @@ impl Succession {
         let silent = now_ns.saturating_sub(self.heard_ns) >= self.silence_ns / 3 * 2;
         head.master == sender
             && sender != SERVER_SENDER
-            && head.term <= newest.term.saturating_add(MOST_REIGNS_AHEAD)
-            && head.frame <= newest.frame.saturating_add(FARTHEST_AHEAD)
+            && near(newest.term, head.term, MOST_REIGNS_AHEAD)
+            && near(newest.frame, head.frame, FARTHEST_AHEAD)
+            && head.period_us <= newest.period_us
             && (newest.master != SERVER_SENDER || silent)
     }
 
@@ -124,7 +123,7 @@ impl Succession {
         if now_ns.saturating_sub(self.heard_ns) < self.silence_ns + place * turn_ns {
             return Successor::No;
         }
-        let term = newest.term.saturating_add(1);
+        let term = newest.term + 1; // no decoder lets a number near the end pass
         self.reign = Some(term);
         Successor::Stand {
             term,
@@ -141,4 +140,9 @@ impl Succession {
             .is_some_and(|master| master < place);
         Some((place - usize::from(gone)) as u64)
     }
+}
+
+/// Whether `claimed` is at most so far beyond `known`; what lies before it is near.
+pub(super) fn near(known: u64, claimed: u64, most: u64) -> bool {
+    claimed.saturating_sub(known) <= most
 }

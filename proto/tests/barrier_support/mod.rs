@@ -108,7 +108,7 @@ pub fn any_world_whose_server_pauses() -> impl Strategy<Value = World> {
 }
 
 /// When, of which reign, which frame.
-type Moment = (u64, (u32, u16), u64);
+type Moment = (u64, (u64, u16), u64);
 
 /// What was seen of the outside.
 #[derive(Debug, Default)]
@@ -116,7 +116,7 @@ pub struct Seen {
     /// RELEASEs as sent: when, rank, frame.
     releases: Vec<Moment>,
     /// What a frame of a reign shows, by all nodes that showed it.
-    states: HashMap<((u32, u16), u64), Vec<u64>>,
+    states: HashMap<((u64, u16), u64), Vec<u64>>,
     /// When each node showed which frame of which reign.
     shown: BTreeMap<u16, Vec<Moment>>,
     mismatches: u64,
@@ -193,8 +193,8 @@ struct Screen {
     /// State of the newest RELEASE.
     tuple: Newest,
     /// What is being drawn: until when, frame, reign, state.
-    drawing: Option<(u64, u64, (u32, u16), Newest)>,
-    drawn: Option<(u64, (u32, u16), Newest)>,
+    drawing: Option<(u64, u64, (u64, u16), Newest)>,
+    drawn: Option<(u64, (u64, u16), Newest)>,
     heard_server: u64,
 }
 
@@ -212,6 +212,7 @@ impl World {
         MasterSettings {
             swap: self.swap,
             period_ns: self.period_ns,
+            slowest_ns: 100 * MS,
         }
     }
 

@@ -7,6 +7,7 @@ use taut_proto::{
 };
 
 use super::hot::{any_hot, hot};
+use super::values::far;
 
 pub fn arrive() -> Arrive {
     Arrive {
@@ -42,8 +43,14 @@ pub fn release() -> Release {
 
 pub fn any_arrive() -> impl Strategy<Value = Arrive> {
     (
-        any::<(u32, u64, u64, u64, u64)>(),
-        any::<(u32, u64, u64, u32, u32)>(),
+        (far(), far(), far(), any::<u64>(), far()),
+        (
+            any::<u32>(),
+            far(),
+            far(),
+            any::<u32>(),
+            0..=100_000_000_u32,
+        ),
     )
         .prop_map(
             |(
@@ -67,12 +74,19 @@ pub fn any_arrive() -> impl Strategy<Value = Arrive> {
 pub fn any_release() -> impl Strategy<Value = Release> {
     let members = prop::collection::btree_set(any::<u16>(), 0..=MAX_MEMBERS);
     (
-        any::<(u32, u16, u64, u64, u32, u32, u32, u32)>(),
+        (far(), any::<u16>(), far(), far()),
+        (0..=1_000_000_u32, any::<u32>(), any::<u32>(), any::<u32>()),
         members,
         any_hot(),
     )
         .prop_map(
-            |((term, master, frame, swap_ns, period_us, skew_ns, waited, late), members, state)| {
+            |(
+                (term, master, frame, swap_ns),
+                (period_us, skew_ns, waited, late),
+                members,
+                state,
+            )| {
+                let of_members = ((1_u64 << members.len()) - 1) as u32;
                 Release {
                     head: ReleaseHead {
                         term,
@@ -81,8 +95,8 @@ pub fn any_release() -> impl Strategy<Value = Release> {
                         swap_ns,
                         period_us,
                         skew_ns,
-                        waited,
-                        late,
+                        waited: waited & of_members,
+                        late: late & of_members,
                         members: members.into_iter().collect(),
                     },
                     state,

@@ -8,7 +8,7 @@ use taut_proto::{
     },
 };
 
-use super::values::{finite32, pose64};
+use super::values::{far, finite32, pose64, size32};
 
 /// A part with a row of every kind.
 pub fn part() -> ConstraintPart {
@@ -60,7 +60,7 @@ pub fn part() -> ConstraintPart {
 /// As many rows as a datagram surely holds, at any place of a set.
 pub fn any_part() -> impl Strategy<Value = ConstraintPart> {
     (
-        any::<(u64, u64, u64)>(),
+        (far(), far(), far()),
         pose64(),
         0_u8..4,
         (1..=MAX_PARTS as u8).prop_flat_map(|parts| (0..parts, Just(parts))),
@@ -97,23 +97,24 @@ pub fn any_part() -> impl Strategy<Value = ConstraintPart> {
 
 pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
     let three = || prop::array::uniform3(finite32());
-    let two = move || prop::array::uniform2(three());
+    let unit = || prop::array::uniform3(-1.0..=1.0_f32);
+    let two = move || prop::array::uniform2(unit());
     let separation = prop_oneof![
         Just(RowSeparation::OfObstacle),
         Just(RowSeparation::OfBody),
         two().prop_map(RowSeparation::OfEdges),
-        finite32().prop_map(RowSeparation::OfBall),
-        (three(), three(), finite32()).prop_map(|(c, a, r)| RowSeparation::OfRim(c, a, r)),
-        (two(), prop::array::uniform2(finite32())).prop_map(|(u, r)| RowSeparation::OfRods(u, r)),
+        size32().prop_map(RowSeparation::OfBall),
+        (three(), unit(), size32()).prop_map(|(c, a, r)| RowSeparation::OfRim(c, a, r)),
+        (two(), prop::array::uniform2(size32())).prop_map(|(u, r)| RowSeparation::OfRods(u, r)),
     ];
     let feature = || (0_u8..16, any::<u32>()).prop_map(|(kind, index)| RowFeature { kind, index });
-    let came = prop_oneof![Just(0.0_f32), prop::num::f32::NORMAL];
+    let came = prop_oneof![Just(0.0_f32), finite32()];
     (
         any::<u16>(),
         (feature(), feature()),
-        (three(), three(), finite32(), came),
+        (three(), unit(), finite32(), came),
         separation,
-        prop::option::of(three()),
+        prop::option::of(unit()),
     )
         .prop_map(
             |(obstacle, (on_body, on_obstacle), (arm, normal, gap, came), separation, shading)| {

@@ -19,10 +19,10 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
     let refusal = Refusal {
         code: RefusalCode::NameTaken,
         version: 1,
-        text: "taken".to_owned(),
+        text: "taken".into(),
     };
     let hello = Hello {
-        node: "left".to_owned(),
+        node: "left".into(),
         role: Role::Render,
         transport: Transport::QuicDatagram,
         rate_hz: 1000,
@@ -64,7 +64,7 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
     let hash = MeshHash { bytes: [1; 32] };
     let log = LogEvent {
         level: LogLevel::Warning,
-        text: "software rendering".to_owned(),
+        text: "software rendering".into(),
     };
     vec![
         ("refused", ControlMessage::Refused(refusal)),
@@ -88,13 +88,13 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         (
             "coupling_at_server",
             ControlMessage::Coupling(CouplingOffer::AtServer {
-                reason: "a height map".to_owned(),
+                reason: "a height map".into(),
             }),
         ),
         (
             "bye",
             ControlMessage::Bye(Bye {
-                reason: "done".to_owned(),
+                reason: "done".into(),
             }),
         ),
         ("arm", ControlMessage::Arm(ArmRequest { arm: true })),
@@ -109,7 +109,10 @@ pub fn messages() -> Vec<(&'static str, ControlMessage)> {
         ),
         (
             "states_by",
-            ControlMessage::StatesBy(StatesBy { multicast: true }),
+            ControlMessage::StatesBy(StatesBy {
+                multicast: true,
+                forged: false,
+            }),
         ),
     ]
 }

@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
+    Confirmation, HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
+    confirmation::{MAX_CONFIRMED, SentState},
     events::EventAck,
     time::{TimeRequest, TimeResponse},
 };
@@ -10,7 +11,7 @@ use taut_proto::{
 use super::barrier::{any_arrive, any_release, arrive, release};
 use super::constraints::{any_part, part};
 use super::hot::{any_hot, hot};
-use super::values::{finite64, pose64};
+use super::values::{far, finite64, pose64};
 
 pub fn datagrams() -> Vec<(&'static str, Payload)> {
     let input = InputSample {
@@ -41,6 +42,17 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
             rotation: [0.5, 0.5, 0.5, 0.5],
         },
     };
+    let sent = |tick, state_hash| SentState { tick, state_hash };
+    let confirmation = Confirmation {
+        asked_ns: 17,
+        states: [
+            sent(1000, 0x0102_0304_0506_0708),
+            sent(999, 9),
+            sent(990, 10),
+        ]
+        .into_iter()
+        .collect(),
+    };
     let response = TimeResponse {
         client_sent: 17,
         server_received: 1017,
@@ -61,6 +73,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         ("arrive", Payload::Arrive(arrive())),
         ("release", Payload::Release(release())),
         ("event_ack", Payload::EventAck(EventAck { newest: 17 })),
+        ("confirm", Payload::Confirm(confirmation)),
     ]
 }
 
@@ -70,7 +83,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
     };
     let input = (
-        any::<(u64, u64, u64, u16, u16, u64)>(),
+        (far(), far(), far(), any::<u16>(), any::<u16>(), far()),
         pose64(),
         six(),
         six(),
@@ -96,7 +109,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             },
         );
     let wrench =
-        (any::<(u64, u64, u16)>(), six()).prop_map(|((time_ns, origin_ns, flags), wrench)| {
+        ((far(), far(), any::<u16>()), six()).prop_map(|((time_ns, origin_ns, flags), wrench)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
                 origin_ns,
@@ -104,15 +117,14 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 flags,
             })
         });
-    let response =
-        any::<(u64, u64, u64)>().prop_map(|(client_sent, server_received, server_sent)| {
-            Payload::TimeResponse(TimeResponse {
-                client_sent,
-                server_received,
-                server_sent,
-            })
-        });
-    let head = (any::<(u64, u64)>(), pose64()).prop_map(|((sample_time_ns, index), pose)| {
+    let response = (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
+        Payload::TimeResponse(TimeResponse {
+            client_sent,
+            server_received,
+            server_sent,
+        })
+    });
+    let head = ((far(), far()), pose64()).prop_map(|((sample_time_ns, index), pose)| {
         Payload::Head(HeadSample {
             sample_time_ns,
             index,
@@ -121,7 +133,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
     });
     prop_oneof![
         any_hot().prop_map(Payload::Hot),
-        any::<u64>().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
+        far().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
         response,
         Just(Payload::Heartbeat),
         input,
@@ -130,5 +142,22 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
         head,
         any_arrive().prop_map(Payload::Arrive),
         any_release().prop_map(Payload::Release),
+        any_confirmation().prop_map(Payload::Confirm),
     ]
+}
+
+fn any_confirmation() -> impl Strategy<Value = Confirmation> {
+    let older = prop::collection::vec(any::<(u16, u64)>(), 0..=MAX_CONFIRMED);
+    (far(), far(), older).prop_map(|(asked_ns, newest, older)| {
+        let mut confirmation = Confirmation {
+            asked_ns,
+            ..Confirmation::default()
+        };
+        let mut tick = newest;
+        for (back, state_hash) in older {
+            confirmation.add(SentState { tick, state_hash });
+            tick = tick.saturating_sub(u64::from(back.max(1)));
+        }
+        confirmation
+    })
 }

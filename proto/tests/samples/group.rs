@@ -6,7 +6,7 @@ use taut_proto::{Group, GroupMember, Role, group::GroupSecret};
 pub fn group() -> Group {
     let member = |sender: u16, node: &str, role, address: Option<&str>| GroupMember {
         sender,
-        node: node.to_owned(),
+        node: node.into(),
         role,
         address: address.and_then(|address| address.parse().ok()),
     };

@@ -9,7 +9,7 @@ use taut_proto::{
     },
 };
 
-use super::values::{finite32, list, pose32};
+use super::values::{far, finite32, list, pose32};
 
 pub fn hot() -> HotState {
     let pose = PoseF32 {
@@ -66,7 +66,7 @@ pub fn any_hot() -> impl Strategy<Value = HotState> {
         RunState::Paused,
         RunState::Fault,
     ]);
-    let head = (pose32(), any::<i32>(), finite32(), any::<u32>()).prop_map(
+    let head = (pose32(), any::<i32>(), 0.0..=1.0_f32, any::<u32>()).prop_map(
         |(pose, age_us, eye_separation, flags)| HeadState {
             pose,
             age_us,
@@ -82,7 +82,7 @@ pub fn any_hot() -> impl Strategy<Value = HotState> {
     let event =
         any::<(u32, u32, u32)>().prop_map(|(id, tick, code)| EventRecord { id, tick, code });
     (
-        any::<(u64, u64, u32, u32)>(),
+        (far(), far(), any::<u32>(), any::<u32>()),
         run,
         head,
         list(tool()),

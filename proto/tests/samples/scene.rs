@@ -2,23 +2,23 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    MeshHash, PoseF64, SceneDescription,
+    MeshHash, PoseF64, SceneDescription, Untrusted,
     scene::{
         BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
     },
 };
 
-use super::values::{finite32, finite64, pose64};
+use super::values::{finite64, pose64};
 
 pub fn scene() -> SceneDescription {
     let body = |name: &str, byte: u8| BodyDescription {
-        name: name.to_owned(),
+        name: name.into(),
         mesh: MeshHash { bytes: [byte; 32] },
         pose: PoseF64::IDENTITY,
         colour: [1.0, 0.5, 0.25, 1.0],
     };
     SceneDescription {
-        name: "peg".to_owned(),
+        name: "peg".into(),
         revision: 7,
         god_object: body("peg", 1),
         obstacles: vec![body("box", 2)],
@@ -26,21 +26,21 @@ pub fn scene() -> SceneDescription {
         scene_origin: PoseF64::IDENTITY,
         display_scale: 2.0,
         screens: vec![ScreenDescription {
-            name: "front".to_owned(),
+            name: "front".into(),
             lower_left: [-1.0, 1.0, 0.0],
             lower_right: [1.0, 1.0, 0.0],
             upper_left: [-1.0, 1.0, 1.0],
         }],
         nodes: vec![NodeDescription {
-            name: "left".to_owned(),
-            screens: vec!["front".to_owned()],
+            name: "left".into(),
+            screens: vec!["front".into()],
             stereo: Stereo::SideBySide,
             window: WindowDescription {
                 width: 640,
                 height: 480,
                 fullscreen: true,
             },
-            monitors: vec!["DP-1".to_owned(), "1".to_owned()],
+            monitors: vec!["DP-1".into(), "1".into()],
         }],
         viewer: PoseF64::IDENTITY,
         eye_separation: 0.0625,
@@ -63,10 +63,10 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             ".{0,20}",
             any::<[u8; 32]>(),
             pose64(),
-            prop::array::uniform4(finite32()),
+            prop::array::uniform4(0.0..=1.0_f32),
         )
             .prop_map(|(name, bytes, pose, colour)| BodyDescription {
-                name,
+                name: name.into(),
                 mesh: MeshHash { bytes },
                 pose,
                 colour,
@@ -75,7 +75,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
     let corner = || prop::array::uniform3(finite64());
     let screen = (".{0,20}", corner(), corner(), corner()).prop_map(
         |(name, lower_left, lower_right, upper_left)| ScreenDescription {
-            name,
+            name: name.into(),
             lower_left,
             lower_right,
             upper_left,
@@ -92,20 +92,20 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         ".{0,20}",
         prop::collection::vec(".{0,9}", 0..4),
         stereo,
-        any::<(u32, u32, bool)>(),
+        (0..=65_536_u32, 0..=65_536_u32, any::<bool>()),
         prop::collection::vec(".{0,9}", 0..3),
     )
         .prop_map(
             |(name, screens, stereo, (width, height, fullscreen), monitors)| NodeDescription {
-                name,
-                screens,
+                name: name.into(),
+                screens: screens.into_iter().map(Untrusted::from).collect(),
                 stereo,
                 window: WindowDescription {
                     width,
                     height,
                     fullscreen,
                 },
-                monitors,
+                monitors: monitors.into_iter().map(Untrusted::from).collect(),
             },
         );
     let lists = (
@@ -114,7 +114,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
         prop::collection::vec(node, 0..4),
     );
     let numbers = (
-        prop::array::uniform6(finite64()),
+        prop::array::uniform6(1e-9..=1.0_f64),
         prop::array::uniform3(finite64()),
         any::<(u32, bool, bool, bool, bool)>(),
     );
@@ -135,7 +135,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                 nearest_disparity,
             ] = scalars;
             SceneDescription {
-                name,
+                name: name.into(),
                 revision,
                 god_object,
                 obstacles,

@@ -1,20 +1,34 @@
-//! Strategies of the values that messages are made of: finite numbers, poses, bounded lists.
+//! Strategies of the values that messages are made of: numbers in their ranges, poses, bounded lists.
 
 use proptest::prelude::*;
 use taut_proto::{ArrayVec, PoseF32, PoseF64};
 
+/// A length, velocity or force.
 pub fn finite32() -> impl Strategy<Value = f32> {
-    prop::num::f32::NORMAL | prop::num::f32::ZERO | prop::num::f32::SUBNORMAL
+    let small = prop::num::f32::ZERO | prop::num::f32::SUBNORMAL;
+    prop_oneof![-1e6..=1e6_f32, small]
 }
 
+/// The same in double precision.
 pub fn finite64() -> impl Strategy<Value = f64> {
-    prop::num::f64::NORMAL | prop::num::f64::ZERO | prop::num::f64::SUBNORMAL
+    let small = prop::num::f64::ZERO | prop::num::f64::SUBNORMAL;
+    prop_oneof![-1e6..=1e6_f64, small]
+}
+
+/// What is not below zero, and below a million.
+pub fn size32() -> impl Strategy<Value = f32> {
+    0.0..=1e6_f32
+}
+
+/// A time or count.
+pub fn far() -> impl Strategy<Value = u64> {
+    0..=1_u64 << 61
 }
 
 pub fn pose32() -> impl Strategy<Value = PoseF32> {
     (
         prop::array::uniform3(finite32()),
-        prop::array::uniform4(finite32()),
+        prop::array::uniform4(-1.0..=1.0_f32),
     )
         .prop_map(|(position, rotation)| PoseF32 { position, rotation })
 }
@@ -22,7 +36,7 @@ pub fn pose32() -> impl Strategy<Value = PoseF32> {
 pub fn pose64() -> impl Strategy<Value = PoseF64> {
     (
         prop::array::uniform3(finite64()),
-        prop::array::uniform4(finite64()),
+        prop::array::uniform4(-1.0..=1.0_f64),
     )
         .prop_map(|(position, rotation)| PoseF64 { position, rotation })
 }

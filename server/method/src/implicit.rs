@@ -94,6 +94,11 @@ impl ImplicitRounds {
         }
     }
 
+    /// See [`Projector::limit_iterations`].
+    pub(crate) fn limit_iterations(&mut self, most: u32) {
+        self.projector.limit_iterations(most);
+    }
+
     /// Projects again from where the linear rows led to. `None` when they were true, or when no round had a certified answer.
     ///
     /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. At most `implicit_rounds` projections;

@@ -327,7 +327,7 @@ fn no_contact_of_the_bunnies_is_late_or_far_early() {
     let Some(text) = geometry_shapes::data_dir()
         .and_then(|d| std::fs::read_to_string(d.join("bunny_contacts.csv")).ok())
     else {
-        println!("skipped: bunny_contacts.csv is not in the test data");
+        taut_test_kit::left_out("bunny_contacts.csv is not in the test data");
         return;
     };
     // The file's times are those of touching, to 2 nm.

@@ -258,3 +258,60 @@ fn the_tree_holds_every_triangle_once_and_inside_its_boxes() {
     }
     assert!(seen.iter().all(|n| *n == 1));
 }
+
+/// Boxes with these half sides and centres, each turned inside out where the sign is negative, as one surface.
+fn boxes(parts: &[([f64; 3], [f64; 3], f64)]) -> geometry_shapes::Soup {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (half, center, sign) in parts {
+        let first = vertices.len() as u32;
+        let (corners, faces) = cuboid(*half);
+        vertices.extend(corners.iter().map(|p| p + Vector3::from(*center)));
+        triangles.extend(faces.iter().map(|t| {
+            let [a, b, c] = t.map(|v| v + first);
+            if *sign < 0.0 { [b, a, c] } else { [a, b, c] }
+        }));
+    }
+    (vertices, triangles)
+}
+
+#[test]
+fn a_closed_part_that_is_inside_out_is_refused_by_name() {
+    let (large, small) = ([1.0; 3], [0.2; 3]);
+    let beside = boxes(&[(large, [0.0; 3], 1.0), (small, [3.0, 0.0, 0.0], -1.0)]);
+    let error = Mesh::new(beside.0.clone(), beside.1.clone()).unwrap_err();
+    let MeshError::PartInsideOut(part) = error else {
+        panic!("{error}");
+    };
+    assert_eq!((part.triangle, part.triangles), (12, 12));
+    assert!((part.center - Point3::new(3.0, 0.0, 0.0)).norm() < 1e-12);
+    assert!((part.volume + 0.064).abs() < 1e-12, "{}", part.volume);
+    let report = MeshReport::of(&beside.0, &beside.1);
+    assert!(report.watertight && !report.oriented && !report.is_sound());
+    assert_eq!(report.inverted_parts, [part]);
+}
+
+#[test]
+fn cavities_and_what_floats_in_them_are_told_by_nesting() {
+    // A box with two cavities, one of which holds a box with a cavity of its own.
+    let sound = boxes(&[
+        ([1.0; 3], [0.0; 3], 1.0),
+        ([0.4; 3], [0.5, 0.0, 0.0], -1.0),
+        ([0.2; 3], [0.5, 0.1, 0.0], 1.0),
+        ([0.1; 3], [0.5, 0.1, 0.0], -1.0),
+        ([0.1; 3], [-0.5, 0.0, 0.0], -1.0),
+    ]);
+    assert!(MeshReport::of(&sound.0, &sound.1).is_sound());
+    assert!(Mesh::new(sound.0, sound.1).is_ok());
+    // What floats in a cavity, inside out.
+    let floating = boxes(&[
+        ([1.0; 3], [0.0; 3], 1.0),
+        ([0.4; 3], [0.5, 0.0, 0.0], -1.0),
+        ([0.2; 3], [0.5, 0.1, 0.0], -1.0),
+    ]);
+    let refused = Mesh::new(floating.0, floating.1).unwrap_err();
+    assert!(matches!(refused, MeshError::PartInsideOut(part) if part.triangle == 24));
+    // A part inside out that cuts through the wall of another is no cavity.
+    let crossing = boxes(&[([1.0; 3], [0.0; 3], 1.0), ([0.3; 3], [1.0, 0.0, 0.0], -1.0)]);
+    let refused = Mesh::new(crossing.0, crossing.1).unwrap_err();
+    assert!(matches!(refused, MeshError::PartInsideOut(_)));
+}

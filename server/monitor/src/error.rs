@@ -18,16 +18,6 @@ pub enum MonitorError {
         /// What the operating system said.
         source: std::io::Error,
     },
-    /// The stream's server did not come up although its port was free.
-    #[error(
-        "the monitoring stream did not start on {address} within {waited_s} s; look for a rerun message above, or choose another monitoring.grpc_port"
-    )]
-    NoAnswer {
-        /// Address and port asked for.
-        address: SocketAddr,
-        /// How long it was given, seconds.
-        waited_s: u64,
-    },
     /// The recording cannot be written.
     #[error("the recording {} cannot be written ({reason}); check monitoring.record", path.display())]
     Record {

@@ -10,6 +10,8 @@
 
 mod colours;
 mod error;
+mod guard;
+mod hosted;
 mod inspect;
 mod layout;
 mod log;

@@ -1,6 +1,5 @@
 //! The monitor: a thread that owns rerun.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,15 +7,14 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use rerun::grpc_server::GrpcServerSink;
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::{FileSink, FileSinkOptions, LogSink};
-use rerun::web_viewer::WebViewerConfig;
 use rerun::{
     MemoryLimit, PlaybackBehavior, RecordingStream, RecordingStreamBuilder, ServerOptions,
 };
 
 use crate::error::MonitorError;
+use crate::hosted::Hosted;
 use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel, MonitorLog};
 use crate::options::MonitorOptions;
 use crate::ports::{self, GRPC_KEY, WEB_KEY};
@@ -115,11 +113,7 @@ impl Monitor {
         let stream_url = served.as_ref().map(|served| served.stream_url.clone());
         let thread = std::thread::Builder::new()
             .name("taut-monitor".to_owned())
-            .spawn(move || {
-                let closed = run(stream, receiver, &command_queue);
-                drop(served); // The page goes last.
-                closed
-            })
+            .spawn(move || run(stream, receiver, &command_queue))
             .map_err(MonitorError::Thread)?;
 
         let monitor = Monitor {
@@ -201,9 +195,8 @@ impl Drop for Monitor {
     }
 }
 
-/// The servers and what to type to reach them; dropping it closes the web page.
+/// What to type to reach the servers.
 struct Served {
-    _web_page: Box<dyn std::any::Any + Send>,
     page_url: String,
     stream_url: String,
 }
@@ -215,45 +208,24 @@ impl Served {
         messages_dropped: Arc<AtomicU64>,
     ) -> Result<(Served, ServedSink), MonitorError> {
         let bind = options.bind;
-        let grpc_port = ports::free_port(bind, options.grpc_port, GRPC_KEY)?;
-        let web_port = ports::free_port(bind, options.web_port, WEB_KEY)?;
-        let grpc_address = SocketAddr::new(bind, grpc_port);
-
-        let web_page = WebViewerConfig {
-            bind_ip: bind.to_string(),
-            web_port: web_port.into(),
-            open_browser: false,
-            ..WebViewerConfig::default()
-        }
-        .host_web_viewer()
-        .map_err(|error| MonitorError::Listen {
-            address: SocketAddr::new(bind, web_port),
-            key: WEB_KEY,
-            source: std::io::Error::other(error.to_string()),
-        })?;
-
-        let server = GrpcServerSink::new(
-            &bracketed(bind),
-            grpc_port,
+        let (stream, grpc_port) = ports::listen(bind, options.grpc_port, GRPC_KEY)?;
+        let (page, web_port) = ports::listen(bind, options.web_port, WEB_KEY)?;
+        let server = Hosted::start(
+            stream,
+            page,
             ServerOptions {
                 // Who joins late sees the present at once; the past follows.
                 playback_behavior: PlaybackBehavior::NewestFirst,
                 memory_limit: MemoryLimit::from_bytes(history_bytes(options, scene)),
                 cors_allowed_origins: ports::allowed_origins(bind, web_port),
             },
-        )
-        .map_err(|error| MonitorError::Rerun {
-            what: "the address to listen on",
-            reason: error.to_string(),
-        })?;
-        ports::wait_until_listening(grpc_address)?;
+        )?;
         let sink = ServedSink::new(server, messages_dropped)?;
 
         let host = ports::reachable_by_observers(bind);
         let stream_url = ports::stream_url(host, grpc_port);
         let page_url = ports::page_url(host, web_port, &stream_url);
         let served = Served {
-            _web_page: Box::new(web_page),
             page_url,
             stream_url,
         };
@@ -268,15 +240,6 @@ fn history_bytes(options: &MonitorOptions, scene: &MonitorScene) -> u64 {
     // Creases multiply vertices, and the god-object is there twice, as itself and as the ghost.
     let at_least = LEAST_HISTORY_BYTES + 6 * meshes.sum::<usize>() as u64;
     options.memory_limit_bytes.max(at_least)
-}
-
-/// rerun puts a colon and the port behind it, so an IPv6 address needs brackets.
-fn bracketed(ip: std::net::IpAddr) -> String {
-    if ip.is_ipv6() {
-        format!("[{ip}]")
-    } else {
-        ip.to_string()
-    }
 }
 
 /// A stream into all `sinks`; into nothing without any.

@@ -1,7 +1,6 @@
 //! Ports and addresses: find out early that a port is taken, and what an observer has to type.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
-use std::time::{Duration, Instant};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
 
 use crate::error::MonitorError;
 
@@ -10,38 +9,21 @@ pub(crate) const GRPC_KEY: &str = "monitoring.grpc_port";
 /// Configuration key of the web page's port, for messages.
 pub(crate) const WEB_KEY: &str = "monitoring.web_port";
 
-/// How long the stream's server may take to listen; it needs milliseconds on an idle machine.
-const LISTEN_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// Checks that a port can be listened on and returns it; for port 0, a free one.
-///
-/// rerun takes a number, not a socket, and only logs when it cannot have it; so the port is tried first. Another
-/// program could still take it in between; [`wait_until_listening`] cannot tell the two apart.
-pub(crate) fn free_port(bind: IpAddr, port: u16, key: &'static str) -> Result<u16, MonitorError> {
+/// Listens on a port; the port that it got, for 0 a free one.
+pub(crate) fn listen(
+    bind: IpAddr,
+    port: u16,
+    key: &'static str,
+) -> Result<(TcpListener, u16), MonitorError> {
     let address = SocketAddr::new(bind, port);
-    let listen = |source| MonitorError::Listen {
+    let refused = |source| MonitorError::Listen {
         address,
         key,
         source,
     };
-    let listener = TcpListener::bind(address).map_err(listen)?;
-    Ok(listener.local_addr().map_err(listen)?.port())
-}
-
-/// Waits until something accepts connections at `address`.
-pub(crate) fn wait_until_listening(address: SocketAddr) -> Result<(), MonitorError> {
-    let reachable = SocketAddr::new(reachable_on_this_machine(address.ip()), address.port());
-    let start = Instant::now();
-    while start.elapsed() < LISTEN_TIMEOUT {
-        if TcpStream::connect_timeout(&reachable, Duration::from_secs(1)).is_ok() {
-            return Ok(());
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    Err(MonitorError::NoAnswer {
-        address,
-        waited_s: LISTEN_TIMEOUT.as_secs(),
-    })
+    let listener = TcpListener::bind(address).map_err(refused)?;
+    let port = listener.local_addr().map_err(refused)?.port();
+    Ok((listener, port))
 }
 
 fn reachable_on_this_machine(bind: IpAddr) -> IpAddr {
@@ -116,16 +98,14 @@ mod tests {
     fn a_taken_port_is_refused_and_named_with_its_key() {
         let taken = TcpListener::bind((LOCALHOST, 0)).unwrap();
         let port = taken.local_addr().unwrap().port();
-        let message = free_port(LOCALHOST, port, GRPC_KEY)
-            .unwrap_err()
-            .to_string();
+        let message = listen(LOCALHOST, port, GRPC_KEY).unwrap_err().to_string();
         assert!(message.contains(&port.to_string()), "{message}");
         assert!(message.contains(GRPC_KEY), "{message}");
     }
 
     #[test]
     fn port_zero_becomes_a_port() {
-        assert_ne!(free_port(LOCALHOST, 0, WEB_KEY).unwrap(), 0);
+        assert_ne!(listen(LOCALHOST, 0, WEB_KEY).unwrap().1, 0);
     }
 
     #[test]

@@ -26,7 +26,7 @@ fn host_of(url: &str) -> &str {
 fn request(host: &str, path: &str, origin: &str) -> String {
     let mut connection = TcpStream::connect(host).unwrap();
     connection
-        .set_read_timeout(Some(Duration::from_secs(20)))
+        .set_read_timeout(Some(Duration::from_secs(60)))
         .unwrap();
     write!(
         connection,
@@ -85,12 +85,84 @@ fn the_page_opens_the_stream_and_both_end_with_the_monitor() {
         let start = Instant::now();
         while TcpStream::connect(host).is_ok() {
             assert!(
-                start.elapsed() < Duration::from_secs(10),
+                start.elapsed() < Duration::from_secs(60),
                 "{host} stays open"
             );
             std::thread::sleep(Duration::from_millis(20));
         }
     }
+}
+
+/// Status of an answer to what a browser would send.
+fn status(address: &str, method: &str, path: &str, headers: &str) -> String {
+    let mut connection = TcpStream::connect(address).unwrap();
+    connection
+        .set_read_timeout(Some(Duration::from_secs(20)))
+        .unwrap();
+    write!(
+        connection,
+        "{method} {path} HTTP/1.1\r\n{headers}Content-Length: 0\r\nConnection: close\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = Vec::new();
+    connection.read_to_end(&mut answer).unwrap();
+    let answer = String::from_utf8_lossy(&answer);
+    answer.split(' ').nth(1).unwrap_or_default().to_owned()
+}
+
+#[test]
+fn a_page_from_elsewhere_reaches_neither_port_and_nobody_writes_into_the_stream() {
+    let scene = MonitorScene::new("empty");
+    let (monitor, _sender) = Monitor::start(&on_free_ports(), scene).unwrap();
+    let page = host_of(monitor.address().unwrap()).to_owned();
+    let stream = host_of(monitor.stream_address().unwrap()).to_owned();
+    let page_port = page.rsplit(':').next().unwrap();
+    let service = "/rerun.sdk_comms.v1alpha1.MessageProxyService";
+    let (read, write) = (
+        format!("{service}/ReadMessages"),
+        format!("{service}/WriteMessages"),
+    );
+    let web = "Content-Type: application/grpc-web+proto\r\n";
+    for (address, method, path) in [
+        (&page, "GET", "/"),
+        (&page, "GET", "/re_viewer.js"),
+        (&stream, "POST", read.as_str()),
+        (&stream, "OPTIONS", read.as_str()),
+    ] {
+        // A name that was bound to this address anew; then pages of other origins.
+        let rebound = format!("Host: rebound.example:{page_port}\r\n{web}");
+        assert_eq!(status(address, method, path, &rebound), "403", "{path}");
+        for origin in [
+            "http://evil.example",
+            "http://rerun.io",
+            "http://127.0.0.1:1",
+            "null",
+        ] {
+            let foreign = format!("Host: {address}\r\nOrigin: {origin}\r\n{web}");
+            assert_eq!(
+                status(address, method, path, &foreign),
+                "403",
+                "{path} {origin}"
+            );
+        }
+    }
+    let own = format!("Host: {stream}\r\nOrigin: http://{page}\r\n{web}");
+    assert_eq!(
+        status(&page, "GET", "/", &format!("Host: {page}\r\n")),
+        "200"
+    );
+    assert_eq!(
+        status(
+            &stream,
+            "OPTIONS",
+            &read,
+            &format!("{own}Access-Control-Request-Method: POST\r\n")
+        ),
+        "200"
+    );
+    // Whoever may look on may not make others see what is not.
+    assert_eq!(status(&stream, "POST", &write, &own), "403");
+    monitor.stop().unwrap();
 }
 
 #[test]

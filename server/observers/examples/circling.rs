@@ -83,7 +83,7 @@ fn circle(tool: &mut ToolState, time: f64) {
 
 fn scene() -> SceneDescription {
     let body = |name: &str| BodyDescription {
-        name: name.to_owned(),
+        name: name.into(),
         mesh: MeshHash::of(b""),
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],

@@ -36,3 +36,11 @@ pub use stream_server::{StreamServer, StreamSettings};
 pub use vrpn_reports::VrpnFrame;
 #[cfg(feature = "servers")]
 pub use vrpn_server::{VrpnServer, VrpnSettings};
+
+/// Whether the head of an observer's request gets what it asks for, where `token` is asked of everybody; `None` while it is not whole. What the
+/// stream's server does first with the bytes of strangers.
+#[cfg(feature = "servers")]
+#[must_use]
+pub fn grants_request(head: &[u8], token: Option<&str>) -> Option<bool> {
+    request::read(head, token).map(|answer| answer.is_ok())
+}

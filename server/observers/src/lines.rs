@@ -167,11 +167,11 @@ impl Hello {
     pub fn line(&self) -> String {
         let scene = &self.scene;
         let obstacles = scene.obstacles.iter().map(|body| Obstacle {
-            name: &body.name,
+            name: body.name.raw(),
             pose: placed(&body.pose),
         });
         let screens = scene.screens.iter().map(|screen| Screen {
-            name: &screen.name,
+            name: screen.name.raw(),
             lower_left: screen.lower_left,
             lower_right: screen.lower_right,
             upper_left: screen.upper_left,
@@ -181,7 +181,7 @@ impl Hello {
             format: FORMAT,
             program: &self.program,
             workbench: &self.workbench,
-            scene: &scene.name,
+            scene: scene.name.raw(),
             scene_revision: scene.revision,
             rate_hz: self.rate,
             units: Units {
@@ -199,7 +199,7 @@ impl Hello {
             workbench_from_scene: placed(&scene.scene_origin),
             display_scale: scene.display_scale,
             reference_point: scene.reference_point,
-            god_object: &scene.god_object.name,
+            god_object: scene.god_object.name.raw(),
             obstacles: obstacles.collect(),
             screens: screens.collect(),
             viewer: placed(&scene.viewer),
@@ -359,7 +359,7 @@ mod tests {
 
     fn empty_scene() -> SceneDescription {
         let body = taut_proto::scene::BodyDescription {
-            name: "ball".to_owned(),
+            name: "ball".into(),
             mesh: taut_proto::MeshHash::of(b""),
             pose: PoseF64::IDENTITY,
             colour: [1.0; 4],
@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn a_name_cannot_break_the_line() {
         let mut scene = empty_scene();
-        scene.name = "two\nlines \"quoted\"".to_owned();
+        scene.name = "two\nlines \"quoted\"".into();
         let hello = Hello {
             workbench: "bench".to_owned(),
             program: "taut".to_owned(),

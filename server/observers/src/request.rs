@@ -3,7 +3,7 @@
 //! Without a token only pages of this very server may ask, under a name that cannot be another's: a page from elsewhere in a
 //! browser on this machine could otherwise open a WebSocket to the loopback address and read along.
 
-use std::net::IpAddr;
+use taut_proto::web::is_from_here;
 
 /// Most bytes of a request's head.
 pub(crate) const MAX_REQUEST_BYTES: usize = 8192;
@@ -17,6 +17,8 @@ pub(crate) enum Wish {
     Page,
     /// The `hello` line alone.
     Hello,
+    /// The program's metrics.
+    Metrics,
     /// Lines as the body of an answer.
     Lines,
     /// Lines over WebSocket; the client's key.
@@ -46,7 +48,10 @@ impl Refusal {
         match self {
             Self::NotHttp => ("400 Bad Request", "this port speaks HTTP and WebSocket"),
             Self::Method => ("405 Method Not Allowed", "use GET"),
-            Self::NotFound => ("404 Not Found", "there are /, /hello, /stream and /ws"),
+            Self::NotFound => (
+                "404 Not Found",
+                "there are /, /hello, /stream, /ws and /metrics",
+            ),
             Self::Token => (
                 "401 Unauthorized",
                 "give the token: the header `Authorization: Bearer TOKEN`, or ?token=TOKEN",
@@ -97,7 +102,9 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
                 return Err(Refusal::Token);
             }
         }
-        None if !is_from_here(header("Host"), header("Origin")) => return Err(Refusal::Foreign),
+        None if !is_from_here(header("Host"), header("Origin"), None) => {
+            return Err(Refusal::Foreign);
+        }
         None => {}
     }
     if request.method != Some("GET") {
@@ -106,6 +113,7 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
     match path {
         "/" => Ok(Wish::Page),
         "/hello" => Ok(Wish::Hello),
+        "/metrics" => Ok(Wish::Metrics),
         "/stream" => Ok(Wish::Lines),
         "/ws" => header("Sec-WebSocket-Key")
             .map(|key| Wish::WebSocket(key.to_owned()))
@@ -117,20 +125,6 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
 /// Compares hashes: the time that it takes tells nothing of the token.
 fn is_same(given: &str, token: &str) -> bool {
     blake3::hash(given.as_bytes()) == blake3::hash(token.as_bytes())
-}
-
-/// Whether the server was asked by address or as `localhost`, and by nobody's page or its own.
-fn is_from_here(host: Option<&str>, origin: Option<&str>) -> bool {
-    let Some(host) = host else {
-        return origin.is_none(); // a script of HTTP/1.0
-    };
-    let name = match host.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
-        Some((address, _)) => address,
-        None => host.split(':').next().unwrap_or_default(),
-    };
-    let is_fixed = name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok();
-    let is_own = origin.is_none_or(|origin| origin.strip_prefix("http://") == Some(host));
-    is_fixed && is_own
 }
 
 #[cfg(test)]
@@ -149,6 +143,7 @@ mod tests {
     fn wishes_are_understood() {
         assert_eq!(ask("/", HERE, None), Ok(Wish::Page));
         assert_eq!(ask("/hello?x=1", HERE, None), Ok(Wish::Hello));
+        assert_eq!(ask("/metrics", HERE, None), Ok(Wish::Metrics));
         assert_eq!(ask("/stream", "Host: [::1]:80\r\n", None), Ok(Wish::Lines));
         let key = format!("{HERE}sec-websocket-key: abc\r\n");
         assert_eq!(ask("/ws", &key, None), Ok(Wish::WebSocket("abc".into())));

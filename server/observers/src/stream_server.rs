@@ -1,4 +1,5 @@
-//! JSON lines for browsers and scripts: over WebSocket at `/ws`, as a plain HTTP body at `/stream`, and a page at `/`.
+//! JSON lines for browsers and scripts: over WebSocket at `/ws`, as a plain HTTP body at `/stream`, and a page at `/`; and the
+//! program's metrics for Prometheus at `/metrics`.
 //!
 //! Plain HTTP without TLS: it belongs on the loopback address, behind a tunnel, or, with a token, on a network that is trusted.
 //! Every line is written once, whoever reads it. An observer that does not keep up misses states (the newest is next) and, if
@@ -36,6 +37,13 @@ const SEND_TIME: Duration = Duration::from_secs(5);
 const EVENT_LINES: usize = 256;
 /// Largest message of an observer; they have nothing to say.
 const MAX_INBOUND_BYTES: usize = 4096;
+/// What Prometheus is told that `/metrics` is.
+const METRICS_KIND: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+/// At `/metrics`, before the first measurement.
+const NOTHING_MEASURED: (&str, &str) = (
+    "503 Service Unavailable",
+    "nothing is measured yet; ask again in a second\n",
+);
 /// What every answer says beside its own: nothing is kept, nothing is taken from elsewhere.
 const COMMON_HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\nConnection: close\r\n";
 
@@ -59,6 +67,7 @@ pub struct StreamSettings {
 pub struct StreamServer {
     address: SocketAddr,
     counts: Arc<Counts>,
+    metrics: watch::Sender<Option<Arc<str>>>,
     _service: Service,
 }
 
@@ -75,6 +84,7 @@ struct Shared {
     hello: Utf8Bytes,
     states: watch::Receiver<Option<Arc<Utf8Bytes>>>,
     events: broadcast::Sender<Utf8Bytes>,
+    metrics: watch::Receiver<Option<Arc<str>>>,
     counts: Arc<Counts>,
     max_observers: usize,
 }
@@ -96,11 +106,13 @@ impl StreamServer {
         let counts = Arc::<Counts>::default();
         let (sender, states) = watch::channel(None);
         let (events, _) = broadcast::channel(EVENT_LINES);
+        let (metrics, shown_metrics) = watch::channel(None);
         let shared = Shared {
             token: settings.token.map(Arc::from),
             hello: hello.line().into(),
             states,
             events: events.clone(),
+            metrics: shown_metrics,
             counts: counts.clone(),
             max_observers: settings.max_observers,
         };
@@ -118,6 +130,7 @@ impl StreamServer {
         Ok(Self {
             address,
             counts,
+            metrics,
             _service: service,
         })
     }
@@ -126,6 +139,11 @@ impl StreamServer {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Makes this the newest text at `/metrics`, for Prometheus.
+    pub fn publish_metrics(&self, text: String) {
+        self.metrics.send_replace(Some(text.into()));
     }
 
     /// Observers that are connected.
@@ -212,6 +230,16 @@ async fn observer(mut stream: TcpStream, shared: &Shared) -> Result<(), End> {
         Ok(Wish::Hello) => {
             let line = format!("{}\n", shared.hello);
             answer(&mut stream, "200 OK", "application/json", &line).await
+        }
+        Ok(Wish::Metrics) => {
+            let text = shared.metrics.borrow().clone();
+            match text {
+                Some(text) => answer(&mut stream, "200 OK", METRICS_KIND, &text).await,
+                None => {
+                    let (status, why) = NOTHING_MEASURED;
+                    answer(&mut stream, status, "text/plain; charset=utf-8", why).await
+                }
+            }
         }
         Ok(Wish::Lines) => {
             let head = head("200 OK", "application/x-ndjson");

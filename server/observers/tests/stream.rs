@@ -16,7 +16,7 @@ use tokio_tungstenite::tungstenite::Message;
 
 fn hello() -> Hello {
     let body = BodyDescription {
-        name: "ball".to_owned(),
+        name: "ball".into(),
         mesh: MeshHash::of(b""),
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],

@@ -90,7 +90,11 @@ impl Connection {
 }
 
 fn is_timeout(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
+    // Interrupted: by whoever stops and continues the process.
+    matches!(
+        error.kind(),
+        ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+    )
 }
 
 fn pose_of(sensor: i32) -> impl FnMut(&Event) -> Option<[f64; 3]> {

@@ -39,9 +39,9 @@ pub use trace::{
     TraceSample,
 };
 pub use workbench::{
-    Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Monitoring, Network, Node,
-    ObserverStream, Passivity, RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen,
-    Show, Stereo, TransportKind, Viewer, Vrpn, VrpnSensor, Window, Workbench, Zenoh,
+    Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Log, LogLevel, Monitoring, Network,
+    Node, ObserverStream, Passivity, RealTime, RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety,
+    Screen, Show, Stereo, TransportKind, Viewer, Vrpn, VrpnSensor, Window, Workbench, Zenoh,
 };
 
 /// Why a scene could not be used.

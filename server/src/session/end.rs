@@ -15,6 +15,7 @@ impl Session {
     /// Ends everything and says what was measured; the failure, if something broke.
     pub fn stop(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
         self.follow_network(terminal);
+        self.audit.end();
         let duration = self.age();
         let mut report = self.statistics.report(duration);
         report.fidelity = self.fidelity.as_ref().map(|f| f.watch.report(&f.plan));

@@ -16,11 +16,13 @@ use std::time::Duration;
 
 use taut_bridge::ArmSwitch;
 use taut_bridge::realtime::Awake;
+use taut_bridge::signals::EndFlag;
 use taut_link::{JoinPolicy, ServerLink, ServerPin};
 use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
 
+use crate::audit::AuditTrail;
 use crate::clients::ClientLedger;
 use crate::clock::SessionClock;
 use crate::fidelity::FidelityWatch;
@@ -54,6 +56,7 @@ pub struct Session {
     fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
+    audit: AuditTrail,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
@@ -111,12 +114,17 @@ impl Session {
         &self.arm_switch
     }
 
+    /// Lets `flag` end the session: the loops look at it themselves.
+    pub fn end_with(&self, flag: &EndFlag) {
+        self.shutdown.follow(flag);
+    }
+
     /// How long the loops have run.
     pub fn age(&self) -> Duration {
         self.clock.now().saturating_sub(self.started)
     }
 
-    /// Whether the session asked for its own end, because something broke.
+    /// Whether the end was asked for, by a signal or because something broke.
     pub fn is_ending(&self) -> bool {
         self.shutdown.is_asked()
     }

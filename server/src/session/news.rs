@@ -3,11 +3,12 @@
 use std::sync::atomic::Ordering;
 
 use god_object::spatial::linear;
-use taut_bridge::ArmWish;
-use taut_link::{LinkEvent, proto};
+use taut_bridge::EventKind;
+use taut_link::{LinkEvent, ServerLink, proto};
 use taut_recording::EventRecord;
 
 use crate::loops::incidents::{self};
+use crate::metrics::{self, ClientLink, Metrics};
 use crate::monitor::Severity;
 use crate::terminal::Terminal;
 
@@ -28,16 +29,13 @@ impl Session {
             return;
         };
         let mut lines = Vec::new();
+        let now = self.clock.now();
         while let Some(event) = link.try_event() {
-            if let LinkEvent::Arm { arm, .. } = event {
-                self.arm_switch
-                    .wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+            let to_be_told = self.audit.follow(&event, now);
+            let line = self.clients.follow(&event);
+            if to_be_told {
+                lines.extend(line.map(|line| (severity(&event), line)));
             }
-            lines.extend(
-                self.clients
-                    .follow(&event)
-                    .map(|line| (severity(&event), line)),
-            );
         }
         for (severity, line) in lines {
             if severity == Severity::Error {
@@ -58,6 +56,7 @@ impl Session {
         let clients = link.clients();
         self.clients.look_at(&clients);
         let counters = link.counters();
+        self.audit.look(&counters, now);
         self.network
             .packets_sent
             .store(counters.packets_sent, Ordering::Relaxed);
@@ -75,6 +74,9 @@ impl Session {
         let counts = &self.statistics.haptics.incidents;
         for (event, times) in self.incidents.since_last(counts) {
             let text = incidents::line(&event, times);
+            if event.kind.is_fault() || is_about_arming(event.kind) {
+                self.audit.follow_port(&text, event.kind.is_fault());
+            }
             if event.kind.is_good_news() {
                 tracing::info!("{text}");
             } else {
@@ -87,6 +89,35 @@ impl Session {
                     text,
                 });
             }
+        }
+    }
+
+    /// Everything measured so far.
+    pub fn metrics(&self) -> Metrics {
+        let counters = self.link.as_ref().map(ServerLink::counters);
+        let clients = self.link.as_ref().map(ServerLink::clients);
+        let client_links: Vec<ClientLink> = clients.iter().flatten().map(ClientLink::of).collect();
+        let mut session = self.statistics.report(self.age());
+        if let Some(counters) = &counters {
+            session.packets_sent = counters.packets_sent;
+            session.packets_refused = counters.garbage
+                + counters.wrong_version
+                + counters.forged
+                + counters.replayed
+                + counters.inputs_refused;
+        }
+        let (memory_bytes, open_files) = metrics::process();
+        Metrics {
+            time_s: metrics::wall_clock_s(),
+            session,
+            network: counters.iter().flat_map(|c| c.named()).collect(),
+            clients_present: client_links.len() as u64,
+            client_links,
+            stream_observers: self.looking_on.stream_observers(),
+            stream_observers_dropped: self.looking_on.stream_observers_dropped(),
+            log_lines_lost: taut_log::lost_lines(),
+            memory_bytes,
+            open_files,
         }
     }
 
@@ -111,6 +142,18 @@ impl Session {
     }
 }
 
+/// Whether somebody let force in, or kept it out.
+fn is_about_arming(kind: EventKind) -> bool {
+    matches!(
+        kind,
+        EventKind::Armed
+            | EventKind::Disarmed
+            | EventKind::DeadManReleased
+            | EventKind::ArmRefused
+            | EventKind::RearmNeeded
+    )
+}
+
 fn severity(event: &LinkEvent) -> Severity {
     use proto::control::LogLevel;
     match event {
@@ -119,6 +162,12 @@ fn severity(event: &LinkEvent) -> Severity {
         | LinkEvent::Stats { .. }
         | LinkEvent::Arm { .. } => Severity::Info,
         LinkEvent::Silent { .. } => Severity::Warning,
+        // The wall is not what it was, and somebody should know.
+        LinkEvent::FreeRunning { free, .. } => match free {
+            true => Severity::Error,
+            false => Severity::Info,
+        },
+        LinkEvent::NoPlace { .. } | LinkEvent::StatesForged { .. } => Severity::Error,
         // Whoever stands at the haptic PC should know that somebody knocked.
         LinkEvent::Refused { .. } => Severity::Error,
         LinkEvent::Forbidden { .. } => Severity::Warning,

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{keep_cores_awake, lock_memory};
-use taut_bridge::{Device, RemoteDevice};
+use taut_bridge::{ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
 use tokio::runtime::Runtime;
 
+use crate::audit::AuditTrail;
 use crate::broadcast::{BridgeCommands, StateWriter};
 use crate::checker::PenetrationChecker;
 use crate::clients::ClientLedger;
@@ -56,7 +57,7 @@ impl Session {
                 setup.realtime.broadcast_period.as_secs_f64().recip(),
             ),
             DeviceSource::Local(_) => CouplingOffer::AtServer {
-                reason: "its workbench has a device of its own".to_owned(),
+                reason: "its workbench has a device of its own".into(),
             },
         };
         let options = ServerOptions {
@@ -113,6 +114,10 @@ impl Session {
             taps,
         )
         .with_motions(setup.motions.clone());
+        let switch = loops.arm_switch.clone();
+        link.on_arm(move |arm| {
+            switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
+        });
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
@@ -128,6 +133,7 @@ impl Session {
             fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
+            audit: AuditTrail::default(),
             threads: Vec::new(),
             monitor: None,
             recorder,
@@ -182,6 +188,7 @@ impl Session {
         )?;
         session.start_frames(&setup.realtime)?;
         session.start_haptics(loops.haptics, &setup.realtime)?;
+        session.start_service_manager()?;
         session.enforce(setup.realtime.policy)?;
         session.tell_start(&opening);
         Ok(session)
@@ -258,7 +265,7 @@ fn opening(setup: &SessionSetup) -> String {
 fn picture(setup: &SessionSetup) -> MonitorPicture {
     let description = &setup.content.description;
     MonitorPicture {
-        name: description.name.clone(),
+        name: description.name.to_string(),
         world: setup.world.clone(),
         moving: setup.motions.iter().map(|motion| motion.obstacle).collect(),
         start: setup.start,

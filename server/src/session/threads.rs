@@ -16,6 +16,7 @@ use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
 use crate::loops::shell::{Beat, Waker, run_at_deadlines, spawn};
 use crate::realtime::{RealtimePolicy, Scheduling};
+use crate::service_manager;
 use crate::setup::RealtimeSettings;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::fanout::Subscriber;
@@ -167,6 +168,17 @@ impl Session {
                 }
             },
         )
+    }
+
+    /// Signs of life to systemd, where it started this.
+    pub(super) fn start_service_manager(&mut self) -> Result<(), Failure> {
+        if !service_manager::is_there() {
+            return Ok(());
+        }
+        let (statistics, shutdown) = (self.statistics.clone(), self.shutdown.clone());
+        self.start_thread("notify", Scheduling::Background, None, move || {
+            service_manager::run(&statistics, &shutdown);
+        })
     }
 
     pub(super) fn start_thread(

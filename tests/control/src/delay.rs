@@ -13,9 +13,9 @@ use taut::edge_sets::EdgeSets;
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::edge::{EdgeCoupler, offer_of};
 use taut_bridge::{
-    BridgeLoop, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand, MAX_EDGE_DELAY,
-    MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice, SafetySettings, SimulatedDevice,
-    ValidationSettings, ViaPoint,
+    BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand,
+    MAX_EDGE_DELAY, MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice, SafetySettings,
+    SimulatedDevice, ValidationSettings, ViaPoint,
 };
 use taut_link::DeviceInput;
 use taut_proto::time::{TimeRequest, TimeResponse};
@@ -290,13 +290,14 @@ impl Bridge {
         };
         let port = DevicePort::new(Box::new(device), safety, point, &scene.start);
         let mut of = BridgeLoop::new(port);
-        of.begin_session(match mode {
+        let edge = match mode {
             Mode::Shipped => None,
             Mode::Edge => match offer_of(&scene.world, &scene.settings, 1000.0) {
                 CouplingOffer::AtEdge(offer) => EdgeCoupler::new(&offer).ok(),
                 CouplingOffer::AtServer { reason } => panic!("{reason}"),
             },
-        });
+        };
+        of.begin_session(CommandSource::Other, edge);
         Self {
             of,
             clock: ClockFilter::default(),

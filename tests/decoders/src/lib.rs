@@ -32,7 +32,7 @@ pub struct Decoder {
 pub const FIXED_MEMORY: usize = 4 << 20;
 
 /// All of them.
-pub const DECODERS: [Decoder; 21] = [
+pub const DECODERS: [Decoder; 22] = [
     decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
     decoder("payload", wire::payload, wire::payload_seeds, 1),
     decoder("opener", wire::opener, wire::datagram_seeds, 1),
@@ -60,6 +60,12 @@ pub const DECODERS: [Decoder; 21] = [
         "space_mouse",
         peripherals::space_mouse,
         peripherals::space_mouse_seeds,
+        1,
+    ),
+    decoder(
+        "http_request",
+        peripherals::http_request,
+        peripherals::http_seeds,
         1,
     ),
     decoder("join_key", files::join_key, files::join_key_seeds, 1),

@@ -76,6 +76,39 @@ pub(crate) fn space_mouse(bytes: &[u8]) {
     }
 }
 
+/// What observers must show in the checks.
+const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+
+/// An observer's request: without a token and with one, which nobody gets past who does not show it; bytes that follow change no answer.
+pub(crate) fn http_request(bytes: &[u8]) {
+    let open = taut_observers::grants_request(bytes, None);
+    let closed = taut_observers::grants_request(bytes, Some(TOKEN));
+    assert_eq!(open.is_some(), closed.is_some(), "whole or not");
+    if closed == Some(true) {
+        let mut parts = bytes.windows(TOKEN.len());
+        assert!(parts.any(|part| part == TOKEN.as_bytes()), "no token");
+    }
+    if open.is_some() {
+        let more = [bytes, b"more"].concat();
+        assert_eq!(taut_observers::grants_request(&more, None), open);
+    }
+}
+
+pub(crate) fn http_seeds() -> Vec<Vec<u8>> {
+    let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
+    [
+        "GET / HTTP/1.0\r\n\r\n".to_owned(),
+        "GET /hello HTTP/1.1\r\nHost: [::1]:4860\r\n\r\n".to_owned(),
+        format!("GET /stream HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\n\r\n"),
+        format!("GET /ws?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n{key}\r\n\r\n"),
+        format!(
+            "GET /ws HTTP/1.1\r\nHost: 127.0.0.1:1\r\nOrigin: http://127.0.0.1:1\r\n{key}\r\n\r\n"
+        ),
+    ]
+    .map(String::into_bytes)
+    .into()
+}
+
 pub(crate) fn vrpn_seeds() -> Vec<Vec<u8>> {
     let mut stream = taut_vrpn::cookie::cookie().to_vec();
     description::append_udp(&mut stream, SocketAddrV4::new(Ipv4Addr::LOCALHOST, 3884));

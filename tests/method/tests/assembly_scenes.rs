@@ -10,7 +10,9 @@ fn assembles(name: &str, seed: Option<u64>, every: usize) {
         .find(|assembly| assembly.name == name)
         .expect("one of the assemblies");
     let Some(loaded) = assembly.load() else {
-        println!("skipped: {name}, because assembly/{name}.toml is not in the data directory");
+        taut_test_kit::left_out(format_args!(
+            "{name}, because assembly/{name}.toml is not in the data directory"
+        ));
         return;
     };
     let (scene, trace) = loaded.unwrap_or_else(|error| panic!("{error}"));

@@ -12,7 +12,9 @@ use taut_scene::{DeviceTrace, data_file, read_mesh};
 
 fn trace(name: &str) -> Option<DeviceTrace> {
     let Some(path) = data_file(format!("traces/{name}.csv")) else {
-        println!("skipped: traces/{name}.csv is not in the data directory");
+        taut_test_kit::left_out(format_args!(
+            "traces/{name}.csv is not in the data directory"
+        ));
         return None;
     };
     Some(DeviceTrace::load(&path).unwrap_or_else(|error| panic!("{error}")))
@@ -20,7 +22,9 @@ fn trace(name: &str) -> Option<DeviceTrace> {
 
 fn bunny(triangles: &str) -> Option<Mesh> {
     let Some(path) = data_file(format!("bunny_{triangles}.ply")) else {
-        println!("skipped: bunny_{triangles}.ply is not in the data directory");
+        taut_test_kit::left_out(format_args!(
+            "bunny_{triangles}.ply is not in the data directory"
+        ));
         return None;
     };
     let raw = read_mesh(&path).unwrap_or_else(|error| panic!("{error}"));

@@ -1,5 +1,5 @@
 //! Prints the table of the cluster's targets with what this machine keeps of them now:
-//! `cargo run --release -p taut-network-tests -- [--quick] [--soak S] [--seconds S] [--taut PROGRAM] [--csv FILE] [SECTION...]`.
+//! `cargo run --release -p taut-network-tests -- [--quick] [--soak S] [--log FILE] [--seconds S] [--taut PROGRAM] [--csv FILE] [SECTION...]`.
 //!
 //! `-- --node SERVER NAME udp|quic KEY SECONDS` is one node of a network of namespaces or machines, see `scripts/netns-cluster`.
 //!
@@ -119,14 +119,17 @@ taut-network-tests [OPTION...] [SECTION...]
   --quick          seconds instead of minutes: invariants, no speeds
   --seconds S      length of each latency or age run
   --turns N        turns of the isolation runs, each without and with clients
-  --soak S         clients come, go and die for S seconds while datagrams are forged
+  --soak S         clients come, go and die for S seconds while datagrams are forged; then, with --taut, the whole program for S seconds
+  --log FILE       CSV file of the soak's resources and broken promises, and of the whole program's beside it; a soak that was cut off goes
+                   on with it
   --taut PROGRAM   the program that serves and draws; build it by cargo build --release -p taut
   --csv FILE       writes the table, too
 
 Sections, all of them unless some are named:
 {}
 Exit code 1: a target is missed. 2: something could not be measured, or the arguments are wrong.
-Example: taut-network-tests --taut target/release/taut skew screens
+Examples: taut-network-tests --taut target/release/taut skew screens
+          taut-network-tests --taut target/release/taut --soak 28800 --log soak.csv soak
 ",
         sections.collect::<String>()
     )
@@ -145,6 +148,7 @@ fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dy
                 }
             }
             "--soak" => extent.soak_seconds = Some(positive(&value()?)?),
+            "--log" => extent.soak_log = Some(value()?.into()),
             "--seconds" => extent.seconds = positive(&value()?)?,
             "--turns" => extent.turns = positive(&value()?)?.ceil() as usize,
             // Some of those that run it do so from a folder of their own.

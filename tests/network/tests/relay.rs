@@ -9,7 +9,7 @@ use taut_network_tests::relay::{
 
 /// Standard deviations that a count may be off: once in 10^9 runs if seeds were drawn anew.
 const SIGMAS: f64 = 6.0;
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 fn fates(impairment: &Impairment, seed: u64, count: usize) -> Vec<Fate> {
     let mut fates = Fates::new(impairment.clone(), seed, 0, Direction::Down);

@@ -232,7 +232,7 @@ mod tests {
         }
     }
 
-    /// Reads at growing times of a virtual clock until `done`; five real seconds at most.
+    /// Reads at growing times of a virtual clock until `done`; only a hang takes a minute.
     fn read_until(
         mouse: &mut SpaceMouse,
         now: &mut Duration,
@@ -246,7 +246,7 @@ mod tests {
                 return sample;
             }
             assert!(
-                start.elapsed() < Duration::from_secs(5),
+                start.elapsed() < Duration::from_secs(60),
                 "it never came: {sample:?}"
             );
             thread::sleep(Duration::from_millis(1));

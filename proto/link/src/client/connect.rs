@@ -11,7 +11,9 @@ use super::{
 };
 use crate::{
     DEFAULT_QUIC_PORT, LinkError, binding,
-    framing::{CLOSE_REFUSED, ReadMessageError, close_text, read_message, write_message},
+    framing::{
+        CLOSE_REFUSED, ReadMessageError, close_text, peer_text, read_message, write_message,
+    },
     pinning::PinnedServer,
     transport,
 };
@@ -115,6 +117,7 @@ pub(crate) async fn connect_with(
         hot,
         AtJoin {
             session: welcome.session,
+            epoch: welcome.epoch,
             node_timeout: Duration::from_millis(
                 welcome
                     .node_timeout_ms
@@ -204,7 +207,7 @@ async fn reach(
                         },
                         None => LinkError::Protocol {
                             server,
-                            reason: error.to_string(),
+                            reason: peer_text(&error),
                         },
                     });
                 }
@@ -245,7 +248,7 @@ async fn join(options: &ClientOptions, connection: &Connection) -> Result<Joined
         grant,
     };
     let hello = Hello {
-        node: options.node.clone(),
+        node: options.node.as_str().into(),
         role: options.role,
         transport: options.transport,
         rate_hz: options.rate_hz,

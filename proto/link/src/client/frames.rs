@@ -234,7 +234,7 @@ impl Frames {
         match answer {
             Answer::Counted => ToMember::Nothing,
             Answer::Repeat => ToMember::Newest,
-            Answer::Refused => ToMember::Refused,
+            Answer::Refused | Answer::Full => ToMember::Refused,
         }
     }
 
@@ -283,6 +283,8 @@ impl Frames {
                     // Without the server no clock is anybody's.
                     swap: Swap::Immediate,
                     period_ns: u64::from(head.period_us) * 1000,
+                    // Frames grow no slower than they were: nobody would follow.
+                    slowest_ns: 0,
                 };
                 let mut master = Master::new(settings, part.session, term, first);
                 master.expect(local_ns, &head.members);

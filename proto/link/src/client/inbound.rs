@@ -1,7 +1,7 @@
 //! What arrives on the hot plane: states into a bounded queue, the newest wrench, constraint sets put together, time into the clock
 //! filter; everything else counted.
 
-use super::{ReceivedState, ReceivedWrench, frames::Frames};
+use super::{Provenance, ReceivedState, ReceivedWrench, frames::Frames};
 use crate::counters::ClientCounterCells;
 use std::{
     collections::VecDeque,
@@ -11,6 +11,7 @@ use std::{
 use taut_proto::{
     Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken, Payload,
     Role, SessionTime,
+    confirmation::{Trust, Unconfirmed},
     seal::{OpenError, Opened, Opener},
     state::EventRecord,
 };
@@ -39,6 +40,19 @@ struct Inner {
     events: EventInbox,
     /// Newest event that was acknowledged.
     acknowledged: Option<u32>,
+    grouped: Grouped,
+}
+
+/// States from the group.
+#[derive(Default)]
+struct Grouped {
+    /// Whether they are taken.
+    follows: bool,
+    unconfirmed: Unconfirmed,
+    /// Why they are not taken any more, until somebody asks.
+    lost_trust: Option<Trust>,
+    /// How often that was found.
+    withdrawn: u64,
 }
 
 /// Constraint sets, for a device bridge.
@@ -64,6 +78,7 @@ impl Inbound {
                 }),
                 events: EventInbox::default(),
                 acknowledged: None,
+                grouped: Grouped::default(),
             }),
             frames: Frames::new(),
             start: Instant::now(),
@@ -99,7 +114,7 @@ impl Inbound {
         if let Payload::Hot(_) = opened.payload {
             self.frames.witness(opened.state_hash);
         }
-        inner.take(opened, received, local_ns, counters);
+        inner.take(opened, received, local_ns, counters, Provenance::Session);
     }
 
     /// Takes what the server said to the group.
@@ -112,7 +127,31 @@ impl Inbound {
             None => counters.lost.take_one(),
         }
         let local_ns = self.local_ns(received);
-        self.lock().take(opened, received, local_ns, counters);
+        let mut inner = self.lock();
+        if inner.grouped.follows || !matches!(opened.payload, Payload::Hot(_)) {
+            inner.take(opened, received, local_ns, counters, Provenance::Group);
+        }
+    }
+
+    /// Whether states of the group are taken from now on.
+    pub(crate) fn follow_group(&self, follows: bool) {
+        let mut inner = self.lock();
+        inner.grouped.follows = follows;
+        inner.grouped.unconfirmed.clear();
+    }
+
+    /// How often states that came by the group were found false, or were not confirmed.
+    pub(crate) fn states_withdrawn(&self) -> u64 {
+        self.lock().grouped.withdrawn
+    }
+
+    /// Why states of the group are not taken any more, if that is news.
+    pub(crate) fn take_lost_trust(&self, now_ns: u64) -> Option<Trust> {
+        let mut inner = self.lock();
+        if inner.grouped.follows && inner.grouped.unconfirmed.is_overdue(now_ns) {
+            inner.judge(Trust::Unconfirmed);
+        }
+        inner.grouped.lost_trust.take()
     }
 
     /// When the server was last heard on this client's own path, ns.
@@ -206,18 +245,30 @@ impl Inner {
         received: Instant,
         local_ns: u64,
         counters: &ClientCounterCells,
+        provenance: Provenance,
     ) {
         let sequence = opened.header.sequence;
         match opened.payload {
             Payload::Hot(state) => {
                 counters.states.one();
-                self.events.repeated(&state.events);
+                // An event of the group is nobody's word: the control stream tells the server's.
+                if provenance == Provenance::Session {
+                    self.events.repeated(&state.events);
+                }
                 // Newest wins: a state that others overtook is of no use to a picture, and ticks stay in order.
                 match self.newest_tick {
                     Some(newest) if newest > state.tick => return counters.late.one(),
                     // By the other path already.
                     Some(newest) if newest == state.tick => return counters.duplicates.one(),
                     _ => self.newest_tick = Some(state.tick),
+                }
+                if provenance == Provenance::Group {
+                    let waiting = &mut self.grouped.unconfirmed;
+                    let trust = waiting.take(state.tick, opened.state_hash, local_ns);
+                    self.judge(trust);
+                    if !self.grouped.follows {
+                        return;
+                    }
                 }
                 if self.states.len() == MAX_QUEUED_STATES {
                     self.states.pop_front();
@@ -228,7 +279,14 @@ impl Inner {
                     sequence,
                     received,
                     state_hash: opened.state_hash,
+                    provenance,
                 });
+            }
+            Payload::Confirm(confirmation) => {
+                if self.grouped.follows {
+                    let trust = self.grouped.unconfirmed.confirm(&confirmation);
+                    self.judge(trust);
+                }
             }
             Payload::TimeResponse(response) => {
                 if !self.clock.update(&response, local_ns) {
@@ -265,5 +323,21 @@ impl Inner {
             | Payload::EventAck(_) => counters.garbage.one(),
             Payload::Release(_) => {} // taken before
         }
+    }
+
+    /// Takes no state of the group any more where it is not to be trusted, and forgets those that nobody has taken yet.
+    fn judge(&mut self, trust: Trust) {
+        if trust == Trust::Kept {
+            return;
+        }
+        let grouped = &mut self.grouped;
+        grouped.follows = false;
+        grouped.lost_trust = Some(trust);
+        grouped.withdrawn += 1;
+        grouped.unconfirmed.clear();
+        self.states
+            .retain(|state| state.provenance == Provenance::Session);
+        // A forged tick must not keep the server's own states out.
+        self.newest_tick = grouped.unconfirmed.newest();
     }
 }

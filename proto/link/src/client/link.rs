@@ -40,6 +40,7 @@ pub struct ClientLink {
     endpoint: Endpoint,
     hot: Arc<Hot>,
     session: u16,
+    epoch: u32,
     node_timeout: Duration,
     description: SceneDescription,
     coupling: Option<CouplingOffer>,
@@ -50,6 +51,7 @@ pub struct ClientLink {
 /// What the server tells at join.
 pub(crate) struct AtJoin {
     pub(crate) session: u16,
+    pub(crate) epoch: u32,
     pub(crate) node_timeout: Duration,
     pub(crate) description: SceneDescription,
     /// For a device bridge.
@@ -74,6 +76,7 @@ impl ClientLink {
             endpoint,
             hot,
             session: told.session,
+            epoch: told.epoch,
             node_timeout: told.node_timeout,
             description: told.description,
             coupling: told.coupling,
@@ -97,6 +100,11 @@ impl ClientLink {
         self.session
     }
 
+    /// Incarnation of the server: another process has another one.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
     /// Silence on the hot plane after which the server gives a node up, and after which it is to be given up itself.
     pub fn node_timeout(&self) -> Duration {
         self.node_timeout
@@ -117,6 +125,12 @@ impl ClientLink {
     /// Moves the states received since the last call to the end of `out`: oldest first, ticks increasing, at most the newest 256.
     pub fn drain_states(&self, out: &mut Vec<ReceivedState>) {
         self.hot.inbound.drain_states(out);
+    }
+
+    /// How often states that came by the multicast group were found to be forged, or were not confirmed by the server in time: when that grows, whoever
+    /// keeps states forgets those of before. Those that were still waiting to be drained are gone already.
+    pub fn states_withdrawn(&self) -> u64 {
+        self.hot.inbound.states_withdrawn()
     }
 
     /// Takes part in the barrier of frames, where the server leads one and [`crate::Role::Render`] joined. `period`: shortest time between
@@ -224,7 +238,10 @@ impl ClientLink {
 
     /// Sends a line for the workbench's log without waiting; `false` if it was not taken.
     pub fn post_log(&self, level: LogLevel, text: String) -> bool {
-        self.post(ControlMessage::Log(LogEvent { level, text }))
+        self.post(ControlMessage::Log(LogEvent {
+            level,
+            text: text.into(),
+        }))
     }
 
     /// Asks for force at the device, or for none, without waiting; `false` if it was not taken. Counts if [`crate::Role::Operator`] joined; the
@@ -288,7 +305,7 @@ impl ClientLink {
     /// The same for a link that others share; they find it closed.
     pub async fn leave(&self) {
         let bye = ControlMessage::Bye(Bye {
-            reason: "the node left".to_owned(),
+            reason: "the node left".into(),
         });
         let goodbye = async {
             if self.outbox.send(bye).await.is_ok() {

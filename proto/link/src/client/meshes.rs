@@ -5,7 +5,7 @@ use super::mesh_cache::{Cached, MeshCache};
 use crate::{
     LinkError, MeshCounters,
     counters::MeshCounterCells,
-    framing::{close_text, read_message, write_message},
+    framing::{close_text, peer_text, read_message, write_message},
 };
 use quinn::Connection;
 use std::{
@@ -142,17 +142,17 @@ async fn fetch(
     let (mut send, mut recv) = connection
         .open_bi()
         .await
-        .map_err(|error| ended(error.to_string()))?;
+        .map_err(|error| ended(peer_text(&error)))?;
     write_message(
         &mut send,
         &ControlMessage::MeshRequest(MeshRequest { hash }),
     )
     .await
-    .map_err(|error| ended(error.to_string()))?;
+    .map_err(|error| ended(peer_text(&error)))?;
     let _ = send.finish(); // fails only if the stream is gone, and then reading fails too
     let answer = read_message(&mut recv, MAX_HEADER_BYTES)
         .await
-        .map_err(|error| ended(error.to_string()))?;
+        .map_err(|error| ended(peer_text(&error)))?;
     let length = match answer {
         ControlMessage::MeshHeader(MeshHeader {
             hash: found,
@@ -180,7 +180,7 @@ async fn fetch(
     let bytes = recv
         .read_to_end(length)
         .await
-        .map_err(|error| ended(error.to_string()))?;
+        .map_err(|error| ended(peer_text(&error)))?;
     if bytes.len() != length {
         return Err(bad_mesh(
             server,

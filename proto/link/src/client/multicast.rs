@@ -10,6 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
+    confirmation::Trust,
     control::{ControlMessage, StatesBy},
     header::MAX_DATAGRAM_BYTES,
     multicast::{MulticastWatch, StatePath},
@@ -43,6 +44,8 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
     socket.set_read_timeout(Some(LOOK_PERIOD))?;
     let receiver: UdpSocket = socket.try_clone()?.into();
     let mut watch = MulticastWatch::default();
+    let mut generation = None;
+    let mut unsaid = None;
     let mut joined = Instant::now();
     let mut buffer = [0; MAX_DATAGRAM_BYTES + 1]; // one more byte tells an oversized datagram
     while !hot.is_over() {
@@ -61,7 +64,14 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
             Err(_) => std::thread::sleep(LOOK_PERIOD), // soft, but no reason to spin
         }
         let now = Instant::now();
-        ask(hot, &mut watch, group, now);
+        let newest = hot.group.roster().map(|roster| roster.generation);
+        if std::mem::replace(&mut generation, newest) != newest {
+            watch.rekeyed();
+        }
+        // What a busy stream does not take is said at the next look.
+        unsaid = unsaid
+            .or_else(|| ask(hot, &mut watch, group, now))
+            .filter(|words| !hot.post(ControlMessage::StatesBy(*words)));
         if now.duration_since(joined) >= REJOIN_PERIOD {
             joined = now;
             renew(&socket, group, interface);
@@ -70,16 +80,21 @@ fn listen(hot: &Hot, group: SocketAddrV4, server: SocketAddr) -> io::Result<()> 
     Ok(())
 }
 
-fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant) {
+/// Turns to the way that the watch or the confirmations ask for; what the server is to be told of it.
+fn ask(
+    hot: &Hot,
+    watch: &mut MulticastWatch,
+    group: SocketAddrV4,
+    now: Instant,
+) -> Option<StatesBy> {
     let now_ns = hot.inbound.local_ns(now);
-    let Some(path) = watch.wish(now_ns, hot.inbound.heard_ns()) else {
-        return;
-    };
-    let multicast = path == StatePath::Multicast;
-    if !hot.post(ControlMessage::StatesBy(StatesBy { multicast })) {
-        return; // the control stream is busy: asked again at the next look
+    if let Some(trust) = hot.inbound.take_lost_trust(now_ns) {
+        return leave(hot, watch, group, trust, now_ns);
     }
+    let path = watch.wish(now_ns, hot.inbound.heard_ns())?;
+    let multicast = path == StatePath::Multicast;
     watch.asked(path, now_ns);
+    hot.inbound.follow_group(multicast);
     match path {
         StatePath::Multicast => tracing::info!(%group, "states come by multicast"),
         StatePath::Unicast => {
@@ -87,6 +102,43 @@ fn ask(hot: &Hot, watch: &mut MulticastWatch, group: SocketAddrV4, now: Instant)
             tracing::warn!(%group, "multicast fell silent while the server lives: states come by unicast again");
         }
     }
+    Some(StatesBy {
+        multicast,
+        forged: false,
+    })
+}
+
+/// Turns to unicast, because what came by the group is not to be trusted. Its states are not taken any more already.
+fn leave(
+    hot: &Hot,
+    watch: &mut MulticastWatch,
+    group: SocketAddrV4,
+    trust: Trust,
+    now_ns: u64,
+) -> Option<StatesBy> {
+    let counters = &hot.inbound.counters;
+    let forged = matches!(trust, Trust::Forged { .. });
+    match trust {
+        Trust::Kept => return None,
+        Trust::Forged { tick } => {
+            counters.states_forged.one();
+            watch.forged();
+            tracing::error!(%group, tick, "a member of the group forges the server's states: states come by unicast until the group's keys change");
+        }
+        Trust::Unconfirmed => {
+            counters.states_unconfirmed.one();
+            tracing::warn!(%group, "the server did not confirm what came by multicast: states come by unicast again");
+        }
+        Trust::Unheard => {
+            counters.multicast_lost.one();
+            tracing::warn!(%group, "multicast brings none of the server's states: states come by unicast again");
+        }
+    }
+    watch.asked(StatePath::Unicast, now_ns);
+    Some(StatesBy {
+        multicast: false,
+        forged,
+    })
 }
 
 fn renew(socket: &Socket, group: SocketAddrV4, interface: std::net::Ipv4Addr) {

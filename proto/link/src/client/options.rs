@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
     time::{Duration, Instant},
 };
-use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand};
+use taut_proto::{HotState, JoinKey, Role, Transport, WrenchCommand, state::RunState};
 
 /// Longer than any server's own: QUIC takes the shorter one of both ends.
 const LONGEST_IDLE: Duration = Duration::from_secs(120);
@@ -70,6 +70,39 @@ pub struct ReceivedState {
     pub received: Instant,
     /// Fingerprint of the state as received: report it in `ClientStats::drawn`.
     pub state_hash: u64,
+    /// Who vouches for it.
+    pub provenance: Provenance,
+}
+
+/// Under whose keys a state came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Provenance {
+    /// Those of this session: the server sent it.
+    Session,
+    /// The group's: a member sent it, and what it says is the server's is so until it is found out, for
+    /// [`taut_proto::confirmation::PATIENCE_NS`] at most. To draw from, and for nothing else.
+    Group,
+}
+
+/// A state that the server sent, for who decides by it: what asks for force, or for none, takes no other.
+#[derive(Clone, Copy, Debug)]
+pub struct ServerState<'a>(&'a HotState);
+
+impl ReceivedState {
+    /// The state, if it came under the keys of this session.
+    pub fn of_server(&self) -> Option<ServerState<'_>> {
+        match self.provenance {
+            Provenance::Session => Some(ServerState(&self.state)),
+            Provenance::Group => None,
+        }
+    }
+}
+
+impl ServerState<'_> {
+    /// Whether forces are given.
+    pub fn run(&self) -> RunState {
+        self.0.run
+    }
 }
 
 /// A command to the device with its history.

@@ -18,7 +18,7 @@ use crate::{
 use quinn::{Connection, RecvStream, SendStream};
 use std::{sync::Arc, time::Duration};
 use taut_proto::{
-    Act, DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport,
+    Act, DecodeError, PROTOCOL_VERSION, Refusal, Role, Transport, Untrusted,
     control::{
         ControlMessage, Hello, MAX_FRAME_BYTES, MAX_NODE_NAME_BYTES, MeshHeader, RefusalCode,
         Welcome,
@@ -94,7 +94,7 @@ async fn join(
 ) -> Option<(Arc<Session>, SendStream, RecvStream)> {
     let connection = incoming.await.ok()?;
     let (mut send, mut recv) = connection.accept_bi().await.ok()?;
-    let mut node = String::new();
+    let mut node = Untrusted::default();
     let outcome = match read_message(&mut recv, MAX_HELLO_BYTES).await {
         Ok(ControlMessage::Hello(hello)) => {
             node.clone_from(&hello.node);
@@ -148,7 +148,7 @@ fn admit(
     let binding = binding::proof_binding(connection).map_err(|error| bad(error.to_string()))?;
     let claim = Claim {
         role: hello.role,
-        node: &hello.node,
+        node: hello.node.raw(),
         grant: hello.grant,
     };
     let secret = shared.key.join_secret(claim.role, claim.node, claim.grant);
@@ -156,6 +156,14 @@ fn admit(
         shared.counters.wrong_key.one();
         let text = "its secret is not one of this workbench: its cluster key or credential (--key) is damaged or forged, make it again with `taut keys`";
         return Err((RefusalCode::WrongKey, text.to_owned()));
+    }
+    // From here on the name is one that may be shown, whatever it is part of.
+    let name = hello.node.raw();
+    if name.trim().is_empty() || name.len() > MAX_NODE_NAME_BYTES || !hello.node.is_printable() {
+        let text = format!(
+            "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
+        );
+        return Err(bad(text));
     }
     let policy = lock(&shared.policy);
     policy.check(claim).map_err(|shut_out| {
@@ -166,16 +174,12 @@ fn admit(
         };
         (code, shut_out.to_string())
     })?;
-    let printable = hello.node.chars().all(|c| !c.is_control());
-    if hello.node.trim().is_empty() || hello.node.len() > MAX_NODE_NAME_BYTES || !printable {
-        let text = format!(
-            "a node's name has 1 to {MAX_NODE_NAME_BYTES} printable bytes: choose another (--node)"
-        );
-        return Err(bad(text));
-    }
     // Who may choose his name must not take a screen's.
     let is_any_node = matches!(hello.grant, Grant::AnyNode { .. });
-    if is_any_node && hello.role != Role::Render && shared.content.nodes.contains(&hello.node) {
+    if is_any_node
+        && hello.role != Role::Render
+        && shared.content.nodes.iter().any(|node| node == name)
+    {
         let text = format!(
             "\"{}\" is a render node of the workbench: choose another name (--node)",
             hello.node
@@ -184,23 +188,21 @@ fn admit(
     }
     let now_ns = shared.clock.now_ns();
     let Admission { session, replaced } =
-        shared
-            .sessions
-            .admit(&hello.node, hello.role, now_ns, |number| {
-                let keys = binding::server_keys(connection, shared.epoch, number)
-                    .map_err(|error| error.to_string())?;
-                let admitted = Admitted {
-                    number,
-                    node: hello.node.clone(),
-                    role: hello.role,
-                    grant: hello.grant,
-                    transport: hello.transport,
-                    rate_hz: hello.rate_hz,
-                    joined_ns: now_ns,
-                    after_event: shared.discrete.newest(),
-                };
-                Ok(Session::new(admitted, connection.clone(), keys))
-            })?;
+        shared.sessions.admit(name, hello.role, now_ns, |number| {
+            let keys = binding::server_keys(connection, shared.epoch, number)
+                .map_err(|error| error.to_string())?;
+            let admitted = Admitted {
+                number,
+                node: name.to_owned(),
+                role: hello.role,
+                grant: hello.grant,
+                transport: hello.transport,
+                rate_hz: hello.rate_hz,
+                joined_ns: now_ns,
+                after_event: shared.discrete.newest(),
+            };
+            Ok(Session::new(admitted, connection.clone(), keys))
+        })?;
     if let Some(old) = replaced {
         let reason = format!(
             "a new node named \"{}\" took the place of this silent one",
@@ -227,16 +229,16 @@ async fn refuse(
     shared: &Shared,
     connection: &Connection,
     mut send: SendStream,
-    node: String,
+    node: Untrusted,
     code: RefusalCode,
     text: String,
 ) {
     shared.counters.refused.one();
-    tracing::info!(address = %connection.remote_address(), node, ?code, "client refused: {text}");
+    tracing::info!(address = %connection.remote_address(), %node, ?code, "client refused: {text}");
     let refusal = Refusal {
         code,
         version: PROTOCOL_VERSION,
-        text: text.clone(),
+        text: text.as_str().into(),
     };
     shared.tell(LinkEvent::Refused {
         address: connection.remote_address(),
@@ -322,12 +324,17 @@ async fn read_control(shared: &Shared, session: &Session, recv: &mut RecvStream)
                 node: session.node.clone(),
                 event,
             }),
-            ControlMessage::Arm(request) => shared.tell(LinkEvent::Arm {
-                node: session.node.clone(),
-                arm: request.arm,
-            }),
-            ControlMessage::StatesBy(states) => session.take_states_by(states),
-            ControlMessage::Bye(bye) => return bye.reason,
+            ControlMessage::Arm(request) => {
+                if let Some(take) = shared.arm.get() {
+                    take(request.arm);
+                }
+                shared.tell(LinkEvent::Arm {
+                    node: session.node.clone(),
+                    arm: request.arm,
+                });
+            }
+            ControlMessage::StatesBy(states) => session.take_states_by(states, shared),
+            ControlMessage::Bye(bye) => return bye.reason.to_string(),
             other => return broken(session, &format!("a client sent {}", other.name())),
         }
     }

@@ -2,7 +2,9 @@
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
-use taut_proto::{CouplingOffer, MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
+use taut_proto::{
+    CouplingOffer, MeshBlob, MeshHash, SceneDescription, Untrusted, control::ControlMessage,
+};
 
 /// What clients fetch at join.
 #[derive(Clone, Debug)]
@@ -21,7 +23,7 @@ pub(crate) struct EncodedContent {
     pub(crate) coupling: Vec<u8>,
     pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
     /// Names of the workbench's render nodes.
-    pub(crate) nodes: Vec<String>,
+    pub(crate) nodes: Vec<Untrusted>,
 }
 
 impl Content {

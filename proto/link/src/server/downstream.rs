@@ -1,7 +1,7 @@
 //! What the server tells a client on its control stream after the join: the group, and discrete events.
 
 use super::{session::Session, shared::Shared};
-use crate::framing::{WriteMessageError, close_text, write_message};
+use crate::framing::{WriteMessageError, close_text, peer_text, write_message};
 use quinn::SendStream;
 use taut_proto::{EventsTold, control::ControlMessage};
 
@@ -18,7 +18,7 @@ async fn write(
     session: &Session,
     mut send: SendStream,
 ) -> Result<(), WriteMessageError> {
-    let ended = |error: quinn::WriteError| WriteMessageError::Ended(error.to_string());
+    let ended = |error: quinn::WriteError| WriteMessageError::Ended(peer_text(&error));
     let (mut group, mut events) = (shared.group.follow(), shared.discrete.follow());
     let mut newest = session.after_event;
     let entry = EventsTold {

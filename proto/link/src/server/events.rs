@@ -7,7 +7,7 @@ use std::sync::{
     Mutex,
     atomic::{AtomicBool, Ordering},
 };
-use taut_proto::{EventOutbox, EventsTold, HotState};
+use taut_proto::{EventOutbox, EventsTold, HotState, events::is_newer};
 use tokio::sync::watch;
 
 pub(crate) struct EventHub {
@@ -64,6 +64,11 @@ impl EventHub {
     /// Number of the newest event.
     pub(crate) fn newest(&self) -> u32 {
         lock(&self.outbox).newest()
+    }
+
+    /// Whether there was an event of this number, or none since; where it is asked for often, no lock.
+    pub(crate) fn has_told(&self, number: u32) -> bool {
+        !is_newer(number, *self.newest.borrow())
     }
 
     /// What a client that has all up to `after` is to be told.

@@ -1,6 +1,7 @@
 //! The frames thread: releases frames when their time has come, twice, to every node that takes part.
 
 use super::{
+    LinkEvent,
     frames::Frames,
     session::{Session, lock},
     shared::Shared,
@@ -195,9 +196,18 @@ impl FrameMaster {
                 .map_or("a node that left", |session| &session.node);
             let (node, state) = (node.to_owned(), change.to);
             drop(leading);
+            let is_news = lock(&frames.recorder).note(&node, state);
+            if let Some(free) = is_news {
+                let node = node.clone();
+                self.shared.tell(LinkEvent::FreeRunning { node, free });
+            }
             match state {
                 Some(NodeState::Synced) => tracing::info!(node, "frames in step"),
                 Some(NodeState::Late) => tracing::debug!(node, "late at a frame"),
+                Some(NodeState::FreeRunning) => tracing::warn!(
+                    node,
+                    "free-running: it draws fewer frames than the least rate, or than it says"
+                ),
                 Some(_) => tracing::debug!(node, ?state, "frames"),
                 None => tracing::info!(node, "out of step: its frames are not waited for"),
             }

@@ -1,7 +1,7 @@
 //! How frames went: counts, and how far apart the screens swapped.
 
 use hdrhistogram::Histogram;
-use taut_proto::barrier::{Counts, FrameSkew};
+use taut_proto::barrier::{Counts, FrameSkew, NodeState};
 
 /// Longest time told apart, ns: a minute.
 const LONGEST_NS: u64 = 60_000_000_000;
@@ -37,6 +37,8 @@ pub struct FrameReport {
     pub age: Spread,
     /// Each node by name: its swap call less the first of the same frame, µs.
     pub nodes: Vec<(String, Spread)>,
+    /// Nodes that swap on their own now, by name.
+    pub free_running: Vec<String>,
 }
 
 /// Gathers shown frames. Memory is taken once, and once for each node that shows its first frame.
@@ -45,6 +47,8 @@ pub(crate) struct Recorder {
     overhead: Histogram<u64>,
     age: Histogram<u64>,
     nodes: Vec<(String, Histogram<u64>)>,
+    /// As many as there are members, at most.
+    free_running: Vec<String>,
 }
 
 impl Default for Recorder {
@@ -54,6 +58,7 @@ impl Default for Recorder {
             overhead: histogram(),
             age: histogram(),
             nodes: Vec::new(),
+            free_running: Vec::new(),
         }
     }
 }
@@ -85,6 +90,27 @@ impl Recorder {
         }
     }
 
+    /// Notes what became of a node; whether it runs free from now on, or is in step again, if that is news.
+    pub(crate) fn note(&mut self, node: &str, state: Option<NodeState>) -> Option<bool> {
+        let known = self.free_running.iter().position(|free| free == node);
+        match (state, known) {
+            (Some(NodeState::FreeRunning), None) => {
+                self.free_running.push(node.to_owned());
+                Some(true)
+            }
+            // On its way back it is on probation still.
+            (Some(NodeState::Synced), Some(index)) => {
+                self.free_running.remove(index);
+                Some(false)
+            }
+            (None, Some(index)) => {
+                self.free_running.remove(index);
+                None
+            }
+            _ => None,
+        }
+    }
+
     pub(crate) fn report(&self, counts: Counts) -> FrameReport {
         let nodes = self.nodes.iter();
         FrameReport {
@@ -95,6 +121,7 @@ impl Recorder {
             nodes: nodes
                 .map(|(node, times)| (node.clone(), spread(times)))
                 .collect(),
+            free_running: self.free_running.clone(),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! call. The newest state comes from the broadcaster, which never waits for it: where the lock is taken, that state is left out.
 
 use super::{
+    LinkEvent,
     frame_report::{FrameReport, Recorder},
     session::{Sent, Session, lock},
     shared::Shared,
@@ -19,7 +20,7 @@ use taut_proto::{
 const MAX_SHOWN: usize = 64;
 /// The server's session number and its term.
 const SERVER: u16 = 0;
-const FIRST_TERM: u32 = 1;
+const FIRST_TERM: u64 = 1;
 
 pub(crate) struct Frames {
     pub(super) master: Mutex<Leading>,
@@ -93,7 +94,7 @@ impl Frames {
         let mut payload = [0; MAX_PAYLOAD_BYTES];
         let bytes = match answer {
             Answer::Repeat => leading.sent_bytes,
-            Answer::Counted | Answer::Refused => 0,
+            Answer::Counted | Answer::Refused | Answer::Full => 0,
         };
         payload[..bytes].copy_from_slice(&leading.sent[..bytes]);
         drop(leading);
@@ -105,8 +106,12 @@ impl Frames {
             let sent = session.send_bytes(Kind::Release, &payload[..bytes], &mut buffer, shared);
             debug_assert!(sent != Sent::NoPath, "its ARRIVE opened the path");
         }
-        if answer == Answer::Refused {
-            shared.counters.garbage.one();
+        match answer {
+            Answer::Refused => shared.counters.garbage.one(),
+            Answer::Full if session.note_no_place() => shared.tell(LinkEvent::NoPlace {
+                node: session.node.clone(),
+            }),
+            Answer::Full | Answer::Counted | Answer::Repeat => {}
         }
     }
 

@@ -16,7 +16,8 @@ pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
         | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
-        | Payload::Constraints(_) => None,
+        | Payload::Constraints(_)
+        | Payload::Confirm(_) => None,
     }
 }
 

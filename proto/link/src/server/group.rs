@@ -176,7 +176,7 @@ fn roster(shared: &Shared) -> Vec<GroupMember> {
         .filter(|session| is_member(session.role))
         .map(|session| GroupMember {
             sender: session.number,
-            node: session.node.clone(),
+            node: session.node.as_str().into(),
             role: session.role,
             address: session.udp_address(),
         })

@@ -25,7 +25,7 @@ use std::{
     io,
     net::{SocketAddr, UdpSocket},
     sync::{
-        Arc, Mutex,
+        Arc, Mutex, OnceLock,
         atomic::{AtomicBool, Ordering},
         mpsc::{self, Receiver},
     },
@@ -101,6 +101,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         sessions: Sessions::new(options.max_clients),
         counters: CounterCells::default(),
         events: events_in,
+        arm: OnceLock::new(),
         inputs: InputWriter::new(input),
         frames: options.frames.map(Frames::new),
         sent_states: SentStates::new(),
@@ -219,6 +220,12 @@ impl ServerLink {
             }
         }
         ended
+    }
+
+    /// Gives every operator's wish for force, or for none, to `take`, from the task that hears the client: no queue is on the way, and nobody who reads
+    /// events. `take` waits for nothing. The first call counts; [`LinkEvent::Arm`] tells of the wish all the same.
+    pub fn on_arm(&self, take: impl Fn(bool) + Send + Sync + 'static) {
+        let _ = self.shared.arm.set(Box::new(take));
     }
 
     /// Next event, if there is one.

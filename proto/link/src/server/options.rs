@@ -60,7 +60,7 @@ impl ServerOptions {
             clock: SessionClock::start_now(),
             frames: None,
             coupling: CouplingOffer::AtServer {
-                reason: "it offers nothing else".to_owned(),
+                reason: "it offers nothing else".into(),
             },
         }
     }

@@ -98,13 +98,22 @@ pub(crate) fn receive(
                 }),
                 shared,
             );
+            // Who hears the group is told what was really sent to it.
+            if session.may_listen() && shared.group.is_wanted() {
+                let confirmation = shared.sent_states.lately(request.client_sent);
+                session.send(&Payload::Confirm(confirmation), shared);
+            }
         }
         Payload::Arrive(arrive) => {
             if let Some(frames) = &shared.frames {
                 frames.arrive(session, &arrive, now_ns, shared);
             }
         }
-        Payload::EventAck(ack) => session.acknowledge(ack.newest),
+        Payload::EventAck(ack) => match shared.discrete.has_told(ack.newest) {
+            true => session.acknowledge(ack.newest),
+            // Of an event that there was not: it would end what is repeated for the others.
+            false => counters.garbage.one(),
+        },
         Payload::Input(sample) => {
             let input = DeviceInput {
                 sample,
@@ -134,7 +143,8 @@ pub(crate) fn receive(
         | Payload::Release(_)
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
-        | Payload::Constraints(_) => {}
+        | Payload::Constraints(_)
+        | Payload::Confirm(_) => {}
     }
 }
 

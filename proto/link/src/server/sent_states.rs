@@ -1,8 +1,10 @@
 //! Shared datum: fingerprints of the states sent lately, to compare with what clients say they drew.
 //!
-//! Writer: the broadcaster. Readers: the sessions' control tasks, once per report. Wait-free; a slot being rewritten reads as unknown.
+//! Writer: the broadcaster, before it sends. Readers: the sessions' control tasks, once per report, and the receiving thread, which confirms to each client
+//! what went to the group. Wait-free; a slot being rewritten reads as unknown.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use taut_proto::{Confirmation, confirmation::SentState};
 
 /// States remembered: four seconds at 1 kHz, where clients report once per second.
 const REMEMBERED: usize = 4096;
@@ -11,6 +13,7 @@ const EMPTY: u64 = u64::MAX;
 
 pub(crate) struct SentStates {
     slots: Box<[Slot]>,
+    newest: AtomicU64,
 }
 
 struct Slot {
@@ -26,6 +29,7 @@ impl SentStates {
         };
         SentStates {
             slots: std::iter::repeat_with(slot).take(REMEMBERED).collect(),
+            newest: AtomicU64::new(EMPTY),
         }
     }
 
@@ -34,6 +38,32 @@ impl SentStates {
         slot.tick.store(EMPTY, Ordering::SeqCst);
         slot.hash.store(hash, Ordering::SeqCst);
         slot.tick.store(tick, Ordering::SeqCst);
+        self.newest.store(tick, Ordering::SeqCst);
+    }
+
+    /// The newest states, for a client that asked at `asked_ns` of its clock. Some microseconds, no allocation.
+    pub(crate) fn lately(&self, asked_ns: u64) -> Confirmation {
+        let mut lately = Confirmation {
+            asked_ns,
+            ..Confirmation::default()
+        };
+        let newest = self.newest.load(Ordering::SeqCst);
+        if newest == EMPTY {
+            return lately;
+        }
+        let oldest = newest.saturating_sub(REMEMBERED as u64 - 1);
+        for tick in (oldest..=newest).rev() {
+            let slot = self.slot(tick);
+            if slot.tick.load(Ordering::SeqCst) != tick {
+                continue;
+            }
+            let state_hash = slot.hash.load(Ordering::SeqCst);
+            let is_whole = slot.tick.load(Ordering::SeqCst) == tick;
+            if is_whole && !lately.add(SentState { tick, state_hash }) {
+                break;
+            }
+        }
+        lately
     }
 
     /// Whether `hash` is what was sent at `tick`; `None` if that is not known any more.

@@ -1,6 +1,6 @@
 //! One client's session: its keys, where its datagrams go, and what is counted of it.
 
-use super::{ClientStatus, rights::Rights, shared::Shared};
+use super::{ClientStatus, LinkEvent, rights::Rights, shared::Shared};
 use crate::counters::Cell;
 use std::{
     net::SocketAddr,
@@ -41,6 +41,7 @@ pub(crate) struct Session {
     /// Newest event that the client has, in the upper half beside a 1; 0 before it said so.
     acknowledged: AtomicU64,
     by_multicast: AtomicBool,
+    has_no_place: AtomicBool,
     pace: Mutex<Pace>,
     packets_sent: Cell,
     bytes_sent: Cell,
@@ -95,6 +96,7 @@ impl Session {
             due_ns: AtomicU64::new(0),
             acknowledged: AtomicU64::new(0),
             by_multicast: AtomicBool::new(false),
+            has_no_place: AtomicBool::new(false),
             pace: Mutex::default(),
             packets_sent: Cell::default(),
             bytes_sent: Cell::default(),
@@ -222,12 +224,22 @@ impl Session {
         shared.counters.congested.one();
     }
 
+    /// Notes that there is no place for it among those that swap together; whether that is news.
+    pub(crate) fn note_no_place(&self) -> bool {
+        !self.has_no_place.swap(true, Ordering::Relaxed)
+    }
+
     /// Takes the client's word on how it gets its states.
-    pub(crate) fn take_states_by(&self, states: StatesBy) {
+    pub(crate) fn take_states_by(&self, states: StatesBy, shared: &Shared) {
         let by_multicast = states.multicast && self.may_listen();
         if self.by_multicast.swap(by_multicast, Ordering::Relaxed) != by_multicast {
             let path = if by_multicast { "multicast" } else { "unicast" };
             tracing::info!(node = self.node, "client takes its states by {path}");
+        }
+        if states.forged {
+            shared.tell(LinkEvent::StatesForged {
+                node: self.node.clone(),
+            });
         }
     }
 
@@ -327,6 +339,7 @@ impl Session {
             session: self.number,
             node: self.node.clone(),
             role: self.role,
+            grant: self.grant,
             transport: self.transport,
             rate_hz: self.rate_hz,
             address: self.connection.remote_address(),

@@ -15,7 +15,7 @@ use crate::{SessionClock, counters::CounterCells};
 use std::{
     net::UdpSocket,
     sync::{
-        Arc, Mutex,
+        Arc, Mutex, OnceLock,
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::SyncSender,
     },
@@ -27,6 +27,9 @@ use taut_proto::{
     limits::{JoinGuard, UnknownSources},
     membership::{Pace, SilenceLimits},
 };
+
+/// Takes an operator's wish for force, or for none.
+pub(crate) type ArmTaker = Box<dyn Fn(bool) + Send + Sync>;
 
 pub(crate) struct Shared {
     pub(crate) key: ClusterKey,
@@ -44,6 +47,8 @@ pub(crate) struct Shared {
     pub(crate) sessions: Sessions,
     pub(crate) counters: CounterCells,
     pub(crate) events: SyncSender<LinkEvent>,
+    /// Who takes an operator's wish, at once.
+    pub(crate) arm: OnceLock<ArmTaker>,
     pub(crate) inputs: InputWriter,
     pub(crate) frames: Option<Frames>,
     pub(crate) heads: HeadWriter,

@@ -1,7 +1,10 @@
 //! What the server knows of its clients, and what it tells of them.
 
 use std::{net::SocketAddr, time::Duration};
-use taut_proto::{Act, ClientStats, Role, Transport, control::LogEvent, control::RefusalCode};
+use taut_proto::{
+    Act, ClientStats, Role, Transport, Untrusted, control::LogEvent, control::RefusalCode,
+    proof::Grant,
+};
 
 /// A client as the server sees it.
 #[derive(Clone, Debug)]
@@ -12,6 +15,8 @@ pub struct ClientStatus {
     pub node: String,
     /// Role.
     pub role: Role,
+    /// By what right it is in.
+    pub grant: Grant,
     /// How it gets its states.
     pub transport: Transport,
     /// Most states per second that it wants; 0 for all.
@@ -68,7 +73,7 @@ pub enum LinkEvent {
         /// Where it came from.
         address: SocketAddr,
         /// The name that it gave; empty if it did not come that far.
-        node: String,
+        node: Untrusted,
         /// Why, for programs.
         code: RefusalCode,
         /// Why, for people.
@@ -97,7 +102,24 @@ pub enum LinkEvent {
         /// The line.
         event: LogEvent,
     },
-    /// An operator wants force at the device, or none.
+    /// A render node swaps on its own from now on, or in step with the others again: it draws fewer frames than the least rate, or than it says.
+    FreeRunning {
+        /// Its name.
+        node: String,
+        /// On its own, or in step again.
+        free: bool,
+    },
+    /// As many nodes as can swap together are there already: this one swaps on its own.
+    NoPlace {
+        /// Its name.
+        node: String,
+    },
+    /// It says that a member of the group sealed a state in the server's name: it takes states by itself until the group's keys change.
+    StatesForged {
+        /// Its name.
+        node: String,
+    },
+    /// An operator wants force at the device, or none; for the log: [`ServerLink::on_arm`](super::ServerLink::on_arm) has heard of it before.
     Arm {
         /// Its name.
         node: String,

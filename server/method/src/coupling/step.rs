@@ -69,6 +69,8 @@ pub struct Coupling {
     turn: TurnMemory,
     /// `a_c - a_u` of the last step: what the force did. Zero without force.
     correction: Vector6,
+    /// Most visits of rows in the projections of a step; `None`: as many as the solver's own limits allow.
+    most_row_visits: Option<u32>,
     /// Number of the device sample of the last step.
     sample: Option<u64>,
 }
@@ -137,6 +139,7 @@ impl Coupling {
             warm_start: Vec::with_capacity(capacity.min(6)),
             turn: TurnMemory::default(),
             correction: Vector6::zeros(),
+            most_row_visits: None,
             sample: None,
         }
     }
@@ -325,6 +328,12 @@ impl Coupling {
         }
     }
 
+    /// Bounds the work of a step, whatever the constraint sets are: at most so many visits of rows, one for each row in each step of each projection. A
+    /// projection that is not done by then gives no force, [`ProjectionStatus::IterationLimit`]. For sets from somebody else, in a loop with a deadline.
+    pub fn limit_work(&mut self, most_row_visits: u32) {
+        self.most_row_visits = Some(most_row_visits);
+    }
+
     /// The energy at the device's port since the start; `None` unless passivity is enforced.
     pub fn energy(&self) -> Option<&EnergyObserver> {
         self.energy.as_ref()
@@ -374,6 +383,18 @@ impl Coupling {
         self.projector.copy_from(&prepared.projector);
         self.targets.clone_from(&prepared.bounds);
         self.bounds.clone_from(&prepared.bounds);
+        if let Some(visits) = self.most_row_visits {
+            let rough = if self.friction.is_some() {
+                Friction::MAX_PROJECTIONS
+            } else {
+                0
+            };
+            let projections = 1 + self.settings.implicit_rounds + rough;
+            let rows = self.bounds.len().max(1) as u32; // a set's capacity
+            let most = visits / rows.saturating_mul(projections);
+            self.projector.limit_iterations(most);
+            self.implicit.limit_iterations(most);
+        }
         if self.friction.is_some() {
             let center = Point3::from(prepared.god_object.translation.vector);
             let rows = set.constraints.iter().take(self.bounds.len());

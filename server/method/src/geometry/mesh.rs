@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::mesh_error::MeshError;
 use super::normal_cone::triangle_cones;
+use super::parts::inverted_parts;
 use super::topology::{Edge, Topology};
 use super::tree::Tree;
 use super::wide_tree::WideTree;
@@ -38,11 +39,7 @@ impl Mesh {
             face_normals.push(normal.ok_or(MeshError::ZeroArea { triangle })?);
         }
         let mut topology = Topology::build(&vertices, &triangles, &face_normals)?;
-        let volume = signed_volume(&vertices, &triangles);
-        let outward = volume > 0.0; // false for NaN
-        if !outward {
-            return Err(MeshError::InsideOut { volume });
-        }
+        check_outward(&vertices, &triangles, &topology)?;
 
         let cones = triangle_cones(&vertices, &triangles, &face_normals, &mut topology);
         let tree = Tree::build(&vertices, &triangles);
@@ -219,6 +216,21 @@ fn check_numbers(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Result<(),
         }
     }
     Ok(())
+}
+
+/// Every closed part looks outward, or into a cavity of another.
+fn check_outward(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    topology: &Topology,
+) -> Result<(), MeshError> {
+    let volume = signed_volume(vertices, triangles);
+    let inverted = inverted_parts(vertices, triangles, topology.edges.iter().map(|e| e.faces));
+    match inverted.first() {
+        Some(part) if part.triangles < triangles.len() => Err(MeshError::PartInsideOut(*part)),
+        Some(_) => Err(MeshError::InsideOut { volume }),
+        None => Ok(()),
+    }
 }
 
 /// Outward unit normal, or `None` where the triangle has no area to rounding.

@@ -1,5 +1,7 @@
 //! Why a mesh is refused: one sentence each, with the place and what to do.
 
+use super::parts::InvertedPart;
+
 /// What is wrong with a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
@@ -86,4 +88,10 @@ pub enum MeshError {
         /// Signed volume, m^3.
         volume: f64,
     },
+    /// One closed part of the surface is inside out, and no cavity of another part.
+    #[error(
+        "the closed part with triangle {triangle}, of {triangles} triangles about ({x}, {y}, {z}) m, is inside out: reverse the corner order of its triangles",
+        triangle = .0.triangle, triangles = .0.triangles, x = .0.center.x, y = .0.center.y, z = .0.center.z
+    )]
+    PartInsideOut(InvertedPart),
 }

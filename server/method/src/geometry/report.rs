@@ -5,9 +5,10 @@ use std::collections::HashSet;
 use nalgebra::Point3;
 
 use super::mesh::{face_normal, signed_volume};
+use super::parts::{InvertedPart, inverted_parts};
 
 /// Findings about vertices and triangles as they come from a file. Works for meshes that [`Mesh`](super::Mesh) refuses.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MeshReport {
     /// Number of triangles.
     pub triangles: usize,
@@ -15,8 +16,10 @@ pub struct MeshReport {
     pub vertices: usize,
     /// Every edge has at least two triangles, and there is a triangle.
     pub watertight: bool,
-    /// Wherever two triangles share an edge they agree about outside, and the volume is positive.
+    /// Wherever two triangles share an edge they agree about outside, and every closed part has it outside.
     pub oriented: bool,
+    /// Closed parts that are inside out, no cavities of others; empty where the surface is not closed or does not agree about outside.
+    pub inverted_parts: Vec<InvertedPart>,
     /// Triangles without area, with an index out of range or with a corner that is not finite.
     pub degenerate_faces: usize,
     /// Triangles with the same three corners as an earlier one, in any order.
@@ -54,7 +57,13 @@ impl MeshReport {
             !seen.insert(corners)
         };
         let duplicate_faces = sound.iter().filter(duplicate).count();
-        let sides = count_sides(&sound);
+        let (sides, adjacent) = count_sides(&sound);
+        let closed = sides.border == 0 && sides.crowded == 0 && sides.misoriented == 0;
+        let inverted_parts = if closed {
+            inverted_parts(vertices, &sound, adjacent.into_iter())
+        } else {
+            Vec::new()
+        };
         let volume = if sound.is_empty() {
             0.0
         } else {
@@ -67,7 +76,8 @@ impl MeshReport {
             triangles: triangles.len(),
             vertices: vertices.len(),
             watertight: sides.border == 0 && !sound.is_empty(),
-            oriented: sides.misoriented == 0 && volume > 0.0,
+            oriented: sides.misoriented == 0 && volume > 0.0 && inverted_parts.is_empty(),
+            inverted_parts,
             degenerate_faces: triangles.len() - sound.len(),
             duplicate_faces,
             border_edges: sides.border,
@@ -95,22 +105,27 @@ struct SideCounts {
     misoriented: usize,
 }
 
-fn count_sides(triangles: &[[u32; 3]]) -> SideCounts {
-    let mut sides: Vec<(u32, u32, bool)> = triangles
+/// What the edges are like, and the two triangles at each that has two.
+fn count_sides(triangles: &[[u32; 3]]) -> (SideCounts, Vec<[u32; 2]>) {
+    let mut sides: Vec<(u32, u32, bool, u32)> = triangles
         .iter()
-        .flat_map(|t| (0..3).map(move |k| (t[k], t[(k + 1) % 3])))
-        .map(|(from, to)| (from.min(to), from.max(to), from < to))
+        .zip(0..)
+        .flat_map(|(t, index)| (0..3).map(move |k| (t[k], t[(k + 1) % 3], index)))
+        .map(|(from, to, index)| (from.min(to), from.max(to), from < to, index))
         .collect();
     sides.sort_unstable();
-    let mut counts = SideCounts::default();
+    let (mut counts, mut adjacent) = (SideCounts::default(), Vec::new());
     for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
         match *edge {
             [_] => counts.border += 1,
-            [a, b] => counts.misoriented += usize::from(a.2 == b.2),
+            [a, b] => {
+                counts.misoriented += usize::from(a.2 == b.2);
+                adjacent.push([a.3, b.3]);
+            }
             _ => counts.crowded += 1,
         }
     }
-    counts
+    (counts, adjacent)
 }
 
 /// Doubled area over the longest side.

@@ -25,7 +25,7 @@ const CONTRADICTION_TOLERANCE: f64 = 4.0 * DEPENDENT_SINE;
 const POLISH_ABOVE: f64 = 1e-14;
 
 /// Most rows taken in by one attempt. Six unknowns need about ten, thousands of rows some thirty.
-const MAX_ITERATIONS: u32 = 300;
+pub(super) const MAX_ITERATIONS: u32 = 300;
 
 /// Which violated row is taken in next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use super::working_set::WorkingSet;
 use crate::spatial::Vector6;
 
 /// Most sweeps over all rows; engines use 4 to 50.
-const MAX_SWEEPS: u32 = 1000;
+pub(super) const MAX_SWEEPS: u32 = 1000;
 
 /// A sweep that changes every multiplier by less, relative to the problem's scale, ends the search.
 const CHANGE_TOLERANCE: f64 = 1e-14;

@@ -8,10 +8,10 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.2, Eq. (1), which has b = 0. Beyond the paper: bounds, the certificate, the fallback.
 
-use super::active_set::{ActiveSet, PivotRule};
+use super::active_set::{self, ActiveSet, PivotRule};
 use super::certificate::Certificate;
 use super::clarabel::Clarabel;
-use super::gauss_seidel::GaussSeidel;
+use super::gauss_seidel::{self, GaussSeidel};
 use super::half_space::HalfSpace;
 use super::least_distance::{Bounds, LeastDistance};
 use super::metric::Metric;
@@ -67,6 +67,13 @@ impl Projector {
         self.gauss_seidel.limits = limits;
         self.clarabel.limits = Some(limits);
         self
+    }
+
+    /// Lets the active set and projected Gauss-Seidel take at most so many steps, and never more than their own limits: bounds the time of a projection
+    /// whatever its rows are. A projection that needs more says [`ProjectionStatus::IterationLimit`].
+    pub fn limit_iterations(&mut self, most: u32) {
+        self.active_set.limits.max_iterations = most.min(active_set::MAX_ITERATIONS);
+        self.gauss_seidel.limits.max_iterations = most.min(gauss_seidel::MAX_SWEEPS);
     }
 
     /// The acceleration nearest to `unconstrained` in `metric` that satisfies every row.

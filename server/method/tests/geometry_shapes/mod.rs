@@ -219,7 +219,7 @@ pub(crate) fn data_dir() -> Option<PathBuf> {
 )]
 pub(crate) fn read_ply(name: &str) -> Option<Soup> {
     let Some(bytes) = data_dir().and_then(|d| std::fs::read(d.join(name)).ok()) else {
-        println!("skipped: {name} is not in the test data");
+        taut_test_kit::left_out(format_args!("{name} is not in the test data"));
         return None;
     };
     let end = bytes

@@ -135,7 +135,9 @@ fn check_toml(path: &Path) -> FileReport {
         "monitoring",
         "realtime",
     ]) {
+        let mut notes = Vec::new();
         let workbench = Workbench::load(path).and_then(|workbench| {
+            notes = workbench.notes();
             let scene = workbench.load_scene()?;
             let (inner, fidelity) = summarise_scene(&scene)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
@@ -145,7 +147,10 @@ fn check_toml(path: &Path) -> FileReport {
             );
             Ok((summary, fidelity))
         });
-        report(path, FileKind::Workbench, workbench)
+        FileReport {
+            notes,
+            ..report(path, FileKind::Workbench, workbench)
+        }
     } else {
         let text = "is neither a scene (it has no [god_object]) nor a workbench (it has no [[screen]]); compare it with the shipped examples";
         report(

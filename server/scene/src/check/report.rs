@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use god_object::geometry::MeshReport;
+use god_object::geometry::{InvertedPart, MeshReport};
 use serde::Serialize;
 
 use crate::fidelity::FidelityPlan;
@@ -52,7 +52,7 @@ impl FileReport {
 }
 
 /// Figures of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshFigures {
     /// Number of triangles.
     pub triangles: usize,
@@ -72,12 +72,35 @@ pub struct MeshFigures {
     pub non_manifold_edges: usize,
     /// Edges along which two triangles disagree about outside.
     pub misoriented_edges: usize,
+    /// Closed parts that are inside out, no cavities of others.
+    pub inverted_parts: Vec<InvertedPartFigures>,
     /// m^3, negative if inside out.
     pub volume_m3: f64,
     /// Least height of a triangle, m; absent if none has an area.
     pub smallest_feature_m: Option<f64>,
     /// Sides of the box around it, m.
     pub size_m: [f64; 3],
+}
+
+/// A closed part of a mesh that is inside out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct InvertedPartFigures {
+    /// Number of its triangles.
+    pub triangles: usize,
+    /// Middle of the box around it, m.
+    pub center_m: [f64; 3],
+    /// m^3, negative.
+    pub volume_m3: f64,
+}
+
+impl InvertedPartFigures {
+    fn of(part: &InvertedPart) -> Self {
+        Self {
+            triangles: part.triangles,
+            center_m: part.center.into(),
+            volume_m3: part.volume,
+        }
+    }
 }
 
 impl MeshFigures {
@@ -96,6 +119,11 @@ impl MeshFigures {
             border_edges: report.border_edges,
             non_manifold_edges: report.non_manifold_edges,
             misoriented_edges: report.misoriented_edges,
+            inverted_parts: report
+                .inverted_parts
+                .iter()
+                .map(InvertedPartFigures::of)
+                .collect(),
             volume_m3: report.volume,
             smallest_feature_m: Some(report.smallest_feature).filter(|height| height.is_finite()),
             size_m: size,
@@ -131,10 +159,18 @@ impl MeshFigures {
             .filter(|(n, _)| *n > 0)
             .map(|(n, text)| format!("{n} {text}"))
             .collect();
-        if self.watertight && self.misoriented_edges == 0 && !self.oriented {
+        let whole = |part: &&InvertedPartFigures| part.triangles == self.triangles;
+        if self.inverted_parts.iter().any(|part| whole(&part)) {
             faults.push(format!(
                 "the surface is inside out (volume {} m^3); turn all triangles around",
                 self.volume_m3
+            ));
+        }
+        for part in self.inverted_parts.iter().filter(|part| !whole(part)) {
+            let [x, y, z] = part.center_m;
+            faults.push(format!(
+                "the closed part of {} triangles about ({x:.4}, {y:.4}, {z:.4}) m is inside out (volume {} m^3); turn its triangles around",
+                part.triangles, part.volume_m3
             ));
         }
         faults

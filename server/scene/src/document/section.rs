@@ -23,6 +23,8 @@ pub(crate) enum Range {
     PositiveUpTo(f64),
     /// Zero to this, ends included.
     UpTo(f64),
+    /// From the one to the other, ends included.
+    Between(f64, f64),
 }
 
 impl Range {
@@ -35,6 +37,7 @@ impl Range {
                 Self::NotPositive => value <= 0.0,
                 Self::PositiveUpTo(limit) => value > 0.0 && value <= limit,
                 Self::UpTo(limit) => (0.0..=limit).contains(&value),
+                Self::Between(low, high) => (low..=high).contains(&value),
             }
     }
 
@@ -46,6 +49,7 @@ impl Range {
             Self::NotPositive => "a finite number not above zero".into(),
             Self::PositiveUpTo(limit) => format!("greater than zero and at most {limit}"),
             Self::UpTo(limit) => format!("between 0 and {limit}"),
+            Self::Between(low, high) => format!("between {low} and {high}"),
         }
     }
 }

@@ -4,6 +4,8 @@ use crate::document::{Range, Section};
 
 /// Fastest frames, 1/s.
 const MAX_FRAME_RATE: f64 = 1000.0;
+/// Slowest frames, 1/s: what the protocol carries.
+const MIN_FRAME_RATE: f64 = 1.0;
 
 /// When a frame is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,8 +24,10 @@ pub enum FrameSwap {
 pub struct Frames {
     /// When a frame is shown.
     pub swap: FrameSwap,
-    /// Most frames per second; the slowest node's own limit holds for all.
+    /// Most frames per second; the slowest node's own limit holds for all, down to `least_rate`.
     pub rate: f64,
+    /// Least frames per second that a slow node brings about: one that is made for fewer, or gets there no more, swaps on its own.
+    pub least_rate: f64,
 }
 
 impl Default for Frames {
@@ -31,6 +35,7 @@ impl Default for Frames {
         Self {
             swap: FrameSwap::Scheduled,
             rate: 60.0,
+            least_rate: 10.0,
         }
     }
 }
@@ -42,8 +47,26 @@ pub(super) fn frames(section: &Section<'_>) -> Frames {
         ("off", FrameSwap::Off),
     ];
     let default = Frames::default();
+    let rates = Range::Between(MIN_FRAME_RATE, MAX_FRAME_RATE);
+    let rate = section.number_or("rate", rates, default.rate);
+    let least_rate = section
+        .number("least_rate", rates)
+        .unwrap_or(default.least_rate.min(rate));
+    if least_rate > rate {
+        let at = section
+            .get("least_rate")
+            .map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!(
+                "`least_rate` in {} is {least_rate}, above the `rate` of {rate}: every node would swap on its own; choose one that the slowest node keeps",
+                section.name()
+            ),
+        );
+    }
     Frames {
         swap: section.choice("swap", &swaps).unwrap_or(default.swap),
-        rate: section.number_or("rate", Range::PositiveUpTo(MAX_FRAME_RATE), default.rate),
+        rate,
+        least_rate,
     }
 }

@@ -6,6 +6,7 @@ use god_object::Pose;
 
 use super::dynamics::DeviceDynamics;
 use super::frames::Frames;
+use super::log::Log;
 use super::looking_on::{ObserverStream, Vrpn, Zenoh};
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
@@ -46,6 +47,8 @@ pub struct Workbench {
     pub realtime: RealTime,
     /// What no force may pass.
     pub safety: Safety,
+    /// What is logged.
+    pub log: Log,
     /// What is drawn beside the bodies.
     pub show: Show,
     /// The VRPN server.

@@ -6,6 +6,7 @@ mod displays;
 mod dynamics;
 mod frames;
 mod load;
+mod log;
 mod looking_on;
 mod monitoring;
 mod network;
@@ -13,6 +14,7 @@ mod parse;
 mod parts;
 mod realtime;
 mod safety;
+mod scale;
 mod spec;
 mod tracker;
 mod viewer;
@@ -20,6 +22,7 @@ mod viewer;
 pub use dynamics::DeviceDynamics;
 pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
+pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use spec::{
     Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime, RealTimeMode, Rearm,

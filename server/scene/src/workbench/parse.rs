@@ -10,12 +10,14 @@ use super::displays::{nodes, screens};
 use super::dynamics::dynamics;
 use super::frames::frames;
 use super::load::Workbench;
+use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::monitoring::monitoring;
 use super::network::network;
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
+use super::scale::places;
 use super::spec::Device;
 use super::viewer::{show, viewer};
 use crate::document::{Document, Section};
@@ -67,10 +69,14 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
+    let log = table(&root, "log", log).unwrap_or_default();
     let show = table(&root, "show", show).unwrap_or_default();
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
+    if let Some(network) = &network {
+        places(&root, &nodes, network, &frames);
+    }
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
@@ -106,6 +112,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         monitoring,
         realtime,
         safety,
+        log,
         show,
         vrpn,
         observers,

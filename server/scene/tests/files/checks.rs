@@ -29,7 +29,7 @@ impl Folder {
 fn a_sound_mesh_gets_its_figures() {
     let report = Folder::new().check("box.ply", write_ply(&cuboid([0.1, 0.2, 0.3])));
     assert!(report.is_good(), "{report}");
-    let figures = report.mesh.unwrap();
+    let figures = report.mesh.as_ref().unwrap();
     assert_eq!((figures.triangles, figures.vertices), (12, 8));
     assert!(figures.watertight && figures.oriented);
     assert!((figures.volume_m3 - 0.048).abs() < 1e-12);
@@ -40,6 +40,28 @@ fn a_sound_mesh_gets_its_figures() {
             .contains("12 triangles, 8 vertices, 0.2000 x 0.4000 x 0.6000 m, watertight yes"),
         "{report}"
     );
+}
+
+#[test]
+fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
+    let with_part = |half: f64, x: f64| {
+        let (mut mesh, part) = (cuboid([0.1; 3]), cuboid([half; 3]));
+        let first = mesh.vertices.len() as u32;
+        let moved = part.vertices.iter().map(|p| p + nalgebra::Vector3::x() * x);
+        mesh.vertices.extend(moved);
+        let turned = part.triangles.iter().map(|t| [t[1], t[0], t[2]]);
+        mesh.triangles.extend(turned.map(|t| t.map(|v| v + first)));
+        write_ply(&mesh)
+    };
+    let report = Folder::new().check("inverted.ply", with_part(0.02, 0.3));
+    let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
+    let expected = "the closed part of 12 triangles about (0.3000, 0.0000, 0.0000) m is inside out";
+    assert!(
+        texts.len() == 1 && texts[0].starts_with(expected),
+        "{texts:?}"
+    );
+    let cavity = Folder::new().check("cavity.ply", with_part(0.02, 0.05));
+    assert!(cavity.is_good(), "{cavity}");
 }
 
 #[test]
@@ -158,4 +180,50 @@ fn all_formats_give_the_same_box() {
         );
         assert!(check(&[folder.0.path().join(name)])[0].is_good(), "{name}");
     }
+}
+
+/// The shipped workbench with this many more nodes, and with the first of `changes` put in the place of the second.
+fn workbench_with(nodes: usize, changes: &[(&str, &str)]) -> FileReport {
+    let mut text = SHIPPED_WORKBENCH.to_owned();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from}");
+        text = text.replacen(from, to, 1);
+    }
+    let at = text.find("[viewer]").expect("there is a viewer");
+    let more: String = (0..nodes)
+        .map(|k| format!("[[node]]\nname = \"more-{k}\"\nscreens = [\"front\"]\n\n"))
+        .collect();
+    text.insert_str(at, &more);
+    Folder::new().check("workbench.toml", text)
+}
+
+#[test]
+fn nodes_without_a_place_are_a_fault_and_clients_that_cost_much_a_note() {
+    let room = ("max_clients = 16", "max_clients = 64");
+    let report = workbench_with(40, &[room]);
+    let text = report.to_string();
+    assert!(
+        !report.is_good() && text.contains("32 at most swap together"),
+        "{text}"
+    );
+    let off = ("swap = \"scheduled\"", "swap = \"off\"");
+    let report = workbench_with(40, &[room, off]);
+    assert!(report.is_good(), "{report}");
+    assert!(report.to_string().contains("% of a core"), "{report}");
+    let report = workbench_with(20, &[]);
+    assert!(report.to_string().contains("`max_clients`"), "{report}");
+    let slow = ("broadcast_rate = 1000", "broadcast_rate = 250");
+    let report = workbench_with(0, &[room, slow]);
+    assert!(report.is_good() && report.notes.is_empty(), "{report}");
+}
+
+#[test]
+fn a_least_rate_above_the_rate_is_a_fault() {
+    let report = workbench_with(0, &[("least_rate = 10", "least_rate = 61")]);
+    let text = report.to_string();
+    assert!(
+        !report.is_good() && text.contains("every node would swap on its own"),
+        "{text}"
+    );
+    assert!(!workbench_with(0, &[("rate = 60 ", "rate = 0.5 ")]).is_good());
 }

@@ -76,7 +76,7 @@ fn the_bunnies_load_or_say_how_to_get_them() {
             ),
             "{text}"
         );
-        println!("skipped: bunny_27k.ply is not in the data directory");
+        taut_test_kit::left_out("bunny_27k.ply is not in the data directory");
         return;
     }
     let built = scene.build().unwrap();
@@ -121,7 +121,7 @@ fn the_shipped_workbench_is_l_shaped() {
 #[test]
 fn the_assembly_scenes_and_traces_of_the_data_directory_load() {
     let Some(first) = data_file("assembly/gear_on_pin.toml") else {
-        println!("skipped: the data directory has no assembly scenes");
+        taut_test_kit::left_out("the data directory has no assembly scenes");
         return;
     };
     let mut scenes = 0;

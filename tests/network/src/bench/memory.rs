@@ -1,9 +1,33 @@
-//! Memory of this process.
+//! What a process has of the system: memory, descriptors, threads.
 
-/// Resident memory, bytes; `None` where the system has no `/proc`.
-#[must_use]
-pub fn resident_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
-    let pages: u64 = text.split_whitespace().nth(1)?.parse().ok()?;
-    Some(pages * rustix::param::page_size() as u64)
+use std::path::PathBuf;
+
+/// Resources of a process at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Resources {
+    /// Resident memory, bytes.
+    pub resident_bytes: u64,
+    /// Open file descriptors.
+    pub descriptors: u64,
+    /// Threads.
+    pub threads: u64,
+}
+
+impl Resources {
+    /// Of the process with this number.
+    ///
+    /// # Errors
+    /// There is no such process, or no `/proc`.
+    pub fn of(process: u32) -> std::io::Result<Resources> {
+        let place = PathBuf::from(format!("/proc/{process}"));
+        let text = std::fs::read_to_string(place.join("statm"))?;
+        let pages = text.split_whitespace().nth(1).and_then(|n| n.parse().ok());
+        let pages: u64 = pages.ok_or(std::io::ErrorKind::InvalidData)?;
+        let count = |what| std::fs::read_dir(place.join(what)).map(Iterator::count);
+        Ok(Resources {
+            resident_bytes: pages * rustix::param::page_size() as u64,
+            descriptors: count("fd")? as u64,
+            threads: count("task")? as u64,
+        })
+    }
 }

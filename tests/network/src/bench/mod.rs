@@ -15,16 +15,20 @@ mod process;
 mod program;
 mod quantiles;
 mod realtime;
+pub mod scale;
 pub mod screen;
 pub mod screen_death;
 pub mod server_kill;
 mod session;
 pub mod skew;
 pub mod soak;
+pub mod soak_log;
+pub mod soak_program;
+mod soak_watcher;
 mod state_stream;
 mod threads;
 
-pub use memory::resident_bytes;
+pub use memory::Resources;
 pub use quantiles::Quantiles;
 pub use realtime::{Ticker, keep_cores_awake, request_fifo};
 pub use session::{

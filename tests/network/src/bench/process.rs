@@ -36,6 +36,11 @@ impl Process {
             .ok_or_else(|| BenchError::Missing("the program has no standard error".to_owned()))
     }
 
+    /// Its number.
+    pub(super) fn number(&self) -> u32 {
+        self.child.id()
+    }
+
     /// For signals from another thread, while it is not dropped.
     pub(super) fn id(&self) -> Pid {
         Pid::from_child(&self.child)

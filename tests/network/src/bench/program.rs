@@ -71,15 +71,13 @@ impl Workbench {
             command.args(["--quic", quic, "--udp", udp]);
         }
         let mut process = Process::start(command.stderr(Stdio::piped()))?;
-        let lines = process.errors()?;
-        let mut served = Served {
-            process,
-            lines,
-            quic: String::new(),
-            udp: String::new(),
-        };
-        (served.quic, served.udp) = served.addresses()?;
-        Ok(served)
+        let mut lines = process.errors()?;
+        let (quic, udp) = addresses(&mut lines)?;
+        // What it says later is read, too: nobody may wait for a full pipe.
+        std::thread::Builder::new()
+            .name("lines".to_owned())
+            .spawn(move || std::io::copy(&mut lines, &mut std::io::sink()))?;
+        Ok(Served { process, quic, udp })
     }
 
     /// Starts another role that joins `server` as `node`.
@@ -129,31 +127,35 @@ fn broken() -> BenchError {
 /// A running `taut serve`; killed when dropped.
 pub(super) struct Served {
     process: Process,
-    lines: BufReader<ChildStderr>,
     /// Address of the control plane.
     pub(super) quic: String,
     /// Address of the pose plane.
     pub(super) udp: String,
 }
 
-impl Served {
-    /// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
-    fn addresses(&mut self) -> Result<(String, String), BenchError> {
-        let (mut line, mut all) = (String::new(), String::new());
-        while self.lines.read_line(&mut line)? > 0 {
-            let found = line.trim_end().strip_prefix("serving on ");
-            let both =
-                found.and_then(|text| text.strip_suffix(" (poses)")?.split_once(" (control) and "));
-            if let Some((quic, udp)) = both {
-                return Ok((quic.to_owned(), udp.to_owned()));
-            }
-            all.push_str(&line);
-            line.clear();
+/// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
+fn addresses(lines: &mut BufReader<ChildStderr>) -> Result<(String, String), BenchError> {
+    let (mut line, mut all) = (String::new(), String::new());
+    while lines.read_line(&mut line)? > 0 {
+        let found = line.trim_end().strip_prefix("serving on ");
+        let both =
+            found.and_then(|text| text.strip_suffix(" (poses)")?.split_once(" (control) and "));
+        if let Some((quic, udp)) = both {
+            return Ok((quic.to_owned(), udp.to_owned()));
         }
-        Err(BenchError::Missing(format!(
-            "the program does not serve: {}",
-            all.trim()
-        )))
+        all.push_str(&line);
+        line.clear();
+    }
+    Err(BenchError::Missing(format!(
+        "the program does not serve: {}",
+        all.trim()
+    )))
+}
+
+impl Served {
+    /// Its process's number.
+    pub(super) fn number(&self) -> u32 {
+        self.process.number()
     }
 
     /// Ends it as Ctrl-C does; its report.

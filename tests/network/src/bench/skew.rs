@@ -173,6 +173,7 @@ pub fn settings(swap: Swap, rate: u64) -> MasterSettings {
     MasterSettings {
         swap,
         period_ns: 1_000_000_000 / rate,
+        slowest_ns: 100_000_000,
     }
 }
 

@@ -1,6 +1,334 @@
 //! Frames, members of the group, numbers out of range.
 
-use super::Attack;
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use taut_link::proto::barrier::{Arrive, MOST_REIGNS_AHEAD, MasterSettings, Swap};
+use taut_link::proto::events::EventAck;
+use taut_link::proto::header::MAX_DATAGRAM_BYTES;
+use taut_link::proto::state::RunState;
+use taut_link::proto::{Holder, JoinKey, Payload, confirmation};
+use taut_link::{
+    ClientLink, ClusterKey, FrameReport, FrameTurn, LinkEvent, MulticastOptions, Role, ServerLink,
+    ServerOptions, connect, serve,
+};
+use tokio::runtime::Runtime;
+
+use super::liar::{Liar, multicast_works, to_groups};
+use super::{Attack, Finding};
+use crate::bench::{BenchError, client_options, server_options, small_content, state, wait_until};
+use crate::report::Extent;
 
 /// The attacks of this group.
-pub(super) const ATTACKS: &[Attack] = &[];
+pub(super) const ATTACKS: &[Attack] = &[
+    Attack {
+        name: "slow_node",
+        tried: "a render node that says it draws a frame in two seconds joins two that draw sixty a second",
+        promised: "the wall keeps its rate, and the node is named",
+        run: slow_node,
+    },
+    Attack {
+        name: "last_term",
+        tried: "a render node claims reigns at the end of the numbers, and of the window that counts, under its own keys",
+        promised: "the numbers are refused, the server leads on, and its term stays where a successor's fits above it",
+        run: last_term,
+    },
+    Attack {
+        name: "forged_states",
+        tried: "an observer seals states in the server's name under the group's key: no force, a god-object elsewhere, a tick of the far future",
+        promised: "within 250 ms of the first the render node takes no state of the group, names it, and draws the server's; none of them counts as the server's word",
+        run: forged_states,
+    },
+];
+
+const FRAME: Duration = Duration::from_nanos(16_666_667);
+
+fn runtime() -> Result<Runtime, BenchError> {
+    let mut builder = tokio::runtime::Builder::new_multi_thread();
+    Ok(builder.worker_threads(1).enable_all().build()?)
+}
+
+fn frames() -> Option<MasterSettings> {
+    Some(MasterSettings {
+        swap: Swap::Immediate,
+        period_ns: FRAME.as_nanos() as u64,
+        slowest_ns: 100_000_000,
+    })
+}
+
+fn report(server: &ServerLink) -> FrameReport {
+    server.frame_report().unwrap_or_default()
+}
+
+fn credential(key: &ClusterKey, role: Role, node: &str) -> JoinKey {
+    key.credential(role, Holder::Node(node.to_owned()), 1)
+        .into()
+}
+
+/// Sends a state a millisecond, tells frames, and lets `screens` draw, until `done` has run.
+fn while_serving<T>(
+    server: &ServerLink,
+    screens: &[(&ClientLink, Duration)],
+    done: impl FnOnce() -> Result<T, BenchError>,
+) -> Result<T, BenchError> {
+    let over = AtomicBool::new(false);
+    let over = &over;
+    std::thread::scope(|scope| {
+        let (mut broadcaster, clock) = (server.broadcaster(), server.clock());
+        thread(scope, "states", move || {
+            while !over.load(Ordering::SeqCst) {
+                let now_ns = clock.now_ns();
+                broadcaster.send(&state(now_ns / 1_000_000 + 1, now_ns, false));
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        })?;
+        if let Some(mut master) = server.frame_master() {
+            let lead = move || master.run(&|| over.load(Ordering::SeqCst));
+            thread(scope, "frames", lead)?;
+        }
+        for (screen, period) in screens {
+            thread(scope, "screen", move || draw(screen, *period, over))?;
+        }
+        let result = done();
+        over.store(true, Ordering::SeqCst);
+        result
+    })
+}
+
+fn thread<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    body: impl FnOnce() + Send + 'scope,
+) -> Result<(), BenchError> {
+    let builder = std::thread::Builder::new().name(name.to_owned());
+    builder.spawn_scoped(scope, body)?;
+    Ok(())
+}
+
+/// A screen that takes `period` for a frame, or says that it does.
+fn draw(screen: &ClientLink, period: Duration, over: &AtomicBool) {
+    let mut gate = screen.frame_gate(period);
+    while !over.load(Ordering::SeqCst) {
+        match gate.turn() {
+            FrameTurn::Free => std::thread::sleep(Duration::from_millis(2)),
+            FrameTurn::Draw(_) => {
+                // Most of it in pieces: the attack ends when it ends.
+                let drawn = Instant::now() + period.mul_f64(0.2);
+                while Instant::now() < drawn && !over.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                gate.arrive();
+                gate.wait();
+                gate.swapped(Instant::now());
+            }
+        }
+    }
+}
+
+fn slow_node(_: &Extent) -> Result<Finding, BenchError> {
+    let runtime = runtime()?;
+    let key = ClusterKey::generate()?;
+    let options = ServerOptions {
+        frames: frames(),
+        ..server_options(&key)
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let join = |node| runtime.block_on(connect(client_options(&server, &key, Role::Render, node)));
+    let (left, right, slow) = (join("left")?, join("right")?, join("slow")?);
+    let screens = [
+        (&left, FRAME / 2),
+        (&right, FRAME / 2),
+        (&slow, Duration::from_secs(2)),
+    ];
+    let (mut named, mut rate) = (false, 0.0);
+    while_serving(&server, &screens, || {
+        wait_until("the slow node is named", || {
+            while let Some(event) = server.try_event() {
+                named |=
+                    matches!(event, LinkEvent::FreeRunning { node, free: true } if node == "slow");
+            }
+            named
+        })?;
+        let (before, start) = (report(&server).counts.released, Instant::now());
+        std::thread::sleep(Duration::from_secs(1));
+        let released = report(&server).counts.released - before;
+        rate = released as f64 / start.elapsed().as_secs_f64();
+        Ok(())
+    })?;
+    // A busy machine may lose some of sixty; the attack left one.
+    let report = report(&server);
+    Ok(Finding {
+        happened: format!(
+            "{rate:.0} frames a second; {} swaps on its own",
+            report.free_running.join(", ")
+        ),
+        kept: named && rate > 15.0 && report.free_running == ["slow"],
+    })
+}
+
+fn last_term(_: &Extent) -> Result<Finding, BenchError> {
+    let runtime = runtime()?;
+    let key = ClusterKey::generate()?;
+    let options = ServerOptions {
+        frames: frames(),
+        ..server_options(&key)
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let options = client_options(&server, &key, Role::Render, "left");
+    let left = runtime.block_on(connect(options))?;
+    let key = credential(&key, Role::Render, "liar");
+    let liar = runtime.block_on(Liar::join(&server, &key, Role::Render, "liar"))?;
+    while_serving(&server, &[(&left, FRAME / 2)], || {
+        let steady = || report(&server).counts.released > 20;
+        wait_until("frames", steady)?;
+        let before = report(&server).counts;
+        let claim = |term| {
+            liar.say(&Payload::Arrive(Arrive {
+                term,
+                frame: before.released + 1,
+                ..Arrive::default()
+            }))
+        };
+        // At the end of 32 bits, and one beyond the window; a number beyond its range does not even seal.
+        let claims = [u64::from(u32::MAX), 2 + MOST_REIGNS_AHEAD];
+        for term in claims {
+            claim(term)?;
+        }
+        let beyond = claim(u64::MAX).is_err();
+        // Of an event that there was not: it would end what is repeated for the others.
+        let garbage = server.counters().garbage;
+        liar.say(&Payload::EventAck(EventAck { newest: 1 << 30 }))?;
+        wait_until("the acknowledgement is refused", || {
+            server.counters().garbage > garbage
+        })?;
+        wait_until("the claims arrive", || {
+            report(&server).counts.refused >= before.refused + claims.len() as u64
+        })?;
+        // One at the edge of the window counts: the server leads on above it.
+        claim(1 + MOST_REIGNS_AHEAD)?;
+        wait_until("the server leads on", || {
+            let now = report(&server).counts;
+            now.reclaimed > before.reclaimed && now.released > before.released + 20
+        })?;
+        let counts = report(&server).counts;
+        let status = left.counters();
+        Ok(Finding {
+            happened: format!(
+                "{} claims refused, {} counted; {} frames released since; the other node refused {} datagrams",
+                counts.refused - before.refused,
+                counts.reclaimed - before.reclaimed,
+                counts.released - before.released,
+                status.garbage
+            ),
+            kept: beyond && counts.reclaimed == before.reclaimed + 1 && status.garbage == 0,
+        })
+    })
+}
+
+fn forged_states(_: &Extent) -> Result<Finding, BenchError> {
+    let port = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+    let [high, low] = port.to_be_bytes();
+    let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port);
+    if !multicast_works(group) {
+        return Ok(Finding {
+            happened: "not measured: this system gives no multicast on loopback".to_owned(),
+            kept: true,
+        });
+    }
+    let runtime = runtime()?;
+    let key = ClusterKey::generate()?;
+    let multicast = MulticastOptions {
+        group,
+        announced: None,
+        interface: Ipv4Addr::LOCALHOST,
+    };
+    let options = ServerOptions {
+        multicast: Some(multicast),
+        ..server_options(&key)
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let options = client_options(&server, &key, Role::Render, "screen");
+    let screen = runtime.block_on(connect(options))?;
+    let observer = credential(&key, Role::Observer, "liar");
+    let mut liar = runtime.block_on(Liar::join(&server, &observer, Role::Observer, "liar"))?;
+    let told = runtime.block_on(liar.group_with("screen"))?;
+    while_serving(&server, &[], || {
+        let by_multicast = || {
+            let clients = server.clients();
+            let mut screens = clients.iter().filter(|client| client.node == "screen");
+            screens.any(|client| client.by_multicast)
+        };
+        wait_until("states by multicast", by_multicast)?;
+        let mut states = Vec::new();
+        // Genuine ones first, that none of the group's are refused for nothing.
+        std::thread::sleep(Duration::from_millis(300));
+        screen.drain_states(&mut states);
+        let alarms_before = screen.states_withdrawn();
+        states.clear();
+
+        let (mut sealer, socket) = (liar.as_server(&told), to_groups()?);
+        let (begun, mut sent, mut found, mut drawn) = (Instant::now(), 0, None, 0);
+        while found.is_none() && begun.elapsed() < Duration::from_secs(5) {
+            let now_ns = server.clock().now_ns();
+            let mut forged = state(now_ns / 1_000_000 + 5, now_ns, false);
+            forged.run = RunState::Paused;
+            forged.tools[0].god_object.position[1] = 0.5;
+            if sent % 5 == 4 {
+                forged.tick = 1 << 50;
+            }
+            let mut buffer = [0; MAX_DATAGRAM_BYTES];
+            let datagram = sealer.seal(&Payload::Hot(forged), u64::MAX / 4, &mut buffer);
+            let datagram = datagram.map_err(|error| BenchError::Missing(error.to_string()))?;
+            socket.send_to(datagram, &group.into())?;
+            sent += 1;
+            std::thread::sleep(Duration::from_millis(2));
+            screen.drain_states(&mut states);
+            let is_forged = |state: &&taut_link::ReceivedState| state.state.run == RunState::Paused;
+            drawn += states.iter().filter(is_forged).count();
+            let believed = states.iter().filter(|state| state.of_server().is_some());
+            if believed.filter(is_forged).count() > 0 {
+                return Err(BenchError::Missing(
+                    "a forged state counts as the server's".into(),
+                ));
+            }
+            states.clear();
+            if screen.states_withdrawn() > alarms_before {
+                found = Some(begun.elapsed());
+            }
+        }
+        let named = || {
+            let mut named = false;
+            while let Some(event) = server.try_event() {
+                named |= matches!(event, LinkEvent::StatesForged { node } if node == "screen");
+            }
+            named
+        };
+        wait_until("it is named", named)?;
+        wait_until("states by unicast", || !by_multicast())?;
+        // From now on the server's alone, whatever the liar goes on saying.
+        let mut genuine = 0;
+        wait_until("the server's states", || {
+            screen.drain_states(&mut states);
+            genuine += states.iter().filter(|s| s.of_server().is_some()).count();
+            states.clear();
+            genuine >= 100
+        })?;
+        let patience = Duration::from_nanos(confirmation::PATIENCE_NS);
+        let Some(found) = found else {
+            return Ok(Finding {
+                happened: format!("{sent} forged states, not found"),
+                kept: false,
+            });
+        };
+        Ok(Finding {
+            happened: format!(
+                "found {} ms after the first of {sent} forged states, {drawn} of which could be drawn; named; states by unicast again; {} false alarms before",
+                found.as_millis(),
+                alarms_before
+            ),
+            // A machine that does not run the receiving thread in time does not draw either.
+            kept: found < patience.max(Duration::from_secs(1)) && alarms_before == 0,
+        })
+    })
+}

@@ -6,6 +6,7 @@
 mod cluster;
 mod device;
 mod joining;
+mod liar;
 mod operation;
 mod origin;
 

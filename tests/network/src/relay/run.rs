@@ -23,7 +23,7 @@ const MAX_BYTES: usize = 1 << 16;
 /// Clients that one relay serves; datagrams of more are counted as not sent.
 const MAX_FLOWS: usize = 64;
 /// Upstream datagrams that are kept for those who steal them; later ones pass, but are not kept.
-const MAX_KEPT: usize = 100_000;
+const MAX_KEPT: usize = 1_000;
 
 /// Why a relay does not run.
 #[derive(Debug, thiserror::Error)]
@@ -88,6 +88,7 @@ impl Waiting {
             treatments,
             seed,
             flows: Vec::new(),
+            opened: 0,
             shared: shared.clone(),
         };
         let thread = std::thread::Builder::new()
@@ -106,6 +107,8 @@ impl Waiting {
 struct Shared {
     stop: AtomicBool,
     black_hole: AtomicBool,
+    /// Asked for, and undone when done.
+    forget: AtomicBool,
     up: Cells,
     down: Cells,
     upstream: Mutex<Vec<Vec<u8>>>,
@@ -131,6 +134,18 @@ impl Relay {
         self.shared.black_hole.store(swallow, Ordering::SeqCst);
     }
 
+    /// Forgets all clients, and what is on the way: for when everybody has left. Returns once it is done; who sends again is a new client.
+    pub fn forget_clients(&self) {
+        self.shared.forget.store(true, Ordering::SeqCst);
+        while self.shared.forget.load(Ordering::SeqCst) && !self.is_over() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// What was done to datagrams of this direction.
     #[must_use]
     pub fn counts(&self, direction: Direction) -> RelayCounts {
@@ -140,7 +155,7 @@ impl Relay {
         }
     }
 
-    /// The first 100,000 datagrams that clients sent, as they came.
+    /// The first 1,000 datagrams that clients sent, as they came.
     #[must_use]
     pub fn upstream(&self) -> Vec<Vec<u8>> {
         let kept = self.shared.upstream.lock();
@@ -174,6 +189,8 @@ struct Thread {
     treatments: Vec<Treatment>,
     seed: u64,
     flows: Vec<Flow>,
+    /// Flows so far, those that are forgotten included.
+    opened: usize,
     shared: Arc<Shared>,
 }
 
@@ -185,6 +202,10 @@ impl Thread {
             self.take_from_clients(&mut buffer);
             self.take_from_server(&mut buffer);
             self.deliver();
+            if self.shared.forget.load(Ordering::SeqCst) {
+                self.flows.clear();
+                self.shared.forget.store(false, Ordering::SeqCst);
+            }
         }
     }
 
@@ -265,13 +286,14 @@ impl Thread {
         if let Some(number) = self.flows.iter().position(|flow| flow.client == client) {
             return Some(number);
         }
-        let number = self.flows.len();
-        if number == MAX_FLOWS {
+        if self.flows.len() == MAX_FLOWS {
             return None;
         }
         let any = SocketAddr::new(self.clients.local_addr().ok()?.ip(), 0);
         let socket = open(any).ok()?;
         socket.connect(self.server).ok()?;
+        let number = self.opened;
+        self.opened += 1;
         let treatment = self.treatments.get(number).or(self.treatments.last());
         let Treatment { up, down } = treatment.cloned().unwrap_or_default();
         let fates =
@@ -284,7 +306,7 @@ impl Thread {
             up: OnTheWay::default(),
             down: OnTheWay::default(),
         });
-        Some(number)
+        Some(self.flows.len() - 1)
     }
 
     fn keep(&self, datagram: &[u8]) {

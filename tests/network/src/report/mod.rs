@@ -6,7 +6,9 @@
 mod frames;
 mod processes;
 mod row;
+mod scale;
 mod sections;
+mod soak;
 
 pub use row::{Row, Verdict, csv, table};
 pub use sections::{Extent, SECTIONS, Section};

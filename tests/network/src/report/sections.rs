@@ -8,9 +8,10 @@ use taut_proto::membership::SilenceLimits;
 use super::frames::{failover_rows, skew_rows};
 use super::processes::{missing, screen_death_rows, server_kill_rows};
 use super::row::{Row, brief};
+use super::scale::scale_rows;
 use crate::bench::age::{self, Age};
 use crate::bench::death::{self, Aftermath, Death};
-use crate::bench::{BenchError, events, isolation, join, latency, soak};
+use crate::bench::{BenchError, events, isolation, join, latency};
 use crate::forge::attack;
 use crate::relay::{Burst, Impairment};
 
@@ -25,6 +26,8 @@ pub struct Extent {
     pub joins: usize,
     /// Deaths of each sort; of those that whole processes or all nodes take part in, at most three.
     pub deaths: usize,
+    /// Numbers of clients whose cost is measured.
+    pub clients: &'static [usize],
     /// Numbers of nodes whose swaps are compared.
     pub screens: &'static [u64],
     /// Runs of each sort of frames, of which the median counts.
@@ -37,6 +40,8 @@ pub struct Extent {
     pub turn_seconds: f64,
     /// Time of the soak, s; `None`: not now.
     pub soak_seconds: Option<f64>,
+    /// Where the soak's log goes, if anywhere.
+    pub soak_log: Option<PathBuf>,
     /// The program `taut`.
     pub program: PathBuf,
     /// This program.
@@ -82,6 +87,11 @@ pub const SECTIONS: &[Section] = &[
         run: isolation_rows,
     },
     Section {
+        name: "scale",
+        about: "processor time for each state and client, 8 to 64 clients",
+        run: scale_rows,
+    },
+    Section {
         name: "forged",
         about: "forged, replayed, truncated and damaged datagrams",
         run: forged_rows,
@@ -113,8 +123,8 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "soak",
-        about: "clients that come, go, vanish and are refused behind a bad network",
-        run: soak_rows,
+        about: "hours in which clients, server and bridge come, go and are killed",
+        run: super::soak::rows,
     },
     Section {
         name: "hostile",
@@ -400,57 +410,6 @@ fn death_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     Ok(rows)
 }
 
-fn soak_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
-    let Some(seconds) = extent.soak_seconds else {
-        let why = "--soak SECONDS runs it";
-        return Ok(vec![Row::unknown("soak", "no invariant broken", why)]);
-    };
-    let run = soak::run(Duration::from_secs_f64(seconds), 21)?;
-    let server = &run.server;
-    let forged_counted =
-        server.garbage + server.wrong_version + server.forged + server.replayed + server.flooded;
-    let [before, after] = run.memory.map(|bytes| bytes as f64 / (1 << 20) as f64);
-    Ok(vec![
-        Row::invariant(
-            format!("soak of {seconds} s: states wrong or out of order"),
-            "0",
-            format!(
-                "{} of {} taken; {} joined, {} left, {} vanished, {} refused for their key, {} joins lost to the network",
-                run.wrong,
-                run.received,
-                run.joined,
-                run.left,
-                run.vanished,
-                run.refused,
-                run.failed_joins
-            ),
-            run.wrong == 0 && run.received > 0 && run.joined > 0,
-        ),
-        Row::invariant(
-            "soak: clients left over at the end",
-            "0",
-            run.remaining,
-            run.remaining == 0,
-        ),
-        Row::invariant(
-            "soak: forgeries at the server's own port that are counted, and change nothing",
-            "all",
-            format!(
-                "{forged_counted} counted for {} forged and what the relay damaged; {} inputs",
-                run.forged, server.inputs
-            ),
-            forged_counted >= run.forged && server.inputs == 0 && server.inputs_refused == 0,
-        ),
-        Row::at_most(
-            "soak: growth of resident memory",
-            after - before,
-            8.0,
-            "MiB",
-            format!("{} to {} MiB", brief(before), brief(after)),
-        ),
-    ])
-}
-
 /// Targets of the cluster that other programs measure.
 fn elsewhere(_: &Extent) -> Result<Vec<Row>, BenchError> {
     Ok(vec![Row::unknown(
@@ -469,12 +428,14 @@ impl Extent {
             forgeries: 1_000_000,
             joins: 10,
             deaths: 5,
+            clients: &[8, 32, 64],
             screens: &[2, 4],
             skew_turns: 5,
             node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),
             turns: 6,
             turn_seconds: 8.0,
             soak_seconds: None,
+            soak_log: None,
             program: this.with_file_name("taut"),
             this: this.to_path_buf(),
         }
@@ -488,13 +449,14 @@ impl Extent {
             forgeries: 20_000,
             joins: 1,
             deaths: 1,
+            clients: &[4],
             screens: &[2],
             skew_turns: 1,
             // A busy machine starves a thread for longer than a workbench forgives.
             node_timeout: Duration::from_secs(2),
             turns: 1,
             turn_seconds: 2.0,
-            soak_seconds: Some(3.0),
+            soak_seconds: Some(20.0),
             ..Extent::full(this)
         }
     }

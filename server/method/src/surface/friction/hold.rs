@@ -56,6 +56,9 @@ pub struct FrictionProblem<'a> {
 }
 
 impl Friction {
+    /// Most projections of one [`Friction::hold`].
+    pub(crate) const MAX_PROJECTIONS: u32 = MAX_ROUNDS as u32 + 1;
+
     /// The friction of a world; `None` where every obstacle is frictionless: then there is nothing to pay.
     pub fn of(world: &World, settings: &Settings) -> Option<Self> {
         let coefficients: Vec<f64> = world

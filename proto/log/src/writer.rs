@@ -1,0 +1,275 @@
+//! The one thread that writes to standard error.
+
+use std::fs::File;
+use std::io::{self, IsTerminal, Write};
+use std::os::fd::AsFd;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use tracing_appender::non_blocking::{ErrorCounter, NonBlocking, NonBlockingBuilder, WorkerGuard};
+
+/// Lines that wait for a terminal or a journal that is slow; further ones are lost.
+pub const MAX_WAITING: usize = 4096;
+
+/// Return to the first column and clear the line.
+const CLEAR_LINE: &[u8] = b"\r\x1b[2K";
+/// The piece that asks for nothing but the status line.
+const REFRESH: &[u8] = b"\r";
+
+/// The process's writer, once it was asked for.
+static TERMINAL: OnceLock<Writer> = OnceLock::new();
+
+/// Lines that go to `to` by a thread of their own.
+#[derive(Debug)]
+pub(crate) struct Writer {
+    lines: NonBlocking,
+    lost: ErrorCounter,
+    guard: Mutex<Option<WorkerGuard>>,
+    /// The thread is within a write.
+    busy: Arc<AtomicBool>,
+    status: Arc<Mutex<Status>>,
+}
+
+/// One line that is written again below every other.
+#[derive(Debug, Default)]
+struct Status {
+    text: String,
+    /// A refresh waits for the thread: no further one is needed.
+    asked: bool,
+}
+
+impl Writer {
+    /// To `to`, with at most `waiting` lines between.
+    pub(crate) fn new(to: impl Write + Send + 'static, waiting: usize) -> Self {
+        let lost = Arc::<OnceLock<ErrorCounter>>::default();
+        let busy = Arc::<AtomicBool>::default();
+        let status = Arc::<Mutex<Status>>::default();
+        let telling = Telling {
+            to,
+            busy: busy.clone(),
+            lost: lost.clone(),
+            status: status.clone(),
+            told: 0,
+        };
+        let (lines, guard) = NonBlockingBuilder::default()
+            .lossy(true)
+            .buffered_lines_limit(waiting)
+            .thread_name("lines")
+            .finish(telling);
+        let counter = lines.error_counter();
+        // Set here alone.
+        let _ = lost.set(counter.clone());
+        Self {
+            lines,
+            lost: counter,
+            guard: Mutex::new(Some(guard)),
+            busy,
+            status,
+        }
+    }
+
+    /// Replaces the status line.
+    pub(crate) fn status(&self, text: String) {
+        let mut status = lock(&self.status);
+        status.text = text;
+        if !std::mem::replace(&mut status.asked, true) {
+            let _ = self.lines().write(REFRESH);
+        }
+    }
+
+    /// Leaves the last status line standing.
+    pub(crate) fn end_status(&self) {
+        let mut status = lock(&self.status);
+        if !std::mem::take(&mut status.text).is_empty() {
+            let _ = self.lines().write(b"\n");
+        }
+    }
+
+    /// Lines that were lost.
+    pub(crate) fn lost(&self) -> u64 {
+        self.lost.dropped_lines() as u64
+    }
+
+    /// A handle for writing: each `write` is one piece, taken whole or lost.
+    pub(crate) fn lines(&self) -> NonBlocking {
+        self.lines.clone()
+    }
+
+    /// Waits for what was handed over, at most about a second; nothing is written afterwards.
+    pub(crate) fn flush(&self) {
+        let guard = lock(&self.guard).take();
+        if self.busy.load(Ordering::Acquire) && self.lost() > 0 {
+            // Nobody reads, and the queue is full: there is nothing to wait for, and a guard that cannot say goodbye prints so.
+            std::mem::forget(guard);
+        }
+    }
+}
+
+/// Writes, and says before the next line how many were lost since it last did.
+struct Telling<W> {
+    to: W,
+    busy: Arc<AtomicBool>,
+    lost: Arc<OnceLock<ErrorCounter>>,
+    status: Arc<Mutex<Status>>,
+    told: usize,
+}
+
+impl<W: Write> Telling<W> {
+    /// A line above the status line, if there is one.
+    fn with_status(&mut self, line: &[u8]) -> io::Result<()> {
+        let status = {
+            let mut status = lock(&self.status);
+            if line == REFRESH {
+                status.asked = false;
+            }
+            status.text.clone()
+        };
+        if status.is_empty() {
+            return match line {
+                REFRESH => Ok(()),
+                line => self.to.write_all(line),
+            };
+        }
+        self.to.write_all(CLEAR_LINE)?;
+        if line != REFRESH {
+            self.to.write_all(line)?;
+        }
+        self.to.write_all(status.as_bytes())
+    }
+}
+
+impl<W: Write> Write for Telling<W> {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        self.busy.store(true, Ordering::Release);
+        let lost = self.lost.get().map_or(0, ErrorCounter::dropped_lines);
+        if lost > self.told {
+            let since = lost - self.told;
+            let told = writeln!(
+                self.to,
+                "taut: {since} lines were lost here: the terminal or the journal did not take them"
+            );
+            if told.is_ok() {
+                self.told = lost;
+            }
+        }
+        // A terminal that is gone has nobody to be told.
+        let written = self.with_status(line);
+        self.busy.store(false, Ordering::Release);
+        written.map(|()| line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+/// Standard error of the process: never waits, loses what it cannot take.
+pub fn terminal() -> NonBlocking {
+    process_writer().lines()
+}
+
+/// Writes a line to standard error by [`terminal`].
+pub fn say(line: &str) {
+    // Writing to a queue does not fail: what finds no room is counted.
+    let _ = terminal().write(format!("{line}\n").as_bytes());
+}
+
+/// Replaces the status line: one line that stays below all others. For a terminal alone; where standard error is none, nothing happens.
+pub fn status(text: String) {
+    if io::stderr().is_terminal() {
+        process_writer().status(text);
+    }
+}
+
+/// Leaves the last status line standing.
+pub fn end_status() {
+    if let Some(writer) = TERMINAL.get() {
+        writer.end_status();
+    }
+}
+
+/// Lines of this process that were lost.
+pub fn lost_lines() -> u64 {
+    TERMINAL.get().map_or(0, Writer::lost)
+}
+
+/// At the end of the process: waits for what was handed over, at most about a second.
+pub fn flush() {
+    if let Some(writer) = TERMINAL.get() {
+        writer.flush();
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn process_writer() -> &'static Writer {
+    TERMINAL.get_or_init(|| {
+        // A descriptor of its own: who holds the lock of `std::io::stderr` while the terminal stands would stop everybody else's.
+        match io::stderr().as_fd().try_clone_to_owned() {
+            Ok(descriptor) => Writer::new(File::from(descriptor), MAX_WAITING),
+            Err(_) => Writer::new(io::stderr(), MAX_WAITING),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Read;
+    use std::time::{Duration, Instant};
+
+    /// A pipe that nobody reads takes 64 KiB, then makes writers wait: a stopped terminal does the same.
+    #[test]
+    fn a_reader_that_stands_still_costs_lines_and_no_time_and_is_told_how_many() {
+        let (mut reader, pipe) = io::pipe().expect("a pipe");
+        let writer = Writer::new(pipe, 64);
+        let mut lines = writer.lines();
+        let line = format!("{}\n", "x".repeat(1023));
+        let begun = Instant::now();
+        for _ in 0..10_000 {
+            lines.write_all(line.as_bytes()).expect("never fails");
+        }
+        // Ten megabytes of lines went into nowhere: a writer that waited would still be here.
+        let took = begun.elapsed();
+        let lost = writer.lost();
+        assert!((9_000..10_000).contains(&lost), "{lost} lost in {took:?}");
+
+        // Somebody reads again: what waited comes, and how much did not.
+        let reading = std::thread::Builder::new()
+            .spawn(move || {
+                let mut text = String::new();
+                reader.read_to_string(&mut text).map(|_| text)
+            })
+            .expect("a thread");
+        loop {
+            let before = writer.lost();
+            lines.write_all(b"after\n").expect("never fails");
+            if writer.lost() == before {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        writer.flush();
+        drop(lines);
+        drop(writer);
+        let text = reading.join().expect("no panic").expect("text");
+        assert!(text.contains("lines were lost here"), "it was told");
+        assert!(text.ends_with("after\n"));
+        let shown = text.lines().filter(|line| line.starts_with('x')).count() as u64;
+        assert_eq!(shown + lost, 10_000, "each line came or was counted");
+    }
+
+    #[test]
+    fn the_end_does_not_wait_for_a_reader_that_stands_still() {
+        let (_reader, pipe) = io::pipe().expect("a pipe");
+        let writer = Writer::new(pipe, 16);
+        for _ in 0..1000 {
+            let _ = writer.lines().write(&[b'x'; 1024]);
+        }
+        let begun = Instant::now();
+        writer.flush();
+        assert!(begun.elapsed() < Duration::from_secs(30), "it ends at all");
+    }
+}

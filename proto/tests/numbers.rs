@@ -1,0 +1,157 @@
+//! Every number of every message has a range: listed in `docs/numbers.md`, refused beyond it by name.
+
+mod samples;
+
+use samples::*;
+use taut_proto::{
+    DecodeError, EncodeError, HeadSample, HotState, InputSample, Payload, PoseF64,
+    barrier::{Arrive, ReleaseHead},
+    codec::{decode, encode_onto},
+    header::MAX_PAYLOAD_BYTES,
+    range::{MAX_NODE_PERIOD_US, MAX_PERIOD_US, numbers},
+    time::TimeRequest,
+};
+
+const PAGE: &str = include_str!("../../docs/numbers.md");
+const BEGIN: &str = "<!-- numbers: begin -->\n";
+const END: &str = "<!-- numbers: end -->\n";
+
+fn table() -> String {
+    let mut table = "| number | range |\n| --- | --- |\n".to_owned();
+    for number in numbers() {
+        table += &format!("| `{}` | {} |\n", number.name, number.bounds.text);
+    }
+    table
+}
+
+/// The page before, in, and after the table.
+fn parts() -> (&'static str, &'static str, &'static str) {
+    let (before, rest) = PAGE.split_once(BEGIN).expect("the page has a table");
+    let (table, after) = rest.split_once(END).expect("the table ends");
+    (before, table, after)
+}
+
+/// After a change of a range: `cargo test -p taut-proto --test numbers -- --ignored`.
+#[test]
+#[ignore = "writes the page"]
+fn write_the_page() {
+    let (before, _, after) = parts();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/numbers.md");
+    let page = format!("{before}{BEGIN}{}{END}{after}", table());
+    std::fs::write(path, page).unwrap_or_else(|error| panic!("{path}: {error}"));
+}
+
+#[test]
+fn the_page_lists_every_number_with_its_range() {
+    assert_eq!(parts().1, table(), "write it anew: see `write_the_page`");
+    let mut names: Vec<_> = numbers().map(|number| number.name).collect();
+    let all = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), all, "each once");
+}
+
+fn bytes_of(payload: &Payload) -> Result<Vec<u8>, EncodeError> {
+    let mut buffer = [0; MAX_PAYLOAD_BYTES];
+    let used = payload.encode_into(&mut buffer)?;
+    Ok(buffer[..used].to_vec())
+}
+
+/// The sample with its bytes at `at` replaced, read.
+fn bent(payload: &Payload, at: usize, with: &[u8]) -> Result<Payload, DecodeError> {
+    let mut bytes = bytes_of(payload).expect("a sample");
+    bytes[at..at + with.len()].copy_from_slice(with);
+    Payload::decode(payload.kind(), &bytes)
+}
+
+fn refused(result: Result<Payload, DecodeError>) -> &'static str {
+    match result {
+        Err(DecodeError::OutOfRange { number, .. }) => number,
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+#[test]
+fn the_last_number_of_a_kind_is_refused_by_name() {
+    let far = u64::MAX.to_le_bytes();
+    let arrive = Payload::Arrive(arrive());
+    assert_eq!(refused(bent(&arrive, 0, &far)), "Arrive.term");
+    assert_eq!(refused(bent(&arrive, 8, &far)), "Arrive.frame");
+    let end = bytes_of(&arrive).expect("a sample").len();
+    let period = u32::MAX.to_le_bytes();
+    assert_eq!(refused(bent(&arrive, end - 4, &period)), "Arrive.period_us");
+    let release = Payload::Release(release());
+    assert_eq!(refused(bent(&release, 0, &far)), "ReleaseHead.term");
+    assert_eq!(
+        refused(bent(&release, 26, &far[..4])),
+        "ReleaseHead.period_us"
+    );
+    let hot = Payload::Hot(hot());
+    assert_eq!(refused(bent(&hot, 0, &far)), "HotState.sample_time_ns");
+    assert_eq!(refused(bent(&hot, 8, &far)), "HotState.tick");
+    let ask = Payload::TimeRequest(TimeRequest { client_sent: 1 });
+    assert_eq!(refused(bent(&ask, 0, &far)), "TimeRequest.client_sent");
+    // A set of this number would overtake every other for ever.
+    let set = Payload::Constraints(part());
+    assert_eq!(refused(bent(&set, 0, &far)), "SetHead.sequence");
+}
+
+#[test]
+fn what_nobody_takes_nobody_sends() {
+    let sent = |payload: &Payload| bytes_of(payload).err();
+    let out = |number| Some(EncodeError::OutOfRange { number });
+    let mut state: HotState = hot();
+    state.tools[0].god_object.position[0] = 1e7;
+    assert_eq!(sent(&Payload::Hot(state)), out("PoseF32.position"));
+    let head = HeadSample {
+        sample_time_ns: 1,
+        index: u64::MAX,
+        pose: PoseF64::IDENTITY,
+    };
+    assert_eq!(sent(&Payload::Head(head)), out("HeadSample.index"));
+    let input = InputSample {
+        sample_time_ns: 1,
+        index: 1,
+        pose: PoseF64 {
+            rotation: [2.0, 0.0, 0.0, 0.0],
+            ..PoseF64::IDENTITY
+        },
+        velocity: [0.0; 6],
+        buttons: 0,
+        flags: 0,
+        rendered: [0.0; 6],
+        set_sequence: 0,
+    };
+    assert_eq!(sent(&Payload::Input(input)), out("PoseF64.rotation"));
+    let arrive = Arrive {
+        period_us: MAX_NODE_PERIOD_US + 1,
+        ..Arrive::default()
+    };
+    assert_eq!(sent(&Payload::Arrive(arrive)), out("Arrive.period_us"));
+}
+
+#[test]
+fn the_ends_of_a_range_are_in_it() {
+    let head = ReleaseHead {
+        term: 1 << 61,
+        frame: 1 << 61,
+        period_us: MAX_PERIOD_US,
+        ..ReleaseHead::default()
+    };
+    let mut bytes = Vec::new();
+    assert_eq!(encode_onto(&head, &mut bytes), Ok(()));
+    assert_eq!(decode::<ReleaseHead>(&bytes), Ok(head));
+}
+
+#[test]
+fn nobody_is_waited_for_who_is_not_there() {
+    let head = ReleaseHead {
+        waited: 0b100,
+        members: [1, 2].into_iter().collect(),
+        ..ReleaseHead::default()
+    };
+    let mut bytes = Vec::new();
+    assert_eq!(encode_onto(&head, &mut bytes), Ok(()));
+    let read = decode::<ReleaseHead>(&bytes);
+    assert!(matches!(read, Err(DecodeError::Inconsistent { .. })));
+}

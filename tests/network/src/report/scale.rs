@@ -1,0 +1,72 @@
+//! Rows of what one more client costs.
+
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+
+use taut_link::MulticastOptions;
+
+use super::row::{Row, brief};
+use super::sections::Extent;
+use crate::bench::BenchError;
+use crate::bench::scale::{cost, ways};
+
+/// Longest run, s.
+const LONGEST: f64 = 5.0;
+/// Half of a core at 1 kHz, µs for each state.
+const HALF_A_CORE: f64 = 500.0;
+
+pub(super) fn scale_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let seconds = extent.seconds.min(LONGEST);
+    let mut rows = Vec::new();
+    for &clients in extent.clients {
+        let ways = ways(clients)?;
+        rows.push(Row::at_most(
+            format!("one system call for {clients} datagrams, beside one for each"),
+            ways.at_once / ways.one_by_one,
+            1.0,
+            "of the time",
+            format!(
+                "{} us a datagram, {} us one by one, sealing {} us",
+                brief(ways.at_once),
+                brief(ways.one_by_one),
+                brief(ways.seal)
+            ),
+        ));
+    }
+    for &clients in extent.clients {
+        let unicast = cost(&extent.this, clients, None, seconds)?;
+        rows.push(Row::at_most(
+            format!("{clients} clients by unicast: broadcasting thread, a state"),
+            unicast.state,
+            HALF_A_CORE,
+            "us",
+            format!(
+                "{} us for each client, {:.1} % sent",
+                brief(unicast.each),
+                unicast.sent * 100.0
+            ),
+        ));
+        let multicast = cost(&extent.this, clients, Some(group()?), seconds)?;
+        rows.push(Row::at_most(
+            format!("{clients} clients by multicast: broadcasting thread, a state"),
+            multicast.state,
+            HALF_A_CORE,
+            "us",
+            format!(
+                "{} of unicast's time",
+                brief(multicast.state / unicast.state)
+            ),
+        ));
+    }
+    Ok(rows)
+}
+
+/// A group of this run alone.
+fn group() -> Result<MulticastOptions, BenchError> {
+    let port = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+    let [high, low] = port.to_be_bytes();
+    Ok(MulticastOptions {
+        group: SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port),
+        announced: None,
+        interface: Ipv4Addr::LOCALHOST,
+    })
+}

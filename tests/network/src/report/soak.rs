@@ -1,0 +1,153 @@
+//! Rows of the soak: what held for hours, and what grew.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use super::row::Row;
+use super::sections::Extent;
+use crate::bench::soak_log::SoakLog;
+use crate::bench::{BenchError, soak, soak_program};
+
+const SEED: u64 = 21;
+
+/// The links first, then the whole program, where there is one.
+pub(super) fn rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    let Some(seconds) = extent.soak_seconds else {
+        let why = "--soak SECONDS runs it";
+        return Ok(vec![Row::unknown("soak", "no invariant broken", why)]);
+    };
+    let duration = Duration::from_secs_f64(seconds);
+    let mut rows = of_links(duration, extent.soak_log.as_deref())?;
+    if extent.program.is_file() {
+        let log = extent.soak_log.as_deref().map(beside);
+        rows.extend(of_program(&extent.program, duration, log.as_deref())?);
+    } else {
+        let why = format!("{} is not there: --taut PROGRAM", extent.program.display());
+        rows.push(Row::unknown(
+            "soak of the whole program",
+            "no promise broken",
+            why,
+        ));
+    }
+    Ok(rows)
+}
+
+/// `soak.csv` has `soak-program.csv` beside it.
+fn beside(log: &Path) -> PathBuf {
+    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
+    let end = log.extension().unwrap_or_default().to_string_lossy();
+    log.with_file_name(format!("{stem}-program.{end}"))
+}
+
+fn of_links(duration: Duration, log: Option<&Path>) -> Result<Vec<Row>, BenchError> {
+    let mut log = SoakLog::open(log)?;
+    let run = soak::run(duration, SEED, &mut log)?;
+    let server = &run.server;
+    let forged_counted =
+        server.garbage + server.wrong_version + server.forged + server.replayed + server.flooded;
+    let mut rows = vec![
+        Row::invariant(
+            format!(
+                "soak of {} s: states wrong or out of order",
+                duration.as_secs_f64()
+            ),
+            "0",
+            format!(
+                "{} of {} taken; {} joined, {} left, {} vanished, {} refused for their key, {} joins lost to the network",
+                run.wrong,
+                run.received,
+                run.joined,
+                run.left,
+                run.vanished,
+                run.refused,
+                run.failed_joins
+            ),
+            run.wrong == 0 && run.received > 0 && run.joined > 0,
+        ),
+        Row::invariant(
+            "soak: events missing or doubled",
+            "0",
+            format!("{} of {}", run.wrong_events, run.events),
+            run.wrong_events == 0 && run.events > 0,
+        ),
+        Row::invariant(
+            "soak: times that all had left and the server had let all go",
+            "all",
+            run.quiet,
+            run.quiet > 0,
+        ),
+        Row::invariant(
+            "soak: forgeries at the server's own port that are counted, and change nothing",
+            "all that the socket's buffer took",
+            format!(
+                "{forged_counted} counted for {} forged and what the relay damaged; {} inputs",
+                run.forged, server.inputs
+            ),
+            forged_counted > 0 && server.inputs == 0 && server.inputs_refused == 0,
+        ),
+    ];
+    rows.push(growth("soak", &log));
+    Ok(rows)
+}
+
+fn of_program(
+    program: &Path,
+    duration: Duration,
+    log: Option<&Path>,
+) -> Result<Vec<Row>, BenchError> {
+    let mut log = SoakLog::open(log)?;
+    let run = soak_program::run(program, duration, SEED, &mut log)?;
+    let broken = log.broken();
+    let first = broken
+        .first()
+        .map_or(String::new(), |what| format!(", the first: {what}"));
+    Ok(vec![
+        Row::invariant(
+            "soak of the whole program: promises broken (penetration, age and slew of the force, order, events, coming back)",
+            "0",
+            format!(
+                "{}{first}; {} states, largest force {:.1} N; {} nodes, {} observers, {} bridges, {} servers went and came",
+                broken.len(),
+                run.states,
+                run.largest_force_n,
+                run.nodes,
+                run.observers,
+                run.bridges,
+                run.servers
+            ),
+            broken.is_empty() && run.states > 0,
+        ),
+        growth("soak of the whole program", &log),
+    ])
+}
+
+/// One row for all resources of all processes; the one that comes nearest to its limit is named.
+fn growth(what: &str, log: &SoakLog) -> Row {
+    let all = log.growth();
+    let grown: Vec<String> = all
+        .iter()
+        .filter(|growth| growth.is_growth())
+        .map(|growth| {
+            let [from, to] = growth.medians;
+            format!("{}: {} {from} to {to}", growth.process, growth.what)
+        })
+        .collect();
+    let memory = all.iter().filter(|growth| growth.what == "resident memory");
+    let most = memory.map(|growth| (growth.medians[1] - growth.medians[0]) / f64::from(1 << 20));
+    let most = most.fold(f64::NAN, f64::max);
+    Row::invariant(
+        format!(
+            "{what}: growth of memory, descriptors or threads from the second to the last quarter"
+        ),
+        "none beyond the allocator's",
+        if grown.is_empty() {
+            format!(
+                "none in {} processes; resident memory {most:+.1} MiB at most",
+                all.len() / 3
+            )
+        } else {
+            grown.join("; ")
+        },
+        grown.is_empty() && !all.is_empty(),
+    )
+}
