@@ -9,30 +9,28 @@ use nalgebra::Vector6;
 use taut_link::proto::constraints::ConstraintSet;
 use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
-use taut_link::proto::{InputSample, PoseF64, WrenchCommand};
+use taut_link::proto::{InputSample, PoseF64, SessionTime, WrenchCommand};
 
 use crate::device::DeviceFault;
 use crate::edge::EdgeCoupler;
+use crate::own_stamps::OwnStamps;
 use crate::port::{Command, CommandSource, DevicePort, Events};
 use crate::report::Durations;
 
-/// How many ticks a round trip may take to be measured: 1 s at 1 kHz.
-const REMEMBERED_TICKS: usize = 1024;
-
-/// A command and when it arrived here.
+/// The newest command, and when the device was read for what it comes from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Arrival {
-    pub(crate) command: WrenchCommand,
-    pub(crate) received: Duration,
+struct Newest {
+    command: WrenchCommand,
+    origin: Duration,
 }
 
 /// What one tick gives.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TickOutput {
+pub struct TickOutput {
     /// To be sent.
-    pub(crate) input: InputSample,
+    pub input: InputSample,
     /// To be told.
-    pub(crate) events: Events,
+    pub events: Events,
 }
 
 /// What the ticks have seen.
@@ -50,29 +48,28 @@ pub(crate) struct TickStats {
     pub(crate) wrench_age: Durations,
     /// From reading the device to holding the wrench that answers it.
     pub(crate) round_trip: Durations,
-    /// Longest that a force outlived what it came from.
+    /// Largest age of the reading that a force came from.
     pub(crate) max_force_age: Duration,
     pub(crate) max_force: f64,
     pub(crate) max_torque: f64,
 }
 
 /// The device side of a session.
-pub(crate) struct BridgeLoop {
+pub struct BridgeLoop {
     port: DevicePort,
     stats: TickStats,
-    /// Number of the next reading; the first is 1, because 0 answers none.
+    /// Number of the next reading.
     next_index: u64,
-    /// When reading i was taken, at i modulo the length.
-    sent: [Duration; REMEMBERED_TICKS],
-    newest: Option<Arrival>,
-    /// When what the force comes from last arrived in this session: a command, or a constraint set.
-    heard: Option<Duration>,
+    stamps: OwnStamps,
+    newest: Option<Newest>,
     /// The coupling, where it is here and not at the server.
     edge: Option<Box<EdgeCoupler>>,
 }
 
 impl BridgeLoop {
-    pub(crate) fn new(port: DevicePort) -> Self {
+    /// A loop without a session.
+    #[must_use]
+    pub fn new(port: DevicePort) -> Self {
         Self {
             port,
             stats: TickStats {
@@ -90,15 +87,15 @@ impl BridgeLoop {
                 max_torque: 0.0,
             },
             next_index: 1,
-            sent: [Duration::ZERO; REMEMBERED_TICKS],
+            stamps: OwnStamps::default(),
             newest: None,
-            heard: None,
             edge: None,
         }
     }
 
     /// What stands between this loop and the device.
-    pub(crate) fn port(&self) -> &DevicePort {
+    #[must_use]
+    pub fn port(&self) -> &DevicePort {
         &self.port
     }
 
@@ -117,9 +114,9 @@ impl BridgeLoop {
 
     /// Forgets the last session: no force until a command or a constraint set of the new one, which ramps in. With `edge` the force
     /// is computed here.
-    pub(crate) fn begin_session(&mut self, source: CommandSource, edge: Option<EdgeCoupler>) {
+    pub fn begin_session(&mut self, source: CommandSource, edge: Option<EdgeCoupler>) {
         self.newest = None;
-        self.heard = None;
+        self.stamps = OwnStamps::default();
         self.edge = edge.map(Box::new);
         self.port.restart(source);
     }
@@ -129,19 +126,19 @@ impl BridgeLoop {
         self.edge.is_some()
     }
 
-    /// Takes the newest constraint set, that was completed or confirmed at `received`; once or again. `session_ns` is
-    /// session time, 0 while unknown.
-    pub(crate) fn take_set(&mut self, set: &ConstraintSet, received: Duration, session_ns: u64) {
-        let Some(edge) = &mut self.edge else {
+    /// Takes the newest constraint set, once or again, before the tick at `now`. One that does not say which reading it answers is left alone.
+    pub fn take_set(&mut self, set: &ConstraintSet, now: Duration, session: Option<SessionTime>) {
+        self.stamps.follow(now, session);
+        let (Some(edge), Some(origin)) = (&mut self.edge, self.stamps.made(set.head.device_ns))
+        else {
             return;
         };
-        self.heard = self.heard.max(Some(received));
         let new = edge.sequence() != Some(set.head.sequence);
-        match edge.take(set, received) {
+        match edge.take(set, origin) {
             Ok(()) if new => {
                 self.stats.sets += 1;
-                if session_ns > 0 {
-                    let age = session_ns.saturating_sub(set.head.made_ns);
+                if let Some(session) = session {
+                    let age = session.ns.saturating_sub(set.head.made_ns);
                     self.stats.set_age.record(Duration::from_nanos(age));
                 }
             }
@@ -150,35 +147,36 @@ impl BridgeLoop {
         }
     }
 
-    /// One tick at `now`. `session_ns` is session time, 0 while unknown; `arrival` is the newest command,
-    /// again and again until there is a newer one.
-    pub(crate) fn tick(
+    /// One tick at `now`. `session` is session time, `None` while the clock is not locked; `command` is the newest one, again and again
+    /// until there is a newer one.
+    pub fn tick(
         &mut self,
         now: Duration,
-        session_ns: u64,
-        arrival: Option<Arrival>,
+        session: Option<SessionTime>,
+        command_heard: Option<WrenchCommand>,
     ) -> TickOutput {
         self.stats.ticks += 1;
-        self.adopt(now, session_ns, arrival);
+        self.stamps.follow(now, session);
+        let session_ns = session.map_or(0, |session| session.ns);
+        self.adopt(now, session_ns, command_heard);
 
         let index = self.next_index;
         self.next_index += 1;
-        self.sent[index as usize % REMEMBERED_TICKS] = now;
         let (newest, edge) = (self.newest, &mut self.edge);
         let report = self.port.tick(now, |reading| match edge {
             Some(edge) => edge
-                .step(now, &reading.sample.pose)
-                .map(|felt| Command::fresh(felt.received, felt.wrench)),
-            None => newest.map(|arrival| command(&arrival)),
+                .step(now, &reading.sample)
+                .map(|felt| Command::on_set(felt.origin, felt.wrench)),
+            None => newest.map(|newest| command(&newest)),
         });
 
         let wrench = &report.wrench;
         self.stats.max_force = self.stats.max_force.max(wrench.fixed_rows::<3>(0).norm());
         self.stats.max_torque = self.stats.max_torque.max(wrench.fixed_rows::<3>(3).norm());
-        if let Some(heard) = self.heard
+        if let Some(origin) = self.port.origin()
             && *wrench != Vector6::zeros()
         {
-            let age = now.saturating_sub(heard);
+            let age = now.saturating_sub(origin);
             self.stats.max_force_age = self.stats.max_force_age.max(age);
         }
         self.stats.safety_events += report
@@ -198,6 +196,7 @@ impl BridgeLoop {
         TickOutput {
             input: InputSample {
                 sample_time_ns: session_ns.saturating_sub(age),
+                clock_uncertainty_ns: session.map_or(0, |session| session.uncertainty_ns),
                 index,
                 pose: PoseF64::from_isometry(&sample.pose),
                 velocity: sample.velocity.into(),
@@ -214,40 +213,31 @@ impl BridgeLoop {
         }
     }
 
-    /// Takes a command that is newer than the last one.
-    fn adopt(&mut self, now: Duration, session_ns: u64, arrival: Option<Arrival>) {
+    /// Takes a command that is newer than the last one, if it says what it comes from.
+    fn adopt(&mut self, now: Duration, session_ns: u64, command: Option<WrenchCommand>) {
         let known = self.newest.map(|newest| newest.command.time_ns);
-        let Some(arrival) = arrival.filter(|arrival| Some(arrival.command.time_ns) > known) else {
+        let Some(command) = command.filter(|command| Some(command.time_ns) > known) else {
             return;
         };
-        self.newest = Some(arrival);
-        if self.edge.is_none() {
-            self.heard = self.heard.max(Some(arrival.received));
-        }
+        let Some(origin) = self.stamps.made(command.origin_ns) else {
+            return;
+        };
+        self.newest = Some(Newest { command, origin });
         self.stats.wrenches += 1;
-        if session_ns > 0 {
-            let age = session_ns.saturating_sub(arrival.command.time_ns);
-            self.stats.wrench_age.record(Duration::from_nanos(age));
-        }
-        let answered = arrival.command.input_index;
-        let remembered = answered > 0
-            && answered < self.next_index
-            && self.next_index - answered < REMEMBERED_TICKS as u64;
-        if remembered {
-            let taken = self.sent[answered as usize % REMEMBERED_TICKS];
-            self.stats.round_trip.record(now.saturating_sub(taken));
-        }
+        let age = session_ns.saturating_sub(command.time_ns);
+        self.stats.wrench_age.record(Duration::from_nanos(age));
+        self.stats.round_trip.record(now.saturating_sub(origin));
     }
 }
 
 /// The command that arrived, for the port.
-fn command(arrival: &Arrival) -> Command {
-    let wrench = if arrival.command.flags & WRENCH_PAUSED == 0 {
-        Vector6::from(arrival.command.wrench)
+fn command(newest: &Newest) -> Command {
+    let wrench = if newest.command.flags & WRENCH_PAUSED == 0 {
+        Vector6::from(newest.command.wrench)
     } else {
         Vector6::zeros()
     };
-    Command::fresh(arrival.received, wrench)
+    Command::fresh(newest.origin, wrench)
 }
 
 #[cfg(test)]
@@ -278,16 +268,27 @@ mod tests {
         SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, path, Point3::origin())
     }
 
-    fn push(time_ms: u64, newtons: f64, input_index: u64) -> Arrival {
-        Arrival {
-            command: WrenchCommand {
-                time_ns: time_ms * 1_000_000,
-                input_index,
-                wrench: [0.0, 0.0, newtons, 0.0, 0.0, 0.0],
-                flags: 0,
-            },
-            received: ms(time_ms),
+    /// Session time is that of the ticks, exactly.
+    fn session(time_ms: u64) -> Option<SessionTime> {
+        Some(SessionTime {
+            ns: time_ms * 1_000_000,
+            uncertainty_ns: 1000,
+        })
+    }
+
+    /// What was computed at `time_ms` from the reading of `origin_ms`.
+    fn push(time_ms: u64, newtons: f64, origin_ms: u64) -> WrenchCommand {
+        WrenchCommand {
+            time_ns: time_ms * 1_000_000,
+            origin_ns: origin_ms * 1_000_000,
+            wrench: [0.0, 0.0, newtons, 0.0, 0.0, 0.0],
+            flags: 0,
         }
+    }
+
+    /// The same of the reading before, which a bridge ticks on at `time_ms`.
+    fn at_once(time_ms: u64, newtons: f64) -> WrenchCommand {
+        push(time_ms, newtons, time_ms)
     }
 
     #[test]
@@ -295,13 +296,14 @@ mod tests {
         let mut bridge = bridge(simulated());
         let mut z = 0.0;
         for tick in 1..2000 {
-            let arrival = push(tick, 2.0, tick.saturating_sub(3));
-            let output = bridge.tick(ms(tick), tick * 1_000_000, Some(arrival));
+            let command = push(tick, 2.0, tick.saturating_sub(3));
+            let output = bridge.tick(ms(tick), session(tick), Some(command));
             assert_eq!((output.input.index, output.input.flags), (tick, 0));
             z = output.input.pose.position[2];
         }
         assert!((z - 2.0 / Hand::LIGHT.stiffness).abs() < 1e-3, "{z} m");
-        assert_eq!(bridge.stats().wrenches, 1999);
+        // The first three come from no reading.
+        assert_eq!(bridge.stats().wrenches, 1996);
         // The histogram keeps three digits.
         let round_trip = bridge.stats().round_trip.summary().expect("measured");
         assert!(round_trip.p50.abs_diff(3000) <= 3, "{} us", round_trip.p50);
@@ -312,11 +314,11 @@ mod tests {
     fn a_server_that_falls_silent_is_felt_no_longer_than_120_ms() {
         let mut bridge = bridge(simulated());
         for tick in 1..=1000 {
-            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+            let _ = bridge.tick(ms(tick), session(tick), Some(at_once(tick, 5.0)));
         }
         let mut told = Vec::new();
         for tick in 1001..=1300 {
-            let output = bridge.tick(ms(tick), 0, Some(push(1000, 5.0, 0)));
+            let output = bridge.tick(ms(tick), session(tick), Some(at_once(1000, 5.0)));
             told.extend(output.events.iter().copied());
             let felt = bridge.port().rendered().norm();
             // 5 ms before the promise: the margin for a loop that is late.
@@ -330,14 +332,11 @@ mod tests {
     fn the_same_command_sent_again_is_no_new_one() {
         let mut bridge = bridge(simulated());
         for tick in 1..=1000 {
-            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+            let _ = bridge.tick(ms(tick), session(tick), Some(at_once(tick, 5.0)));
         }
         for tick in 1001..=1200 {
-            let repeated = Arrival {
-                received: ms(tick),
-                ..push(1000, 5.0, 0)
-            };
-            let _ = bridge.tick(ms(tick), 0, Some(repeated));
+            let repeated = Some(at_once(1000, 5.0));
+            let _ = bridge.tick(ms(tick), session(tick), repeated);
         }
         assert_eq!(*bridge.port().rendered(), Vector6::zeros());
         assert_eq!(bridge.stats().wrenches, 1000);
@@ -347,9 +346,9 @@ mod tests {
     fn a_paused_server_gives_no_force() {
         let mut bridge = bridge(simulated());
         for tick in 1..=1000 {
-            let mut arrival = push(tick, 5.0, 0);
-            arrival.command.flags = WRENCH_PAUSED;
-            let _ = bridge.tick(ms(tick), 0, Some(arrival));
+            let mut command = at_once(tick, 5.0);
+            command.flags = WRENCH_PAUSED;
+            let _ = bridge.tick(ms(tick), session(tick), Some(command));
         }
         assert_eq!(bridge.stats().max_force, 0.0);
         assert_eq!(bridge.stats().wrenches, 1000);
@@ -365,7 +364,9 @@ mod tests {
         let trace = vec![row(0.0), row(0.01)];
         let device = RecordedDevice::new(trace, AtEnd::Fault, Point3::origin());
         let mut bridge = bridge(device.expect("a valid trace"));
-        let outputs: Vec<_> = (0..20).map(|tick| bridge.tick(ms(tick), 0, None)).collect();
+        let outputs: Vec<_> = (0..20)
+            .map(|tick| bridge.tick(ms(tick), session(tick), None))
+            .collect();
         assert!(outputs[..11].iter().all(|output| output.input.flags == 0));
         assert!(
             outputs[11..]
@@ -386,22 +387,66 @@ mod tests {
     fn a_new_session_starts_without_force() {
         let mut bridge = bridge(simulated());
         for tick in 1..=1000 {
-            let _ = bridge.tick(ms(tick), 0, Some(push(tick, 5.0, 0)));
+            let _ = bridge.tick(ms(tick), session(tick), Some(at_once(tick, 5.0)));
         }
         bridge.begin_session(CommandSource::Other, None);
         // The new server's clock starts at zero: its commands count although their time is smaller. What was felt goes by the slew
         // limit, and what comes ramps in.
         let mut lowest = f64::INFINITY;
         for tick in 1001..=1100 {
-            let first = Arrival {
-                received: ms(tick),
-                ..push(tick - 1000, 5.0, 0)
-            };
-            let _ = bridge.tick(ms(tick), 0, Some(first));
+            let first = Some(at_once(tick - 1000, 5.0));
+            let _ = bridge.tick(ms(tick), session(tick - 1000), first);
             lowest = lowest.min(bridge.port().rendered().norm());
         }
         assert!(lowest < 0.2, "{lowest} N");
         assert!(bridge.port().rendered().norm() < 1.01);
         assert_eq!(bridge.stats().wrenches, 1100);
+    }
+
+    /// Force that is felt, N, when every command comes from a reading that is `age` old, ms.
+    fn felt_at(mut age: impl FnMut(u64) -> u64, ticks: u64) -> (Vec<f64>, Vec<EventKind>, u128) {
+        let mut bridge = bridge(simulated());
+        let (mut felt, mut told) = (Vec::new(), Vec::new());
+        for tick in 1..=ticks {
+            let command = push(tick, 5.0, tick.saturating_sub(age(tick)));
+            let output = bridge.tick(ms(tick), session(tick), Some(command));
+            told.extend(output.events.iter().map(|event| event.kind));
+            felt.push(bridge.port().rendered().norm());
+        }
+        (felt, told, bridge.stats().max_force_age.as_millis())
+    }
+
+    #[test]
+    fn a_delay_that_grows_under_new_commands_is_felt_no_longer_than_a_silence() {
+        let growing = |tick: u64| 2 + tick.saturating_sub(1000) / 10;
+        let (felt, told, oldest) = felt_at(growing, 3000);
+        assert!((felt[999] - 5.0).abs() < 1e-12);
+        // 20 ms old after 180 ms; then the fade of a silence, which does not wait for the delay.
+        let last = felt
+            .iter()
+            .rposition(|force| *force > 0.0)
+            .expect("a force");
+        assert!((1180..1300).contains(&last), "{last}");
+        assert!(oldest < 120, "{oldest} ms");
+        assert!(told.contains(&EventKind::ForceStale), "{told:?}");
+    }
+
+    #[test]
+    fn commands_that_come_from_no_reading_are_none() {
+        // Without a clock, from the future, from before the clock was known.
+        let mut unlocked = bridge(simulated());
+        for tick in 1..=1000 {
+            let output = unlocked.tick(ms(tick), None, Some(at_once(tick, 5.0)));
+            assert_eq!(output.input.sample_time_ns, 0);
+        }
+        assert_eq!(unlocked.stats().max_force, 0.0);
+        for origin in [|tick| tick + 3, |_| 0] {
+            let mut bridge = bridge(simulated());
+            for tick in 1..=1000 {
+                let command = push(tick, 5.0, origin(tick));
+                let _ = bridge.tick(ms(tick), session(tick), Some(command));
+            }
+            assert_eq!(bridge.stats().max_force, 0.0);
+        }
     }
 }

@@ -140,9 +140,9 @@ pub struct SafetyArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..16))]
     pub arm_button: Option<u8>,
 
-    /// Damp away energy that comes out of the device.
-    #[arg(long)]
-    pub passivity_control: bool,
+    /// What is done about energy that comes out of the device, as a delayed force puts it in: control damps it away, observe reports it.
+    #[arg(long, value_name = "WHAT", default_value = "control", value_parser = parse_passivity)]
+    pub passivity: Passivity,
 }
 
 impl SafetyArgs {
@@ -167,11 +167,7 @@ impl SafetyArgs {
             dead_man: self.dead_man,
             arm_button: self.arm_button,
             passivity: PassivitySettings {
-                mode: if self.passivity_control {
-                    Passivity::Control
-                } else {
-                    Passivity::Observe
-                },
+                mode: self.passivity,
                 ..default.passivity
             },
             ..default
@@ -185,6 +181,16 @@ fn parse_rearm(text: &str) -> Result<Rearm, String> {
         "manual" => Ok(Rearm::Manual),
         _ => Err(format!(
             "nobody called `{text}` arms; use automatic or manual"
+        )),
+    }
+}
+
+fn parse_passivity(text: &str) -> Result<Passivity, String> {
+    match text {
+        "control" => Ok(Passivity::Control),
+        "observe" => Ok(Passivity::Observe),
+        _ => Err(format!(
+            "passivity cannot be `{text}`; use control or observe"
         )),
     }
 }
@@ -266,6 +272,7 @@ mod tests {
         assert_eq!(args.hand, HandPreset::Light);
         assert_eq!((args.rate, args.transport), (1000.0, Transport::Udp));
         assert_eq!(args.coupling, None);
+        assert_eq!(args.safety.passivity, Passivity::Control);
         let args = parse(&["--server", "pc:1", "--coupling", "edge"]).expect("valid");
         assert_eq!(args.coupling, Some(CouplingChoice::Edge));
     }
@@ -308,6 +315,7 @@ mod tests {
             (["--hand", "fist"], "use released, light, firm or arm"),
             (["--transport", "tcp"], "use udp or quic"),
             (["--rearm", "never"], "use automatic or manual"),
+            (["--passivity", "on"], "use control or observe"),
         ] {
             let words = ["--server", "pc:1", words[0], words[1]];
             let error = parse(&words).expect_err("a wrong word").to_string();

@@ -14,7 +14,7 @@ use taut_link::proto::ConstraintSet;
 use taut_link::{ClientCounters, ClientLink};
 
 use crate::arm_switch::{ArmSwitch, ArmWish};
-use crate::bridge_loop::{Arrival, BridgeLoop};
+use crate::bridge_loop::BridgeLoop;
 use crate::device::DeviceFault;
 use crate::port::SafetyEvent;
 use crate::realtime::{self, Awake, RealtimeGrant, Ticker, monotonic_now};
@@ -72,23 +72,17 @@ impl DeviceLoop {
                 self.totals.period.record(now.saturating_sub(last));
             }
 
-            let session_ns = self.link.session_now().map_or(0, |session| session.ns);
-            let arrival = self.link.latest_wrench().map(|wrench| Arrival {
-                command: wrench.command,
-                received: now.saturating_sub(wrench.received.elapsed()),
-            });
-            if bridge.couples()
-                && let Some(confirmed) = self.link.newest_set(&mut set)
-            {
-                let received = now.saturating_sub(confirmed.elapsed());
-                bridge.take_set(&set, received, session_ns);
+            let session = self.link.session_now();
+            let command = self.link.latest_wrench().map(|wrench| wrench.command);
+            if bridge.couples() && self.link.newest_set(&mut set).is_some() {
+                bridge.take_set(&set, now, session);
             }
             match self.wishes.take() {
                 Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
                 Some(ArmWish::Disarm) => bridge.port_mut().ask_to_disarm(),
                 None => {}
             }
-            let output = bridge.tick(now, session_ns, arrival);
+            let output = bridge.tick(now, session, command);
             self.link.send_input(&output.input);
             for event in output.events.iter() {
                 let _ = self.notices.try_send(*event); // full: dropped, and counted in the report

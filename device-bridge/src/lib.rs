@@ -22,6 +22,7 @@ mod device;
 mod device_loop;
 mod devices;
 pub mod edge;
+mod own_stamps;
 mod placement;
 mod port;
 pub mod realtime;
@@ -33,6 +34,7 @@ mod vrpn;
 
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
+pub use bridge_loop::{BridgeLoop, TickOutput};
 pub use choice::{
     DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
 };

@@ -93,8 +93,8 @@ pub struct BridgeReport {
     pub energy_injected_j: f64,
     /// Net energy given to the hand, J.
     pub energy_delivered_j: f64,
-    /// Longest that a force outlived the arrival of the command or constraint set that it came from, ms: after a silence the force is gone
-    /// within 120 ms, as long as the loop itself is on time.
+    /// Largest age of the device's reading that a force came from, or the constraint set that it rested on, ms: the force is gone when that is
+    /// 120 ms, as long as the loop itself is on time.
     pub max_force_age_ms: f64,
     /// Largest force rendered, N.
     pub max_force_n: f64,
@@ -143,7 +143,7 @@ impl fmt::Display for BridgeReport {
         }
         writeln!(
             out,
-            "largest force {:.2} N, torque {:.3} N m, at most {:.0} ms older than its command; energy injected {:.2e} J; {} safety event(s), {} faulty tick(s)",
+            "largest force {:.2} N, torque {:.3} N m, from readings of at most {:.0} ms ago; energy injected {:.2e} J; {} safety event(s), {} faulty tick(s)",
             self.max_force_n,
             self.max_torque_n_m,
             self.max_force_age_ms,

@@ -6,13 +6,13 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
-    AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, Grip, Hand, MinJerkPath,
-    Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
+    AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
+    MinJerkPath, Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
     SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;
-use taut_link::proto::coupling::{EdgeAdaptation, EdgeSolver, EdgeSurface};
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings, EdgeSolver, EdgeSurface};
 use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
 
 #[global_allocator]
@@ -38,7 +38,7 @@ fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {
                 let wrench = Vector6::repeat(reading.sample.pose.translation.vector.z * 1e3 + 1.0);
                 let mut command = Command::fresh(now, wrench);
                 if (500..900).contains(&tick) {
-                    command.made = Duration::ZERO;
+                    command.origin = Duration::ZERO;
                 }
                 Some(command)
             });
@@ -80,7 +80,8 @@ fn a_remote_device_does_not_allocate() {
     drive(device, &mut |tick| {
         inputs.write(Some(DeviceInput {
             sample: InputSample {
-                sample_time_ns: 0,
+                sample_time_ns: tick * 1_000_000 + 1,
+                clock_uncertainty_ns: 1000,
                 index: tick + 1,
                 pose: PoseF64::IDENTITY,
                 velocity: [0.0; 6],
@@ -107,22 +108,33 @@ fn coupling_at_the_edge_does_not_allocate() {
         inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
         reference_point: [0.0; 3],
         radius: 0.02,
-        k_s: 0.5,
-        k_h: 2000.0,
-        radius_of_gyration: None,
-        adaptation: Some(EdgeAdaptation {
-            duration: 0.02,
-            threshold: -1e-3,
-        }),
-        look_ahead: true,
-        passive: true,
-        force_limit: 20.0,
-        torque_limit: 0.5,
-        rest_distance: 4e-6,
-        motion_tolerance: 2e-8,
-        max_constraints: 1024,
-        implicit_rounds: 2,
-        solver: EdgeSolver::ActiveSet,
+        settings: EdgeSettings {
+            k_s: 0.5,
+            k_h: 2000.0,
+            damping_time: 0.01,
+            radius_of_gyration: None,
+            adaptation: Some(EdgeAdaptation {
+                duration: 0.02,
+                threshold: -1e-3,
+            }),
+            look_ahead: true,
+            passive: true,
+            force_limit: 20.0,
+            torque_limit: 0.5,
+            rest_distance: 4e-6,
+            minimum_gap: 4e-7,
+            gap_tolerance: 4e-8,
+            activation_distance: 1.6e-4,
+            look_ahead_limit: 0.16,
+            look_ahead_pairs: 1000,
+            motion_tolerance: 2e-8,
+            max_constraints: 1024,
+            max_substeps: 10,
+            implicit_rounds: 2,
+            max_advancement_steps: 200,
+            work_budget: None,
+            solver: EdgeSolver::ActiveSet,
+        },
         set_rate_hz: 1000.0,
         obstacles: vec![surface(0.0), surface(0.3)],
     };
@@ -147,9 +159,14 @@ fn coupling_at_the_edge_does_not_allocate() {
     assert_no_alloc(|| {
         for (tick, set) in (0..).zip(&sets) {
             let now = Duration::from_millis(tick);
-            let pose = Pose::translation(0.0, 1e-5 * tick as f64, -1e-3);
+            let sample = DeviceSample {
+                time: now,
+                pose: Pose::translation(0.0, 1e-5 * tick as f64, -1e-3),
+                velocity: Vector6::zeros(),
+                buttons: 0,
+            };
             let taken = coupler.take(set, now);
-            let felt = coupler.step(now, &pose);
+            let felt = coupler.step(now, &sample);
             let pushes = felt.is_some_and(|felt| felt.wrench[2] > 0.0);
             forces += u32::from(taken.is_ok() && pushes);
         }

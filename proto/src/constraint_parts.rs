@@ -67,7 +67,7 @@ pub enum PartTaken {
     Whole,
     /// More parts are to come.
     Waiting,
-    /// It is of the set that was given out last: the sender is alive and has nothing newer.
+    /// It is of the set that was given out last: its head says for which reading that is true.
     Repeated,
     /// A newer set is whole already, or too many newer ones are on their way.
     Overtaken,
@@ -130,8 +130,10 @@ impl Assembler {
         match self.newest {
             Some(newest) if sequence < newest => return PartTaken::Overtaken,
             Some(newest) if sequence == newest => {
-                // The sender may have changed its mind about giving force, which no rows depend on.
-                self.whole.head.flags = part.head.flags;
+                // The same rows for a newer reading, or other flags, which no rows depend on; of two that change places the newer one counts.
+                if part.head.device_ns >= self.whole.head.device_ns {
+                    self.whole.head = part.head;
+                }
                 return PartTaken::Repeated;
             }
             _ => {}

@@ -45,7 +45,8 @@ pub struct SetHead {
     pub sequence: u64,
     /// When the god-object loop published it: session time, ns.
     pub made_ns: u64,
-    /// Session time of the device reading that it answers, ns.
+    /// [`crate::InputSample::sample_time_ns`] of the device reading that it answers, as the bridge stamped it: the age of the set counts
+    /// from there. 0 for none.
     pub device_ns: u64,
     /// God-object's own frame in the scene frame, where the rows hold.
     pub pose: PoseF64,

@@ -35,10 +35,25 @@ pub struct EdgeCoupling {
     pub reference_point: [f64; 3],
     /// Distance of the body's farthest point from it, m.
     pub radius: f64,
+    /// The settings of the method, all of them.
+    pub settings: EdgeSettings,
+    /// Constraint sets per second.
+    pub set_rate_hz: f64,
+    /// The obstacles, in the scene's order.
+    pub obstacles: Vec<EdgeSurface>,
+}
+
+/// The settings of the method as the server uses them, whole: the bridge computes with the same, whatever of them a coupling looks at.
+///
+/// One field for each of the method's settings, in its order; what it means is said there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeSettings {
     /// Share of the pose difference that one update covers.
     pub k_s: f64,
     /// Coupling constant, 1/s².
     pub k_h: f64,
+    /// Damping of a contact over its stiffness, s.
+    pub damping_time: f64,
     /// Radius of gyration that stands for the inertia tensor in the metric, m; `None`: the tensor.
     pub radius_of_gyration: Option<f64>,
     /// How a violated new row enters; `None`: at once.
@@ -53,18 +68,30 @@ pub struct EdgeCoupling {
     pub torque_limit: f64,
     /// Gap at which the god-object rests, m.
     pub rest_distance: f64,
+    /// Gap below which it never comes, m.
+    pub minimum_gap: f64,
+    /// How far above that gap collision detection may stop, m.
+    pub gap_tolerance: f64,
+    /// Feature pairs nearer than this make rows, m.
+    pub activation_distance: f64,
+    /// Most that look-ahead adds to that distance, m.
+    pub look_ahead_limit: f64,
+    /// Pairs that one collection may look at.
+    pub look_ahead_pairs: u64,
     /// A motion whose fastest point covers less is none, m.
     pub motion_tolerance: f64,
     /// Most rows of a set.
     pub max_constraints: u32,
+    /// Most repetitions within one update.
+    pub max_substeps: u32,
     /// How often rows are linearised anew for one force.
     pub implicit_rounds: u32,
+    /// Most evaluations of one feature pair's gap.
+    pub max_advancement_steps: u32,
+    /// Work after which an update starts no further sub-step, us; `None` is no budget.
+    pub work_budget: Option<u64>,
     /// Who solves the projection.
     pub solver: EdgeSolver,
-    /// Constraint sets per second.
-    pub set_rate_hz: f64,
-    /// The obstacles, in the scene's order.
-    pub obstacles: Vec<EdgeSurface>,
 }
 
 /// How a violated new row enters.
@@ -112,8 +139,14 @@ wire_struct!(EdgeCoupling {
     inertia,
     reference_point,
     radius,
+    settings,
+    set_rate_hz,
+    obstacles,
+});
+wire_struct!(EdgeSettings {
     k_s,
     k_h,
+    damping_time,
     radius_of_gyration,
     adaptation,
     look_ahead,
@@ -121,12 +154,18 @@ wire_struct!(EdgeCoupling {
     force_limit,
     torque_limit,
     rest_distance,
+    minimum_gap,
+    gap_tolerance,
+    activation_distance,
+    look_ahead_limit,
+    look_ahead_pairs,
     motion_tolerance,
     max_constraints,
+    max_substeps,
     implicit_rounds,
+    max_advancement_steps,
+    work_budget,
     solver,
-    set_rate_hz,
-    obstacles,
 });
 wire_struct!(EdgeAdaptation {
     duration,

@@ -11,6 +11,8 @@ use crate::{
 pub struct InputSample {
     /// When it was read: session time as the bridge knows it, ns; 0 while its clock is not locked.
     pub sample_time_ns: u64,
+    /// Largest error of that time, as the bridge's clock filter knows it, ns.
+    pub clock_uncertainty_ns: u64,
     /// Number of the reading, strictly increasing; the newest wins.
     pub index: u64,
     /// Device in the scene frame.
@@ -34,6 +36,7 @@ pub const INPUT_AT_EDGE: u16 = 2;
 
 wire_ranged!(InputSample {
     sample_time_ns in TIME,
+    clock_uncertainty_ns in TIME,
     index in COUNT,
     pose,
     velocity in VELOCITY,

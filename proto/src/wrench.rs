@@ -2,16 +2,17 @@
 
 use crate::{
     codec::wire_ranged,
-    range::{BITS, COUNT, FORCE, TIME},
+    range::{BITS, FORCE, TIME},
 };
 
-/// One command to the device. A bridge that hears none for its watchdog time gives zero force.
+/// One command to the device. A bridge gives zero force once the reading that the newest command was computed from is too old.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WrenchCommand {
     /// When it was computed: session time, ns.
     pub time_ns: u64,
-    /// [`crate::InputSample::index`] of the reading that it answers; 0 for none.
-    pub input_index: u64,
+    /// [`crate::InputSample::sample_time_ns`] of the reading that it was computed from, as the bridge stamped it: there the difference to
+    /// now is an age on one clock. 0 for none.
+    pub origin_ns: u64,
     /// Force then torque on the user's hand at the reference point, N and N m, scene axes, limited already.
     pub wrench: [f64; 6],
     /// [`WRENCH_PAUSED`], [`WRENCH_AT_EDGE`].
@@ -25,7 +26,7 @@ pub const WRENCH_AT_EDGE: u16 = 2;
 
 wire_ranged!(WrenchCommand {
     time_ns in TIME,
-    input_index in COUNT,
+    origin_ns in TIME,
     wrench in FORCE,
     flags in BITS
 });

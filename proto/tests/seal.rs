@@ -39,6 +39,7 @@ fn sealed(sealer: &Sealer, payload: &Payload) -> Vec<u8> {
 fn input(index: u64) -> Payload {
     Payload::Input(InputSample {
         sample_time_ns: 5,
+        clock_uncertainty_ns: 7,
         index,
         pose: PoseF64::IDENTITY,
         velocity: [0.5; 6],
@@ -52,7 +53,7 @@ fn input(index: u64) -> Payload {
 fn fullest() -> HotState {
     HotState {
         sample_time_ns: 1 << 61,
-        tick: u64::MAX,
+        tick: 1 << 61,
         scene_revision: u32::MAX,
         run: RunState::Fault,
         constraint_age_us: u32::MAX,

@@ -63,7 +63,9 @@ pub fn run(
             let fresh = wrenches.update();
             let command = wrenches.output_buffer();
             let armed = states.is_armed();
-            let at_edge = sets.tick(now, command, armed, states.contacts(), &mut broadcaster);
+            let at_edge = sets.tick(now, command, armed, states.contacts(), |part| {
+                broadcaster.send_constraints(part);
+            });
             if fresh && !at_edge {
                 broadcaster.send_wrench(command);
             }
@@ -78,7 +80,7 @@ pub fn run(
         commands.sets.pause(&mut broadcaster);
         broadcaster.send_wrench(&WireWrench {
             time_ns: nanoseconds(clock.now()),
-            input_index: 0,
+            origin_ns: 0,
             wrench: [0.0; 6],
             flags: WRENCH_PAUSED,
         });

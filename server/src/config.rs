@@ -234,7 +234,7 @@ fn safety(
         None => Rearm::Manual,
     };
     // What comes over a network is stamped there and may be late; the device drops what is too late, which for a bridge that couples
-    // by itself is much later.
+    // by itself is later.
     let time_slack = match workbench.device {
         Device::Remote => MAX_EDGE_DELAY,
         _ => Duration::ZERO,

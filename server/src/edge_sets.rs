@@ -14,7 +14,7 @@ use taut_bridge::edge::write_set;
 use taut_link::Broadcaster;
 use taut_proto::constraints::SET_PAUSED;
 use taut_proto::wrench::WRENCH_AT_EDGE;
-use taut_proto::{ConstraintSet, Division, WrenchCommand};
+use taut_proto::{ConstraintPart, ConstraintSet, Division, WrenchCommand};
 
 use crate::clock::nanoseconds;
 use crate::shared::contact_snapshot::ContactSnapshot;
@@ -23,8 +23,8 @@ use crate::shared::contact_snapshot::ContactSnapshot;
 const DATAGRAMS_PER_TICK: usize = 8;
 /// Sets of this many datagrams are sent twice.
 const REPEATED_FROM: usize = 4;
-/// Age of a set from which on it is not sent any more. With the hold of 20 ms at the bridge the force fades once the constraints are
-/// older than 100 ms.
+/// Age of a set from which on it is not sent any more: the bridge, which counts from the device sample that a set answers, would not render in full what
+/// rests on it.
 const OLDEST: Duration = Duration::from_millis(80);
 /// Silence of the haptics loop from which on no set is sent.
 const HAPTICS_SILENCE: Duration = Duration::from_millis(20);
@@ -52,7 +52,7 @@ impl EdgeSets {
         }
     }
 
-    /// Sends what is due at `now`, if the bridge that `command` answers couples by itself and is heard; whether it does.
+    /// Gives `send` what is due at `now`, if the bridge that `command` answers couples by itself and is heard; whether it does.
     ///
     /// `armed`: the haptics loop's port lets force through; if not, the bridge's may not either.
     pub fn tick(
@@ -61,7 +61,7 @@ impl EdgeSets {
         command: &WrenchCommand,
         armed: bool,
         newest: &ContactSnapshot,
-        broadcaster: &mut Broadcaster,
+        mut send: impl FnMut(ConstraintPart),
     ) -> bool {
         if command.flags & WRENCH_AT_EDGE == 0 {
             self.due = 0;
@@ -77,7 +77,7 @@ impl EdgeSets {
         let end = self.due.min(self.sent + DATAGRAMS_PER_TICK);
         for datagram in self.sent..end {
             let part = datagram % self.division.parts();
-            broadcaster.send_constraints(self.division.part(&self.set, part));
+            send(self.division.part(&self.set, part));
         }
         self.sent = end;
         true

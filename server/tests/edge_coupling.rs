@@ -139,6 +139,9 @@ fn run(coupling: &str) -> Run {
         &DURATION_S.to_string(),
         "--coupling",
         coupling,
+        // What is looked at is the force of the coupling alone.
+        "--passivity",
+        "observe",
     ];
     let args = Cli::try_parse_from(words).expect("valid").args;
     let bridge = std::thread::Builder::new()

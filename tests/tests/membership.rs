@@ -225,6 +225,7 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
     for index in 1..=OLD_DATAGRAMS {
         old.send_input(&InputSample {
             sample_time_ns: index,
+            clock_uncertainty_ns: 0,
             index,
             pose: PoseF64::IDENTITY,
             velocity: [0.0; 6],

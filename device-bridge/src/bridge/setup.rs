@@ -14,7 +14,7 @@ use crate::cli::BridgeArgs;
 use crate::device::{Device, Pose};
 use crate::devices::{AtEnd, Grip, MinJerkPath, RecordedDevice, SimulatedDevice, Trace, Tremor};
 use crate::placement::Placement;
-use crate::port::DevicePort;
+use crate::port::{DevicePort, Passivity};
 use crate::simulated_strings::{simulated_spidar, string_geometry};
 use crate::trace_file::{read_trace, via_points};
 
@@ -195,8 +195,11 @@ pub(super) fn behind_port(
     reference_point: Point3<f64>,
     start: &Pose,
 ) -> BridgeLoop {
-    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated { .. })
-        || device.info().actuated_degrees_of_freedom == 0;
-    let safety = args.safety.settings(args.rate, nobody_is_hurt);
+    let has_motors = device.info().actuated_degrees_of_freedom > 0;
+    let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated { .. }) || !has_motors;
+    let mut safety = args.safety.settings(args.rate, nobody_is_hurt);
+    if !has_motors {
+        safety.passivity.mode = Passivity::Observe; // nobody is given any energy
+    }
     BridgeLoop::new(DevicePort::new(device, safety, reference_point, start))
 }

@@ -2,7 +2,10 @@
 //!
 //! Poses come from the link's receiving thread by a triple buffer; wrenches go to the broadcast thread by another one. Both are
 //! wait-free, one writer each: this device is the only reader of the first and the only writer of the
-//! second. Silence is a fault: a pose that is old says nothing about where the hand is.
+//! second. Age is a fault, of which silence is one cause: a pose that is old says nothing about where the hand is.
+//!
+//! A reading is as old as session time minus the bridge's stamp, plus what the bridge's clock may be off by. That it arrived just now says
+//! nothing. A bridge whose clock is not locked yet stamps nothing, and a reading without a stamp moves nothing.
 //!
 //! `now` must be session time, the clock of [`taut_link::SessionClock`].
 
@@ -15,18 +18,22 @@ use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_AT_EDGE;
 
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt};
+use crate::port::SafetySettings;
 
 /// Age of the newest reading from which on the device counts as lost.
 pub const DEFAULT_MAX_AGE: Duration = Duration::from_millis(20);
 
-/// Age up to which a reading counts that came on time from a bridge which couples by itself: a slow network delays it, and
-/// no force waits for it.
-pub const MAX_EDGE_DELAY: Duration = Duration::from_millis(250);
+/// The same for a bridge which couples by itself: no force waits for the reading, but the constraint set that answers an older one is of no
+/// use to it.
+pub const MAX_EDGE_DELAY: Duration = SafetySettings::ZERO_AFTER;
+
+/// How far the clocks of network and loops, which are one, may read apart: their zeros are taken one after the other.
+const ONE_CLOCK: Duration = Duration::from_micros(100);
 
 /// The command that says "no force".
 const NO_FORCE: WrenchCommand = WrenchCommand {
     time_ns: 0,
-    input_index: 0,
+    origin_ns: 0,
     wrench: [0.0; 6],
     flags: 0,
 };
@@ -39,8 +46,10 @@ pub struct RemoteDevice {
     max_age: Duration,
     /// The session that the readings come from.
     session: Option<u16>,
-    /// Index of the newest reading: what a command answers.
-    index: u64,
+    /// A reading of this session had a time.
+    on_clock: bool,
+    /// What the next command comes from.
+    origin: Option<Duration>,
     faulty: bool,
     /// What the bridge says that it renders.
     felt: Option<Felt>,
@@ -71,7 +80,8 @@ impl RemoteDevice {
             commands,
             max_age,
             session: None,
-            index: 0,
+            on_clock: false,
+            origin: None,
             faulty: true,
             felt: None,
         };
@@ -82,9 +92,9 @@ impl RemoteDevice {
         let Some(input) = *self.inputs.read() else {
             return Err(DeviceFault::NotStarted);
         };
-        self.index = input.sample.index;
         let known = self.session.replace(input.session);
         if known.is_some_and(|known| known != input.session) {
+            self.on_clock = false;
             return Err(DeviceFault::Reconnected);
         }
 
@@ -94,16 +104,24 @@ impl RemoteDevice {
         self.felt = finite.then_some(Felt { wrench, at_edge });
 
         let received = Duration::from_nanos(input.received_ns);
-        // The bridge's own stamp is the better one, once its clock is locked.
-        let measured = match input.sample.sample_time_ns {
-            0 => received,
-            stamp => Duration::from_nanos(stamp),
-        };
-        if measured > now.saturating_add(self.max_age) {
+        let stamp = input.sample.sample_time_ns;
+        if stamp == 0 {
+            // The bridge's clock locks a moment after it has joined.
+            return Err(if self.on_clock {
+                DeviceFault::TimeNotOnClock
+            } else {
+                DeviceFault::NotStarted
+            });
+        }
+        self.on_clock = true;
+        let measured = Duration::from_nanos(stamp);
+        let uncertainty = Duration::from_nanos(input.sample.clock_uncertainty_ns);
+        if measured.saturating_sub(now) > uncertainty.saturating_add(ONE_CLOCK) {
             return Err(DeviceFault::TimeNotOnClock);
         }
-        // Too old by either clock is too old: a full queue delivers old readings on time.
-        let age = now.saturating_sub(measured.min(received));
+        let age = now
+            .saturating_sub(measured.min(received))
+            .saturating_add(uncertainty);
         let silence = now.saturating_sub(received);
         let allowed = if at_edge {
             MAX_EDGE_DELAY
@@ -144,6 +162,10 @@ impl Device for RemoteDevice {
         sample
     }
 
+    fn comes_from(&mut self, origin: Option<Duration>) {
+        self.origin = origin;
+    }
+
     /// Hands the wrench to the broadcast thread; a zero one while the device is faulty.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
         let renderable = !self.faulty && wrench.iter().all(|x| x.is_finite());
@@ -153,8 +175,8 @@ impl Device for RemoteDevice {
             [0.0; 6]
         };
         self.commands.write(WrenchCommand {
-            time_ns: u64::try_from(now.as_nanos()).unwrap_or(u64::MAX),
-            input_index: self.index,
+            time_ns: nanoseconds(now),
+            origin_ns: nanoseconds(self.origin.unwrap_or_default()),
             wrench,
             // A bridge that is faulty gets no sets: their silence lets its force fade.
             flags: if self.felt.is_some_and(|felt| felt.at_edge) {
@@ -168,6 +190,10 @@ impl Device for RemoteDevice {
     fn felt(&self) -> Option<Felt> {
         self.felt
     }
+}
+
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
 }
 
 #[cfg(test)]
@@ -193,6 +219,7 @@ mod tests {
         DeviceInput {
             sample: InputSample {
                 sample_time_ns: measured_ms * 1_000_000,
+                clock_uncertainty_ns: 0,
                 index: 41,
                 pose: PoseF64 {
                     position: [0.1, 0.2, 0.3],
@@ -219,16 +246,18 @@ mod tests {
         assert_eq!(sample.pose.translation.vector.as_slice(), [0.1, 0.2, 0.3]);
         assert_eq!((sample.velocity[2], sample.buttons), (-0.5, 5));
 
+        device.comes_from(Some(ms(997)));
         device.write(ms(1001), &Vector6::new(1.0, 2.0, 3.0, 0.1, 0.2, 0.3));
         let command = commands.read();
         assert_eq!(command.wrench, [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]);
-        assert_eq!((command.input_index, command.time_ns), (41, 1_001_000_000));
+        let times = (command.origin_ns, command.time_ns);
+        assert_eq!(times, (997_000_000, 1_001_000_000));
     }
 
     #[test]
     fn silence_of_more_than_20_ms_is_a_fault_and_stops_the_force() {
         let (mut inputs, mut device, mut commands) = device();
-        inputs.write(Some(input(0, 1000))); // clock not locked: the arrival counts
+        inputs.write(Some(input(1000, 1000)));
         assert!(device.read(ms(1020)).is_ok());
         assert_eq!(
             device.read(ms(1021)),
@@ -236,7 +265,7 @@ mod tests {
         );
         device.write(ms(1021), &Vector6::repeat(3.0));
         assert_eq!(commands.read().wrench, [0.0; 6]);
-        inputs.write(Some(input(0, 1030)));
+        inputs.write(Some(input(1030, 1030)));
         assert!(device.read(ms(1030)).is_ok());
     }
 
@@ -248,6 +277,48 @@ mod tests {
             device.read(ms(1000)),
             Err(DeviceFault::Lost { age: ms(100) })
         );
+    }
+
+    #[test]
+    fn what_the_bridges_clock_may_be_off_by_counts_as_age() {
+        let (mut inputs, mut device, _commands) = device();
+        let mut doubtful = input(990, 999);
+        doubtful.sample.clock_uncertainty_ns = 9_000_000;
+        inputs.write(Some(doubtful));
+        assert!(device.read(ms(1000)).is_ok());
+        assert_eq!(
+            device.read(ms(1002)),
+            Err(DeviceFault::Lost { age: ms(21) })
+        );
+        // The clock may be ahead by that much, and no more.
+        doubtful.sample.sample_time_ns = 1_008_000_000;
+        inputs.write(Some(doubtful));
+        assert_eq!(
+            device.read(ms(1000)).map(|sample| sample.time),
+            Ok(ms(1000))
+        );
+        doubtful.sample.sample_time_ns = 1_010_000_000;
+        inputs.write(Some(doubtful));
+        assert_eq!(device.read(ms(1000)), Err(DeviceFault::TimeNotOnClock));
+        doubtful.sample.clock_uncertainty_ns = u64::MAX;
+        inputs.write(Some(doubtful));
+        assert!(
+            device.read(ms(1000)).is_err(),
+            "nothing is known of its age"
+        );
+    }
+
+    #[test]
+    fn a_bridge_whose_clock_is_not_locked_moves_nothing() {
+        let (mut inputs, mut device, mut commands) = device();
+        inputs.write(Some(input(0, 1000)));
+        assert_eq!(device.read(ms(1000)), Err(DeviceFault::NotStarted));
+        device.write(ms(1000), &Vector6::repeat(1.0));
+        assert_eq!(commands.read().wrench, [0.0; 6]);
+        inputs.write(Some(input(1001, 1001)));
+        assert!(device.read(ms(1001)).is_ok());
+        inputs.write(Some(input(0, 1002)));
+        assert_eq!(device.read(ms(1002)), Err(DeviceFault::TimeNotOnClock));
     }
 
     #[test]

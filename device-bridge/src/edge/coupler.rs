@@ -1,19 +1,21 @@
 //! The coupling beside the device: newest whole constraint set, newest device sample, force.
 //!
-//! | time                 | clock              | what for                                                    |
-//! |----------------------|--------------------|-------------------------------------------------------------|
-//! | `now`, `received`    | the bridge's       | adaptation ramps, rows of moving obstacles, the watchdog      |
-//! | [`SetHead::made_ns`] | the session's      | the age that is told in reports                             |
+//! | time                   | clock              | what for                                                    |
+//! |------------------------|--------------------|-------------------------------------------------------------|
+//! | `now`, `origin`        | the bridge's       | adaptation ramps, rows of moving obstacles, age               |
+//! | [`SetHead::device_ns`] | the bridge's stamp, come back | where `origin` is from                           |
+//! | [`SetHead::made_ns`]   | the session's      | what is told in reports                                     |
 //!
 //! A ramp begins when its row is first seen here and lasts its time here, whatever the network did; so no step of the force depends on two clocks.
-//! The watchdog counts silence from a set's *arrival*: a network of 50 ms delays every set alike and is no silence.
-//! How old a set may be when it leaves is the server's part: it sends none that its god-object loop has not renewed for 80 ms.
+//! A set is as old as the device reading that it answers: the way up, the server's part and the way down, all of it. When it arrived says
+//! nothing. A body at rest has one set for many readings: its number stays, and the newest reading that it answers counts.
 //!
 //! [`SetHead::made_ns`]: taut_link::proto::constraints::SetHead::made_ns
+//! [`SetHead::device_ns`]: taut_link::proto::constraints::SetHead::device_ns
 
 use std::time::Duration;
 
-use god_object::{ConstraintSet, Coupling, Pose, ProjectionStatus};
+use god_object::{ConstraintSet, Coupling, ProjectionStatus};
 use nalgebra::Vector6;
 use taut_link::proto;
 use taut_link::proto::EdgeCoupling;
@@ -22,15 +24,16 @@ use taut_link::proto::constraints::SET_PAUSED;
 use super::offer::{OfferError, world_of};
 use super::sets::{BrokenSet, read_set};
 use super::work::{most_rows, most_visits};
+use crate::device::DeviceSample;
 
 /// A force beside the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeWrench {
     /// Force then torque on the hand at the reference point, N and N m, world axes; before the safety stage.
     pub wrench: Vector6<f64>,
-    /// When the constraint set that it rests on arrived, or was last confirmed; on the clock of `now`. What the safety stage counts
-    /// silence from.
-    pub received: Duration,
+    /// When the device was read for the oldest of what it rests on, this sample and the constraint set; on the clock of `now`. What the
+    /// safety stage counts age from.
+    pub origin: Duration,
     /// Number of that set.
     pub sequence: u64,
     /// The projection was solved; if not, the wrench is zero.
@@ -44,7 +47,8 @@ pub struct EdgeCoupler {
     set: ConstraintSet,
     /// Where a set is read to, so that a broken one harms nothing.
     next: ConstraintSet,
-    received: Option<Duration>,
+    /// When the device was read that the set answers; `None` before the first set.
+    origin: Option<Duration>,
     paused: bool,
     most_rows: usize,
 }
@@ -61,7 +65,7 @@ impl EdgeCoupler {
             coupling: Coupling::new(&world, &settings),
             set: ConstraintSet::with_capacity(capacity),
             next: ConstraintSet::with_capacity(capacity),
-            received: None,
+            origin: None,
             paused: false,
             most_rows: usize::MAX,
         })
@@ -76,18 +80,15 @@ impl EdgeCoupler {
         self
     }
 
-    /// Takes a whole set that arrived at `received`, on the clock of [`Self::step`]'s `now`.
+    /// Takes a whole set that answers the device's reading of `origin`, on the clock of [`Self::step`]'s `now`.
     ///
-    /// The same set again confirms it: its sender is alive. A set older than the present one changes nothing.
+    /// The same set again may answer a newer reading, as a body at rest does, and say whether the server pauses; of itself it grows no younger.
+    /// A set older than the present one changes nothing.
     ///
     /// # Errors
     /// [`BrokenSet`]: the one before stays.
-    pub fn take(
-        &mut self,
-        wire: &proto::ConstraintSet,
-        received: Duration,
-    ) -> Result<(), BrokenSet> {
-        let known = self.received.is_some();
+    pub fn take(&mut self, wire: &proto::ConstraintSet, origin: Duration) -> Result<(), BrokenSet> {
+        let known = self.origin.is_some();
         if known && wire.head.sequence < self.set.sequence {
             return Ok(());
         }
@@ -101,7 +102,7 @@ impl EdgeCoupler {
             read_set(wire, &mut self.next)?;
             std::mem::swap(&mut self.set, &mut self.next);
         }
-        self.received = Some(received);
+        self.origin = self.origin.max(Some(origin));
         self.paused = wire.head.flags & SET_PAUSED != 0;
         Ok(())
     }
@@ -109,23 +110,25 @@ impl EdgeCoupler {
     /// Number of the set in use; `None` before the first.
     #[must_use]
     pub fn sequence(&self) -> Option<u64> {
-        self.received.map(|_| self.set.sequence)
+        self.origin.map(|_| self.set.sequence)
     }
 
-    /// The force for a device pose (world from body); `None` before the first set. `now` never runs back.
+    /// The force for a device sample; `None` before the first set. `now` never runs back. A sample of the time of the one before is the same
+    /// reading again.
     #[must_use]
-    pub fn step(&mut self, now: Duration, device_pose: &Pose) -> Option<EdgeWrench> {
-        let received = self.received?;
+    pub fn step(&mut self, now: Duration, sample: &DeviceSample) -> Option<EdgeWrench> {
+        let origin = self.origin?;
+        let reading = u64::try_from(sample.time.as_nanos()).unwrap_or(u64::MAX);
         let output = self
             .coupling
-            .step(now.as_secs_f64(), device_pose, &self.set);
+            .answer(now.as_secs_f64(), reading, &sample.pose, &self.set);
         Some(EdgeWrench {
             wrench: if self.paused {
                 Vector6::zeros()
             } else {
                 output.wrench
             },
-            received,
+            origin: origin.min(sample.time),
             sequence: self.set.sequence,
             solved: output.status == ProjectionStatus::Solved,
         })
@@ -135,9 +138,10 @@ impl EdgeCoupler {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::Pose;
     use proto::PoseF64;
     use proto::constraints::{ConstraintRow, SetHead};
-    use proto::coupling::EdgeSolver;
+    use proto::coupling::{EdgeSettings, EdgeSolver};
 
     fn offer() -> EdgeCoupling {
         EdgeCoupling {
@@ -145,19 +149,30 @@ mod tests {
             inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
             reference_point: [0.0; 3],
             radius: 0.02,
-            k_s: 0.5,
-            k_h: 2000.0,
-            radius_of_gyration: None,
-            adaptation: None,
-            look_ahead: true,
-            passive: false,
-            force_limit: 20.0,
-            torque_limit: 0.5,
-            rest_distance: 4e-6,
-            motion_tolerance: 2e-8,
-            max_constraints: 1024,
-            implicit_rounds: 0,
-            solver: EdgeSolver::ActiveSet,
+            settings: EdgeSettings {
+                k_s: 0.5,
+                k_h: 2000.0,
+                damping_time: 0.0,
+                radius_of_gyration: None,
+                adaptation: None,
+                look_ahead: true,
+                passive: false,
+                force_limit: 20.0,
+                torque_limit: 0.5,
+                rest_distance: 4e-6,
+                minimum_gap: 4e-7,
+                gap_tolerance: 4e-8,
+                activation_distance: 1.6e-4,
+                look_ahead_limit: 0.16,
+                look_ahead_pairs: 1000,
+                motion_tolerance: 2e-8,
+                max_constraints: 1024,
+                max_substeps: 10,
+                implicit_rounds: 0,
+                max_advancement_steps: 200,
+                work_budget: None,
+                solver: EdgeSolver::ActiveSet,
+            },
             set_rate_hz: 1000.0,
             obstacles: Vec::new(),
         }
@@ -186,19 +201,12 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    #[test]
-    fn the_force_is_the_stiffness_times_the_depth_wherever_the_god_object_is() {
-        let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
-        assert_eq!(coupler.step(MS, &Pose::translation(0.0, 0.0, 0.0)), None);
-        assert_eq!(coupler.take(&floor(1, 0), 5 * MS), Ok(()));
-        for (place, depth) in [(0.0, 5e-3), (0.03, 5e-3), (0.0, -5e-3)] {
-            let pose = Pose::translation(place, 0.0, 0.02 - depth);
-            let felt = coupler.step(6 * MS, &pose).expect("a set is here");
-            // 1000 N/m, from the rest distance of 4 um on.
-            let expected = 1000.0 * f64::max(depth + 4e-6, 0.0);
-            assert!((felt.wrench[2] - expected).abs() < 1e-4, "{felt:?}");
-            assert!(felt.wrench.fixed_rows::<2>(0).norm() < 1e-9);
-            assert_eq!((felt.received, felt.sequence), (5 * MS, 1));
+    fn at(time: Duration, pose: Pose) -> DeviceSample {
+        DeviceSample {
+            time,
+            pose,
+            velocity: Vector6::zeros(),
+            buttons: 0,
         }
     }
 
@@ -226,7 +234,7 @@ mod tests {
         let new = || EdgeCoupler::new(&offer()).expect("an offer");
         let mut slow = new().within(MS);
         assert_eq!(slow.take(&cone(1024), MS), Ok(()));
-        let felt = slow.step(MS, &pose).expect("a set");
+        let felt = slow.step(MS, &at(MS, pose)).expect("a set");
         assert!(felt.solved && felt.wrench.norm() > 1.0, "{felt:?}");
         let mut fast = new().within(MS / 4);
         let refused = BrokenSet::TooManyRows {
@@ -234,28 +242,49 @@ mod tests {
             most: 625,
         };
         assert_eq!(fast.take(&cone(1024), MS), Err(refused));
-        assert_eq!(fast.step(MS, &pose), None);
+        assert_eq!(fast.step(MS, &at(MS, pose)), None);
         // No time at all: no force, and no step that goes on for ever.
         let mut none = new();
         none.coupling.limit_work(1024);
         assert_eq!(none.take(&cone(1024), MS), Ok(()));
-        let felt = none.step(MS, &pose).expect("a set");
+        let felt = none.step(MS, &at(MS, pose)).expect("a set");
         assert!(!felt.solved && felt.wrench == Vector6::zeros(), "{felt:?}");
     }
 
     #[test]
-    fn newer_sets_replace_repeats_confirm_and_older_ones_change_nothing() {
+    fn the_force_is_the_stiffness_times_the_depth_wherever_the_god_object_is() {
+        let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
+        assert_eq!(coupler.step(MS, &at(MS, Pose::identity())), None);
+        assert_eq!(coupler.take(&floor(1, 0), 5 * MS), Ok(()));
+        for (place, depth) in [(0.0, 5e-3), (0.03, 5e-3), (0.0, -5e-3)] {
+            let pose = Pose::translation(place, 0.0, 0.02 - depth);
+            let felt = coupler
+                .step(6 * MS, &at(6 * MS, pose))
+                .expect("a set is here");
+            // 1000 N/m, from the rest distance of 4 um on.
+            let expected = 1000.0 * f64::max(depth + 4e-6, 0.0);
+            assert!((felt.wrench[2] - expected).abs() < 1e-4, "{felt:?}");
+            assert!(felt.wrench.fixed_rows::<2>(0).norm() < 1e-9);
+            assert_eq!((felt.origin, felt.sequence), (5 * MS, 1));
+        }
+    }
+
+    #[test]
+    fn newer_sets_replace_repeats_are_as_old_as_what_they_answer_and_older_ones_change_nothing() {
         let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
         let pose = Pose::translation(0.0, 0.0, 0.015);
-        let mut state = |set: &proto::ConstraintSet, at| {
-            coupler.take(set, at * MS).expect("a set");
-            let felt = coupler.step(at * MS, &pose).expect("a set");
-            (felt.sequence, felt.received)
+        let mut state = |set: &proto::ConstraintSet, answers, time| {
+            coupler.take(set, answers * MS).expect("a set");
+            let felt = coupler
+                .step(time * MS, &at(time * MS, pose))
+                .expect("a set");
+            (felt.sequence, felt.origin)
         };
-        assert_eq!(state(&floor(4, 0), 1), (4, MS));
-        assert_eq!(state(&floor(3, 0), 2), (4, MS));
-        assert_eq!(state(&floor(4, 0), 3), (4, 3 * MS));
-        assert_eq!(state(&floor(5, 0), 4), (5, 4 * MS));
+        assert_eq!(state(&floor(4, 0), 1, 2), (4, MS));
+        assert_eq!(state(&floor(3, 0), 2, 3), (4, MS));
+        assert_eq!(state(&floor(4, 0), 1, 4), (4, MS), "repeated");
+        assert_eq!(state(&floor(4, 0), 3, 4), (4, 3 * MS), "still true then");
+        assert_eq!(state(&floor(5, 0), 4, 5), (5, 4 * MS));
     }
 
     #[test]
@@ -263,13 +292,13 @@ mod tests {
         let mut coupler = EdgeCoupler::new(&offer()).expect("an offer");
         let pose = Pose::translation(0.0, 0.0, 0.015);
         coupler.take(&floor(1, 0), MS).expect("a set");
-        let before = coupler.step(MS, &pose);
+        let before = coupler.step(MS, &at(MS, pose));
         let mut broken = floor(2, 0);
         broken.rows[0].normal = [0.0, 0.0, 0.5];
         assert_eq!(coupler.take(&broken, 2 * MS), Err(BrokenSet::Normal));
-        assert_eq!(coupler.step(MS, &pose), before);
+        assert_eq!(coupler.step(MS, &at(MS, pose)), before);
         coupler.take(&floor(3, SET_PAUSED), 3 * MS).expect("a set");
-        let paused = coupler.step(3 * MS, &pose).expect("a set");
+        let paused = coupler.step(3 * MS, &at(3 * MS, pose)).expect("a set");
         assert_eq!(paused.wrench, Vector6::zeros());
     }
 }

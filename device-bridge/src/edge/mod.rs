@@ -8,6 +8,7 @@
 //! | file           | what                                                                     |
 //! |----------------|--------------------------------------------------------------------------|
 //! | `offer.rs`     | what a server tells a bridge at join, to and from the method's world       |
+//! | `settings.rs`  | the method's settings, to and from the wire                              |
 //! | `sets.rs`      | constraint sets, to and from the wire                                    |
 //! | `coupler.rs`   | the coupling beside the device                                           |
 //! | `ahead.rs`     | where the hand will be that the server sees late                        |
@@ -19,6 +20,7 @@ mod ahead;
 mod coupler;
 mod offer;
 mod sets;
+mod settings;
 mod work;
 
 pub use ahead::{device_ahead, device_predicted};

@@ -5,12 +5,12 @@
 
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
 use god_object::{
-    Adaptation, Body, Mesh, Obstacle, RotationMetric, Settings, SettingsError, SineTexture,
-    SolverKind, Surface, Texture, World,
+    Body, Mesh, Obstacle, Settings, SettingsError, SineTexture, Surface, Texture, World,
 };
-use taut_link::proto::constraints::MAX_SET_ROWS;
-use taut_link::proto::coupling::{EdgeAdaptation, EdgeSine, EdgeSolver, EdgeSurface};
+use taut_link::proto::coupling::{EdgeSine, EdgeSurface};
 use taut_link::proto::{CouplingOffer, EdgeCoupling, PoseF64};
+
+use super::settings::{from_wire, to_wire};
 
 /// A unit vector may be this far from unit length: some roundings.
 const UNIT_TOLERANCE: f64 = 1e-9;
@@ -34,67 +34,71 @@ pub enum OfferError {
 /// What a server with this world offers its bridge, `set_rate_hz` sets a second; the reason where it cannot.
 #[must_use]
 pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> CouplingOffer {
-    let at_server = |reason: &str| CouplingOffer::AtServer {
+    let at_server = |reason: String| CouplingOffer::AtServer {
         reason: reason.into(),
     };
-    if settings.max_constraints > MAX_SET_ROWS {
-        return at_server("its constraint sets may have more rows than travel (1024)");
-    }
-    if settings.solver == SolverKind::Clarabel {
-        return at_server("its solver takes memory, which a device's loop may not");
-    }
-    let surface = |obstacle: &Obstacle| {
-        let sine = match &obstacle.surface.texture {
-            None => None,
-            Some(Texture::Sine(sine)) => Some(EdgeSine {
-                axis: sine.axis.into(),
-                wavelength: sine.wavelength,
-                amplitude: sine.amplitude,
-            }),
-            Some(_) => return None,
-        };
-        Some(EdgeSurface {
-            pose: PoseF64::from_isometry(&obstacle.pose),
-            friction: obstacle.surface.friction,
-            sine,
-        })
+    let settings = match to_wire(settings) {
+        Ok(settings) => settings,
+        Err(reason) => return at_server(reason.to_string()),
     };
-    let Some(obstacles) = world.obstacles.iter().map(surface).collect() else {
-        return at_server("a surface has a height map, which does not travel");
+    let World { body, obstacles } = world;
+    let Some(obstacles) = obstacles.iter().map(wire_surface).collect() else {
+        return at_server("a surface has a height map, which does not travel".to_owned());
     };
-    let body = &world.body;
-    let mut inertia = [0.0; 9];
-    // Column by column or row by row: it is symmetric.
-    inertia.copy_from_slice(body.inertia.as_slice());
-    CouplingOffer::AtEdge(EdgeCoupling {
-        mass: body.mass,
+    // Shapes stay here: the coupling asks for the radius alone.
+    let Body {
+        mesh,
+        primitive: _,
+        mass,
         inertia,
-        reference_point: body.reference_point.coords.into(),
-        radius: body.mesh.radius_about(&body.reference_point),
-        k_s: settings.k_s,
-        k_h: settings.k_h,
-        radius_of_gyration: match settings.rotation_metric {
-            RotationMetric::Inertia => None,
-            RotationMetric::RadiusOfGyration(radius) => Some(radius),
-        },
-        adaptation: settings.adaptation.map(|adaptation| EdgeAdaptation {
-            duration: adaptation.duration,
-            threshold: adaptation.threshold,
-        }),
-        look_ahead: settings.look_ahead,
-        passive: settings.passive,
-        force_limit: settings.force_limit,
-        torque_limit: settings.torque_limit,
-        rest_distance: settings.rest_distance,
-        motion_tolerance: settings.motion_tolerance,
-        max_constraints: settings.max_constraints as u32, // at most MAX_SET_ROWS
-        implicit_rounds: settings.implicit_rounds,
-        solver: match settings.solver {
-            SolverKind::ProjectedGaussSeidel => EdgeSolver::GaussSeidel,
-            SolverKind::ActiveSet | SolverKind::Clarabel => EdgeSolver::ActiveSet,
-        },
+        reference_point,
+    } = body;
+    let mut rows = [0.0; 9];
+    // Column by column or row by row: it is symmetric.
+    rows.copy_from_slice(inertia.as_slice());
+    CouplingOffer::AtEdge(EdgeCoupling {
+        mass: *mass,
+        inertia: rows,
+        reference_point: reference_point.coords.into(),
+        radius: mesh.radius_about(reference_point),
+        settings,
         set_rate_hz,
         obstacles,
+    })
+}
+
+/// How an obstacle feels; `None` where that does not travel.
+fn wire_surface(obstacle: &Obstacle) -> Option<EdgeSurface> {
+    // Its shape comes as rows, shading as their normals.
+    let Obstacle {
+        name: _,
+        mesh: _,
+        primitive: _,
+        pose,
+        surface:
+            Surface {
+                shading: _,
+                texture,
+                friction,
+            },
+    } = obstacle;
+    let sine = match texture {
+        None => None,
+        Some(Texture::Sine(SineTexture {
+            axis,
+            wavelength,
+            amplitude,
+        })) => Some(EdgeSine {
+            axis: (*axis).into(),
+            wavelength: *wavelength,
+            amplitude: *amplitude,
+        }),
+        Some(_) => return None,
+    };
+    Some(EdgeSurface {
+        pose: PoseF64::from_isometry(pose),
+        friction: *friction,
+        sine,
     })
 }
 
@@ -123,7 +127,7 @@ pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
     if !reference_point.iter().all(|x| x.is_finite()) {
         reference_point = Point3::origin();
     }
-    let settings = settings_of(offer)?;
+    let settings = from_wire(&offer.settings)?;
     let obstacles = offer
         .obstacles
         .iter()
@@ -140,37 +144,6 @@ pub fn world_of(offer: &EdgeCoupling) -> Result<(World, Settings), OfferError> {
         obstacles,
     };
     Ok((world, settings))
-}
-
-fn settings_of(offer: &EdgeCoupling) -> Result<Settings, OfferError> {
-    let scale = offer.rest_distance / Settings::for_size(1.0).rest_distance;
-    let settings = Settings {
-        k_s: offer.k_s,
-        k_h: offer.k_h,
-        rotation_metric: offer
-            .radius_of_gyration
-            .map_or(RotationMetric::Inertia, RotationMetric::RadiusOfGyration),
-        adaptation: offer.adaptation.map(|adaptation| Adaptation {
-            duration: adaptation.duration,
-            threshold: adaptation.threshold,
-        }),
-        look_ahead: offer.look_ahead,
-        passive: offer.passive,
-        force_limit: offer.force_limit,
-        torque_limit: offer.torque_limit,
-        rest_distance: offer.rest_distance,
-        motion_tolerance: offer.motion_tolerance,
-        max_constraints: (offer.max_constraints as usize).min(MAX_SET_ROWS),
-        implicit_rounds: offer.implicit_rounds,
-        solver: match offer.solver {
-            EdgeSolver::ActiveSet => SolverKind::ActiveSet,
-            EdgeSolver::GaussSeidel => SolverKind::ProjectedGaussSeidel,
-        },
-        // Lengths of the god-object loop, which is not here: in the order that is asked of them.
-        ..Settings::for_size(scale)
-    };
-    settings.validate()?;
-    Ok(settings)
 }
 
 fn obstacle(surface: &EdgeSurface) -> Result<Obstacle, OfferError> {
@@ -229,7 +202,8 @@ fn tetrahedron(center: &Point3<f64>, radius: f64) -> Result<Mesh, OfferError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use god_object::Pose;
+    use god_object::{Pose, RotationMetric};
+    use taut_link::proto::constraints::MAX_SET_ROWS;
 
     fn scene() -> (World, Settings) {
         let size = 0.05;
@@ -289,14 +263,7 @@ mod tests {
         for (there, here) in there.obstacles.iter().zip(&world.obstacles) {
             assert_eq!((&there.pose, &there.surface), (&here.pose, &here.surface));
         }
-        let relevant = Settings {
-            minimum_gap: back.minimum_gap,
-            gap_tolerance: back.gap_tolerance,
-            activation_distance: back.activation_distance,
-            look_ahead_limit: back.look_ahead_limit,
-            ..settings
-        };
-        assert_eq!(back, relevant);
+        assert_eq!(back, settings);
     }
 
     #[test]
@@ -340,7 +307,7 @@ mod tests {
                 "an inertia tensor",
             ),
             (refused(|offer| offer.radius = f64::NAN), "a radius"),
-            (refused(|offer| offer.k_s = 2.0), "k_s"),
+            (refused(|offer| offer.settings.k_s = 2.0), "k_s"),
             (
                 refused(|offer| offer.obstacles[1].friction = -1.0),
                 "friction",

@@ -63,9 +63,12 @@ pub struct DevicePort {
     fault: Option<DeviceFault>,
     /// Energy given out since the last sample, J.
     work: f64,
-    /// The newest command that may be rendered, and when it was seen.
+    /// The newest command that may be rendered, and the reading of the device that it comes from.
     held: Vector6<f64>,
+    held_origin: Option<Duration>,
+    /// Origin of the newest command, and when there was news of it.
     last_command: Option<Duration>,
+    last_news: Duration,
     arm_asked: bool,
     disarm_asked: bool,
     buttons: Buttons,
@@ -114,7 +117,9 @@ impl DevicePort {
             fault: None,
             work: 0.0,
             held: Vector6::zeros(),
+            held_origin: None,
             last_command: None,
+            last_news: Duration::ZERO,
             arm_asked: false,
             disarm_asked: false,
             buttons: Buttons::new(settings.dead_man, settings.arm_button),
@@ -165,6 +170,12 @@ impl DevicePort {
         self.slew.rendered()
     }
 
+    /// When the device was read for what the force of now comes from, on the clock of the ticks; `None` before the first command.
+    #[must_use]
+    pub fn origin(&self) -> Option<Duration> {
+        self.held_origin
+    }
+
     /// Asks for force, as a person does; the next tick grants or refuses it.
     pub fn ask_to_arm(&mut self) {
         self.arm_asked = true;
@@ -199,6 +210,7 @@ impl DevicePort {
         let reading = self.sense(now);
         let command = command(&reading);
         let wrench = self.render(now, passed, command);
+        self.device.comes_from(self.held_origin);
         self.device.write(now, &wrench);
         // The device's own word is what does the work.
         let felt = self.device.felt().map_or(wrench, |felt| felt.wrench);
@@ -256,6 +268,11 @@ impl DevicePort {
                 self.sample.velocity = Vector6::zeros();
                 self.energy.skip();
                 self.motion.forget();
+                if let DeviceFault::Lost { age } = fault {
+                    // What was lost is older than its last arrival.
+                    let good = now.saturating_sub(age);
+                    self.last_good = self.last_good.map(|seen| seen.min(good));
+                }
                 if self.fault.is_none() {
                     let (kind, value) = kind_of_fault(&fault);
                     self.teller.tell(kind, value);
@@ -286,6 +303,7 @@ impl DevicePort {
             && !self.arming.keeps_last_wrench()
         {
             self.held = wrench;
+            self.held_origin = self.last_command;
         }
         let gain = self.arming.gain();
         // Limited first too: a huge command would turn infinite, and a small share of it would be none of its limit.
@@ -394,9 +412,14 @@ impl DevicePort {
             None => stale_since = Some(now),
         }
 
-        if taken.is_some() {
-            self.last_command = command.map(|command| command.made.min(now));
+        if let Some(command) = command.filter(|_| taken.is_some()) {
+            let origin = Some(command.origin.min(now));
+            if self.last_command != origin {
+                self.last_news = now;
+            }
+            self.last_command = origin;
         }
+        let late_command = now.saturating_sub(self.last_news) > self.settings.late();
         // The force is as old as the older of the two that it rests on.
         let newest = |seen: Option<Duration>| seen.unwrap_or(now);
         let is_fault = self.fault.is_some() || !finite;
@@ -409,7 +432,7 @@ impl DevicePort {
         let situation = Situation {
             fault_since,
             stale_since,
-            late: late_sample || fresh == Some(Freshness::Late),
+            late: late_sample || late_command,
             commanded: command.is_some() && self.last_good.is_some(),
             held,
             asked: std::mem::take(&mut self.arm_asked) || pressed,

@@ -187,7 +187,12 @@ impl EventKind {
     pub fn is_good_news(self) -> bool {
         matches!(
             self,
-            Self::Arming | Self::Armed | Self::Disarmed | Self::DeadManReleased | Self::DeviceBack
+            Self::Arming
+                | Self::Armed
+                | Self::Disarmed
+                | Self::DeadManReleased
+                | Self::DeviceBack
+                | Self::PassivityActs // as it does in any contact, where it is on
         )
     }
 

@@ -629,9 +629,9 @@ proptest! {
                     Fault::TimeBack => answer = Ok(DeviceSample { time: now - ms(300), ..sample(now) }),
                     Fault::Unplugged => answer = Err(DeviceFault::Lost { age: now - begun }),
                     Fault::WrenchNan => command.wrench[3] = f64::NAN,
-                    Fault::CommandsStop => command.made = good_command,
+                    Fault::CommandsStop => command.origin = good_command,
                     Fault::ConstraintsStop => command.constraint_age = now - begun,
-                    Fault::CommandsAhead => command.made = now + ms(50),
+                    Fault::CommandsAhead => command.origin = now + ms(50),
                     Fault::Disarm => stage.port.ask_to_disarm(),
                     Fault::None => {}
                 }

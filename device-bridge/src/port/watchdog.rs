@@ -6,25 +6,42 @@ use std::time::Duration;
 
 use super::settings::SafetySettings;
 
-/// What the hand is to feel, and when that was computed.
+/// What the hand is to feel, and how old that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Force and torque on the hand at the reference point, N and N m, world axes.
     pub wrench: nalgebra::Vector6<f64>,
-    /// When it was computed, or when it arrived, on the clock of the ticks.
-    pub made: Duration,
-    /// How old the constraints were from which it was computed.
+    /// When the device was read for what it was computed from, on the clock of the ticks: never when it was computed, sent or heard.
+    pub origin: Duration,
+    /// How much older than that the constraints were from which it was computed.
     pub constraint_age: Duration,
+    /// Age up to which it is rendered in full, where that is longer than the port's hold.
+    pub full_until: Duration,
 }
 
 impl Command {
+    /// Age up to which a force is rendered in full that rests on a constraint set which waited for a network. A set answers an earlier
+    /// reading and is nearly as good for this one, where a force is not. From here on 20 N can come down by 0.5 N/ms until nothing
+    /// may be felt any more.
+    pub const SET_FULL_UNTIL: Duration = Duration::from_millis(75);
+
     /// A command that was computed just now from constraints of now.
     #[must_use]
     pub fn fresh(now: Duration, wrench: nalgebra::Vector6<f64>) -> Self {
         Self {
             wrench,
-            made: now,
+            origin: now,
             constraint_age: Duration::ZERO,
+            full_until: Duration::ZERO,
+        }
+    }
+
+    /// A command computed for the sample of now from a constraint set that answers the reading of `origin`.
+    #[must_use]
+    pub fn on_set(origin: Duration, wrench: nalgebra::Vector6<f64>) -> Self {
+        Self {
+            full_until: Self::SET_FULL_UNTIL,
+            ..Self::fresh(origin, wrench)
         }
     }
 }
@@ -45,22 +62,20 @@ pub(super) enum Missing {
 pub(super) enum Freshness {
     /// In full.
     Fresh,
-    /// In full still, but nothing new came for longer than [`SafetySettings::late`].
-    Late,
     /// No more.
     Stale {
         /// What is missing.
         missing: Missing,
         /// Its age, or by how much it is ahead.
         age: Duration,
-        /// When it grew too old.
+        /// Since when the force is on its way down, so that it ends in time.
         since: Duration,
     },
 }
 
 /// How fresh `command` is at `now`.
 pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySettings) -> Freshness {
-    let ahead = command.made.saturating_sub(now);
+    let ahead = command.origin.saturating_sub(now);
     if ahead > settings.hold {
         return Freshness::Stale {
             missing: Missing::NotOnClock,
@@ -68,29 +83,51 @@ pub(super) fn freshness(now: Duration, command: &Command, settings: &SafetySetti
             since: now,
         };
     }
-    let constraints_made = command.made.saturating_sub(command.constraint_age);
+    let constraints_made = command.origin.saturating_sub(command.constraint_age);
+    let longest = command.full_until.min(longest_in_full(settings));
     let candidates = [
-        (Missing::Command, command.made, settings.hold),
+        (
+            Missing::Command,
+            command.origin,
+            settings.hold.max(longest),
+            settings.hold,
+        ),
         (
             Missing::Constraints,
             constraints_made,
             settings.max_constraint_age,
+            settings.max_constraint_age,
         ),
     ];
-    // The one that grew too old first.
-    let oldest = candidates
+    // The one that is furthest on its way down. What is rendered in full for longer is down at the same age as everything else.
+    let stale = candidates
         .into_iter()
-        .map(|(missing, made, limit)| (made.saturating_add(limit), missing, made))
-        .min_by_key(|(since, ..)| *since);
-    match oldest {
-        Some((since, missing, made)) if now > since => Freshness::Stale {
+        .filter_map(|(missing, made, full, fade)| {
+            let age = now.saturating_sub(made);
+            (age > full).then(|| (made.saturating_add(fade), missing, age))
+        });
+    match stale.min_by_key(|(since, ..)| *since) {
+        Some((since, missing, age)) => Freshness::Stale {
             missing,
-            age: now.saturating_sub(made),
+            age,
             since,
         },
-        _ if now.saturating_sub(command.made) > settings.late() => Freshness::Late,
-        _ => Freshness::Fresh,
+        None => Freshness::Fresh,
     }
+}
+
+/// Age from which the largest force and torque come down by the slew limit until nothing may be felt any more.
+fn longest_in_full(settings: &SafetySettings) -> Duration {
+    // A write of a slow loop uses up less than its period of the slew limit.
+    let share = settings
+        .period
+        .div_duration_f64(SafetySettings::LONGEST_STEP);
+    let down = (settings.max_force / settings.force_rate)
+        .max(settings.max_torque / settings.torque_rate)
+        * share.max(1.0);
+    let end = settings.hold.saturating_add(settings.ramp_out);
+    // Negative and NaN: no time is known to be enough.
+    Duration::try_from_secs_f64(down).map_or(Duration::ZERO, |down| end.saturating_sub(down))
 }
 
 #[cfg(test)]
@@ -105,8 +142,9 @@ mod tests {
     fn at(now_ms: u64, made_ms: u64, constraint_age_ms: u64) -> Freshness {
         let command = Command {
             wrench: Vector6::zeros(),
-            made: ms(made_ms),
+            origin: ms(made_ms),
             constraint_age: ms(constraint_age_ms),
+            full_until: Duration::ZERO,
         };
         freshness(ms(now_ms), &command, &SafetySettings::default())
     }
@@ -115,8 +153,7 @@ mod tests {
     fn twenty_milliseconds_are_held_and_no_more() {
         assert_eq!(at(1000, 1000, 0), Freshness::Fresh);
         assert_eq!(at(1005, 1000, 0), Freshness::Fresh);
-        assert_eq!(at(1006, 1000, 0), Freshness::Late);
-        assert_eq!(at(1020, 1000, 0), Freshness::Late);
+        assert_eq!(at(1020, 1000, 0), Freshness::Fresh);
         let stale = Freshness::Stale {
             missing: Missing::Command,
             age: ms(21),
@@ -134,6 +171,27 @@ mod tests {
             since: ms(1000),
         };
         assert_eq!(at(1003, 1001, 101), stale);
+    }
+
+    #[test]
+    fn a_force_on_a_set_is_full_for_longer_and_down_at_the_same_age() {
+        let settings = SafetySettings::default();
+        let command = Command::on_set(ms(1000), Vector6::zeros());
+        let at = |now_ms, settings: &SafetySettings| freshness(ms(now_ms), &command, settings);
+        assert_eq!(at(1075, &settings), Freshness::Fresh);
+        let stale = Freshness::Stale {
+            missing: Missing::Command,
+            age: ms(76),
+            since: ms(1020),
+        };
+        assert_eq!(at(1076, &settings), stale);
+        // 40 N take 80 ms.
+        let strong = SafetySettings {
+            max_force: 40.0,
+            ..settings
+        };
+        assert_eq!(at(1035, &strong), Freshness::Fresh);
+        assert!(at(1036, &strong) != Freshness::Fresh);
     }
 
     #[test]

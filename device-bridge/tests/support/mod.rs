@@ -207,6 +207,7 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
                 seen.lowest_z = seen.lowest_z.min(z);
                 seen.heights.push(z);
                 wrench.z = STIFFNESS * (-z).max(0.0);
+                device.comes_from(Some(sample.time));
             }
             device.write(now, &wrench);
             let _ = broadcaster.send_wrench(commands.read());

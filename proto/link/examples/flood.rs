@@ -405,6 +405,7 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
 fn reading(index: u64) -> InputSample {
     InputSample {
         sample_time_ns: 0,
+        clock_uncertainty_ns: 0,
         index,
         pose: PoseF64::IDENTITY,
         velocity: [0.0; 6],

@@ -158,7 +158,7 @@ async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
     let mut broadcaster = server.broadcaster();
     let command = WrenchCommand {
         time_ns: 1,
-        input_index: taken.sample.index,
+        origin_ns: taken.sample.sample_time_ns,
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.01],
         flags: 0,
     };

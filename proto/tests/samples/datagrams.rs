@@ -17,6 +17,7 @@ use super::values::{far, finite64, pose64};
 pub fn datagrams() -> Vec<(&'static str, Payload)> {
     let input = InputSample {
         sample_time_ns: 1_000_000_000,
+        clock_uncertainty_ns: 250_000,
         index: 41,
         pose: PoseF64 {
             position: [0.5, 0.25, -0.125],
@@ -30,7 +31,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
     };
     let wrench = WrenchCommand {
         time_ns: 1_000_000_500,
-        input_index: 41,
+        origin_ns: 999_500_000,
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
         flags: 0,
     };
@@ -91,15 +92,21 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             .prop_map(|list| <[f64; 6]>::try_from(list).unwrap_or_default())
     };
     let input = (
-        (far(), far(), any::<u16>(), any::<u16>(), far()),
+        (far(), far(), far(), any::<u16>(), any::<u16>(), far()),
         pose64(),
         six(),
         six(),
     )
         .prop_map(
-            |((sample_time_ns, index, buttons, flags, set_sequence), pose, velocity, rendered)| {
+            |(
+                (sample_time_ns, clock_uncertainty_ns, index, buttons, flags, set_sequence),
+                pose,
+                velocity,
+                rendered,
+            )| {
                 Payload::Input(InputSample {
                     sample_time_ns,
+                    clock_uncertainty_ns,
                     index,
                     pose,
                     velocity,
@@ -110,16 +117,15 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 })
             },
         );
-    let wrench = ((far(), far(), any::<u16>()), six()).prop_map(
-        |((time_ns, input_index, flags), wrench)| {
+    let wrench =
+        ((far(), far(), any::<u16>()), six()).prop_map(|((time_ns, origin_ns, flags), wrench)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
-                input_index,
+                origin_ns,
                 wrench,
                 flags,
             })
-        },
-    );
+        });
     let response = (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
         Payload::TimeResponse(TimeResponse {
             client_sent,

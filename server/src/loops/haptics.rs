@@ -27,6 +27,8 @@ pub struct HapticsLoop {
     coupling: Waker,
     switch: Arc<ArmSwitch>,
     state: DeviceState,
+    /// Time and pose of the device's newest sample.
+    newest_sample: Option<(Duration, Pose)>,
     last_tick: Option<Duration>,
     /// CPU time of the coupling up to the command rendered last.
     coupling_cpu_time: Duration,
@@ -97,6 +99,7 @@ impl HapticsLoop {
             coupling,
             switch,
             state: DeviceState::at_start(start),
+            newest_sample: None,
             last_tick: None,
             coupling_cpu_time: Duration::ZERO,
             recording: None,
@@ -132,12 +135,15 @@ impl HapticsLoop {
             None => {}
         }
         let (state, states, wrench) = (&mut self.state, &mut self.states, &mut self.wrench);
-        let coupling = &self.coupling;
+        let (known, coupling) = (&mut self.newest_sample, &self.coupling);
+        let has_motors = self.port.info().actuated_degrees_of_freedom > 0;
         let report = self.port.tick(now, |reading| {
-            follow(state, reading, now);
+            follow(state, known, reading, now);
             states.publish(state);
             coupling.wake();
-            Some(newest_command(wrench))
+            // Beside a bridge that couples by itself this force is rendered by nobody.
+            let at_edge = reading.felt.is_some_and(|felt| felt.at_edge);
+            Some(newest_command(wrench, has_motors && !at_edge))
         });
         self.count(now, &report);
     }
@@ -213,8 +219,17 @@ impl HapticsLoop {
 }
 
 /// Takes the reading over into the state that is published.
-fn follow(state: &mut DeviceState, reading: &Reading, now: Duration) {
+fn follow(
+    state: &mut DeviceState,
+    known: &mut Option<(Duration, Pose)>,
+    reading: &Reading,
+    now: Duration,
+) {
     state.sequence += 1;
+    let sample = Some((reading.sample.time, reading.sample.pose));
+    if std::mem::replace(known, sample) != sample {
+        state.sample = state.sequence;
+    }
     state.read = now;
     state.faulty = reading.fault.is_some();
     // The clock of a bridge is corrected while it runs, by less than the port allows: what is published does not run back by that.
@@ -225,13 +240,18 @@ fn follow(state: &mut DeviceState, reading: &Reading, now: Duration) {
     state.felt = reading.felt;
 }
 
-/// The newest wrench of the coupling, as the port takes it.
-fn newest_command(wrench: &mut Subscriber<WrenchCommand>) -> Command {
+/// The newest wrench of the coupling, as the port takes it. One that is felt is as old as the device sample that it was computed from.
+fn newest_command(wrench: &mut Subscriber<WrenchCommand>, is_felt: bool) -> Command {
     let command = wrench.newest();
+    let origin = if is_felt {
+        command.sample_time.min(command.time)
+    } else {
+        command.time
+    };
+    let constraints = command.time.saturating_sub(command.constraint_age);
     Command {
-        wrench: command.wrench,
-        made: command.time,
-        constraint_age: command.constraint_age,
+        constraint_age: origin.saturating_sub(constraints),
+        ..Command::fresh(origin, command.wrench)
     }
 }
 
@@ -275,8 +295,8 @@ mod tests {
     #[test]
     fn time_as_published_does_not_run_back_with_a_bridge_whose_clock_is_corrected() {
         let mut state = DeviceState::at_start(&Pose::identity());
-        let mut times = Vec::new();
-        for ms in [10, 12, 11, 13] {
+        let (mut times, mut samples, mut known) = (Vec::new(), Vec::new(), None);
+        for ms in [10, 12, 12, 11, 13] {
             let reading = Reading {
                 sample: DeviceSample {
                     time: Duration::from_millis(ms),
@@ -287,11 +307,17 @@ mod tests {
                 fault: None,
                 felt: None,
             };
-            follow(&mut state, &reading, Duration::from_millis(20));
+            follow(&mut state, &mut known, &reading, Duration::from_millis(20));
             times.push(state.time.as_millis());
+            samples.push(state.sample);
         }
-        assert_eq!(times, [10, 12, 12, 13]);
-        assert_eq!(state.sequence, 4);
+        assert_eq!(times, [10, 12, 12, 12, 13]);
+        assert_eq!(state.sequence, 5);
+        assert_eq!(
+            samples,
+            [1, 2, 2, 4, 5],
+            "the third is the second, read again"
+        );
     }
 
     #[test]
@@ -337,6 +363,7 @@ mod tests {
                     sequence,
                     time: ms(read),
                     sample_read: ms(read),
+                    sample_time: ms(read),
                     constraint_sample: ms(read / 2),
                     cpu_time: Duration::from_micros(*cpu_us),
                     ..WrenchCommand::at_start()

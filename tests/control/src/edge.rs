@@ -163,7 +163,7 @@ impl Server {
                 let output = self.coupling.step(now.as_secs_f64(), &pose, set);
                 let command = WrenchCommand {
                     time_ns: now_ns,
-                    input_index: input.index,
+                    origin_ns: input.sample_time_ns,
                     wrench: output.wrench.into(),
                     flags: 0,
                 };
@@ -231,7 +231,8 @@ impl Bridge {
             Payload::Constraints(part) => match self.assembler.take(&part) {
                 PartTaken::Whole | PartTaken::Repeated => {
                     if let Some(set) = self.assembler.newest() {
-                        let taken = self.coupler.take(set, here);
+                        let origin = CLOCK_OFFSET + Duration::from_nanos(set.head.device_ns);
+                        let taken = self.coupler.take(set, origin);
                         assert_eq!(taken, Ok(()), "a whole set is a set");
                     }
                 }
@@ -251,7 +252,7 @@ impl Bridge {
             Ok(sample) => sample,
             Err(fault) => panic!("{fault}"),
         };
-        let felt = self.coupler.step(here, &sample.pose);
+        let felt = self.coupler.step(here, &sample);
         let wrench = match self.mode {
             Mode::Edge => felt.map_or(Vector6::zeros(), |felt| felt.wrench),
             Mode::Shipped => self
@@ -264,6 +265,7 @@ impl Bridge {
         self.index += 1;
         let input = InputSample {
             sample_time_ns: now_ns,
+            clock_uncertainty_ns: 0,
             index: self.index,
             pose: PoseF64::from_isometry(&sample.pose),
             velocity: sample.velocity.into(),

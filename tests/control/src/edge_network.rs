@@ -55,6 +55,11 @@ impl Way {
         }
     }
 
+    /// From now on the least time on the way is this, ns.
+    pub fn set_delay(&mut self, delay_ns: u64) {
+        self.impairment.delay_ns = delay_ns;
+    }
+
     /// Seals `payload` and lets it go at `now_ns`.
     ///
     /// # Panics

@@ -10,9 +10,11 @@
 //! - [`faulty_device`]: a device that fails on cue, behind its port.
 //! - [`recipes`]: the recipes.
 //! - [`edge`]: coupling beside the device against shipping forces; its chart is the example `edge_coupling`.
+//! - [`delay`]: a whole session behind a network whose delay grows.
 //! - [`wall_table`]: the printed table of critical stiffness.
 
 pub mod closed_loop;
+pub mod delay;
 pub mod edge;
 pub mod edge_error;
 pub mod edge_network;

@@ -140,6 +140,7 @@ pub fn state(tick: u64) -> HotState {
 pub fn input(index: u64) -> InputSample {
     InputSample {
         sample_time_ns: index * 1_000_000,
+        clock_uncertainty_ns: 0,
         index,
         pose: PoseF64 {
             position: [index as f64 * 1e-3, 0.0, 0.0],

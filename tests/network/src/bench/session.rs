@@ -85,6 +85,7 @@ pub fn serve_behind(
 pub fn reading(index: u64) -> InputSample {
     InputSample {
         sample_time_ns: 0,
+        clock_uncertainty_ns: 0,
         index,
         pose: PoseF64::IDENTITY,
         velocity: [0.0; 6],

@@ -1,6 +1,165 @@
 //! Age: forces computed from what is old.
+//!
+//! A congested link is enough, no key is needed: the relay lets each datagram wait a little longer than the one before, both ways. Nothing is lost,
+//! nothing falls silent, and each datagram that arrives is genuine and new.
 
-use super::Attack;
+use std::path::Path;
+use std::time::Duration;
+
+use taut::config::{Overrides, session_setup};
+use taut::failure::Failure;
+use taut::session::Session;
+use taut::terminal::Terminal;
+use taut_bridge::{BridgeArgs, BridgeReport, CouplingChoice, HandPreset};
+use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+
+use super::{Attack, Finding};
+use crate::bench::BenchError;
+use crate::relay::{Growth, Impairment, Treatment, Waiting};
+use crate::report::Extent;
 
 /// The attacks of this group.
-pub(super) const ATTACKS: &[Attack] = &[];
+pub(super) const ATTACKS: &[Attack] = &[
+    Attack {
+        name: "growing-delay-shipped",
+        tried: "a delay that grows to 2 s each way while the server computes the force",
+        promised: PROMISE,
+        run: |_| growing_delay(CouplingChoice::Server),
+    },
+    Attack {
+        name: "growing-delay-edge",
+        tried: "a delay that grows to 2 s each way while the bridge computes the force",
+        promised: PROMISE,
+        run: |_| growing_delay(CouplingChoice::Edge),
+    },
+];
+
+const PROMISE: &str = "at most 20 mJ more for the hand than without delay; no force from readings of 120 ms ago; an event";
+/// J.
+const MORE_ENERGY: f64 = 0.02;
+const ZERO_AFTER: Duration = Duration::from_millis(120);
+
+/// A ball over a half-space, both exact: 1000 N/m.
+const SCENE: &str = r#"
+name = "ball on floor"
+[god_object]
+shape = { sphere = { radius = 0.020 } }
+mass = 1.0
+pose = { position = [0.0, 0.0, 0.040] }
+[[obstacle]]
+name = "floor"
+shape = { plane = { axis = "z" } }
+[coupling]
+k_s = 0.5
+k_h = 2000.0
+"#;
+
+/// The hand taps and rubs, twice in three seconds.
+const PATH: &str = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.03,1,0,0,0\n0.4,0,0,0.012,1,0,0,0\n0.8,0.04,0,0.01,1,0,0,0\n1.1,0.04,0,0.022,1,0,0,0\n1.5,0,0,0.03,1,0,0,0\n";
+/// Of each run, s.
+const DURATION: f64 = 6.0;
+
+/// 0.5 s per second at 1 kHz, from two seconds after the join on: the force has ramped in then.
+const GROWTH: Growth = Growth {
+    from: 2000,
+    step: Duration::from_micros(500),
+    most: Duration::from_secs(2),
+};
+
+fn growing_delay(coupling: CouplingChoice) -> Result<Finding, BenchError> {
+    let usual = run(coupling, Impairment::default())?;
+    let attacked = run(
+        coupling,
+        Impairment {
+            growth: Some(GROWTH),
+            ..Impairment::default()
+        },
+    )?;
+    let given = [&usual, &attacked].map(|report| report.energy_injected_j);
+    // The loop of a machine that pauses it notices an age that much later.
+    let late = attacked.period_us.map_or(0, |period| period.max);
+    let allowed = ZERO_AFTER + Duration::from_micros(late);
+    let oldest = attacked.max_force_age_ms;
+    Ok(Finding {
+        happened: format!(
+            "{:.2} mJ given ({:.2} without delay), {:.1} N at most; oldest reading felt {oldest:.0} ms ({:.1} ms the longest period), {} events",
+            given[1] * 1e3,
+            given[0] * 1e3,
+            attacked.max_force_n,
+            late as f64 * 1e-3,
+            attacked.safety_events,
+        ),
+        kept: given[1] <= given[0] + MORE_ENERGY
+            && oldest <= allowed.as_secs_f64() * 1e3
+            && attacked.max_force_n > 0.5
+            && attacked.safety_events > 0,
+    })
+}
+
+/// A session with a remote device, and a bridge to it whose datagrams are treated like this both ways.
+fn run(coupling: CouplingChoice, impairment: Impairment) -> Result<BridgeReport, BenchError> {
+    let folder = tempfile::tempdir()?;
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).map(|()| path)
+    };
+    let (scene, path) = (file("scene.toml", SCENE)?, file("path.csv", PATH)?);
+    let key_path = folder.path().join("key");
+    let key = taut_link::create_key_file(&key_path).map_err(missing)?;
+    let wanted = [
+        "network.quic_port=0",
+        "network.udp_port=0",
+        "device={kind=\"remote\"}",
+    ];
+    let workbench = Workbench::parse_with_overrides(
+        "workbench.toml",
+        SHIPPED_WORKBENCH,
+        Path::new(""),
+        &wanted,
+    )
+    .map_err(missing)?;
+    let overrides = Overrides {
+        scene: scene.to_str().map(str::to_owned),
+        no_monitor: true,
+        ..Overrides::default()
+    };
+    let mut setup = session_setup(&workbench, key, &overrides).map_err(failed)?;
+    let waiting = Waiting::bind()?;
+    setup.link.announced_udp_port = Some(waiting.address().port());
+    let mut session = Session::start(setup).map_err(failed)?;
+    let (Some(quic), Some(udp)) = (session.quic_address(), session.udp_address()) else {
+        return Err(BenchError::Missing(
+            "the session does not listen".to_owned(),
+        ));
+    };
+    let relay = waiting.start(udp, vec![Treatment::both_ways(impairment)], 3)?;
+
+    let Some(mut args) = BridgeArgs::joining(&quic.to_string(), "hand") else {
+        return Err(BenchError::Missing(
+            "the bridge takes no arguments".to_owned(),
+        ));
+    };
+    args.key = Some(key_path);
+    args.path = Some(path);
+    args.looping = true;
+    args.hand = HandPreset::Light;
+    args.duration = Some(DURATION);
+    args.coupling = Some(coupling);
+    args.priority = 0;
+    let report = taut_bridge::run(&args).map_err(missing);
+    drop(relay);
+    session.follow_network(&Terminal::standard_error());
+    let (_, failure) = session.stop(&Terminal::standard_error());
+    match failure {
+        Some(failure) => Err(failed(failure)),
+        None => report,
+    }
+}
+
+fn missing(error: impl std::fmt::Display) -> BenchError {
+    BenchError::Missing(error.to_string())
+}
+
+fn failed(failure: Failure) -> BenchError {
+    missing(failure)
+}

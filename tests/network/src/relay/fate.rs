@@ -85,7 +85,11 @@ impl Fates {
             swapped: swapped < plan.swapped,
             doubled: doubled < plan.doubled,
             flipped: (flipped < plan.flipped).then_some(bit),
-            delay: plan.delay + plan.jitter.mul_f64(jitter),
+            delay: plan.delay
+                + plan
+                    .growth
+                    .map_or(Duration::ZERO, |growth| growth.of(number))
+                + plan.jitter.mul_f64(jitter),
         }
     }
 }

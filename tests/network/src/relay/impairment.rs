@@ -12,6 +12,25 @@ pub struct Burst {
     pub length: u32,
 }
 
+/// A time on the way that grows from datagram to datagram, as a queue's does that fills.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
+    /// Number of the datagram from which on it grows.
+    pub from: u64,
+    /// By how much at each.
+    pub step: Duration,
+    /// Most that it grows to.
+    pub most: Duration,
+}
+
+impl Growth {
+    /// What the datagram of this number waits.
+    pub(super) fn of(&self, number: u64) -> Duration {
+        let steps = u32::try_from(number.saturating_sub(self.from)).unwrap_or(u32::MAX);
+        self.step.saturating_mul(steps).min(self.most)
+    }
+}
+
 /// What a relay does to the datagrams of one direction. Probabilities are per datagram, in [0, 1]; the default does nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Impairment {
@@ -21,6 +40,8 @@ pub struct Impairment {
     pub bursts: Option<Burst>,
     /// Time on the way.
     pub delay: Duration,
+    /// Further time on the way, which grows.
+    pub growth: Option<Growth>,
     /// Largest further time on the way, uniform from zero. Order is kept, as a queue keeps it.
     pub jitter: Duration,
     /// Probability that a datagram is held back until the next one has passed, at most 20 ms.

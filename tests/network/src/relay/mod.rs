@@ -12,5 +12,5 @@ mod run;
 
 pub use counts::RelayCounts;
 pub use fate::{Fate, Fates, Loss};
-pub use impairment::{Burst, Direction, Impairment, Treatment};
+pub use impairment::{Burst, Direction, Growth, Impairment, Treatment};
 pub use run::{Relay, RelayError, Waiting};

@@ -1,0 +1,373 @@
+//! A whole session behind a network whose delay grows slowly, under a virtual clock: what the hand is given, and how old what it feels is.
+//!
+//! The server is the three loops of a session with a remote device, the bridge is the bridge's own loop with its port, its clock filter
+//! and its coupling; sealed datagrams travel between them. Sockets and threads alone are left out. What the bridge thinks of ages is
+//! checked against the virtual clock, which it does not know.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+use god_object::GodObject;
+use taut::edge_sets::EdgeSets;
+use taut::loops::wiring::WiredLoops;
+use taut_bridge::edge::{EdgeCoupler, offer_of};
+use taut_bridge::{
+    BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand,
+    MAX_EDGE_DELAY, MinJerkPath, Passivity, PassivitySettings, Pose, RemoteDevice, SafetySettings,
+    SimulatedDevice, ValidationSettings, ViaPoint,
+};
+use taut_link::DeviceInput;
+use taut_proto::time::{TimeRequest, TimeResponse};
+use taut_proto::{
+    Assembler, ClockFilter, ConstraintSet, CouplingOffer, InputSample, PartTaken, Payload,
+    WrenchCommand,
+};
+
+use crate::edge::Mode;
+use crate::edge_network::{Impairment, Way};
+use crate::edge_scenes::Task;
+
+/// Both ends tick this often.
+const TICK: Duration = Duration::from_millis(1);
+/// Zero of the bridge's clock on the session's.
+const CLOCK_OFFSET: Duration = Duration::from_secs(12_345);
+/// Time requests: quick ones at the join, and later.
+const TIME_REQUESTS: (u32, u32, u32) = (16, 5, 50);
+/// Bound of the promise: nothing is felt that rests on older data.
+pub const ZERO_AFTER: Duration = SafetySettings::ZERO_AFTER;
+
+/// How a network's delay grows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Growth {
+    /// From when on.
+    pub begin: Duration,
+    /// Whether the way up and the way down are delayed.
+    pub ways: [bool; 2],
+    /// Time in which the delay doubles, from a millisecond on.
+    pub doubling: Duration,
+    /// Largest delay.
+    pub most: Duration,
+}
+
+impl Growth {
+    /// A network that stays as it is.
+    pub const NONE: Self = Self {
+        begin: Duration::ZERO,
+        ways: [false; 2],
+        doubling: Duration::from_secs(1),
+        most: Duration::ZERO,
+    };
+
+    fn delay_ns(&self, now: Duration, way: usize) -> u64 {
+        if !self.ways[way] {
+            return 0;
+        }
+        let elapsed = now.saturating_sub(self.begin).as_secs_f64();
+        let grown = 1e-3 * ((elapsed / self.doubling.as_secs_f64()).exp2() - 1.0);
+        (grown.min(self.most.as_secs_f64()) * 1e9) as u64
+    }
+}
+
+/// What a run showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// Energy given to the hand beyond what it had put in, J.
+    pub given: f64,
+    /// Largest force felt before the delay began to grow, and after, N.
+    pub largest: [f64; 2],
+    /// Largest true age of the newest data that was here while a force was felt.
+    pub oldest: Duration,
+    /// True age of that data at the end.
+    pub age_at_end: Duration,
+    /// What the bridge's port told.
+    pub told: Vec<EventKind>,
+}
+
+/// A ball that a light hand taps and rubs against the scene of `task`, again and again: centre of the motion and its reach there and back.
+#[derive(Debug)]
+pub struct Rubbing {
+    task: Task,
+    path: MinJerkPath,
+}
+
+impl Rubbing {
+    /// Taps on a wall and slides along it.
+    #[must_use]
+    pub fn on_wall() -> Self {
+        Self::along(
+            Task::wall(),
+            &[
+                [0.0, 0.0, 0.04],
+                [0.0, 0.0, -0.015],
+                [0.06, 0.0, -0.01],
+                [0.06, 0.0, 0.022],
+            ],
+        )
+    }
+
+    /// Slides over a dome from side to side.
+    #[must_use]
+    pub fn over_dome() -> Self {
+        Self::along(
+            Task::dome(),
+            &[
+                [-0.05, 0.0, 0.08],
+                [-0.018, 0.0, 0.018],
+                [0.018, 0.0, 0.018],
+                [0.0, 0.0, 0.03],
+            ],
+        )
+    }
+
+    fn along(task: Task, places: &[[f64; 3]; 4]) -> Self {
+        let via = |time_s, place: &[f64; 3]| ViaPoint {
+            time_s,
+            pose: Pose::translation(place[0], place[1], place[2]),
+        };
+        let [first, pressed, slid, lifted] = places;
+        let points = vec![
+            via(0.0, first),
+            via(0.5, pressed),
+            via(0.9, slid),
+            via(1.2, lifted),
+            via(1.5, slid),
+            via(2.0, first),
+        ];
+        match MinJerkPath::new(points, true) {
+            Ok(path) => Self { task, path },
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+/// One run over `duration`; the same arguments give the same outcome.
+///
+/// # Panics
+/// When the scene of the task is none.
+#[must_use]
+pub fn run(rubbing: &Rubbing, mode: Mode, growth: Growth, duration: Duration) -> Outcome {
+    let near = Impairment::new(0.3, 0.0);
+    let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
+    let mut server = Server::new(&rubbing.task);
+    let mut bridge = Bridge::new(rubbing, mode);
+    let mut outcome = Outcome {
+        given: 0.0,
+        largest: [0.0; 2],
+        oldest: Duration::ZERO,
+        age_at_end: Duration::ZERO,
+        told: Vec::new(),
+    };
+    let ticks = (duration.as_secs_f64() / TICK.as_secs_f64()) as u32;
+    for tick in 1..=ticks {
+        let now = TICK * tick;
+        up.set_delay(near.delay_ns + growth.delay_ns(now, 0));
+        down.set_delay(near.delay_ns + growth.delay_ns(now, 1));
+        let felt = bridge.tick(tick, now, &mut down, &mut up, &mut outcome.told);
+        outcome.age_at_end = bridge.newest_data.map_or(now, |taken| now - taken);
+        if felt > 0.0 {
+            let after = usize::from(now >= growth.begin);
+            outcome.largest[after] = outcome.largest[after].max(felt);
+            outcome.oldest = outcome.oldest.max(outcome.age_at_end);
+        }
+        server.tick(now, &mut up, &mut down);
+    }
+    outcome.given = bridge.of.port().energy().injected();
+    outcome
+}
+
+/// The three loops, and what stands between them and the network.
+struct Server {
+    loops: WiredLoops,
+    inputs: triple_buffer::Input<Option<DeviceInput>>,
+    newest: u64,
+    wrenches: triple_buffer::Output<WrenchCommand>,
+    sets: EdgeSets,
+}
+
+impl Server {
+    fn new(task: &Task) -> Self {
+        let scene = &task.scene;
+        let world = Arc::new(scene.world.clone());
+        let god_object = match GodObject::new(world.clone(), scene.settings, scene.start) {
+            Ok(god_object) => god_object,
+            Err(error) => panic!("{error}"),
+        };
+        let (inputs, output) = triple_buffer::TripleBuffer::new(&None).split();
+        let (device, wrenches) =
+            RemoteDevice::new(output, DeviceLimits::UNLIMITED, DEFAULT_MAX_AGE);
+        let default = ValidationSettings::default();
+        let safety = SafetySettings {
+            validation: ValidationSettings {
+                max_age: default.max_age + MAX_EDGE_DELAY,
+                time_slack: MAX_EDGE_DELAY,
+                ..default
+            },
+            ..SafetySettings::default()
+        };
+        Self {
+            loops: WiredLoops::new(
+                &world,
+                &scene.settings,
+                god_object,
+                Box::new(device),
+                safety,
+                None,
+            ),
+            inputs,
+            newest: 0,
+            wrenches,
+            sets: EdgeSets::new(&scene.settings),
+        }
+    }
+
+    fn tick(&mut self, now: Duration, up: &mut Way, down: &mut Way) {
+        let now_ns = now.as_nanos() as u64;
+        up.receive(now_ns, |payload| match payload {
+            Payload::Input(sample) if sample.index > self.newest => {
+                self.newest = sample.index;
+                self.inputs.write(Some(DeviceInput {
+                    sample,
+                    received_ns: now_ns,
+                    session: 1,
+                }));
+            }
+            Payload::TimeRequest(TimeRequest { client_sent }) => {
+                let response = TimeResponse {
+                    client_sent,
+                    server_received: now_ns,
+                    server_sent: now_ns,
+                };
+                down.send(now_ns, &Payload::TimeResponse(response));
+            }
+            _ => {}
+        });
+        let loops = &mut self.loops;
+        loops.haptics.tick(now);
+        loops.coupling.tick(now);
+        loops.god_object.tick(|| now);
+        loops.coupling.tick(now);
+        let view = &mut loops.observers.broadcast;
+        let armed = !view.device.newest().safety.arming.is_off();
+        let fresh = self.wrenches.update();
+        let command = self.wrenches.output_buffer();
+        let contacts = view.contacts.newest();
+        let at_edge = self.sets.tick(now, command, armed, contacts, |part| {
+            down.send(now_ns, &Payload::Constraints(part));
+        });
+        if fresh && !at_edge {
+            down.send(now_ns, &Payload::Wrench(*command));
+        }
+    }
+}
+
+/// The bridge's loop, and what stands between it and the network.
+struct Bridge {
+    of: BridgeLoop,
+    clock: ClockFilter,
+    assembler: Assembler,
+    set: ConstraintSet,
+    command: Option<WrenchCommand>,
+    /// Stamps of readings and when they were truly taken, oldest first.
+    stamps: VecDeque<(u64, Duration)>,
+    /// When the reading was truly taken that the newest data here come from.
+    newest_data: Option<Duration>,
+}
+
+impl Bridge {
+    fn new(rubbing: &Rubbing, mode: Mode) -> Self {
+        let scene = &rubbing.task.scene;
+        let point = scene.reference_point();
+        let device =
+            SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, rubbing.path.clone(), point);
+        // As `taut bridge` has it.
+        let safety = SafetySettings {
+            passivity: PassivitySettings {
+                mode: Passivity::Control,
+                ..PassivitySettings::default()
+            },
+            ..SafetySettings::default()
+        };
+        let port = DevicePort::new(Box::new(device), safety, point, &scene.start);
+        let mut of = BridgeLoop::new(port);
+        let edge = match mode {
+            Mode::Shipped => None,
+            Mode::Edge => match offer_of(&scene.world, &scene.settings, 1000.0) {
+                CouplingOffer::AtEdge(offer) => EdgeCoupler::new(&offer).ok(),
+                CouplingOffer::AtServer { reason } => panic!("{reason}"),
+            },
+        };
+        of.begin_session(CommandSource::Other, edge);
+        Self {
+            of,
+            clock: ClockFilter::default(),
+            assembler: Assembler::new(),
+            set: ConstraintSet::new(),
+            command: None,
+            stamps: VecDeque::new(),
+            newest_data: None,
+        }
+    }
+
+    /// One period; the force that is felt, N.
+    fn tick(
+        &mut self,
+        tick: u32,
+        now: Duration,
+        down: &mut Way,
+        up: &mut Way,
+        told: &mut Vec<EventKind>,
+    ) -> f64 {
+        let (now_ns, here) = (now.as_nanos() as u64, now + CLOCK_OFFSET);
+        let here_ns = here.as_nanos() as u64;
+        let (mut newest_stamp, mut whole) = (0, false);
+        down.receive(now_ns, |payload| match payload {
+            Payload::TimeResponse(response) => {
+                assert!(self.clock.update(&response, here_ns));
+            }
+            Payload::Constraints(part) => {
+                let taken = self.assembler.take(&part);
+                whole |= matches!(taken, PartTaken::Whole | PartTaken::Repeated);
+            }
+            Payload::Wrench(command) => {
+                newest_stamp = newest_stamp.max(command.origin_ns);
+                self.command = Some(command);
+            }
+            _ => {}
+        });
+        if whole && let Some(set) = self.assembler.newest() {
+            self.set.clone_from(set);
+            newest_stamp = newest_stamp.max(set.head.device_ns);
+        }
+        self.note_data(newest_stamp);
+
+        let session = self.clock.session_time(here_ns);
+        if self.set.head.device_ns > 0 {
+            self.of.take_set(&self.set, here, session);
+        }
+        let output = self.of.tick(here, session, self.command);
+        told.extend(output.events.iter().map(|event| event.kind));
+        let InputSample { sample_time_ns, .. } = output.input;
+        self.stamps.push_back((sample_time_ns, now));
+        up.send(now_ns, &Payload::Input(output.input));
+        let (quick, often, seldom) = TIME_REQUESTS;
+        let period = if tick <= quick * often { often } else { seldom };
+        if tick % period == 0 {
+            let request = TimeRequest {
+                client_sent: here_ns,
+            };
+            up.send(now_ns, &Payload::TimeRequest(request));
+        }
+        self.of.port().rendered().fixed_rows::<3>(0).norm()
+    }
+
+    /// Looks up when the reading of this stamp was truly taken.
+    fn note_data(&mut self, stamp: u64) {
+        while let Some((_, taken)) = self
+            .stamps
+            .pop_front_if(|(of, _)| *of <= stamp && stamp > 0)
+        {
+            self.newest_data = Some(taken);
+        }
+    }
+}
