@@ -50,8 +50,8 @@ fn input(index: u64) -> Payload {
 
 fn fullest() -> HotState {
     HotState {
-        sample_time_ns: u64::MAX,
-        tick: u64::MAX,
+        sample_time_ns: 1 << 61,
+        tick: 1 << 61,
         scene_revision: u32::MAX,
         run: RunState::Fault,
         constraint_age_us: u32::MAX,
