@@ -4,8 +4,9 @@
 //! tick and fingerprint of every state that it took from the group, and compares them with what the server confirms, which comes with each time
 //! exchange, twenty times a second. A state that the server did not send is found with the first confirmation that was asked for after it came.
 //!
-//! Chosen by measuring (`cargo run --release -p taut-proto --example state_proofs`, figures in `docs/pose-stream.md`): a signature for each batch of states costs
-//! the broadcasting thread ninety times as much, and every receiver four times, for a forgery that is found some tens of milliseconds sooner.
+//! Chosen by measuring (`cargo run --release -p taut-proto --example state_proofs`, figures in `docs/pose-stream.md`): a signature for each batch of states
+//! loads the thread that broadcasts, which must not be late, and costs every receiver four times as much, for a forgery that is found some tens of
+//! milliseconds sooner. With many receivers it would cost the server as a whole less.
 
 use crate::{
     DecodeError, EncodeError,
