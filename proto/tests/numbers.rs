@@ -111,6 +111,7 @@ fn what_nobody_takes_nobody_sends() {
     assert_eq!(sent(&Payload::Head(head)), out("HeadSample.index"));
     let input = InputSample {
         sample_time_ns: 1,
+        clock_uncertainty_ns: 1,
         index: 1,
         pose: PoseF64 {
             rotation: [2.0, 0.0, 0.0, 0.0],

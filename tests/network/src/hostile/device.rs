@@ -74,7 +74,7 @@ impl Rig {
             self.now += self.period;
             let before = *self.port.rendered();
             let command = Command {
-                made: made.unwrap_or(self.now),
+                origin: made.unwrap_or(self.now),
                 ..Command::fresh(self.now, wrench)
             };
             let report = self.port.tick(self.now, |_| Some(command));
