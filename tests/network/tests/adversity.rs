@@ -114,6 +114,7 @@ fn everything_at_once_leaves_a_session_that_holds() {
             length: 20,
         }),
         delay: Duration::from_millis(1),
+        growth: None,
         jitter: Duration::from_millis(3),
         swapped: 0.05,
         doubled: 0.05,
