@@ -158,6 +158,11 @@ impl Settings {
         }
     }
 
+    /// The tightest fit that the rest distance suits, m on each side: see [`Self::with_clearance`].
+    pub fn least_clearance(&self) -> f64 {
+        self.rest_distance / REST_DISTANCE_PER_CLEARANCE
+    }
+
     /// The method as published: a cone of touching contacts, one projection and one collision search per update.
     pub fn paper(size: f64) -> Self {
         Self {
@@ -329,6 +334,20 @@ mod tests {
         for size in [1e-4, 0.1, 100.0] {
             assert_eq!(Settings::for_size(size).validate(), Ok(()));
             assert_eq!(Settings::paper(size).validate(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_tight_fit_shortens_the_rest_distance_and_what_hangs_on_it_and_a_loose_one_nothing() {
+        let part = Settings::for_size(1.0);
+        let tight = part.with_clearance(2e-4);
+        assert_eq!(tight.validate(), Ok(()));
+        assert!((tight.rest_distance - 2e-5).abs() < 1e-12, "{tight:?}");
+        assert!((tight.least_clearance() - 2e-4).abs() < 1e-12);
+        let ratio = |s: &Settings| s.minimum_gap / s.rest_distance;
+        assert!((ratio(&tight) - ratio(&part)).abs() < 1e-12);
+        for loose in [1e-2, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(part.with_clearance(loose), part, "{loose}");
         }
     }
 
