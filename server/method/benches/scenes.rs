@@ -1,7 +1,6 @@
 //! Whole scenes: an update of the god-object, and a force. `cargo bench -p god-object --bench scenes`.
 //!
-//! Wall-clock time; percentiles of thread CPU time over many steps are printed by the examples `update_timing` and
-//! `conforming_timing`. An iteration of `update` is one update at 1 kHz in the midst of the motion.
+//! Wall-clock time; percentiles of thread CPU time over many steps are printed by `conforming_variants` of `tests/method`. An iteration of `update` is one update at 1 kHz in the midst of the motion.
 
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;

@@ -26,6 +26,8 @@ const ACTIVATION_DISTANCE_PER_SIZE: f64 = 4e-3;
 /// Longest look-ahead per metre of body size: a cube of 1 mm at 1 m/s goes its own length per update, and a set is used two or three updates
 /// long. What the look-ahead may cost is bounded by itself (`look_ahead_pairs`), so this binds nobody but a hand that jumps.
 const LOOK_AHEAD_LIMIT_PER_SIZE: f64 = 4.0;
+/// Rest distance per clearance of the tightest fit: two walls take a fifth of the play, and what is left is played in.
+const REST_DISTANCE_PER_CLEARANCE: f64 = 0.1;
 /// Share of the rest distance below which a motion is none: keeps the god-object bit-identical at rest.
 const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
 /// Most rounds of implicit constraints: what three do not mend, the next update does.
@@ -135,6 +137,30 @@ impl Settings {
             work_budget: None,
             solver: SolverKind::ActiveSet,
         }
+    }
+
+    /// The same for a scene in which some fit leaves the body only `clearance` (m) on each side: the rest distance becomes a tenth of that where
+    /// it was more, and the lengths that hang on it become shorter in proportion. What is not a positive finite number changes nothing.
+    #[must_use]
+    pub fn with_clearance(self, clearance: f64) -> Self {
+        let rest_distance = REST_DISTANCE_PER_CLEARANCE * clearance;
+        let shorter = rest_distance > 0.0 && rest_distance < self.rest_distance; // false for NaN
+        if !shorter {
+            return self;
+        }
+        let share = rest_distance / self.rest_distance;
+        Self {
+            rest_distance,
+            minimum_gap: self.minimum_gap * share,
+            gap_tolerance: self.gap_tolerance * share,
+            motion_tolerance: self.motion_tolerance * share,
+            ..self
+        }
+    }
+
+    /// The tightest fit that the rest distance suits, m on each side: see [`Self::with_clearance`].
+    pub fn least_clearance(&self) -> f64 {
+        self.rest_distance / REST_DISTANCE_PER_CLEARANCE
     }
 
     /// The method as published: a cone of touching contacts, one projection and one collision search per update.
@@ -308,6 +334,20 @@ mod tests {
         for size in [1e-4, 0.1, 100.0] {
             assert_eq!(Settings::for_size(size).validate(), Ok(()));
             assert_eq!(Settings::paper(size).validate(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_tight_fit_shortens_the_rest_distance_and_what_hangs_on_it_and_a_loose_one_nothing() {
+        let part = Settings::for_size(1.0);
+        let tight = part.with_clearance(2e-4);
+        assert_eq!(tight.validate(), Ok(()));
+        assert!((tight.rest_distance - 2e-5).abs() < 1e-12, "{tight:?}");
+        assert!((tight.least_clearance() - 2e-4).abs() < 1e-12);
+        let ratio = |s: &Settings| s.minimum_gap / s.rest_distance;
+        assert!((ratio(&tight) - ratio(&part)).abs() < 1e-12);
+        for loose in [1e-2, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(part.with_clearance(loose), part, "{loose}");
         }
     }
 

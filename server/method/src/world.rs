@@ -24,6 +24,10 @@ pub struct Body {
     /// Inertia tensor about the reference point, body axes, kg m^2.
     pub inertia: Matrix3<f64>,
     /// The point G at which motion is split and wrenches act, body frame, m.
+    ///
+    /// The kinetic metric about a point that is c away from the centre of mass has blocks `-m [c]x` between translation and rotation; M is
+    /// without them, `diag(m I_3, I_G)`, so it is the kinetic metric at the centre of mass alone. Elsewhere it is that of another body, which has its
+    /// centre of mass at G and the inertia I_G: every property of the projection holds, and the force answers to that body's M.
     pub reference_point: Point3<f64>,
 }
 

@@ -101,6 +101,33 @@ fn a_finely_cut_body_on_a_plane_has_its_corners_only() {
     assert_eq!(corners.len(), 4);
 }
 
+/// Crowned by 22 um over 0.1 m, cut so finely that no two faces meet at more than 1e-5 rad; and the same of single-precision corners that are not crowned.
+#[test]
+fn bends_that_add_up_are_felt_and_those_of_rounding_are_not() {
+    let (cells, half, gap) = (120, 0.05, 1e-6);
+    let table = mesh(cuboid([0.5, 0.5, 0.1]));
+    for crown in [22e-6, 0.0] {
+        let (mut vertices, triangles) = grid_box([half, half, 0.005], [cells, cells, 1]);
+        for v in vertices.iter_mut().filter(|v| v.z < 0.0) {
+            v.z += crown * 0.5 * (v.x * v.x + v.y * v.y) / (half * half);
+            // Not along the axes, as a file would have it.
+            *v = v.map(|c| f64::from(c as f32));
+        }
+        let plate = mesh((vertices, triangles));
+        let steepest = plate.edges().iter().map(|e| e.convexity.abs());
+        let bends = steepest.filter(|bend| *bend < 0.1).fold(0.0, f64::max);
+        assert!(bends < 2e-5, "{bends}");
+        let pose = Pose::translation(0.0, 0.0, 0.1 + 0.005 + gap);
+        let (contacts, _) = collect(&plate, &pose, &table, &Pose::identity(), 1e-4, 4096);
+        let nearest = contacts.first().expect("a contact").gap;
+        let error = (nearest - gap).abs();
+        assert!(error < 1e-7, "crown {crown}: nearest at {nearest} m");
+        if crown == 0.0 {
+            assert!(contacts.len() < 400, "{} contacts", contacts.len());
+        }
+    }
+}
+
 #[test]
 fn a_box_over_the_rim_of_a_table_is_held_by_the_overlap() {
     let (body, table) = (mesh(cuboid([0.05; 3])), mesh(cuboid([0.5, 0.5, 0.1])));

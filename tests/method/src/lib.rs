@@ -5,6 +5,7 @@
 //! - [`hand`]: what a hand adds to the path that it means to follow.
 //! - [`solids`]: bodies and obstacles made in code.
 //! - [`machined`]: gears and threads.
+//! - [`variants`]: conforming contact in many variants, and what is measured in each.
 //! - [`assembly`]: the insertion scenes of the test data and what must come of them.
 
 pub mod assembly;
@@ -14,3 +15,4 @@ pub mod machined;
 pub mod motion;
 pub mod solids;
 pub mod triangles;
+pub mod variants;

@@ -1,4 +1,4 @@
-//! Dense meshes, a hand that slides, and a clock of CPU time: support of the example `update_timing`.
+//! Dense meshes, a hand that slides, and a clock of CPU time: support of examples that measure.
 #![allow(dead_code, reason = "each user takes its own part")]
 
 use std::collections::HashMap;
@@ -87,10 +87,12 @@ pub(crate) struct Hand {
     random: Random,
     axis: Vector3<f64>,
     turn: Vector3<f64>,
+    /// Shortest and longest step, m.
+    step: [f64; 2],
 }
 
 impl Hand {
-    /// Shortest and longest step, m; greatest rotation in a step, rad; how deep it presses, m.
+    /// Shortest and longest step unless others are given, m; greatest rotation in a step, rad; how deep it presses, m.
     const STEP: [f64; 2] = [0.5e-3, 3e-3];
     const TURN: f64 = 0.5_f64.to_radians();
     const DEPTH: [f64; 2] = [1e-3, 3e-3];
@@ -98,18 +100,23 @@ impl Hand {
     const TWIST: f64 = 3.0_f64.to_radians();
 
     pub(crate) fn new(pose: Pose, seed: u64) -> Self {
+        Self::with_steps(pose, seed, Self::STEP)
+    }
+
+    pub(crate) fn with_steps(pose: Pose, seed: u64, step: [f64; 2]) -> Self {
         Self {
             pose,
             random: Random::new(seed),
             axis: Vector3::y(),
             turn: Vector3::zeros(),
+            step,
         }
     }
 
     /// The next pose of the device, given where the body is.
     pub(crate) fn next(&mut self, body: &Pose) -> Pose {
         let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
-        let length = between(Self::STEP, self.random.unit());
+        let length = between(self.step, self.random.unit());
         let depth = between(Self::DEPTH, self.random.unit());
         // A direction of sliding and an axis of turning that wander.
         self.axis = (self.axis + self.random.vector() * 0.1).normalize();

@@ -2,6 +2,7 @@
 
 mod collapse;
 pub mod distance;
+mod flat_regions;
 pub(crate) mod lanes;
 mod mass;
 mod mesh;

@@ -7,9 +7,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::flat_regions::mark_flat;
 use super::mesh_error::MeshError;
 
-/// Faces that meet at a smaller angle are one face, rad. Single-precision files tilt millimetre triangles by
+/// Faces that meet at a smaller angle may be one face, rad ([`mark_flat`]). Single-precision files tilt millimetre triangles by
 /// 3e-6 rad at 0.1 m from the origin; nobody feels a bend of 1e-5.
 pub(crate) const FLAT_EDGE_ANGLE: f64 = 1e-5;
 /// Fewest convex edges at a vertex whose normal cone has an interior.
@@ -24,13 +25,15 @@ pub struct Edge {
     pub faces: [u32; 2],
     /// Signed angle between the two face normals, rad, in [-pi, pi]: positive where the edge is convex.
     pub convexity: f64,
+    /// Its faces are of one flat region: it is no edge of the shape.
+    pub flat: bool,
 }
 
 impl Edge {
     /// Whether the edge stands out, so that it can touch.
     #[inline]
     pub fn is_convex(&self) -> bool {
-        self.convexity > FLAT_EDGE_ANGLE
+        self.convexity > 0.0 && !self.flat
     }
 }
 
@@ -90,8 +93,16 @@ impl Topology {
                 vertices: ends,
                 faces,
                 convexity: signed_angle(&normals, &along),
+                flat: false,
             });
         }
+        mark_flat(
+            &mut edges,
+            vertices,
+            triangles,
+            face_normals,
+            &triangle_edges,
+        );
         let (ring_start, neighbours) = rings(vertices.len(), &edges);
         let (vertex_owner, owned) = owners(vertices.len(), triangles, &edges, &triangle_edges);
         Ok(Self {

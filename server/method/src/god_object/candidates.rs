@@ -36,10 +36,9 @@ impl GodObject {
         reduction.begin(at, distance);
         self.set.gap_min = f64::INFINITY;
         let lands = !reduction.holds(at.rest_distance);
-        let obstacles = at.world.obstacles.len();
-        let mut pairs = self.settings.look_ahead_pairs;
-        for index in 0..obstacles {
-            let share = (pairs / (obstacles - index) as u64).max(1);
+        let share = self.share();
+        let mut looked_at = 0;
+        for index in (0..at.places.len()).filter(|index| at.places[*index].chosen) {
             // Where trees have failed, what touches is found along the surfaces, and they are to find what is new.
             let conforms = reduction.conforms(at, index);
             let walked = if conforms {
@@ -53,17 +52,35 @@ impl GodObject {
                 lands,
             };
             let collected = self.candidates_of(index, reduction, at, &asked, work);
-            pairs = pairs.saturating_sub(walked + collected.looked_at);
+            let looked_at_this = walked + collected.looked_at;
+            looked_at += looked_at_this;
+            self.looked_at[index] = looked_at_this;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, &self.contacts, &collected);
             if !conforms && reduction.conforms(at, index) {
                 reduction.offer_along(at, index, work);
             }
         }
-        let looked_at = self.settings.look_ahead_pairs - pairs;
+        let looked_at = looked_at + self.given.looked_at;
         self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));
         // Known rows may be nearer than what a collection that was given up has found.
-        self.set.gap_min = self.set.gap_min.min(reduction.gap_min());
+        let gap_min = reduction.gap_min().min(self.given.gap_min);
+        self.set.gap_min = self.set.gap_min.min(gap_min);
+    }
+
+    /// Most pairs to look at for one obstacle, whichever comes first: what those do not need that needed little last time is the others'.
+    fn share(&self) -> u64 {
+        let all = self.settings.look_ahead_pairs;
+        let count = |chosen: usize| (chosen as u64).max(1);
+        let chosen = || {
+            let both = self.places.iter().zip(&self.looked_at);
+            both.filter(|(place, _)| place.chosen)
+                .map(|(_, pairs)| *pairs)
+        };
+        let little = all / (2 * count(chosen().count()));
+        let spent: u64 = chosen().filter(|pairs| *pairs < little).sum();
+        let others = count(chosen().filter(|pairs| *pairs >= little).count());
+        (all.saturating_sub(spent) / others).max(1)
     }
 
     /// Leaves those of one obstacle in `self.contacts`, nearest first.
@@ -75,12 +92,12 @@ impl GodObject {
         asked: &Asked,
         work: &mut Work,
     ) -> Collected {
-        let obstacle = &at.world.obstacles[index];
+        let obstacle = at.obstacle(index);
         let contacts = &mut self.contacts;
         let mut collect_within = |reach: f64, pairs: u64, contacts: &mut Vec<Contact>| {
             collect_bounded(
                 (&at.world.body.mesh, &at.pose),
-                (&obstacle.mesh, &obstacle.pose),
+                obstacle,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 reach,
                 pairs,

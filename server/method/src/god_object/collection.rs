@@ -1,74 +1,205 @@
-//! The constraint set of the present pose: every pair of features that face each other within a distance.
+//! The constraint set of the present pose: every pair of features that face each other within a distance, of the obstacles whose rows are
+//! not chosen ([`generation`](super::generation)).
+
+use std::sync::Arc;
 
 use super::GodObject;
+use super::generation::Choosable;
 use crate::collision::Work;
-use crate::constraint::NonPenetrationConstraint;
+use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint};
 use crate::shape;
 
+/// Every row of some obstacles, as many as there is room for: the nearest, whichever obstacle they are of.
+#[derive(Debug)]
+pub(super) struct GivenRows {
+    rows: Vec<NonPenetrationConstraint>,
+    pub(super) gap_min: f64,
+    pub(super) truncated: bool,
+    pub(super) complete_within: f64,
+    /// Pairs of triangles and of features that were looked at.
+    pub(super) looked_at: u64,
+}
+
+impl GivenRows {
+    /// What is held while obstacles are gone through: the nearest of those before, and all of one more.
+    pub(super) fn room(capacity: usize) -> usize {
+        2 * capacity
+    }
+
+    pub(super) fn with_capacity(capacity: usize) -> Self {
+        Self {
+            rows: Vec::with_capacity(Self::room(capacity)),
+            gap_min: f64::INFINITY,
+            truncated: false,
+            complete_within: f64::INFINITY,
+            looked_at: 0,
+        }
+    }
+
+    pub(super) fn rows(&self) -> &[NonPenetrationConstraint] {
+        &self.rows
+    }
+
+    fn clear(&mut self, within: f64) {
+        self.rows.clear();
+        self.gap_min = f64::INFINITY;
+        self.truncated = false;
+        self.complete_within = within;
+    }
+
+    /// Leaves the nearest `room` rows.
+    fn keep_nearest(&mut self, room: usize) {
+        if self.rows.len() > room {
+            self.rows.select_nth_unstable_by(room, |a, b| {
+                a.gap.total_cmp(&b.gap).then(a.features.cmp(&b.features))
+            });
+            self.complete_within = self.complete_within.min(self.rows[room].gap);
+            self.rows.truncate(room);
+            self.truncated = true;
+        }
+    }
+}
+
 impl GodObject {
-    /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m.
+    /// Replaces the constraint set by the one of the present pose: every facing pair within `distance`, m, or those of them that are chosen.
     pub(super) fn collect(&mut self, distance: f64, work: &mut Work) {
         self.collected_within = distance;
-        if self.refresh(distance, work) {
-            return;
+        self.note_places();
+        self.collect_given(distance, work);
+        if self.given.truncated && self.choose_from_crowded() {
+            self.note_places();
+            self.collect_given(distance, work);
         }
+        if !self.refresh(distance, work) {
+            self.write_given();
+        }
+    }
+
+    /// Collects to a longer distance what is not chosen; the set is written where nothing else is.
+    pub(super) fn look_farther(&mut self, distance: f64, work: &mut Work) {
+        if self.reduction.is_none() {
+            self.collect(distance, work);
+        } else if self.places.iter().any(|place| !place.chosen) {
+            self.collect_given(distance, work);
+        }
+    }
+
+    /// From now on rows are chosen where there was no room for all; whether there is such an obstacle.
+    fn choose_from_crowded(&mut self) -> bool {
+        let crowded = |choosable: &&mut Choosable| **choosable == Choosable::IfCrowded;
+        let mut any = false;
+        for choosable in self.choosable.iter_mut().filter(crowded) {
+            *choosable = Choosable::Always;
+            any = true;
+        }
+        any
+    }
+
+    /// Takes the places of the obstacles over to the choice of rows, which rests where there is nothing to choose from.
+    fn note_places(&mut self) {
+        let choosable = self.choosable.iter().zip(&self.obstacles);
+        let now = choosable.map(|(choosable, placed)| placed.place(*choosable));
+        let chooses = now.clone().any(|place| place.chosen);
+        // An obstacle on its way is no matter of those that are chosen from.
+        let rearranged = self.places.iter().zip(now.clone()).any(|(before, now)| {
+            before.chosen != now.chosen || now.chosen && before.pose != now.pose
+        });
+        // No copy is alive between two collections.
+        if let Some(places) = Arc::get_mut(&mut self.places) {
+            places
+                .iter_mut()
+                .zip(now)
+                .for_each(|(place, now)| *place = now);
+        }
+        if chooses != self.reduction.is_some() {
+            std::mem::swap(&mut self.reduction, &mut self.resting);
+        }
+        if rearranged && let Some(reduction) = &mut self.reduction {
+            reduction.rearrange(&self.places);
+        }
+    }
+
+    /// Every pair within `distance` of the obstacles whose rows are not chosen.
+    fn collect_given(&mut self, distance: f64, work: &mut Work) {
         let pairs_before = work.triangle_pairs + work.feature_pairs;
-        self.set.sequence += 1;
-        self.set.god_object_pose = self.pose;
-        self.set.gap_min = f64::INFINITY;
-        self.set.truncated = false;
-        self.set.complete_within = distance;
-        self.set.constraints.clear();
-        let placed = self.world.obstacles.iter().zip(&self.obstacles);
-        for (index, (obstacle, placed)) in placed.enumerate() {
+        self.given.clear(distance);
+        let most = self.settings.max_constraints;
+        let room = if self.reduction.is_some() {
+            most.saturating_sub(MAX_ROWS).max(most / 2)
+        } else {
+            most
+        };
+        for index in 0..self.obstacles.len() {
+            if self.reduction.is_some() && self.places[index].chosen {
+                continue;
+            }
             self.contacts.clear();
             let collected = shape::collect(
                 &self.world.body,
                 &self.pose,
-                obstacle,
-                &placed.pose,
+                &self.world.obstacles[index],
+                &self.obstacles[index].pose,
                 u16::try_from(index).unwrap_or(u16::MAX),
                 distance,
                 &mut self.collision,
                 &mut self.contacts,
                 work,
             );
-            self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            let room = self.settings.max_constraints - self.set.constraints.len();
-            self.set.truncated |= collected.truncated || self.contacts.len() > room;
-            let held = self.contacts.get(room).map_or(f64::INFINITY, |c| c.gap);
-            let within = collected.complete_within.min(held);
-            self.set.complete_within = self.set.complete_within.min(within);
-            for contact in self.contacts.iter().take(room) {
-                let shading_normal = self.shading[index].as_ref().and_then(|normals| {
-                    // Shading knows the obstacle where the world has it.
-                    let turn = placed.turned_from(obstacle);
-                    normals
-                        .at(
-                            obstacle,
-                            contact.obstacle_triangle,
-                            &contact.barycentric,
-                            &(turn.inverse() * contact.normal),
-                        )
-                        .map(|normal| turn * normal)
-                });
-                self.set.constraints.push(NonPenetrationConstraint {
-                    features: contact.features,
-                    point: contact.point_on_obstacle,
-                    normal: contact.normal,
-                    gap: contact.gap,
-                    separation: shape::separation(
-                        &contact.features,
-                        (&self.world.body, &self.pose),
-                        (obstacle, &placed.pose),
-                    ),
-                    came: placed.came(&contact.point_on_obstacle, &contact.normal),
-                    shading_normal,
-                });
+            let given = &mut self.given;
+            given.gap_min = given.gap_min.min(collected.gap_min);
+            given.truncated |= collected.truncated;
+            given.complete_within = given.complete_within.min(collected.complete_within);
+            for k in 0..self.contacts.len() {
+                let row = self.row_of(index, &self.contacts[k]);
+                self.given.rows.push(row);
             }
+            self.given.keep_nearest(room);
         }
-        let pairs = work.triangle_pairs + work.feature_pairs - pairs_before;
-        self.afford_look_ahead(distance, pairs);
+        self.given.looked_at = work.triangle_pairs + work.feature_pairs - pairs_before;
+        if self.reduction.is_none() {
+            self.afford_look_ahead(distance, self.given.looked_at);
+        } else if let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) {
+            reduction.give(&at, &self.given.rows);
+        }
+    }
+
+    pub(super) fn row_of(&self, index: usize, contact: &Contact) -> NonPenetrationConstraint {
+        let (obstacle, placed) = (&self.world.obstacles[index], &self.obstacles[index]);
+        let shading_normal = self.shading[index].as_ref().and_then(|normals| {
+            // Shading knows the obstacle where the world has it.
+            let turn = placed.turned_from(obstacle);
+            normals
+                .at(
+                    obstacle,
+                    contact.obstacle_triangle,
+                    &contact.barycentric,
+                    &(turn.inverse() * contact.normal),
+                )
+                .map(|normal| turn * normal)
+        });
+        NonPenetrationConstraint {
+            features: contact.features,
+            point: contact.point_on_obstacle,
+            normal: contact.normal,
+            gap: contact.gap,
+            separation: shape::separation(
+                &contact.features,
+                (&self.world.body, &self.pose),
+                (obstacle, &placed.pose),
+            ),
+            came: placed.came(&contact.point_on_obstacle, &contact.normal),
+            shading_normal,
+        }
+    }
+
+    /// The rows given are all that there are.
+    fn write_given(&mut self) {
+        self.set.sequence += 1;
+        self.set.god_object_pose = self.pose;
+        self.set.gap_min = self.given.gap_min;
+        self.set.truncated = self.given.truncated;
+        self.set.complete_within = self.given.complete_within;
+        std::mem::swap(&mut self.set.constraints, &mut self.given.rows);
         // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
         self.set
             .constraints

@@ -2,31 +2,56 @@
 
 use std::sync::Arc;
 
+use super::obstacles::Ahead;
+use super::projection::Projected;
 use super::substep::Update;
 use super::{GodObject, StepReport};
 use crate::collision::Work;
-use crate::constraint::{At, NonPenetrationConstraint, Purpose, RowReduction, Separation};
+use crate::constraint::{At, Purpose, RowReduction};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
-use crate::world::World;
+use crate::surface::Friction;
+use crate::world::{Obstacle, World};
 
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
+/// Most rows that are added one by one where friction or a moving obstacle leads.
+const MAX_ADDED: u32 = 24;
+
+/// Whether an obstacle's rows are chosen while it stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Choosable {
+    Never,
+    /// Where there is no room for all of them.
+    IfCrowded,
+    Always,
+}
 
 impl GodObject {
-    /// Whether this world's rows can be chosen by their geometry: exact primitives have few, friction is shared by all that
-    /// touch, a shaded row is not the one that the surface has, one that is re-linearised is needed elsewhere, and the paper's cone has every touching contact.
+    /// Of which obstacles rows can be chosen by their geometry: exact primitives have few, a shaded row is not the one that the surface has, one that
+    /// is re-linearised is needed elsewhere, and the paper's cone has every touching contact. Friction is shared by all that touch: its rows are chosen
+    /// where they are too many to be held.
+    pub(super) fn choosable(world: &World, settings: &Settings) -> Vec<Choosable> {
+        let linear = settings.look_ahead && settings.implicit_rounds == 0;
+        let meshes = linear && world.body.primitive.is_none();
+        let choosable = |o: &Obstacle| {
+            let of_surface = o.primitive.is_none() && o.surface.shading.is_none();
+            match (meshes && of_surface, o.surface.friction > 0.0) {
+                (false, _) => Choosable::Never,
+                (true, false) => Choosable::Always,
+                (true, true) => Choosable::IfCrowded,
+            }
+        };
+        world.obstacles.iter().map(choosable).collect()
+    }
+
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
-        let shaded = world.obstacles.iter().any(|o| o.surface.shading.is_some());
-        let rough = world.obstacles.iter().any(|o| o.surface.friction > 0.0);
-        let linear = settings.implicit_rounds == 0;
-        let exact =
-            world.body.primitive.is_some() || world.obstacles.iter().any(|o| o.primitive.is_some());
-        (settings.look_ahead && linear && !shaded && !rough && !exact)
-            .then(|| Box::new(RowReduction::with_capacity(settings.max_constraints, world)))
+        let choosable = Self::choosable(world, settings);
+        let any = choosable.iter().any(|c| *c != Choosable::Never);
+        any.then(|| Box::new(RowReduction::with_capacity(settings.max_constraints, world)))
     }
 
     /// The known rows at the present pose; and every facing pair within `distance` (m) to choose from, where those that were
@@ -46,7 +71,7 @@ impl GodObject {
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
-            self.set.gap_min = reduction.gap_min();
+            self.set.gap_min = reduction.gap_min().min(self.given.gap_min);
             if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
             }
@@ -147,13 +172,45 @@ impl GodObject {
         self.write_set();
     }
 
-    fn place(&self) -> Option<At> {
+    /// Eq. (1) with the rows that its answer needs: friction, and what must be out of the way, lead elsewhere than the wish alone.
+    pub(super) fn project_complete(
+        &mut self,
+        unconstrained: &Vector6,
+        ahead: Option<&Ahead>,
+        report: &mut StepReport,
+    ) -> Option<Projected> {
+        let mut projected = self.project(unconstrained, ahead, report)?;
+        let led_elsewhere = ahead.is_some() || self.friction.as_ref().is_some_and(Friction::acts);
+        for _ in 0..MAX_ADDED {
+            let added =
+                led_elsewhere && self.add_violated(&projected.acceleration, &mut report.work);
+            if !added {
+                break;
+            }
+            projected = self.project(unconstrained, ahead, report)?;
+        }
+        Some(projected)
+    }
+
+    fn add_violated(&mut self, answer: &Vector6, work: &mut Work) -> bool {
+        let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) else {
+            return false;
+        };
+        let added = reduction.add_violated(&at, answer, work);
+        if added {
+            self.write_set();
+        }
+        added
+    }
+
+    pub(super) fn place(&self) -> Option<At> {
         let metric = self
             .world
             .body
             .metric(self.settings.rotation_metric, &self.pose)?;
         Some(At {
             world: Arc::clone(&self.world),
+            places: Arc::clone(&self.places),
             pose: self.pose,
             reference: self.pose_at_reference_point(),
             metric,
@@ -169,26 +226,17 @@ impl GodObject {
         };
         self.set.sequence += 1;
         self.set.god_object_pose = self.pose;
-        self.set.truncated = reduction.truncated();
+        self.set.truncated = reduction.truncated() || self.given.truncated;
         self.set.reduction_error = reduction.error();
-        self.set.complete_within = reduction.known_within(self.radius);
+        let within = reduction.known_within(self.radius);
+        self.set.complete_within = within.min(self.given.complete_within);
         self.set.constraints.clear();
-        let room = self.settings.max_constraints;
+        self.set.constraints.extend_from_slice(self.given.rows());
+        let room = self.settings.max_constraints - self.given.rows().len();
         for contact in reduction.contacts().take(room) {
-            let obstacle = &self.world.obstacles[usize::from(contact.features.obstacle)];
-            self.set.constraints.push(NonPenetrationConstraint {
-                features: contact.features,
-                point: contact.point_on_obstacle,
-                normal: contact.normal,
-                gap: contact.gap,
-                separation: Separation::of(
-                    &contact.features,
-                    (&self.world.body.mesh, &self.pose),
-                    (&obstacle.mesh, &obstacle.pose),
-                ),
-                came: 0.0,
-                shading_normal: None,
-            });
+            let index = usize::from(contact.features.obstacle);
+            let row = self.row_of(index, contact);
+            self.set.constraints.push(row);
         }
         // Ascending features: the coupling finds known rows by bisection, and the order says nothing of the traversal.
         self.set

@@ -13,9 +13,10 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
+use super::generation::Choosable;
 use super::{GodObject, StepReport};
 use crate::collision::TimeOfImpact;
-use crate::constraint::NonPenetrationConstraint;
+use crate::constraint::{NonPenetrationConstraint, Place};
 use crate::shape::{self, ObstacleWay, Primitive};
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
@@ -58,6 +59,14 @@ impl PlacedObstacle {
 
     fn is_moving(&self) -> bool {
         self.pose != self.target
+    }
+
+    /// Where it is; rows are not chosen while it is on its way, and count on what the obstacle does.
+    pub(super) fn place(&self, choosable: Choosable) -> Place {
+        Place {
+            pose: self.pose,
+            chosen: choosable == Choosable::Always && !self.is_moving() && !self.came_here(),
+        }
     }
 
     fn came_here(&self) -> bool {
@@ -143,8 +152,6 @@ impl GodObject {
             }
             return 0.0;
         }
-        // Rows that are carried on between collections count on obstacles that stand.
-        self.reduction = None;
         let mut share = 1.0;
         for _ in 0..MAX_ALTERNATIONS {
             let gone = self.advance_obstacles(share, report);
@@ -254,7 +261,8 @@ impl GodObject {
         }
         for (follows, eases) in [(false, true), (false, false), (true, true), (true, false)] {
             let ahead = Ahead { follows, eases };
-            let Some(projected) = self.project(&Vector6::zeros(), Some(&ahead), report) else {
+            let Some(projected) = self.project_complete(&Vector6::zeros(), Some(&ahead), report)
+            else {
                 continue;
             };
             if !projected.feasible {

@@ -4,11 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::collection::GivenRows;
+use super::generation::Choosable;
 use super::obstacles::PlacedObstacle;
 use super::substep::{Going, Update};
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
-use crate::constraint::{ConstraintSet, Contact, RowReduction};
+use crate::constraint::{ConstraintSet, Contact, Place, RowReduction};
 use crate::implicit::ImplicitRounds;
 use crate::quasi_statics::{HalfSpace, Projector};
 use crate::settings::Settings;
@@ -52,6 +54,15 @@ pub struct GodObject {
     pub(super) affordable: f64,
     /// Finds rows as they are needed; `None` where every pair is collected.
     pub(super) reduction: Option<Box<RowReduction>>,
+    /// Where each obstacle is, and whether its rows are chosen now.
+    pub(super) places: Arc<[Place]>,
+    pub(super) choosable: Vec<Choosable>,
+    /// What finds rows, while there is nothing to choose from.
+    pub(super) resting: Option<Box<RowReduction>>,
+    /// Pairs that the last collection of each obstacle looked at.
+    pub(super) looked_at: Vec<u64>,
+    /// Rows of those obstacles that are not chosen from.
+    pub(super) given: GivenRows,
 }
 
 impl GodObject {
@@ -69,10 +80,23 @@ impl GodObject {
                 .map(PlacedObstacle::at_rest)
                 .collect(),
             reduction: Self::reduction_for(&world, &settings),
+            choosable: Self::choosable(&world, &settings),
+            resting: None,
+            places: world
+                .obstacles
+                .iter()
+                .zip(Self::choosable(&world, &settings))
+                .map(|(obstacle, choosable)| Place {
+                    pose: obstacle.pose,
+                    chosen: choosable == Choosable::Always,
+                })
+                .collect(),
+            looked_at: vec![settings.look_ahead_pairs; world.obstacles.len()],
+            given: GivenRows::with_capacity(capacity),
             world,
             settings,
             pose: start,
-            set: ConstraintSet::with_capacity(capacity),
+            set: ConstraintSet::with_capacity(GivenRows::room(capacity)),
             projector: Projector::new(settings.solver, capacity).with_reference_fallback(true),
             collision: CollisionWorkspace::new(),
             contacts: Vec::with_capacity(capacity),
@@ -184,8 +208,8 @@ impl GodObject {
         self.going = update.going;
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
-        if self.reduction.is_none() && self.collected_within < published {
-            self.collect(published, &mut report.work);
+        if self.collected_within < published {
+            self.look_farther(published, &mut report.work);
         }
         let difference = self
             .turn

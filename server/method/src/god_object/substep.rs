@@ -160,7 +160,7 @@ impl GodObject {
         report: &mut StepReport,
     ) -> Option<(Projected, bool)> {
         self.complete(left, report);
-        let projected = self.project(left, None, report)?;
+        let projected = self.project_complete(left, None, report)?;
         let trusted = if projected.settled {
             self.trust_length
         } else {
@@ -172,7 +172,7 @@ impl GodObject {
         }
         let share = left * (trusted / covered);
         self.complete(&share, report);
-        let mut projected = self.project(&share, None, report)?;
+        let mut projected = self.project_complete(&share, None, report)?;
         // Rows on the way may let a share of the wish go as far as the whole.
         let covered = self.motion_length(&projected.acceleration);
         if covered > trusted {

@@ -30,7 +30,6 @@ impl Certificate {
     pub(crate) fn new(problem: &LeastDistance, scan: &Scan, active: &[(u32, f64)]) -> Certificate {
         let acceleration = *scan.acceleration();
         let scale = problem.scale().max(problem.metric().norm(&acceleration));
-        let mut largest_multiplier = scale;
         let mut worst = scan.violation();
         let mut unexplained = problem
             .metric()
@@ -41,9 +40,9 @@ impl Certificate {
             unexplained -= problem.normal(*row as usize) * *multiplier;
             sound &= *multiplier >= 0.0; // false for NaN
             worst = worst.max(slack.abs().min(*multiplier));
-            largest_multiplier = largest_multiplier.max(*multiplier);
         }
-        let stationarity = scaled_norm(&unexplained) * (scale / largest_multiplier);
+        // In the unit of the force: between walls that nearly face each other multipliers are far larger, and hide nothing.
+        let stationarity = scaled_norm(&unexplained);
         sound &= stationarity >= 0.0 || scale == 0.0; // false for NaN
         let worst = worst.max(stationarity).max(0.0);
         let residual = if !sound {

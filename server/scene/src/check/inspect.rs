@@ -183,6 +183,12 @@ fn summarise_scene(scene: &Scene) -> Result<(String, Option<FidelityPlan>), File
         built.name,
         triangles.join(", ")
     );
+    let settings = &built.settings;
+    summary += &format!(
+        ", rest distance {:.3} um (fits down to {:.3} um a side; for tighter ones give clearance in [method])",
+        settings.rest_distance * 1e6,
+        settings.least_clearance() * 1e6
+    );
     if !exact.is_empty() {
         summary += &format!(", exact: {}", exact.join(", "));
     }

@@ -342,6 +342,9 @@ impl Scene {
         let (coupling, limits, method) =
             (&self.spec.coupling, &self.spec.limits, &self.spec.method);
         let mut defaults = Settings::for_size(size);
+        if let Some(clearance) = method.clearance {
+            defaults = defaults.with_clearance(clearance);
+        }
         if let Some(auto) = auto {
             defaults.gap_tolerance = auto.gap_tolerance;
             defaults.implicit_rounds = auto.rounds;

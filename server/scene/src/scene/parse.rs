@@ -256,6 +256,7 @@ fn method(section: Section<'_>) -> MethodSpec {
         ("pgs", SolverKind::ProjectedGaussSeidel),
     ];
     let spec = MethodSpec {
+        clearance: section.number("clearance", Range::Positive),
         rest_distance: section.number("rest_distance", Range::Positive),
         minimum_gap: section.number("minimum_gap", Range::Positive),
         gap_tolerance: section.number("gap_tolerance", Range::Positive),

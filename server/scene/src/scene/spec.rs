@@ -226,6 +226,8 @@ pub struct LimitSpec {
 /// `[method]`: lengths and limits of the method; what is `None` keeps the method's default for the body's size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MethodSpec {
+    /// Least play that some fit of the scene leaves the body on each side, m: rest distance and what hangs on it follow.
+    pub clearance: Option<f64>,
     /// m.
     pub rest_distance: Option<f64>,
     /// m.

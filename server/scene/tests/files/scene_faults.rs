@@ -74,6 +74,22 @@ fn the_example_of_the_interface_is_read() {
 }
 
 #[test]
+fn the_tightest_fit_of_a_scene_decides_the_rest_distance() {
+    // A ball of 20 mm: 2 um without a word.
+    let built = |method: &str| {
+        let scene = parse(&changed("rest_distance = 1e-5", method)).unwrap();
+        scene.build().unwrap().settings
+    };
+    let (default, tight) = (built(""), built("clearance = 5e-6"));
+    assert!((tight.rest_distance - 5e-7).abs() < 1e-15, "{tight:?}");
+    assert!(tight.minimum_gap < default.minimum_gap);
+    assert_eq!(built("clearance = 1e-3"), default);
+    // What is said in lengths holds.
+    let given = built("clearance = 5e-6\nrest_distance = 1e-6");
+    assert_eq!(given.rest_distance, 1e-6);
+}
+
+#[test]
 fn every_fault_names_file_line_and_key() {
     let cases = [
         (

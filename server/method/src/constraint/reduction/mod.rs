@@ -32,7 +32,7 @@ use nalgebra::Point3;
 use super::collect::{for_contacts, in_world};
 use super::facing::Facing;
 use super::overlay::{MAX_PLACES, Overlay};
-use super::{Collected, Contact, FeaturePair, contact_jacobian};
+use super::{Collected, Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::collision::{Placement, Work};
 use crate::geometry::Mesh;
 use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
@@ -83,10 +83,20 @@ const ALONG_PER_PLACE: usize = 2;
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const HOPED_WITHIN: f64 = 2.0;
 
+/// Where an obstacle is, and whether its rows are chosen: of the others every pair is a row, given from outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    /// World from obstacle.
+    pub(crate) pose: Pose,
+    pub(crate) chosen: bool,
+}
+
 /// Where the rows are to hold.
 #[derive(Clone, Debug)]
 pub(crate) struct At {
     pub(crate) world: Arc<World>,
+    /// Of each obstacle of the world.
+    pub(crate) places: Arc<[Place]>,
     pub(crate) pose: Pose,
     /// Pose of the reference point.
     pub(crate) reference: Pose,
@@ -100,6 +110,11 @@ impl At {
     /// G, world.
     fn center(&self) -> Point3<f64> {
         Point3::from(self.reference.translation.vector)
+    }
+
+    /// An obstacle's mesh, and the world from it.
+    pub(crate) fn obstacle(&self, index: usize) -> (&Mesh, &Pose) {
+        (&self.world.obstacles[index].mesh, &self.places[index].pose)
     }
 }
 
@@ -117,6 +132,8 @@ pub(crate) struct RowReduction {
     candidates: Candidates,
     overlay: Overlay,
     known: Vec<Known>,
+    /// Rows of the pairs that are not chosen from: Jacobian and gap, m.
+    given: Vec<(Vector6, f64)>,
     rows: Vec<HalfSpace>,
     warm_start: Vec<u32>,
     /// Largest violation that a motion asked for was left with, m.
@@ -133,12 +150,14 @@ pub(crate) struct RowReduction {
 impl RowReduction {
     /// A reduction of this world, for at most so many rows that trees find at a time. Allocates everything that it will ever need.
     pub(crate) fn with_capacity(candidates: usize, world: &World) -> Self {
+        let most = MAX_ROWS + candidates;
         Self {
-            projector: Projector::new(SolverKind::ActiveSet, MAX_ROWS),
+            projector: Projector::new(SolverKind::ActiveSet, most),
             candidates: Candidates::with_capacity(candidates + ALONG_PER_PLACE * MAX_PLACES),
             overlay: Overlay::new(&world.body.mesh),
             known: Vec::with_capacity(MAX_ROWS),
-            rows: Vec::with_capacity(MAX_ROWS),
+            given: Vec::with_capacity(candidates),
+            rows: Vec::with_capacity(most),
             warm_start: Vec::with_capacity(6),
             error: 0.0,
             truncated: false,
@@ -193,6 +212,29 @@ impl RowReduction {
         for &hint in hints.iter().take(HINTS_TAKEN) {
             self.take_hint(at, hint, work);
         }
+    }
+
+    /// Obstacles have moved, or their rows are chosen from now on, or no more: what is not chosen from is let go, the rest looked for anew.
+    pub(crate) fn rearrange(&mut self, places: &[Place]) {
+        self.known
+            .retain(|row| places[usize::from(row.contact.features.obstacle)].chosen);
+        self.outdated = true;
+    }
+
+    /// Rows of the present pose that hold beside those that are chosen.
+    pub(crate) fn give(&mut self, at: &At, rows: &[NonPenetrationConstraint]) {
+        let center = at.center();
+        self.given.clear();
+        self.given.extend(rows.iter().map(|row| {
+            let jacobian = contact_jacobian(&row.normal, &row.point, &center);
+            (jacobian, row.gap)
+        }));
+    }
+
+    /// Adds the candidate that an answer which was found elsewhere violates most, if by more than the tolerance; whether there is one.
+    pub(crate) fn add_violated(&mut self, at: &At, answer: &Vector6, work: &mut Work) -> bool {
+        let before = self.known.len();
+        self.add_most_violated(at, answer, 0.0, work) > at.tolerance && self.known.len() > before
     }
 
     /// Whether a pair that mattered has left the features that it was of, so that the candidates are to be collected anew.
@@ -294,11 +336,11 @@ impl RowReduction {
 
     /// Adds contacts of the present pose that are found along the surfaces; how many vertices were looked at.
     pub(crate) fn offer_along(&mut self, at: &At, index: usize, work: &mut Work) -> u64 {
-        let obstacle = &at.world.obstacles[index];
+        let (mesh, pose) = at.obstacle(index);
         let facing = Facing {
             body: &at.world.body.mesh,
-            obstacle: &obstacle.mesh,
-            placement: &Placement::of(&at.pose, &obstacle.pose),
+            obstacle: mesh,
+            placement: &Placement::of(&at.pose, pose),
             obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
             activation_distance: ALONG_REST_DISTANCES * at.rest_distance,
             past_hollows: false,
@@ -309,7 +351,7 @@ impl RowReduction {
             .begin_at(&facing, near.chain(&candidates.contacts));
         self.overlay.walk(&facing, work, |contact| {
             if candidates.room() > 0 {
-                let contact = in_world(&contact, &obstacle.pose);
+                let contact = in_world(&contact, pose);
                 candidates.push(&contact, &jacobian(&contact, &at.center()));
             }
         })
@@ -331,9 +373,11 @@ impl RowReduction {
         let mut rounds = 0;
         loop {
             self.rows.clear();
-            self.rows.extend(self.known.iter().map(|row| HalfSpace {
-                jacobian: row.jacobian,
-                bound: at.rest_distance - row.contact.gap.max(least_gap),
+            let known = self.known.iter().map(|row| (row.jacobian, row.contact.gap));
+            let all = known.chain(self.given.iter().copied());
+            self.rows.extend(all.map(|(jacobian, gap)| HalfSpace {
+                jacobian,
+                bound: at.rest_distance - gap.max(least_gap),
             }));
             work.projections += 1;
             let projection =
@@ -343,7 +387,9 @@ impl RowReduction {
             self.warm_start
                 .extend(projection.active.iter().map(|row| row.row));
             for row in &projection.active {
-                self.known[row.row as usize].idle = 0;
+                if let Some(row) = self.known.get_mut(row.row as usize) {
+                    row.idle = 0;
+                }
             }
             rounds += 1;
             let violation = self.add_most_violated(at, &projection.acceleration, least_gap, work);
@@ -365,7 +411,10 @@ impl RowReduction {
     fn add_neighbours(&mut self, at: &At, projection: &Projection, work: &mut Work) -> bool {
         let before = self.known.len();
         for row in &projection.active {
-            let pair = self.known[row.row as usize].contact.features;
+            let Some(row) = self.known.get(row.row as usize) else {
+                continue;
+            };
+            let pair = row.contact.features;
             let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
             for_neighbours(
                 &at.world.body.mesh,
@@ -509,16 +558,18 @@ impl RowReduction {
     /// Adds what faces between two triangles that stopped a motion.
     fn take_hint(&mut self, at: &At, (a, b): (u32, u32), work: &mut Work) {
         // A hint does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
-        for (index, obstacle) in at.world.obstacles.iter().enumerate() {
+        for index in 0..at.places.len() {
+            let (mesh, pose) = at.obstacle(index);
             let body = &at.world.body.mesh;
-            if a as usize >= body.triangles().len() || b as usize >= obstacle.mesh.triangles().len()
-            {
+            let there =
+                (a as usize) < body.triangles().len() && (b as usize) < mesh.triangles().len();
+            if !there || !at.places[index].chosen {
                 continue;
             }
-            let placement = Placement::of(&at.pose, &obstacle.pose);
+            let placement = Placement::of(&at.pose, pose);
             let facing = Facing {
                 body,
-                obstacle: &obstacle.mesh,
+                obstacle: mesh,
                 placement: &placement,
                 obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
                 activation_distance: HINT_REST_DISTANCES * at.rest_distance,
@@ -526,10 +577,10 @@ impl RowReduction {
             };
             // The features that touch may be other triangles' to look at.
             for a in owners(body, a) {
-                for b in owners(&obstacle.mesh, b) {
+                for b in owners(mesh, b) {
                     for_contacts(&facing, &facing.pair(a, b), work, |contact| {
                         if !self.knows(&contact.features) {
-                            self.add(at, &in_world(&contact, &obstacle.pose));
+                            self.add(at, &in_world(&contact, pose));
                         }
                     });
                 }
@@ -555,11 +606,11 @@ fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
 
 /// The contact between two features at a pose, world frame, when they face each other there, or did before they slid into a hollow.
 fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) -> Option<Contact> {
-    let obstacle = &at.world.obstacles[usize::from(features.obstacle)];
-    let placement = Placement::of(&at.pose, &obstacle.pose);
+    let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
+    let placement = Placement::of(&at.pose, pose);
     let facing = Facing {
         body: &at.world.body.mesh,
-        obstacle: &obstacle.mesh,
+        obstacle: mesh,
         placement: &placement,
         obstacle_index: features.obstacle,
         activation_distance: f64::INFINITY,
@@ -568,7 +619,7 @@ fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) ->
     work.feature_pairs += 1;
     facing
         .features(features)
-        .map(|contact| in_world(&contact, &obstacle.pose))
+        .map(|contact| in_world(&contact, pose))
 }
 
 fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {

@@ -1,0 +1,159 @@
+//! Conforming contact in many variants, and bunnies: times, rows, force errors, and the worst row of each column.
+//! `cargo run --release -p taut-method-tests --example conforming_variants -- [--quick] [--case NAME] [--repeats N] [--seed N]`.
+//!
+//! Variants `v0`, `v1`, ... cover every two levels of two factors; others have names (`peg`, `peg-floor`, ...). `bunnies` and `motions` need
+//! the test data. Times are CPU time of the thread, us; of `--repeats` runs the median of each percentile is printed. `--case` runs the cases whose
+//! name begins so; `--quick` runs coarser meshes, 2,000 triangles each, for a hundred updates.
+
+#[path = "../../../server/method/examples/update_support/mod.rs"]
+mod update_support;
+
+#[path = "conforming_variants/bunnies.rs"]
+mod bunnies;
+
+use taut_method_tests::variants::measure::{Course, Outcome, quantile, run};
+use taut_method_tests::variants::oracle::Oracle;
+use taut_method_tests::variants::{Variant, covering, named};
+use update_support::thread_cpu_us;
+
+/// A column: its heading, and the value of a case.
+type Column = (&'static str, fn(&Outcome) -> f64);
+
+const COLUMNS: [Column; 11] = [
+    ("p50", |o| quantile(&o.update, 0.5)),
+    ("p99", |o| quantile(&o.update, 0.99)),
+    ("max", |o| quantile(&o.update, 1.0)),
+    ("force p99", |o| quantile(&o.force, 0.99)),
+    ("error %", |o| 100.0 * quantile(&o.errors, 1.0)),
+    ("rows p50", |o| quantile(&o.rows, 0.5)),
+    ("rows max", |o| quantile(&o.rows, 1.0)),
+    ("pairs", |o| o.pairs as f64),
+    ("truncated", |o| f64::from(o.truncated)),
+    ("failures", |o| f64::from(o.failures)),
+    ("penetrate", |o| f64::from(o.penetrations)),
+];
+
+struct Arguments {
+    quick: bool,
+    case: String,
+    repeats: usize,
+    seed: u64,
+}
+
+impl Arguments {
+    fn read() -> Result<Self, String> {
+        let mut read = Self {
+            quick: false,
+            case: String::new(),
+            repeats: 3,
+            seed: 1,
+        };
+        let mut given = std::env::args().skip(1);
+        while let Some(key) = given.next() {
+            if key == "--quick" {
+                read.quick = true;
+                continue;
+            }
+            let value = given.next().ok_or_else(|| format!("{key} needs a value"))?;
+            let number = || {
+                value
+                    .parse()
+                    .map_err(|_| format!("{key} {value}: not a number"))
+            };
+            match key.as_str() {
+                "--case" => read.case.clone_from(&value),
+                "--repeats" => read.repeats = usize::try_from(number()?).unwrap_or(1).max(1),
+                "--seed" => read.seed = number()?,
+                _ => return Err(format!("{key}: give --quick, --case, --repeats or --seed")),
+            }
+        }
+        Ok(read)
+    }
+
+    fn wants(&self, name: &str) -> bool {
+        name.starts_with(&self.case)
+    }
+
+    fn command(&self, case: &str) -> String {
+        let quick = if self.quick { "--quick " } else { "" };
+        format!("{quick}--seed {} --case {case}", self.seed)
+    }
+}
+
+fn main() -> Result<(), String> {
+    let arguments = Arguments::read()?;
+    let triangles = if arguments.quick { 2_000 } else { 26_000 };
+    let mut variants = covering(triangles, arguments.seed);
+    if !arguments.quick {
+        variants.extend(named());
+    }
+    print!("{:20} {:>13}", "case", "triangles");
+    COLUMNS.iter().for_each(|(name, _)| print!(" {name:>9}"));
+    println!("  what");
+    let mut table: Vec<(String, [f64; COLUMNS.len()])> = Vec::new();
+    let mut oracle = Oracle::default();
+    for variant in variants.iter().filter(|v| arguments.wants(&v.name)) {
+        let values = measured(variant, &arguments, &mut oracle);
+        table.push((variant.name.clone(), values));
+    }
+    println!("worst of each column:");
+    for (k, (heading, _)) in COLUMNS.iter().enumerate() {
+        let worst = table.iter().max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
+        if let Some((name, values)) = worst {
+            println!(
+                "{heading:>10}: {:10.3}  {}",
+                values[k],
+                arguments.command(name)
+            );
+        }
+    }
+    bunnies::run(&arguments.case, arguments.repeats);
+    Ok(())
+}
+
+/// Runs and prints one variant: the median over the repeats of each column.
+fn measured(variant: &Variant, arguments: &Arguments, oracle: &mut Oracle) -> [f64; COLUMNS.len()] {
+    let steps = if arguments.quick { 100 } else { 400 };
+    let stride = steps / 20;
+    let mut outcomes = Vec::new();
+    for repeat in 0..arguments.repeats {
+        // Runs are the same but for their times: the oracle is asked once.
+        let stride = if repeat == 0 { stride } else { 0 };
+        outcomes.push(run(
+            variant,
+            &Course { steps, stride },
+            oracle,
+            thread_cpu_us,
+        ));
+    }
+    let first = outcomes[0].clone();
+    let values = COLUMNS.map(|(name, value)| {
+        let timed = ["p50", "p99", "max", "force p99"].contains(&name);
+        if timed {
+            let all: Vec<f64> = outcomes.iter().map(value).collect();
+            quantile(&all, 0.5)
+        } else {
+            value(&first)
+        }
+    });
+    let [mine, others] = first.triangles;
+    print!("{:20} {:>13}", variant.name, format!("{mine}/{others}"));
+    values.iter().for_each(|value| print!(" {value:9.2}"));
+    println!(
+        "  {:?} {:?} {:?} {:?} {:.0} um, {}x{} in {}x{}, turned {:.2}, rough {:.0} um, crown {:.0} um{}",
+        variant.fit,
+        variant.motion,
+        variant.feel,
+        variant.moving,
+        variant.clearance * 1e6,
+        variant.body.facets,
+        variant.body.bands,
+        variant.obstacle.facets,
+        variant.obstacle.bands,
+        variant.turned,
+        variant.roughness * 1e6,
+        variant.crown * 1e6,
+        if variant.floor { ", floor" } else { "" },
+    );
+    values
+}

@@ -1,0 +1,194 @@
+//! Bunnies: updates of one that a hand slides over the other, and searches for the time of impact of given motions.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use god_object::collision::{
+    AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,
+};
+use god_object::{GodObject, Mesh, Pose, Settings, Vector6, World};
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use taut_method_tests::solids::{body, obstacle};
+use taut_method_tests::variants::measure::quantile;
+use taut_scene::{data_file, read_mesh};
+
+use crate::update_support::{Hand, subdivided, thread_cpu_us};
+
+const SIZE: f64 = 0.15;
+/// Updates before the body has come to the obstacle.
+const APPROACH: usize = 60;
+
+/// A bunny on a bunny that a hand slides over it.
+struct Slide {
+    name: &'static str,
+    /// Shortest and longest step of the hand, m.
+    step: [f64; 2],
+    updates: usize,
+    /// Each makes four triangles of one.
+    subdivisions: u32,
+}
+
+const SLIDES: [Slide; 3] = [
+    Slide {
+        name: "bunnies",
+        step: [0.3e-3, 1.4e-3],
+        updates: 2500,
+        subdivisions: 0,
+    },
+    Slide {
+        name: "bunnies-fast",
+        step: [0.5e-3, 3e-3],
+        updates: 2500,
+        subdivisions: 0,
+    },
+    Slide {
+        name: "bunnies-1.7M",
+        step: [0.5e-3, 3e-3],
+        updates: 120,
+        subdivisions: 3,
+    },
+];
+
+/// The cases whose name begins with `case`; the dense one only where it is named.
+pub(crate) fn run(case: &str, repeats: usize) {
+    let chosen: Vec<&Slide> = SLIDES
+        .iter()
+        .filter(|slide| slide.name.starts_with(case))
+        .filter(|slide| slide.subdivisions == 0 || slide.name == case)
+        .collect();
+    let motions = "motions".starts_with(case);
+    if chosen.is_empty() && !motions {
+        return;
+    }
+    let Some(bunny) = load("bunny_27k.ply") else {
+        println!("bunnies skipped: TAUT_DATA does not name a folder with bunny_27k.ply");
+        return;
+    };
+    for slide in chosen {
+        run_slide(slide, &bunny, repeats);
+    }
+    if motions {
+        run_motions(repeats);
+    }
+}
+
+fn load(name: &str) -> Option<Mesh> {
+    let raw = read_mesh(&data_file(name)?).ok()?;
+    Mesh::new(raw.vertices, raw.triangles).ok()
+}
+
+fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize) {
+    let soup = (bunny.vertices().to_vec(), bunny.triangles().to_vec());
+    let (vertices, triangles) = subdivided(&soup, slide.subdivisions);
+    let mesh = Mesh::new(vertices, triangles).expect("a subdivided bunny is closed");
+    let world = Arc::new(World {
+        body: body(mesh.clone()),
+        obstacles: vec![obstacle("bunny", mesh, Pose::identity())],
+    });
+    let runs: Vec<[f64; 4]> = (0..repeats).map(|_| updates(&world, slide)).collect();
+    print_medians(slide.name, &runs);
+}
+
+/// p50, p99, p99.9 and the greatest time of an update, us.
+fn updates(world: &Arc<World>, slide: &Slide) -> [f64; 4] {
+    let start = Pose::new(Vector3::new(0.16, 0.02, 0.0), Vector3::new(0.0, 2.0, 0.0));
+    let mut god_object = GodObject::new(Arc::clone(world), Settings::for_size(SIZE), start)
+        .expect("apart at the start");
+    let mut hand = Hand::with_steps(start, 1, slide.step);
+    let mut times = Vec::new();
+    for k in 0..APPROACH + slide.updates {
+        let device = hand.next(god_object.pose());
+        let clock = thread_cpu_us();
+        god_object.step(&device, None);
+        if k >= APPROACH {
+            times.push(thread_cpu_us() - clock);
+        }
+    }
+    quantiles(&times)
+}
+
+/// The motions of `bunny_contacts.csv` on a fresh workspace each: time of a search, and whether it was right.
+fn run_motions(repeats: usize) {
+    let text = data_file("bunny_contacts.csv").and_then(|path| std::fs::read_to_string(path).ok());
+    let Some(text) = text else {
+        println!("motions skipped: bunny_contacts.csv is not there");
+        return;
+    };
+    let settings = AdvancementSettings {
+        minimum_gap: 1e-6,
+        gap_tolerance: 1e-7,
+        ..AdvancementSettings::default()
+    };
+    let (mut times, mut contacts, mut missed, mut late) = (Vec::new(), 0, 0, 0);
+    let mut meshes: HashMap<String, Mesh> = HashMap::new();
+    for line in text.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let bunny = meshes
+            .entry(fields[0].to_owned())
+            .or_insert_with(|| load(fields[0]).expect("the mesh lies beside its motions"));
+        let n: Vec<f64> = fields[2..15]
+            .iter()
+            .map(|f| f.parse().expect("a number"))
+            .collect();
+        let rotation = UnitQuaternion::new_normalize(Quaternion::new(n[6], n[3], n[4], n[5]));
+        let motion = Motion {
+            start: Pose::from_parts(Translation3::new(n[0], n[1], n[2]), rotation),
+            displacement: Vector6::from_column_slice(&n[7..13]),
+            reference_point: Point3::origin(),
+        };
+        let mut found = TimeOfImpact::Separated;
+        let searches: Vec<f64> = (0..repeats)
+            .map(|_| {
+                let mut workspace = CollisionWorkspace::new();
+                let clock = thread_cpu_us();
+                let still = Pose::identity();
+                let work = &mut Work::default();
+                found = time_of_impact(
+                    bunny,
+                    &motion,
+                    bunny,
+                    &still,
+                    &settings,
+                    &mut workspace,
+                    work,
+                );
+                thread_cpu_us() - clock
+            })
+            .collect();
+        times.push(quantile(&searches, 0.5));
+        if let Ok(truth) = fields[15].parse::<f64>() {
+            contacts += 1;
+            match found {
+                TimeOfImpact::Impact { time } | TimeOfImpact::IterationLimit { time } => {
+                    late += u32::from(time > truth);
+                }
+                TimeOfImpact::Separated => missed += 1,
+                TimeOfImpact::Overlapping => {}
+            }
+        }
+    }
+    print_medians("motions", &[quantiles(&times)]);
+    println!(
+        "{:20} {} motions, {contacts} contacts, {missed} missed, {late} late",
+        "",
+        times.len()
+    );
+}
+
+fn quantiles(times: &[f64]) -> [f64; 4] {
+    [0.5, 0.99, 0.999, 1.0].map(|share| quantile(times, share))
+}
+
+fn print_medians(name: &str, runs: &[[f64; 4]]) {
+    let median = |k: usize| {
+        let values: Vec<f64> = runs.iter().map(|run| run[k]).collect();
+        quantile(&values, 0.5)
+    };
+    println!(
+        "{name:20} p50 {:.1}  p99 {:.1}  p99.9 {:.1}  max {:.1} us",
+        median(0),
+        median(1),
+        median(2),
+        median(3)
+    );
+}

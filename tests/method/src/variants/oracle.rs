@@ -1,0 +1,147 @@
+//! The projection on every facing pair within reach, as the answer that a choice of rows is held against.
+
+use god_object::collision::{CollisionWorkspace, Work};
+use god_object::constraint::{Contact, collect_contacts, contact_jacobian};
+use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverKind};
+use god_object::spatial::{angular, at_reference_point, linear, pose_difference};
+use god_object::{GodObject, Pose, Settings, Vector6, World};
+use nalgebra::{Point3, Vector3};
+
+/// Most facing pairs within reach.
+const MOST_PAIRS: usize = 1 << 18;
+/// Forces below this are not compared relatively, N.
+const LEAST_FORCE: f64 = 0.5;
+
+/// How far a published set is from what every pair says.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Difference {
+    /// Of the constrained accelerations in the metric, in shares of the constraint's, or of that of half a newton: force and torque together.
+    pub relative: f64,
+    /// Facing pairs within reach.
+    pub pairs: usize,
+}
+
+/// Memory for the oracle.
+#[derive(Debug)]
+pub struct Oracle {
+    workspace: CollisionWorkspace,
+    contacts: Vec<Contact>,
+    rows: Vec<HalfSpace>,
+    projector: Projector,
+}
+
+impl Default for Oracle {
+    fn default() -> Self {
+        Self {
+            workspace: CollisionWorkspace::with_candidates(2 * MOST_PAIRS),
+            contacts: Vec::with_capacity(MOST_PAIRS),
+            rows: Vec::with_capacity(MOST_PAIRS),
+            projector: Projector::new(SolverKind::ActiveSet, MOST_PAIRS),
+        }
+    }
+}
+
+impl Oracle {
+    /// Compares the rows that were published with all, for a device at `device`: without friction and shading, which act on either alike.
+    ///
+    /// Obstacles with a primitive are left out: they are far away.
+    pub fn compare(&mut self, world: &World, god_object: &GodObject, device: &Pose) -> Difference {
+        let settings = god_object.settings();
+        let body = &world.body;
+        let at = at_reference_point(god_object.pose(), &body.reference_point);
+        let difference = pose_difference(
+            &at_reference_point(device, &body.reference_point),
+            &at,
+            &Vector3::zeros(),
+        );
+        // No point moves farther than this: a pair farther apart cannot hold anything.
+        let reach = linear(&difference).norm()
+            + god_object.radius() * angular(&difference).norm()
+            + 2.0 * settings.rest_distance;
+        self.collect(world, god_object, reach);
+        let center = Point3::from(at.translation.vector);
+        let wanted = difference * settings.k_s;
+        let metric = body
+            .metric(settings.rotation_metric, god_object.pose())
+            .expect("a metric");
+        let every = self.contacts.iter().map(|c| Row {
+            normal: c.normal,
+            point: c.point_on_obstacle,
+            gap: c.gap,
+        });
+        let full = project(
+            &mut self.projector,
+            &mut self.rows,
+            every,
+            &metric,
+            &wanted,
+            &center,
+            settings,
+        );
+        let published = god_object.constraint_set().constraints.iter().map(|c| Row {
+            normal: c.normal,
+            point: c.point,
+            gap: c.gap,
+        });
+        let chosen = project(
+            &mut self.projector,
+            &mut self.rows,
+            published,
+            &metric,
+            &wanted,
+            &center,
+            settings,
+        );
+        let least = LEAST_FORCE / (settings.k_h * body.mass.sqrt());
+        let error = metric.norm(&(chosen - full));
+        Difference {
+            relative: error / metric.norm(&(full - wanted)).max(least),
+            pairs: self.contacts.len(),
+        }
+    }
+
+    fn collect(&mut self, world: &World, god_object: &GodObject, reach: f64) {
+        self.contacts.clear();
+        let placed = world.obstacles.iter().zip(god_object.obstacle_poses());
+        for (index, (obstacle, pose)) in placed.enumerate() {
+            if obstacle.primitive.is_some() {
+                continue;
+            }
+            let collected = collect_contacts(
+                &world.body.mesh,
+                god_object.pose(),
+                &obstacle.mesh,
+                pose,
+                index as u16,
+                reach,
+                &mut self.workspace,
+                &mut self.contacts,
+                &mut Work::default(),
+            );
+            assert!(!collected.truncated, "the oracle holds every pair");
+        }
+    }
+}
+
+struct Row {
+    normal: Vector3<f64>,
+    point: Point3<f64>,
+    gap: f64,
+}
+
+fn project(
+    projector: &mut Projector,
+    rows: &mut Vec<HalfSpace>,
+    given: impl Iterator<Item = Row>,
+    metric: &Metric,
+    wanted: &Vector6,
+    center: &Point3<f64>,
+    settings: &Settings,
+) -> Vector6 {
+    rows.clear();
+    rows.extend(given.map(|row| HalfSpace {
+        jacobian: contact_jacobian(&row.normal, &row.point, center),
+        bound: (settings.k_s * (settings.rest_distance - row.gap)).min(0.0),
+    }));
+    projector.project(metric, wanted, rows, &[]).acceleration
+}

@@ -1,0 +1,125 @@
+//! Conforming contact in variants that cover every two levels of two factors: nothing penetrates, the rows that were chosen give the force of
+//! all, and the order of the obstacles says nothing. Times and dense meshes: the example of the same name.
+
+use std::sync::Arc;
+
+use god_object::{GodObject, Obstacle, Pose, World};
+use taut_method_tests::variants::measure::{Course, run};
+use taut_method_tests::variants::oracle::Oracle;
+use taut_method_tests::variants::scene::VariantScene;
+use taut_method_tests::variants::shapes::Tessellation;
+use taut_method_tests::variants::{Feel, Fit, Motion, Moving, Variant, covering, dense_peg};
+
+/// Triangles of a mesh: few enough for debug builds.
+const TRIANGLES: u32 = 300;
+
+#[test]
+fn no_variant_penetrates_and_every_one_has_the_force_of_all_rows() {
+    let mut oracle = Oracle::default();
+    let course = Course {
+        steps: 60,
+        stride: 10,
+    };
+    let mut wrong = Vec::new();
+    for variant in covering(TRIANGLES, 1) {
+        let outcome = run(&variant, &course, &mut oracle, || 0.0);
+        assert_eq!(outcome.penetrations, 0, "{variant:?}");
+        assert_eq!(outcome.failures, 0, "{variant:?}");
+        let error = outcome.errors.iter().copied().fold(0.0, f64::max);
+        let right = error <= 0.01; // false for NaN
+        if !right {
+            wrong.push(format!("{error} {variant:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// A peg in its hole on an end stop, coarse enough for a test.
+fn peg(name: &str) -> Variant {
+    let cut = Tessellation {
+        facets: 48,
+        bands: 12,
+    };
+    Variant {
+        body: cut,
+        obstacle: cut,
+        turned: 0.3,
+        ..dense_peg(name)
+    }
+}
+
+/// Poses of the body along the path of a variant, in a world whose obstacles are put in order first.
+fn poses(variant: &Variant, order: impl Fn(&mut Vec<Obstacle>)) -> Vec<Pose> {
+    let scene = VariantScene::new(variant);
+    let mut world = World::clone(&scene.world);
+    order(&mut world.obstacles);
+    let mut god_object =
+        GodObject::new(Arc::new(world), scene.settings, scene.start).expect("a free start");
+    let step = |k: i32| {
+        god_object.step(&scene.device(f64::from(k) * 1e-3), None);
+        *god_object.pose()
+    };
+    (0..120).map(step).collect()
+}
+
+#[test]
+fn an_obstacle_far_away_changes_nothing_and_the_order_of_obstacles_next_to_nothing() {
+    let alone = poses(&peg("alone"), |_| {});
+    let with_floor = Variant {
+        floor: true,
+        ..peg("floor")
+    };
+    assert_eq!(alone, poses(&with_floor, |_| {}), "floor last");
+    assert_eq!(
+        alone,
+        poses(&with_floor, |all| all.rotate_right(1)),
+        "first"
+    );
+    let turned = poses(&peg("turned round"), |all| all.reverse());
+    for (k, (a, b)) in alone.iter().zip(&turned).enumerate() {
+        let apart = (a.translation.vector - b.translation.vector).norm();
+        assert!(apart < 1e-7, "step {k}: {apart} m");
+    }
+}
+
+/// A rough peg in a rough hole: of thousands of pairs the nearest say little.
+#[test]
+fn rows_that_find_no_room_are_chosen_whatever_else_is_in_the_scene() {
+    let cut = Tessellation {
+        facets: 72,
+        bands: 60,
+    };
+    let crowded = Variant {
+        fit: Fit::PegInHole,
+        motion: Motion::Rest,
+        roughness: 1e-6,
+        floor: true,
+        body: cut,
+        obstacle: cut,
+        ..peg("crowded")
+    };
+    let mut oracle = Oracle::default();
+    let course = Course {
+        steps: 40,
+        stride: 8,
+    };
+    for (feel, moving, floor) in [
+        (Feel::Plain, Moving::Nothing, true),
+        (Feel::Plain, Moving::Aside, false),
+        (Feel::Friction, Moving::Nothing, false),
+    ] {
+        let variant = Variant {
+            feel,
+            moving,
+            floor,
+            ..crowded.clone()
+        };
+        let outcome = run(&variant, &course, &mut oracle, || 0.0);
+        let error = outcome.errors.iter().copied().fold(0.0, f64::max);
+        assert!(outcome.pairs > 1024, "{} pairs", outcome.pairs);
+        assert!(
+            error <= 0.01,
+            "{feel:?} {moving:?} floor {floor}: off by {error}"
+        );
+    }
+}
