@@ -16,7 +16,6 @@ use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 use super::{Attack, Finding};
 use crate::bench::BenchError;
 use crate::relay::{Growth, Impairment, Treatment, Waiting};
-use crate::report::Extent;
 
 /// The attacks of this group.
 pub(super) const ATTACKS: &[Attack] = &[
