@@ -352,7 +352,7 @@ impl Bridge {
         up.send(now_ns, &Payload::Input(output.input));
         let (quick, often, seldom) = TIME_REQUESTS;
         let period = if tick <= quick * often { often } else { seldom };
-        if tick % period == 0 {
+        if tick.is_multiple_of(period) {
             let request = TimeRequest {
                 client_sent: here_ns,
             };
