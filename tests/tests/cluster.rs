@@ -387,7 +387,7 @@ fn a_second_node_of_the_same_name_and_one_with_another_key_are_refused_in_one_se
     match runtime.block_on(connect(options)) {
         Err(LinkError::Refused { code, text, .. }) => {
             assert_eq!(code, RefusalCode::NameTaken);
-            assert!(text.contains("front"), "{text}");
+            assert!(text.raw().contains("front"), "{text}");
         }
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("two nodes are called front"),

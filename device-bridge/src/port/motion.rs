@@ -6,7 +6,8 @@
 //! | `speed`      | m/s  | its norm in the metric, `sqrt(v^2 + (r w)^2)`; falls off over [`MEMORY`] |
 //!
 //! Only samples that the validation has passed count, so nothing faster than a hand is seen here; and they are averaged as vectors, so noise that goes to and
-//! fro explains nothing. A force answers a motion of a moment ago, as long as it is computed at all: that is what the memory is for.
+//! fro explains nothing. A sample that is the same to the bit says nothing new, as where a device measures less often than it is read: the next one has
+//! moved since the last that did. A force answers a motion of a moment ago, as long as it is computed at all: that is what the memory is for.
 
 use std::time::Duration;
 
@@ -35,6 +36,9 @@ impl Motion {
         period: Duration,
         radius_of_gyration: f64,
     ) {
+        if *travel == Vector6::zeros() && self.sampled.is_some() {
+            return;
+        }
         let Some(last) = self.sampled.replace(time) else {
             return;
         };
@@ -88,6 +92,30 @@ mod tests {
         // Half a millimetre to and fro: 0.5 m/s in each sample.
         let noise = |tick: u32| Vector6::x() * if tick.is_multiple_of(2) { 5e-4 } else { -5e-4 };
         assert!(seen(noise) < 0.12, "{} m/s", seen(noise));
+    }
+
+    #[test]
+    fn samples_that_repeat_make_a_motion_no_faster() {
+        for hz in [100_u32, 300, 1000, 4000] {
+            let period = Duration::from_secs(1) / hz;
+            for repeats in 1..4 {
+                let mut motion = Motion::default();
+                let mut seen: f64 = 0.0;
+                for tick in 0..200 {
+                    // 0.4 m/s, measured once in so many readings.
+                    let fresh = tick % (repeats + 1) == 0;
+                    let travel = 0.4 * period.as_secs_f64() * f64::from(repeats + 1);
+                    let travel = if fresh { travel } else { 0.0 };
+                    motion.fade(period);
+                    motion.follow(period * tick, &(Vector6::x() * travel), period, RADIUS);
+                    seen = seen.max(motion.speed());
+                }
+                assert!(
+                    seen <= 0.4 + 1e-9,
+                    "{seen} m/s at {hz} Hz, {repeats} repeats"
+                );
+            }
+        }
     }
 
     #[test]
