@@ -56,20 +56,20 @@ fn content() -> Content {
     let meshes = meshes.map(|mesh| blob(&mesh));
     let hash = |mesh: &MeshBlob| MeshHash::of(&mesh.encode().expect("small"));
     let body = |name: &str, mesh, [red, green, blue]: [f32; 3]| BodyDescription {
-        name: name.to_owned(),
+        name: name.into(),
         mesh: hash(mesh),
         pose: pose([0.0; 3]),
         colour: [red, green, blue, 1.0],
     };
     let screen = |name: &str, lower_left, lower_right, upper_left| ScreenDescription {
-        name: name.to_owned(),
+        name: name.into(),
         lower_left,
         lower_right,
         upper_left,
     };
     let node = |name: &str, screens: &[&str], stereo| NodeDescription {
-        name: name.to_owned(),
-        screens: screens.iter().map(|s| (*s).to_owned()).collect(),
+        name: name.into(),
+        screens: screens.iter().map(|s| (*s).into()).collect(),
         stereo,
         monitors: Vec::new(),
         window: WindowDescription {
