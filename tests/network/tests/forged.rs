@@ -83,7 +83,7 @@ fn a_servers_counters_account_for_every_one_of_a_hundred_thousand_on_its_socket(
         options.limits.unknown_source,
         options.limits.unknown_sources,
     ) = (rate, rate);
-    (options.idle_timeout, options.node_timeout) = (10 * PATIENCE, 10 * PATIENCE);
+    (options.idle_timeout, options.node_timeout) = (10 * PATIENCE, PATIENCE);
     let server = runtime
         .block_on(serve(options, small_content()))
         .unwrap_or_else(|error| panic!("{error}"));

@@ -1,6 +1,6 @@
 //! Conforming contact in many variants: scenes that nobody tuned for, made from factors, and what is measured in each.
 //!
-//! - [`covering`]: which combinations of factors are run, so that every two levels of two factors meet.
+//! - [`mod@covering`]: which combinations of factors are run, so that every two levels of two factors meet.
 //! - [`shapes`]: solids that fit each other.
 //! - [`scene`]: a variant as a world, settings and the path of a hand.
 //! - [`oracle`]: the force by every facing pair within reach.
