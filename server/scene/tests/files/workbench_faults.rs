@@ -99,7 +99,7 @@ fn every_fault_names_file_line_and_key() {
             "rate = 60 ",
             "rate = 0 ",
             "rate = 0 ",
-            "`rate` in [frames] is 0, but must be greater than zero and at most 1000",
+            "`rate` in [frames] is 0, but must be between 1 and 1000",
         ),
         (
             "rate = 60 ",
