@@ -10,6 +10,7 @@
 //! volume is no nearer than the volume: it goes into its band or a later one.
 
 use super::descent::open;
+use super::displacements::Motions;
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
 use super::work::Work;
@@ -25,10 +26,13 @@ const EDGE_ROUNDING: f64 = 1e-5;
 /// Marks the end of a list.
 const NONE: u32 = u32::MAX;
 
+/// Bands of a search by clearance: as many for what is violated, the deepest first.
+const SIGNED_BANDS: usize = 2 * BANDS;
+
 /// Pairs that wait, by band; the last one of a band is the first out. No allocation after `new`.
 #[derive(Clone, Debug)]
 pub(crate) struct Bands {
-    heads: [u32; BANDS],
+    heads: [u32; SIGNED_BANDS],
     waiting: Vec<Waiting>,
     free: u32,
 }
@@ -42,14 +46,14 @@ struct Waiting {
 impl Bands {
     pub(super) fn new() -> Self {
         Self {
-            heads: [NONE; BANDS],
+            heads: [NONE; SIGNED_BANDS],
             waiting: Vec::with_capacity(CAPACITY),
             free: NONE,
         }
     }
 
     fn clear(&mut self) {
-        self.heads = [NONE; BANDS];
+        self.heads = [NONE; SIGNED_BANDS];
         self.waiting.clear();
         self.free = NONE;
     }
@@ -144,6 +148,63 @@ pub(crate) fn for_nearest_triangle_pairs(
         }
     }
     margin
+}
+
+/// The band of a signed share: what is deepest comes first, what is farthest last.
+#[inline]
+fn signed_band_of(share: f32) -> usize {
+    let band = band_of(share.abs()).min(BANDS - 1);
+    if share < 0.0 {
+        BANDS - 1 - band
+    } else {
+        BANDS + band
+    }
+}
+
+/// The same by how far motions leave the pairs apart, deepest first: for pairs that some motion of `motions` may bring below `target`, m. Stops
+/// when `visit` returns false, and where there is no room.
+pub(crate) fn for_deepest_triangle_pairs(
+    trees: (&WideTree, &WideTree),
+    (volumes, margin): (&FacingVolumes, f64),
+    (motions, target): (&Motions, f32),
+    (bands, turned): (&mut Bands, &mut TurnedNodes),
+    work: &mut Work,
+    wanted: impl Fn(u8, u8) -> bool,
+    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+) {
+    let (body, obstacle) = trees;
+    let scale = (1.0 / margin) as f32;
+    let margin = margin as f32;
+    bands.clear();
+    let mut room = bands.push(0, (ROOT, ROOT));
+    let mut band = 0;
+    while band < SIGNED_BANDS {
+        let Some((a, b)) = bands.pop(band) else {
+            band += 1;
+            continue;
+        };
+        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+            work.triangle_pairs += 1;
+            if !visit(t, s, work) {
+                return;
+            }
+            continue;
+        }
+        work.node_pairs += 1;
+        open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
+            if wanted(body.owned(a), obstacle.owned(b)) {
+                let short = (margin + beyond).max(0.0) + motions.least_along(obstacle, b) - target;
+                let out_of_question = short > 0.0;
+                if !out_of_question {
+                    let own = signed_band_of(short * scale);
+                    room &= bands.push(own.clamp(band, SIGNED_BANDS - 1), (a, b));
+                }
+            }
+        });
+        if !room {
+            return;
+        }
+    }
 }
 
 #[cfg(test)]

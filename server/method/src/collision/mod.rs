@@ -5,6 +5,7 @@ mod agenda;
 mod bands;
 mod beyond;
 mod descent;
+mod displacements;
 mod distance;
 mod facing_volumes;
 mod gaps;
@@ -29,8 +30,9 @@ pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
-pub(crate) use bands::for_nearest_triangle_pairs;
+pub(crate) use bands::{for_deepest_triangle_pairs, for_nearest_triangle_pairs};
 pub(crate) use descent::for_facing_triangle_pairs;
+pub(crate) use displacements::{MAX_MOTIONS, Motions};
 pub(crate) use facing_volumes::FacingVolumes;
 pub(crate) use motion::{Placement, RelativeMotion};
 pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};

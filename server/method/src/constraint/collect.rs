@@ -6,11 +6,13 @@
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, FacingVolumes, MAX_HINTS, Placement, Work, for_facing_triangle_pairs,
-    for_nearest_triangle_pairs,
+    CollisionWorkspace, FacingVolumes, MAX_HINTS, MAX_MOTIONS, Motions, Placement, Work,
+    for_deepest_triangle_pairs, for_facing_triangle_pairs, for_nearest_triangle_pairs,
 };
 use crate::geometry::Mesh;
-use crate::spatial::Pose;
+use crate::spatial::{Pose, Vector6, angular, linear, six};
+use arrayvec::ArrayVec;
+use nalgebra::Point3;
 
 /// The bits of owned features that stand for corners; those of sides follow.
 const CORNERS: u8 = 7;
@@ -125,6 +127,75 @@ pub(crate) fn collect_bounded(
         looked_at,
         gap_min,
     }
+}
+
+/// What a search for violated pairs asks.
+pub(crate) struct Violated<'a> {
+    /// Motions of G, world axes, whose linear clearances count.
+    pub(crate) motions: &'a [Vector6],
+    /// G, world.
+    pub(crate) center: Point3<f64>,
+    /// Pairs that end up nearer than this are of interest, m.
+    pub(crate) target: f64,
+    /// No pair farther apart than this can, m.
+    pub(crate) reach: f64,
+    /// Most pairs of triangles and features to look at.
+    pub(crate) pairs: u64,
+}
+
+/// Calls `found` for contacts, world frame, among which are all that one of the motions would bring below the target: the deepest first, to a band, as
+/// many as the work allows.
+pub(crate) fn for_violated(
+    (body, body_pose): (&Mesh, &Pose),
+    (obstacle, obstacle_pose): (&Mesh, &Pose),
+    obstacle_index: u16,
+    asked: &Violated<'_>,
+    workspace: &mut CollisionWorkspace,
+    work: &mut Work,
+    mut found: impl FnMut(&Contact),
+) {
+    let placement = Placement::of(body_pose, obstacle_pose);
+    let trees = (body.wide_tree(), obstacle.wide_tree());
+    let volumes = FacingVolumes::still(
+        trees,
+        &placement,
+        asked.reach,
+        LOOK_AHEAD_TILT,
+        &mut workspace.turned,
+    );
+    let facing = Facing {
+        body,
+        obstacle,
+        placement: &placement,
+        obstacle_index,
+        activation_distance: asked.reach,
+        past_hollows: false,
+    };
+    let into = obstacle_pose.rotation.inverse();
+    let in_obstacle = asked
+        .motions
+        .iter()
+        .map(|motion| six(&(into * linear(motion)), &(into * angular(motion))))
+        .collect::<ArrayVec<_, MAX_MOTIONS>>();
+    let center = obstacle_pose.inverse_transform_point(&asked.center);
+    let motions = Motions::new(&in_obstacle, &center, trees.1, LOOK_AHEAD_TILT);
+    let mut looked_at = 0;
+    for_deepest_triangle_pairs(
+        trees,
+        (&volumes, asked.reach),
+        (&motions, asked.target as f32),
+        (&mut workspace.bands, &mut workspace.turned),
+        work,
+        can_touch,
+        |a, b, work| {
+            let before = work.feature_pairs;
+            for_contacts(&facing, &facing.pair(a, b), work, |contact| {
+                found(&in_world(&contact, obstacle_pose));
+            });
+            looked_at += 1 + work.feature_pairs - before;
+            looked_at < asked.pairs
+        },
+    );
 }
 
 /// Whether triangles that own these kinds of features, two or those below two volumes, own some that can meet: a corner of either

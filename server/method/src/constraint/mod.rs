@@ -12,10 +12,10 @@ mod separation;
 mod set;
 
 pub use collect::collect_contacts;
-pub(crate) use collect::{Nearest, collect_bounded, in_world};
+pub(crate) use collect::{Nearest, Violated, collect_bounded, for_violated, in_world};
 pub use contact::{Collected, Contact};
 pub use feature::{Feature, FeaturePair};
-pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction};
+pub(crate) use reduction::{At, MAX_ROWS, Place, Purpose, RowReduction, Surfaces};
 pub use separation::{MovedConstraint, Separation};
 pub use set::{ConstraintSet, NonPenetrationConstraint, contact_jacobian};
 

@@ -52,9 +52,8 @@ impl GodObject {
                 lands,
             };
             let collected = self.candidates_of(index, reduction, at, &asked, work);
-            let looked_at_this = walked + collected.looked_at;
-            looked_at += looked_at_this;
-            self.looked_at[index] = looked_at_this;
+            looked_at += collected.looked_at;
+            self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
             reduction.offer(at, &self.contacts, &collected);
             if !conforms && reduction.conforms(at, index) {

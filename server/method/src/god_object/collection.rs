@@ -3,11 +3,16 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
 use super::GodObject;
-use super::generation::Choosable;
+use super::obstacles::{Ahead, PlacedObstacle};
 use crate::collision::Work;
-use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint};
+use crate::constraint::{Contact, MAX_ROWS, NonPenetrationConstraint, Surfaces};
 use crate::shape;
+use crate::spatial::pose_difference;
+use crate::surface::ShadingNormals;
+use crate::world::World;
 
 /// Every row of some obstacles, as many as there is room for: the nearest, whichever obstacle they are of.
 #[derive(Debug)]
@@ -66,10 +71,6 @@ impl GodObject {
         self.collected_within = distance;
         self.note_places();
         self.collect_given(distance, work);
-        if self.given.truncated && self.choose_from_crowded() {
-            self.note_places();
-            self.collect_given(distance, work);
-        }
         if !self.refresh(distance, work) {
             self.write_given();
         }
@@ -84,38 +85,25 @@ impl GodObject {
         }
     }
 
-    /// From now on rows are chosen where there was no room for all; whether there is such an obstacle.
-    fn choose_from_crowded(&mut self) -> bool {
-        let crowded = |choosable: &&mut Choosable| **choosable == Choosable::IfCrowded;
-        let mut any = false;
-        for choosable in self.choosable.iter_mut().filter(crowded) {
-            *choosable = Choosable::Always;
-            any = true;
-        }
-        any
-    }
-
-    /// Takes the places of the obstacles over to the choice of rows, which rests where there is nothing to choose from.
+    /// Takes the places of the obstacles over to the choice of rows.
     fn note_places(&mut self) {
-        let choosable = self.choosable.iter().zip(&self.obstacles);
-        let now = choosable.map(|(choosable, placed)| placed.place(*choosable));
-        let chooses = now.clone().any(|place| place.chosen);
-        // An obstacle on its way is no matter of those that are chosen from.
-        let rearranged = self.places.iter().zip(now.clone()).any(|(before, now)| {
-            before.chosen != now.chosen || now.chosen && before.pose != now.pose
-        });
         // No copy is alive between two collections.
-        if let Some(places) = Arc::get_mut(&mut self.places) {
-            places
-                .iter_mut()
-                .zip(now)
-                .for_each(|(place, now)| *place = now);
-        }
-        if chooses != self.reduction.is_some() {
-            std::mem::swap(&mut self.reduction, &mut self.resting);
-        }
-        if rearranged && let Some(reduction) = &mut self.reduction {
-            reduction.rearrange(&self.places);
+        let Some(places) = Arc::get_mut(&mut self.places) else {
+            return;
+        };
+        for (index, (place, placed)) in places.iter_mut().zip(&self.obstacles).enumerate() {
+            if place.pose == placed.pose {
+                continue;
+            }
+            let path = placed.length(&pose_difference(
+                &placed.pose,
+                &place.pose,
+                &Vector3::zeros(),
+            ));
+            place.pose = placed.pose;
+            if let Some(reduction) = self.reduction.as_mut().filter(|_| place.chosen) {
+                reduction.note_moved(index, path);
+            }
         }
     }
 
@@ -163,20 +151,13 @@ impl GodObject {
         }
     }
 
+    /// What the scene adds to contacts, while obstacles are to be where they are, or `ahead` of that.
+    pub(super) fn surfaces<'a>(&'a self, ahead: Option<&'a Ahead>) -> SceneSurfaces<'a> {
+        SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, ahead)
+    }
+
     pub(super) fn row_of(&self, index: usize, contact: &Contact) -> NonPenetrationConstraint {
         let (obstacle, placed) = (&self.world.obstacles[index], &self.obstacles[index]);
-        let shading_normal = self.shading[index].as_ref().and_then(|normals| {
-            // Shading knows the obstacle where the world has it.
-            let turn = placed.turned_from(obstacle);
-            normals
-                .at(
-                    obstacle,
-                    contact.obstacle_triangle,
-                    &contact.barycentric,
-                    &(turn.inverse() * contact.normal),
-                )
-                .map(|normal| turn * normal)
-        });
         NonPenetrationConstraint {
             features: contact.features,
             point: contact.point_on_obstacle,
@@ -188,7 +169,7 @@ impl GodObject {
                 (obstacle, &placed.pose),
             ),
             came: placed.came(&contact.point_on_obstacle, &contact.normal),
-            shading_normal,
+            shading_normal: self.surfaces(None).shading_normal(contact),
         }
     }
 
@@ -205,5 +186,65 @@ impl GodObject {
             .constraints
             .sort_unstable_by_key(|row| row.features);
         self.warm_start.clear();
+    }
+}
+
+/// The shading and the motion of obstacles.
+pub(super) struct SceneSurfaces<'a> {
+    world: &'a World,
+    obstacles: &'a [PlacedObstacle],
+    shading: &'a [Option<ShadingNormals>],
+    ahead: Option<&'a Ahead>,
+}
+
+impl<'a> SceneSurfaces<'a> {
+    pub(super) fn new(
+        world: &'a World,
+        obstacles: &'a [PlacedObstacle],
+        shading: &'a [Option<ShadingNormals>],
+        ahead: Option<&'a Ahead>,
+    ) -> Self {
+        Self {
+            world,
+            obstacles,
+            shading,
+            ahead,
+        }
+    }
+}
+
+impl Surfaces for SceneSurfaces<'_> {
+    fn shade(&self) -> bool {
+        self.shading.iter().any(Option::is_some)
+    }
+
+    fn move_on(&self) -> bool {
+        let moves = |placed: &PlacedObstacle| placed.came_here() || placed.is_moving();
+        self.obstacles.iter().any(moves)
+    }
+
+    fn shading_normal(&self, contact: &Contact) -> Option<Vector3<f64>> {
+        let index = usize::from(contact.features.obstacle);
+        let normals = self.shading[index].as_ref()?;
+        let obstacle = &self.world.obstacles[index];
+        // Shading knows the obstacle where the world has it.
+        let turn = self.obstacles[index].turned_from(obstacle);
+        let normal = normals.at(
+            obstacle,
+            contact.obstacle_triangle,
+            &contact.barycentric,
+            &(turn.inverse() * contact.normal),
+        );
+        normal.map(|normal| turn * normal)
+    }
+
+    fn nearer(&self, contact: &Contact) -> f64 {
+        let placed = &self.obstacles[usize::from(contact.features.obstacle)];
+        let (point, normal) = (&contact.point_on_obstacle, &contact.normal);
+        match self.ahead {
+            Some(ahead) => placed.way_ahead(point, normal, ahead),
+            // By as much as it came it goes on until the next set.
+            None => placed.came(point, normal),
+        }
     }
 }

@@ -2,55 +2,42 @@
 
 use std::sync::Arc;
 
+use arrayvec::ArrayVec;
+
+use super::collection::SceneSurfaces;
 use super::obstacles::Ahead;
 use super::projection::Projected;
 use super::substep::Update;
 use super::{GodObject, StepReport};
-use crate::collision::Work;
-use crate::constraint::{At, Purpose, RowReduction};
+use crate::collision::{MAX_MOTIONS, Work};
+use crate::constraint::{At, Purpose, RowReduction, Surfaces, Violated, for_violated};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, six};
 use crate::surface::Friction;
-use crate::world::{Obstacle, World};
+use crate::world::World;
 
 /// Share of the distance within which every pair is known that a body may go before the next collection.
 const LONGER_WAY: f64 = 0.5;
 /// Share of the motion tolerance by which a row that was left out may be violated. By the whole of it, rows a millimetre apart would let a
 /// body be turned by tens of microradians, and a torque about the axis of a hole of millionths of the force be felt; a row more costs a microsecond.
 const ROW_TOLERANCE_SHARE: f64 = 1e-3;
+/// Motions of a published set whose answers are searched along: where the device is, and where it goes on to.
+const SEARCHED_MOTIONS: usize = 2;
 /// Most rows that are added one by one where friction or a moving obstacle leads.
 const MAX_ADDED: u32 = 24;
 
-/// Whether an obstacle's rows are chosen while it stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Choosable {
-    Never,
-    /// Where there is no room for all of them.
-    IfCrowded,
-    Always,
-}
-
 impl GodObject {
-    /// Of which obstacles rows can be chosen by their geometry: exact primitives have few, a shaded row is not the one that the surface has, one that
-    /// is re-linearised is needed elsewhere, and the paper's cone has every touching contact. Friction is shared by all that touch: its rows are chosen
-    /// where they are too many to be held.
-    pub(super) fn choosable(world: &World, settings: &Settings) -> Vec<Choosable> {
+    /// Of which obstacles rows are chosen: of meshes. Exact primitives have few; the paper's cone has every touching contact; and rows that are
+    /// re-linearised are needed elsewhere than where they are chosen.
+    pub(super) fn chosen(world: &World, settings: &Settings) -> Vec<bool> {
         let linear = settings.look_ahead && settings.implicit_rounds == 0;
         let meshes = linear && world.body.primitive.is_none();
-        let choosable = |o: &Obstacle| {
-            let of_surface = o.primitive.is_none() && o.surface.shading.is_none();
-            match (meshes && of_surface, o.surface.friction > 0.0) {
-                (false, _) => Choosable::Never,
-                (true, false) => Choosable::Always,
-                (true, true) => Choosable::IfCrowded,
-            }
-        };
-        world.obstacles.iter().map(choosable).collect()
+        let obstacles = world.obstacles.iter();
+        obstacles.map(|o| meshes && o.primitive.is_none()).collect()
     }
 
     pub(super) fn reduction_for(world: &World, settings: &Settings) -> Option<Box<RowReduction>> {
-        let choosable = Self::choosable(world, settings);
-        let any = choosable.iter().any(|c| *c != Choosable::Never);
+        let any = Self::chosen(world, settings).contains(&true);
         any.then(|| Box::new(RowReduction::with_capacity(settings.max_constraints, world)))
     }
 
@@ -67,7 +54,7 @@ impl GodObject {
             } else {
                 &[]
             };
-            reduction.move_to(&at, hints, work);
+            reduction.move_to((&at, &self.surfaces(None)), hints, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
@@ -83,12 +70,64 @@ impl GodObject {
 
     /// Finds the rows that the projection of `unconstrained` needs.
     pub(super) fn complete(&mut self, unconstrained: &Vector6, report: &mut StepReport) {
-        let motion = [(*unconstrained, Purpose::Motion)];
-        self.complete_for(&motion, &mut report.work);
+        let motion = [*unconstrained];
+        self.complete_for(&motion, Purpose::Motion, &mut report.work);
         if self.reduction.as_ref().is_some_and(|r| r.is_outdated()) {
             self.collect_again(&mut report.work);
-            self.complete_for(&motion, &mut report.work);
+            self.complete_for(&motion, Purpose::Motion, &mut report.work);
         }
+    }
+
+    /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a collection
+    /// there is given up before it has seen what a motion presses against. Whether there are any.
+    ///
+    /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so.
+    fn search(
+        &mut self,
+        reduction: &mut RowReduction,
+        at: &At,
+        answers: &[Vector6],
+        purpose: Purpose,
+        work: &mut Work,
+    ) -> bool {
+        let paths = answers.iter().map(|answer| self.motion_length(answer));
+        let path = paths.fold(0.0, f64::max);
+        let nearer = match purpose {
+            Purpose::ForceThen => self.longest_way(),
+            _ => 0.0,
+        };
+        let target = at.rest_distance + nearer;
+        let reach = (target + path).min(self.wanted.max(target)); // NaN is never reached
+        let beyond = reach > reduction.known_within(self.radius); // false for NaN
+        if !beyond || !reach.is_finite() {
+            return false;
+        }
+        let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
+        let mut any = false;
+        for index in 0..at.places.len() {
+            if !at.places[index].chosen || !reduction.conforms(at, index) {
+                continue;
+            }
+            let asked = Violated {
+                motions: answers,
+                center: at.center(),
+                target: target - at.tolerance,
+                reach,
+                pairs: self.settings.look_ahead_pairs * answers.len() as u64,
+            };
+            for_violated(
+                (&at.world.body.mesh, &at.pose),
+                at.obstacle(index),
+                u16::try_from(index).unwrap_or(u16::MAX),
+                &asked,
+                &mut self.collision,
+                work,
+                |contact| {
+                    any |= reduction.offer_violated((at, &surfaces), answers, purpose, contact);
+                },
+            );
+        }
+        any
     }
 
     /// The candidates of the present pose, within the distance of the last collection.
@@ -124,6 +163,8 @@ impl GodObject {
         self.reduction = Some(reduction);
         let reach =
             self.settings.activation_distance + update.all_moved.min(self.look_ahead_limit());
+        self.wanted =
+            self.settings.activation_distance + update.look_ahead.min(self.look_ahead_limit());
         self.choose(difference, reach, &mut report.work);
     }
 
@@ -132,10 +173,17 @@ impl GodObject {
         let Some(mut reduction) = self.reduction.take() else {
             return;
         };
-        let all = self.place().is_some_and(|at| reduction.take_all(&at));
+        let all = self.place().is_some_and(|at| {
+            let surfaces = self.surfaces(None);
+            reduction.set_surfaces(&at, &surfaces);
+            reduction.take_all((&at, &surfaces)) && !reduction.was_given_up()
+        });
         self.reduction = Some(reduction);
         if !all {
-            self.complete_for(&self.probes(difference, reach), work);
+            self.complete_for(&self.probes(difference, reach), Purpose::Force, work);
+            if self.surfaces(None).move_on() {
+                self.complete_for(&[*difference], Purpose::ForceThen, work);
+            }
         }
         if let Some(reduction) = &mut self.reduction {
             reduction.retire();
@@ -144,13 +192,16 @@ impl GodObject {
     }
 
     /// Where the device may be next: where it is, and as far as it reaches along and about each axis.
-    fn probes(&self, difference: &Vector6, reach: f64) -> [(Vector6, Purpose); 13] {
-        let mut probes = [(*difference, Purpose::Force); 13];
-        for (k, probe) in probes[1..].iter_mut().enumerate() {
+    fn probes(&self, difference: &Vector6, reach: f64) -> [Vector6; MAX_MOTIONS] {
+        // By the time of the next set the device has gone on as it came, or otherwise by as much.
+        let forecast = difference + self.device_step;
+        let mut probes = [forecast; MAX_MOTIONS];
+        probes[0] = *difference;
+        for (k, probe) in probes[2..].iter_mut().enumerate() {
             let size = if k % 2 == 0 { reach } else { -reach };
             let axis = nalgebra::Vector3::ith(k / 2 % 3, size);
             let zero = nalgebra::Vector3::zeros();
-            probe.0 += if k < 6 {
+            *probe += if k < 6 {
                 six(&axis, &zero)
             } else {
                 six(&zero, &(axis / self.radius))
@@ -159,17 +210,36 @@ impl GodObject {
         probes
     }
 
-    fn complete_for(&mut self, motions: &[(Vector6, Purpose)], work: &mut Work) {
+    /// Adds rows until the answer of every motion violates no candidate.
+    fn complete_for(&mut self, motions: &[Vector6], purpose: Purpose, work: &mut Work) {
         let Some(mut reduction) = self.reduction.take() else {
             return;
         };
         if let Some(at) = self.place() {
-            for (motion, purpose) in motions {
-                let _ = reduction.complete(&at, motion, *purpose, work);
+            let answers = self.answers(&mut reduction, &at, motions, purpose, work);
+            let searched = &answers[..answers.len().min(SEARCHED_MOTIONS)];
+            if purpose.is_felt() && self.search(&mut reduction, &at, searched, purpose, work) {
+                self.answers(&mut reduction, &at, motions, purpose, work);
             }
         }
         self.reduction = Some(reduction);
         self.write_set();
+    }
+
+    fn answers(
+        &self,
+        reduction: &mut RowReduction,
+        at: &At,
+        motions: &[Vector6],
+        purpose: Purpose,
+        work: &mut Work,
+    ) -> ArrayVec<Vector6, MAX_MOTIONS> {
+        let surfaces = self.surfaces(None);
+        let mut answer = |motion| {
+            let of = (at, &surfaces as &dyn Surfaces);
+            reduction.complete(of, motion, purpose, work).acceleration
+        };
+        motions.iter().map(&mut answer).collect()
     }
 
     /// Eq. (1) with the rows that its answer needs: friction, and what must be out of the way, lead elsewhere than the wish alone.
@@ -179,11 +249,19 @@ impl GodObject {
         ahead: Option<&Ahead>,
         report: &mut StepReport,
     ) -> Option<Projected> {
+        if let (Some(mut reduction), Some(at)) = (self.reduction.take(), self.place()) {
+            if ahead.is_some() {
+                reduction.set_surfaces(&at, &self.surfaces(ahead));
+            }
+            self.reduction = Some(reduction);
+        }
         let mut projected = self.project(unconstrained, ahead, report)?;
         let led_elsewhere = ahead.is_some() || self.friction.as_ref().is_some_and(Friction::acts);
         for _ in 0..MAX_ADDED {
-            let added =
-                led_elsewhere && self.add_violated(&projected.acceleration, &mut report.work);
+            // Rows that contradict each other do so with more of them, too.
+            let added = led_elsewhere
+                && projected.feasible
+                && self.add_violated(&projected.acceleration, ahead, &mut report.work);
             if !added {
                 break;
             }
@@ -192,11 +270,20 @@ impl GodObject {
         Some(projected)
     }
 
-    fn add_violated(&mut self, answer: &Vector6, work: &mut Work) -> bool {
-        let (Some(at), Some(reduction)) = (self.place(), &mut self.reduction) else {
+    fn add_violated(&mut self, answer: &Vector6, ahead: Option<&Ahead>, work: &mut Work) -> bool {
+        let Some(mut reduction) = self.reduction.take() else {
             return false;
         };
-        let added = reduction.add_violated(&at, answer, work);
+        let purpose = match ahead {
+            Some(ahead) if !ahead.eases => Purpose::Room,
+            Some(_) => Purpose::RoomEased,
+            None => Purpose::Motion,
+        };
+        let added = self.place().is_some_and(|at| {
+            let surfaces = self.surfaces(ahead);
+            reduction.add_violated((&at, &surfaces), answer, purpose, work)
+        });
+        self.reduction = Some(reduction);
         if added {
             self.write_set();
         }

@@ -13,10 +13,9 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::generation::Choosable;
 use super::{GodObject, StepReport};
 use crate::collision::TimeOfImpact;
-use crate::constraint::{NonPenetrationConstraint, Place};
+use crate::constraint::NonPenetrationConstraint;
 use crate::shape::{self, ObstacleWay, Primitive};
 use crate::spatial::{
     Pose, Vector6, advance_pose, angular, linear, pose_difference, pose_is_finite,
@@ -57,19 +56,11 @@ impl PlacedObstacle {
         }
     }
 
-    fn is_moving(&self) -> bool {
+    pub(super) fn is_moving(&self) -> bool {
         self.pose != self.target
     }
 
-    /// Where it is; rows are not chosen while it is on its way, and count on what the obstacle does.
-    pub(super) fn place(&self, choosable: Choosable) -> Place {
-        Place {
-            pose: self.pose,
-            chosen: choosable == Choosable::Always && !self.is_moving() && !self.came_here(),
-        }
-    }
-
-    fn came_here(&self) -> bool {
+    pub(super) fn came_here(&self) -> bool {
         self.pose != self.before
     }
 
@@ -88,7 +79,7 @@ impl PlacedObstacle {
     }
 
     /// Bound on the path of its fastest point over a displacement, m.
-    fn length(&self, displacement: &Vector6) -> f64 {
+    pub(super) fn length(&self, displacement: &Vector6) -> f64 {
         linear(displacement).norm() + self.radius * angular(displacement).norm()
     }
 
@@ -99,6 +90,20 @@ impl PlacedObstacle {
         }
         let before = self.before * self.pose.inverse_transform_point(point);
         normal.dot(&(point - before))
+    }
+
+    /// How far its point at `point` goes next along `normal`, as far as the body makes room for it, m.
+    pub(super) fn way_ahead(
+        &self,
+        point: &Point3<f64>,
+        normal: &Vector3<f64>,
+        ahead: &Ahead,
+    ) -> f64 {
+        if !self.is_moving() {
+            return 0.0;
+        }
+        let to_go = self.ahead(point, normal);
+        if ahead.follows { to_go } else { to_go.max(0.0) }
     }
 
     /// How far its point at `point` goes next along `normal`, m.
@@ -114,7 +119,7 @@ pub(super) struct Ahead {
     /// Whether the body may follow where an obstacle goes away: not before that has gone. A body in a hole that moves has no other room.
     follows: bool,
     /// Whether rows nearer than the rest distance are eased out at the same time.
-    eases: bool,
+    pub(super) eases: bool,
 }
 
 impl GodObject {
@@ -192,6 +197,14 @@ impl GodObject {
         for row in &mut self.set.constraints {
             row.came = 0.0;
         }
+    }
+
+    /// Bound on what the points of obstacles came in this update or are still to go, m.
+    pub(super) fn longest_way(&self) -> f64 {
+        let came =
+            |o: &PlacedObstacle| o.length(&pose_difference(&o.pose, &o.before, &Vector3::zeros()));
+        let moving = self.obstacles.iter().filter(|o| o.came_here());
+        moving.map(came).fold(self.longest_way_left(), f64::max)
     }
 
     fn longest_way_left(&self) -> f64 {
@@ -286,11 +299,7 @@ impl GodObject {
         } else {
             standing.min(0.0)
         };
-        let to_go = self
-            .obstacles
-            .get(usize::from(row.features.obstacle))
-            .filter(|obstacle| obstacle.is_moving())
-            .map_or(0.0, |obstacle| obstacle.ahead(&row.point, &row.normal));
-        standing + if ahead.follows { to_go } else { to_go.max(0.0) }
+        let obstacle = self.obstacles.get(usize::from(row.features.obstacle));
+        standing + obstacle.map_or(0.0, |o| o.way_ahead(&row.point, &row.normal, ahead))
     }
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::collection::GivenRows;
-use super::generation::Choosable;
 use super::obstacles::PlacedObstacle;
 use super::substep::{Going, Update};
 use super::{StartError, StepReport};
@@ -44,6 +43,10 @@ pub struct GodObject {
     /// What the last update's motions showed, for the next one: where the hand rests, updates go on from each other.
     pub(super) going: Going,
     pub(super) last_device: Option<Pose>,
+    /// Motion of the device since the update before, m and rad.
+    pub(super) device_step: Vector6,
+    /// How far the set that is published would look ahead if it cost nothing, m.
+    pub(super) wanted: f64,
     /// How much farther than its pose says the device may be, m: see [`GodObject::set_device_ahead`].
     pub(super) device_ahead: f64,
     /// An obstacle has stopped a motion since the rows were last taken to the body's pose: the pair that did is a row.
@@ -54,11 +57,8 @@ pub struct GodObject {
     pub(super) affordable: f64,
     /// Finds rows as they are needed; `None` where every pair is collected.
     pub(super) reduction: Option<Box<RowReduction>>,
-    /// Where each obstacle is, and whether its rows are chosen now.
+    /// Where each obstacle is, and whether its rows are chosen.
     pub(super) places: Arc<[Place]>,
-    pub(super) choosable: Vec<Choosable>,
-    /// What finds rows, while there is nothing to choose from.
-    pub(super) resting: Option<Box<RowReduction>>,
     /// Pairs that the last collection of each obstacle looked at.
     pub(super) looked_at: Vec<u64>,
     /// Rows of those obstacles that are not chosen from.
@@ -80,15 +80,13 @@ impl GodObject {
                 .map(PlacedObstacle::at_rest)
                 .collect(),
             reduction: Self::reduction_for(&world, &settings),
-            choosable: Self::choosable(&world, &settings),
-            resting: None,
             places: world
                 .obstacles
                 .iter()
-                .zip(Self::choosable(&world, &settings))
-                .map(|(obstacle, choosable)| Place {
+                .zip(Self::chosen(&world, &settings))
+                .map(|(obstacle, chosen)| Place {
                     pose: obstacle.pose,
-                    chosen: choosable == Choosable::Always,
+                    chosen,
                 })
                 .collect(),
             looked_at: vec![settings.look_ahead_pairs; world.obstacles.len()],
@@ -115,6 +113,8 @@ impl GodObject {
             trust_length: f64::INFINITY,
             going: Going::default(),
             last_device: None,
+            device_step: Vector6::zeros(),
+            wanted: settings.activation_distance,
             device_ahead: 0.0,
             stopped: false,
             collected_within: 0.0,
@@ -167,9 +167,9 @@ impl GodObject {
             _ => difference * self.settings.k_s,
         };
         let goal = advance_pose(&start, &unconstrained, 1.0);
-        let device_moved = self.last_device.replace(device).map_or(0.0, |last| {
-            self.motion_length(&pose_difference(&device, &last, &Vector3::zeros()))
-        }) + self.device_ahead;
+        let last = self.last_device.replace(device).unwrap_or(device);
+        self.device_step = pose_difference(&device, &last, &Vector3::zeros());
+        let device_moved = self.motion_length(&self.device_step) + self.device_ahead;
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
         let obstacles_moved = self.carry_obstacles(&mut report);

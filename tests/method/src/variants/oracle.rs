@@ -69,24 +69,28 @@ impl Oracle {
             point: c.point_on_obstacle,
             gap: c.gap,
         });
+        // Of the rows that were published some hold though their features face no more: they slid into a hollow.
+        let published = || {
+            let rows = god_object.constraint_set().constraints.iter();
+            rows.map(|c| Row {
+                normal: c.normal,
+                point: c.point,
+                gap: c.gap,
+            })
+        };
         let full = project(
             &mut self.projector,
             &mut self.rows,
-            every,
+            every.chain(published()),
             &metric,
             &wanted,
             &center,
             settings,
         );
-        let published = god_object.constraint_set().constraints.iter().map(|c| Row {
-            normal: c.normal,
-            point: c.point,
-            gap: c.gap,
-        });
         let chosen = project(
             &mut self.projector,
             &mut self.rows,
-            published,
+            published(),
             &metric,
             &wanted,
             &center,

@@ -6,9 +6,10 @@
 //! | g_k    | `gap`        | m      | `g + J d`, d the motion since: exact at the pose of collection      |
 //! | d      | `moved`      | m, rad | from the pose of collection to the present one                     |
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::super::Contact;
+use super::{Purpose, Surfaces, felt};
 use crate::spatial::{Pose, Vector6, pose_difference};
 
 /// The rows. Components lie apart, so that the compiler scans four rows at a time. No allocation after `with_capacity`.
@@ -16,6 +17,12 @@ use crate::spatial::{Pose, Vector6, pose_difference};
 pub(super) struct Candidates {
     pub(super) contacts: Vec<Contact>,
     jacobian: [Vec<f64>; 6],
+    /// The rows that the force has, where some differ: of shaded surfaces. Empty otherwise.
+    felt: [Vec<f64>; 6],
+    /// How much nearer than their gaps say the candidates count, m, where some do: obstacles move. Empty otherwise.
+    nearer: Vec<f64>,
+    shaded: bool,
+    moving: bool,
     /// Gaps at the present pose, m; infinite for a candidate that is out of the question there.
     pub(super) gap: Vec<f64>,
     clearance: Vec<f64>,
@@ -30,6 +37,10 @@ impl Candidates {
         Self {
             contacts: Vec::with_capacity(limit),
             jacobian: std::array::from_fn(|_| Vec::with_capacity(limit)),
+            felt: std::array::from_fn(|_| Vec::with_capacity(limit)),
+            nearer: Vec::with_capacity(limit),
+            shaded: false,
+            moving: false,
             gap: Vec::with_capacity(limit),
             clearance: Vec::with_capacity(limit),
             limit,
@@ -43,6 +54,8 @@ impl Candidates {
     pub(super) fn clear(&mut self, reference: &Pose) {
         self.contacts.clear();
         self.jacobian.iter_mut().for_each(Vec::clear);
+        self.felt.iter_mut().for_each(Vec::clear);
+        self.nearer.clear();
         self.gap.clear();
         self.collected_at = *reference;
         self.moved = Vector6::zeros();
@@ -61,6 +74,30 @@ impl Candidates {
         }
     }
 
+    /// Adds one that was found at the present pose: its gap is carried back to where the others were collected, so that it is true here.
+    pub(super) fn push_at(
+        &mut self,
+        contact: &Contact,
+        jacobian: &Vector6,
+        felt: &Vector6,
+        nearer: f64,
+    ) {
+        let shaded = self.shaded && self.felt[0].len() == self.gap.len();
+        let moving = self.moving && self.nearer.len() == self.gap.len();
+        self.push(contact, jacobian);
+        if let Some(stored) = self.contacts.last_mut() {
+            stored.gap -= jacobian.dot(&self.moved);
+        }
+        if shaded {
+            for (column, x) in self.felt.iter_mut().zip(felt.iter()) {
+                column.push(*x);
+            }
+        }
+        if moving {
+            self.nearer.push(nearer);
+        }
+    }
+
     /// Carries the gaps on to another pose of the reference point.
     pub(super) fn move_to(&mut self, reference: &Pose) {
         self.moved = pose_difference(reference, &self.collected_at, &Vector3::zeros());
@@ -69,12 +106,43 @@ impl Candidates {
         add_products(&mut self.gap, &self.jacobian, &self.moved);
     }
 
-    /// The candidate with the least `max(g, g_0) + J a`, and that.
-    pub(super) fn least_clearance(&mut self, a: &Vector6, least_gap: f64) -> Option<(usize, f64)> {
+    /// Takes over what the scene adds to each candidate.
+    pub(super) fn set_surfaces(&mut self, center: &Point3<f64>, surfaces: &dyn Surfaces) {
+        self.felt.iter_mut().for_each(Vec::clear);
+        self.nearer.clear();
+        (self.shaded, self.moving) = (surfaces.shade(), surfaces.move_on());
+        if self.shaded {
+            for contact in &self.contacts {
+                let row = felt(contact, surfaces, center);
+                for (column, x) in self.felt.iter_mut().zip(row.iter()) {
+                    column.push(*x);
+                }
+            }
+        }
+        if self.moving {
+            let nearer = self.contacts.iter().map(|c| surfaces.nearer(c));
+            self.nearer.extend(nearer);
+        }
+    }
+
+    /// The candidate with the least `max(g, g_0) + J a`, as the purpose sees it, and that.
+    pub(super) fn least_clearance(
+        &mut self,
+        a: &Vector6,
+        purpose: Purpose,
+        least_gap: f64,
+    ) -> Option<(usize, f64)> {
         self.clearance.clear();
         self.clearance
             .extend(self.gap.iter().map(|gap| gap.max(least_gap)));
-        add_products(&mut self.clearance, &self.jacobian, a);
+        let shaded = self.shaded && purpose.is_felt() && self.felt[0].len() == self.gap.len();
+        let rows = if shaded { &self.felt } else { &self.jacobian };
+        add_products(&mut self.clearance, rows, a);
+        if !matches!(purpose, Purpose::Motion | Purpose::Force) {
+            for (clearance, nearer) in self.clearance.iter_mut().zip(&self.nearer) {
+                *clearance -= nearer;
+            }
+        }
         let least = self.clearance.iter().copied().fold(f64::INFINITY, f64::min);
         let place = self.clearance.iter().position(|c| *c == least)?;
         Some((place, least))

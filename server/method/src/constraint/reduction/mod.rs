@@ -27,7 +27,7 @@ mod neighbours;
 use std::sync::Arc;
 
 use arrayvec::ArrayVec;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::collect::{for_contacts, in_world};
 use super::facing::Facing;
@@ -64,6 +64,10 @@ const IDLE_UPDATES_IMPLIED: u32 = 1;
 struct Known {
     contact: Contact,
     jacobian: Vector6,
+    /// The Jacobian that the force has: along the shading normal where the surface is shaded.
+    felt: Vector6,
+    /// How much nearer than its gap says the pair counts, m: its obstacle moves.
+    nearer: f64,
     idle: u32,
     /// Its pair faces no more: it slid into a hollow, where the row is implied by those that are there.
     implied: bool,
@@ -83,7 +87,7 @@ const ALONG_PER_PLACE: usize = 2;
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const HOPED_WITHIN: f64 = 2.0;
 
-/// Where an obstacle is, and whether its rows are chosen: of the others every pair is a row, given from outside.
+/// Where an obstacle is, and whether its rows are chosen: of exact primitives, which have few, every pair is a row, given from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     /// World from obstacle.
@@ -108,7 +112,7 @@ pub(crate) struct At {
 
 impl At {
     /// G, world.
-    fn center(&self) -> Point3<f64> {
+    pub(crate) fn center(&self) -> Point3<f64> {
         Point3::from(self.reference.translation.vector)
     }
 
@@ -118,11 +122,43 @@ impl At {
     }
 }
 
-/// Rows of the god-object loop ease a body out that is nearer than the rest distance, those of the coupling do not.
+/// Rows of the god-object loop ease a body out that is nearer than the rest distance, those of the coupling do not, and have shading normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     Motion,
     Force,
+    /// The force when the next set is due: what moves has gone on as far as it came.
+    ForceThen,
+    /// The god-object makes room for what moves: with and without easing out.
+    RoomEased,
+    Room,
+}
+
+impl Purpose {
+    /// Whether rows have shading normals.
+    pub(crate) fn is_felt(self) -> bool {
+        matches!(self, Self::Force | Self::ForceThen)
+    }
+
+    /// The least gap that a row counts as, m.
+    fn least_gap(self, at: &At) -> f64 {
+        match self {
+            Self::Motion | Self::RoomEased => 0.0,
+            Self::Force | Self::ForceThen | Self::Room => at.rest_distance,
+        }
+    }
+}
+
+/// What the scene adds to a contact.
+pub(crate) trait Surfaces {
+    /// Whether some surface is shaded.
+    fn shade(&self) -> bool;
+    /// Whether some obstacle moves.
+    fn move_on(&self) -> bool;
+    /// Its shading normal, world, where its obstacle is shaded.
+    fn shading_normal(&self, contact: &Contact) -> Option<Vector3<f64>>;
+    /// How far its obstacle's point comes nearer while the rows are in use, m.
+    fn nearer(&self, contact: &Contact) -> f64;
 }
 
 /// Finds rows as motions need them.
@@ -145,6 +181,8 @@ pub(crate) struct RowReduction {
     hoped: Vec<f64>,
     /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
     outdated: bool,
+    /// How far the points of each obstacle may have gone since the candidates were collected, m.
+    gone: Vec<f64>,
 }
 
 impl RowReduction {
@@ -164,6 +202,7 @@ impl RowReduction {
             asked: 0.0,
             hoped: vec![f64::INFINITY; world.obstacles.len()],
             outdated: false,
+            gone: vec![0.0; world.obstacles.len()],
         }
     }
 
@@ -185,7 +224,12 @@ impl RowReduction {
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
     /// `hints` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
-    pub(crate) fn move_to(&mut self, at: &At, hints: &[(u32, u32)], work: &mut Work) {
+    pub(crate) fn move_to(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        hints: &[(u32, u32)],
+        work: &mut Work,
+    ) {
         self.error = 0.0;
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let outdated = &mut self.outdated;
@@ -202,23 +246,37 @@ impl RowReduction {
             if let Some(contact) = contact {
                 row.contact = contact;
                 row.jacobian = jacobian(&contact, &at.center());
+                row.felt = felt(&contact, surfaces, &at.center());
+                row.nearer = surfaces.nearer(&contact);
             }
             contact.is_some()
         });
         for pair in &left {
-            self.follow(at, pair, work);
+            self.follow((at, surfaces), pair, work);
         }
         self.candidates.move_to(&at.reference);
         for &hint in hints.iter().take(HINTS_TAKEN) {
-            self.take_hint(at, hint, work);
+            self.take_hint((at, surfaces), hint, work);
         }
     }
 
-    /// Obstacles have moved, or their rows are chosen from now on, or no more: what is not chosen from is let go, the rest looked for anew.
-    pub(crate) fn rearrange(&mut self, places: &[Place]) {
-        self.known
-            .retain(|row| places[usize::from(row.contact.features.obstacle)].chosen);
-        self.outdated = true;
+    /// An obstacle has moved, its fastest point by at most `path`, m. Candidates of it are collected anew; of one that has none it is enough to know
+    /// how far it may have come.
+    pub(crate) fn note_moved(&mut self, obstacle: usize, path: f64) {
+        self.gone[obstacle] += path;
+        let known = self.known.iter().map(|row| &row.contact);
+        let mut all = known.chain(&self.candidates.contacts);
+        self.outdated |= all.any(|c| usize::from(c.features.obstacle) == obstacle);
+    }
+
+    /// Takes over what the scene adds to each contact, for the motions that are asked for next.
+    pub(crate) fn set_surfaces(&mut self, at: &At, surfaces: &dyn Surfaces) {
+        let center = at.center();
+        for row in &mut self.known {
+            row.felt = felt(&row.contact, surfaces, &center);
+            row.nearer = surfaces.nearer(&row.contact);
+        }
+        self.candidates.set_surfaces(&center, surfaces);
     }
 
     /// Rows of the present pose that hold beside those that are chosen.
@@ -232,9 +290,16 @@ impl RowReduction {
     }
 
     /// Adds the candidate that an answer which was found elsewhere violates most, if by more than the tolerance; whether there is one.
-    pub(crate) fn add_violated(&mut self, at: &At, answer: &Vector6, work: &mut Work) -> bool {
+    pub(crate) fn add_violated(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        answer: &Vector6,
+        purpose: Purpose,
+        work: &mut Work,
+    ) -> bool {
         let before = self.known.len();
-        self.add_most_violated(at, answer, 0.0, work) > at.tolerance && self.known.len() > before
+        let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
+        violation > at.tolerance && self.known.len() > before
     }
 
     /// Whether a pair that mattered has left the features that it was of, so that the candidates are to be collected anew.
@@ -242,10 +307,11 @@ impl RowReduction {
         self.outdated
     }
 
-    /// How far the body may have gone since the candidates were collected, m: `radius` bounds its points' arms about G.
+    /// How far the body and the obstacles may have gone since the candidates were collected, m: `radius` bounds the arms of the body's points about G.
     pub(crate) fn moved(&self, radius: f64) -> f64 {
         let moved = &self.candidates.moved;
-        linear(moved).norm() + radius * angular(moved).norm()
+        let gone = self.gone.iter().copied().fold(0.0, f64::max);
+        linear(moved).norm() + radius * angular(moved).norm() + gone
     }
 
     /// Distance within which every pair was a candidate when they were collected, m.
@@ -287,6 +353,7 @@ impl RowReduction {
         self.asked = asked;
         self.truncated = false;
         self.outdated = false;
+        self.gone.fill(0.0);
         self.candidates.clear(&at.reference);
         self.overlay.begin();
     }
@@ -328,6 +395,33 @@ impl RowReduction {
         self.candidates.complete_within = self.candidates.complete_within.min(within);
     }
 
+    /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does.
+    pub(crate) fn offer_violated(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        motions: &[Vector6],
+        purpose: Purpose,
+        contact: &Contact,
+    ) -> bool {
+        let row = Known::of(contact, surfaces, &at.center());
+        let (jacobian, nearer) = row.for_purpose(purpose);
+        let gap = contact.gap.max(purpose.least_gap(at)) - nearer;
+        let violated = |motion: &Vector6| {
+            let violation = at.rest_distance - gap - jacobian.dot(motion);
+            violation > at.tolerance // false for NaN
+        };
+        if !motions.iter().any(violated) || self.knows(&contact.features) {
+            return false;
+        }
+        if self.candidates.room() == 0 {
+            self.truncated = true;
+            return false;
+        }
+        self.candidates
+            .push_at(contact, &row.jacobian, &row.felt, nearer);
+        true
+    }
+
     /// Whether the trees did not find every pair of an obstacle that a walk along the surfaces would, the last time.
     pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
         let along = ALONG_REST_DISTANCES * at.rest_distance;
@@ -360,25 +454,30 @@ impl RowReduction {
     /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
     pub(crate) fn complete(
         &mut self,
-        at: &At,
+        (at, surfaces): (&At, &dyn Surfaces),
         unconstrained: &Vector6,
         purpose: Purpose,
         work: &mut Work,
     ) -> Projection {
-        let least_gap = match purpose {
-            Purpose::Motion => 0.0,
-            Purpose::Force => at.rest_distance,
-        };
+        let least_gap = purpose.least_gap(at);
         self.warm_start.clear();
         let mut rounds = 0;
         loop {
             self.rows.clear();
-            let known = self.known.iter().map(|row| (row.jacobian, row.contact.gap));
-            let all = known.chain(self.given.iter().copied());
-            self.rows.extend(all.map(|(jacobian, gap)| HalfSpace {
-                jacobian,
-                bound: at.rest_distance - gap.max(least_gap),
-            }));
+            let known = self.known.iter().map(|row| {
+                let (jacobian, nearer) = row.for_purpose(purpose);
+                (jacobian, row.contact.gap, nearer)
+            });
+            let given = self
+                .given
+                .iter()
+                .map(|(jacobian, gap)| (*jacobian, *gap, 0.0));
+            let all = known.chain(given);
+            self.rows
+                .extend(all.map(|(jacobian, gap, nearer)| HalfSpace {
+                    jacobian,
+                    bound: at.rest_distance - gap.max(least_gap) + nearer,
+                }));
             work.projections += 1;
             let projection =
                 self.projector
@@ -392,12 +491,13 @@ impl RowReduction {
                 }
             }
             rounds += 1;
-            let violation = self.add_most_violated(at, &projection.acceleration, least_gap, work);
+            let answer = &projection.acceleration;
+            let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
             let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
             if finished || !violation.is_finite() {
                 let turns_a_corner = purpose == Purpose::Motion
                     && rounds < MAX_ROUNDS
-                    && self.add_neighbours(at, &projection, work);
+                    && self.add_neighbours((at, surfaces), &projection, work);
                 if turns_a_corner {
                     continue;
                 }
@@ -408,7 +508,12 @@ impl RowReduction {
     }
 
     /// Adds the pairs that those of active rows turn into, where the motion violates them by more than the tolerance; whether there are any.
-    fn add_neighbours(&mut self, at: &At, projection: &Projection, work: &mut Work) -> bool {
+    fn add_neighbours(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        projection: &Projection,
+        work: &mut Work,
+    ) -> bool {
         let before = self.known.len();
         for row in &projection.active {
             let Some(row) = self.known.get(row.row as usize) else {
@@ -432,7 +537,7 @@ impl RowReduction {
                     let violation =
                         at.rest_distance - contact.gap - row.dot(&projection.acceleration);
                     if violation > at.tolerance {
-                        self.add(at, &contact);
+                        self.add((at, surfaces), &contact);
                         if let Some(row) = self.known.last_mut() {
                             // It does not face yet.
                             row.implied = true;
@@ -445,7 +550,12 @@ impl RowReduction {
     }
 
     /// Adds the pairs that one turned into which has slid off its features.
-    fn follow(&mut self, at: &At, pair: &FeaturePair, work: &mut Work) {
+    fn follow(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        pair: &FeaturePair,
+        work: &mut Work,
+    ) {
         let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
         let near = NEAR_REST_DISTANCES * at.rest_distance;
         let body = &at.world.body.mesh;
@@ -456,7 +566,7 @@ impl RowReduction {
             if let Some(contact) = face(at, &features, false, work)
                 && contact.gap <= near
             {
-                self.add(at, &contact);
+                self.add((at, surfaces), &contact);
             }
         });
     }
@@ -470,13 +580,15 @@ impl RowReduction {
     /// Adds the candidate that `motion` violates most, if by more than the tolerance; by how much it is violated, m.
     fn add_most_violated(
         &mut self,
-        at: &At,
+        (at, surfaces): (&At, &dyn Surfaces),
         motion: &Vector6,
-        least_gap: f64,
+        purpose: Purpose,
         work: &mut Work,
     ) -> f64 {
+        let least_gap = purpose.least_gap(at);
         for _ in 0..MAX_STALE {
-            let Some((k, clearance)) = self.candidates.least_clearance(motion, least_gap) else {
+            let least = self.candidates.least_clearance(motion, purpose, least_gap);
+            let Some((k, clearance)) = least else {
                 return 0.0;
             };
             let violation = at.rest_distance - clearance;
@@ -496,10 +608,12 @@ impl RowReduction {
             };
             self.outdated |= contact.is_none();
             if let Some(contact) = contact {
-                let row = jacobian(&contact, &at.center());
-                let violation = at.rest_distance - contact.gap.max(least_gap) - row.dot(motion);
+                let row = Known::of(&contact, surfaces, &at.center());
+                let (jacobian, nearer) = row.for_purpose(purpose);
+                let gap = contact.gap.max(least_gap) - nearer;
+                let violation = at.rest_distance - gap - jacobian.dot(motion);
                 if violation > at.tolerance {
-                    self.add(at, &contact);
+                    self.add((at, surfaces), &contact);
                     return violation;
                 }
             }
@@ -508,7 +622,7 @@ impl RowReduction {
     }
 
     /// Makes every candidate a row where they are few; false where they are many. At the pose where they were collected.
-    pub(crate) fn take_all(&mut self, at: &At) -> bool {
+    pub(crate) fn take_all(&mut self, (at, surfaces): (&At, &dyn Surfaces)) -> bool {
         if self.candidates.contacts.len() > FEW {
             return false;
         }
@@ -520,7 +634,7 @@ impl RowReduction {
                 .find(|row| row.contact.features == contact.features)
             {
                 Some(row) => row.idle = 0,
-                None => self.add(at, &contact),
+                None => self.add((at, surfaces), &contact),
             }
         }
         true
@@ -539,7 +653,7 @@ impl RowReduction {
         });
     }
 
-    fn add(&mut self, at: &At, contact: &Contact) {
+    fn add(&mut self, (at, surfaces): (&At, &dyn Surfaces), contact: &Contact) {
         if self.known.len() == MAX_ROWS {
             let most_idle = (0..MAX_ROWS)
                 .max_by_key(|k| self.known[*k].idle)
@@ -547,16 +661,16 @@ impl RowReduction {
             self.known.swap_remove(most_idle);
             self.truncated = true;
         }
-        self.known.push(Known {
-            contact: *contact,
-            jacobian: jacobian(contact, &at.center()),
-            idle: 0,
-            implied: false,
-        });
+        self.known.push(Known::of(contact, surfaces, &at.center()));
     }
 
     /// Adds what faces between two triangles that stopped a motion.
-    fn take_hint(&mut self, at: &At, (a, b): (u32, u32), work: &mut Work) {
+    fn take_hint(
+        &mut self,
+        (at, surfaces): (&At, &dyn Surfaces),
+        (a, b): (u32, u32),
+        work: &mut Work,
+    ) {
         // A hint does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
         for index in 0..at.places.len() {
             let (mesh, pose) = at.obstacle(index);
@@ -580,7 +694,7 @@ impl RowReduction {
                 for b in owners(mesh, b) {
                     for_contacts(&facing, &facing.pair(a, b), work, |contact| {
                         if !self.knows(&contact.features) {
-                            self.add(at, &in_world(&contact, pose));
+                            self.add((at, surfaces), &in_world(&contact, pose));
                         }
                     });
                 }
@@ -624,4 +738,33 @@ fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) ->
 
 fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {
     contact_jacobian(&contact.normal, &contact.point_on_obstacle, center)
+}
+
+/// The row that the force has.
+fn felt(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Vector6 {
+    let normal = surfaces.shading_normal(contact).unwrap_or(contact.normal);
+    contact_jacobian(&normal, &contact.point_on_obstacle, center)
+}
+
+impl Known {
+    fn of(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Self {
+        Self {
+            contact: *contact,
+            jacobian: jacobian(contact, center),
+            felt: felt(contact, surfaces, center),
+            nearer: surfaces.nearer(contact),
+            idle: 0,
+            implied: false,
+        }
+    }
+
+    /// The Jacobian, and how much nearer the pair counts, m.
+    fn for_purpose(&self, purpose: Purpose) -> (Vector6, f64) {
+        match purpose {
+            Purpose::Motion => (self.jacobian, 0.0),
+            Purpose::Force => (self.felt, 0.0),
+            Purpose::Room | Purpose::RoomEased => (self.jacobian, self.nearer),
+            Purpose::ForceThen => (self.felt, self.nearer),
+        }
+    }
 }
