@@ -2,6 +2,8 @@
 
 mod anchor;
 mod cone;
+#[cfg(test)]
+mod cone_tests;
 mod contact;
 mod hold;
 mod newton;
