@@ -7,7 +7,7 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
-//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round, where they converge.
 //!
 //! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides comes with it or is prepared
 //! once when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
@@ -259,13 +259,19 @@ impl Coupling {
             )
         };
         if let Some(answer) = implicit {
-            let change = answer.projection.acceleration - answer.unconstrained;
-            held = answer.metric.mass_matrix_times(&change);
-            // What follows counts from x_s.
-            let nearest = angular(&projection.acceleration) / self.settings.k_s;
-            let moved = pose_difference(&answer.reached, &self.present.god_object, &nearest);
-            projection = answer.projection;
-            projection.acceleration = moved * self.settings.k_s;
+            // Rounds that do not converge give way to the linear rows, without a step between.
+            let trust = answer.trust();
+            if trust > 0.0 {
+                let change = answer.projection.acceleration - answer.unconstrained;
+                let force = answer.metric.mass_matrix_times(&change);
+                held += (force - held) * trust;
+                // What follows counts from x_s.
+                let linear = projection.acceleration;
+                let nearest = angular(&linear) / self.settings.k_s;
+                let moved = pose_difference(&answer.reached, &self.present.god_object, &nearest);
+                projection = answer.projection;
+                projection.acceleration = linear + (moved * self.settings.k_s - linear) * trust;
+            }
         }
         self.correction = projection.acceleration - unconstrained;
         if let Some(damped) = damped {
