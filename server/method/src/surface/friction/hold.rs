@@ -19,7 +19,7 @@ use crate::spatial::{Vector6, linear};
 use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
-const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
+pub(crate) const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
 /// Friction may bring other contacts to touch: so often the cone problem is set up again with them.
 const MAX_ROUNDS: usize = 3;
 /// Where the projection differs by less than this share of the scale from the cone problem, other rows that hold the body are no other contacts: of

@@ -9,4 +9,5 @@ mod hold;
 mod newton;
 
 pub(crate) use anchor::StickAnchor;
+pub(crate) use hold::TOUCHING_MOTION_TOLERANCES;
 pub use hold::{Friction, FrictionProblem};
