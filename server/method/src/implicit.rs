@@ -24,6 +24,9 @@ use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Proj
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference};
 
+/// Rounds whose lengths shrink by less come to nothing; up to this they do in the cases with a closed form, and from 1 they move away.
+const CONVERGING: f64 = 0.85;
+
 /// The rounds after the first projection, and their memory.
 #[derive(Clone, Debug)]
 pub(crate) struct ImplicitRounds {
@@ -67,6 +70,13 @@ pub(crate) struct ImplicitAnswer {
     pub(crate) rounds: u32,
     /// Largest length of a round's motion, as a share of that of the one before; the linear answer is the first.
     pub(crate) contraction: f64,
+}
+
+impl ImplicitAnswer {
+    /// How far the rounds may be trusted, in [0, 1]: 0 where some round was as long as the one before, so that they may end anywhere.
+    pub(crate) fn trust(&self) -> f64 {
+        ((1.0 - self.contraction) / (1.0 - CONVERGING)).clamp(0.0, 1.0)
+    }
 }
 
 impl ImplicitRounds {

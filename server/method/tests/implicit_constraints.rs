@@ -293,3 +293,41 @@ fn a_body_that_pivots_needs_fewer_sub_steps() {
     println!("sub-steps for 0 to 2 rounds: {substeps:?}");
     assert!(substeps[1] * 4 < substeps[0] * 3, "{substeps:?}");
 }
+
+/// Far round, each round of the three is longer than the one before: they end anywhere, and the force must then not be theirs.
+#[test]
+fn on_a_long_bar_that_is_swept_far_rounds_that_do_not_converge_give_way_to_the_linear_rows() {
+    let gyration = 0.05;
+    let half = Vector3::new(0.1, 0.005, 0.005);
+    let world = Arc::new(World {
+        body: box_body(half),
+        ..World::clone(&box_on_table())
+    });
+    let settings = |rounds: u32| Settings {
+        rotation_metric: RotationMetric::RadiusOfGyration(gyration),
+        ..settings(rounds)
+    };
+    let tilt = UnitQuaternion::from_scaled_axis(Vector3::y() * 0.3);
+    let low = tilt.to_rotation_matrix().matrix().row(2).map(f64::abs);
+    let up = low.transpose().dot(&half) + settings(0).rest_distance;
+    let start = Pose::from_parts(Vector3::new(0.0, 0.0, up).into(), tilt);
+    let size = |w: &Vector6| linear(w).norm() + angular(w).norm() / gyration;
+    let mut last: Option<Vector6> = None;
+    for k in 0..=500 {
+        let turn = 0.005 * f64::from(k);
+        let device = Pose::from_parts(
+            Vector3::new(0.0, 0.0, up - DEPTH).into(),
+            UnitQuaternion::from_scaled_axis(Vector3::y() * turn) * tilt,
+        );
+        let [linear, rounds] = [0, 3].map(|rounds| felt(&world, settings(rounds), &start, &device));
+        if let Some(last) = last {
+            let step = size(&(rounds - last)) / size(&linear);
+            assert!(step < 0.1, "a step of {step} at {turn} rad");
+        }
+        last = Some(rounds).filter(|_| turn > 0.2);
+        if turn > 2.3 {
+            let apart = size(&(rounds - linear)) / size(&linear);
+            assert!(apart < 1e-12, "{apart} from the linear rows at {turn} rad");
+        }
+    }
+}

@@ -192,6 +192,58 @@ fn plate() -> Obstacle {
     box_obstacle("plate", Vector3::new(0.3, 0.05, 0.01), Vector3::zeros())
 }
 
+/// Wrenches on a box that is pressed flat on a textured table and slides; vertex k of the box has number `numbers[k]`, and its triangles are turned
+/// round as many places as the first number says.
+fn felt_by_box(numbers: [u32; 8]) -> Vec<Vector6> {
+    let mut world = World::clone(&box_on_table());
+    world.obstacles[0].surface.texture = Some(Texture::Sine(SineTexture {
+        axis: Vector3::new(0.8, 0.6, 0.0),
+        wavelength: 10e-3,
+        amplitude: 0.2,
+    }));
+    let plain = &world.body.mesh;
+    let mut vertices = vec![Point3::origin(); 8];
+    for (vertex, number) in plain.vertices().iter().zip(numbers) {
+        vertices[number as usize] = *vertex;
+    }
+    let renamed = |t: &[u32; 3]| t.map(|v| numbers[v as usize]);
+    let mut triangles: Vec<[u32; 3]> = plain.triangles().iter().map(renamed).collect();
+    triangles.rotate_left(numbers[0] as usize);
+    world.body.mesh = god_object::Mesh::new(vertices, triangles).expect("the same box");
+    let world = Arc::new(world);
+    let settings = Settings::for_size(0.04);
+    let at = |x: f64, z: f64| Pose::translation(x, 0.2 * x, z);
+    let mut coupling = Coupling::new(&world, &settings);
+    let mut god_object = GodObject::new(world, settings, at(0.0, 0.011)).expect("free");
+    let step = |i: u32| {
+        let t = 1e-3 * f64::from(i);
+        let device = at(0.03 * t, (0.011 - 0.05 * t).max(0.007));
+        god_object.step(&device, None);
+        coupling
+            .step(t, &device, god_object.constraint_set())
+            .wrench
+    };
+    (0..300).map(step).collect()
+}
+
+#[test]
+fn renumbering_vertices_leaves_the_felt_texture_as_it_was() {
+    let plain = felt_by_box([0, 1, 2, 3, 4, 5, 6, 7]);
+    let tilted = plain.iter().filter(|w| w[0].abs() > 0.05).count();
+    assert!(tilted > 50, "the texture is felt {tilted} times");
+    for numbers in [
+        [7, 6, 5, 4, 3, 2, 1, 0],
+        [3, 0, 2, 1, 5, 7, 4, 6],
+        [2, 5, 7, 1, 0, 3, 6, 4],
+        [1, 3, 0, 2, 6, 4, 7, 5],
+    ] {
+        for (i, (felt, same)) in felt_by_box(numbers).iter().zip(&plain).enumerate() {
+            let apart = (felt - same).norm();
+            assert!(apart < 1e-6, "{numbers:?}, step {i}: {felt} and {same}");
+        }
+    }
+}
+
 /// Sideways force per ms of a tip that slides at `speed` on `texture`, the god-object updated every `period` ms.
 fn slide(texture: Texture, speed: f64, period: usize) -> Vec<f64> {
     let mut plate = plate();

@@ -7,7 +7,7 @@
 //! | b_k    | `bound`           | m      | `-k_s h_k`: force starts where the device crosses the surface |
 //! | F_c    | `wrench`          | N, N m | `k_h M (a_c - a_u)`, at the reference point                 |
 //!
-//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round.
+//! With [`Settings::implicit_rounds`] the rows are re-linearised at a_c and projected again; the force is that of the last round, where they converge.
 //!
 //! No collision detection, no allocation, bounded work: the god-object stands still meanwhile. What the set decides comes with it or is prepared
 //! once when it arrives; for each device sample there remain a difference of poses, the rows on their way in, the projection and the wrench.
@@ -17,7 +17,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{Arrival, CouplingOutput};
 use crate::adaptation::AdaptationState;
-use crate::constraint::ConstraintSet;
+use crate::constraint::{ConstraintSet, Feature};
 use crate::damping::ContactDamping;
 use crate::implicit::{ImplicitRounds, LinearAnswer};
 use crate::known_rows::KnownRows;
@@ -31,7 +31,8 @@ use crate::spatial::{
     Pose, Vector6, angular, at_reference_point, linear, pose_difference, pose_is_finite, six,
 };
 use crate::surface::{
-    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor, Textures,
+    EnergyObserver, Friction, FrictionProblem, ShadedAcceleration, StickAnchor,
+    TOUCHING_MOTION_TOLERANCES, Textures,
 };
 use crate::turn_memory::TurnMemory;
 use crate::world::World;
@@ -258,34 +259,34 @@ impl Coupling {
                 |pose| self.basis.metric(pose),
             )
         };
+        let mut reached = None;
         if let Some(answer) = implicit {
-            let change = answer.projection.acceleration - answer.unconstrained;
-            held = answer.metric.mass_matrix_times(&change);
-            // What follows counts from x_s.
-            let nearest = angular(&projection.acceleration) / self.settings.k_s;
-            let moved = pose_difference(&answer.reached, &self.present.god_object, &nearest);
-            projection = answer.projection;
-            projection.acceleration = moved * self.settings.k_s;
+            // Rounds that do not converge give way to the linear rows, without a step between.
+            let trust = answer.trust();
+            if trust > 0.0 {
+                let change = answer.projection.acceleration - answer.unconstrained;
+                let force = answer.metric.mass_matrix_times(&change);
+                held += (force - held) * trust;
+                // What follows counts from x_s.
+                let linear = projection.acceleration;
+                let nearest = angular(&linear) / self.settings.k_s;
+                let moved = pose_difference(&answer.reached, &self.present.god_object, &nearest);
+                projection = answer.projection;
+                projection.acceleration = linear + (moved * self.settings.k_s - linear) * trust;
+                reached = Some(answer.reached);
+            }
         }
         self.correction = projection.acceleration - unconstrained;
         if let Some(damped) = damped {
             held += damped;
         }
         let mut wrench = held * self.settings.k_h;
-        if let Some(textures) = &mut self.textures {
+        if let Some(mut textures) = self.textures.take() {
             let felt_at = projection.acceleration / self.settings.k_s;
-            let active = projection.active.iter();
-            let touched = active.filter_map(|row| {
-                let contact = set.constraints.get(row.row as usize)?;
-                let features = &contact.features;
-                Some((
-                    features.obstacle,
-                    features.on_obstacle,
-                    contact.point,
-                    contact.normal,
-                ))
-            });
-            wrench = textures.tilt(&wrench, &self.present.god_object, &felt_at, moved, touched);
+            let touched = self.touched(set, &projection, reached.as_ref());
+            let god_object = &self.present.god_object;
+            wrench = textures.tilt(&wrench, god_object, &felt_at, moved, touched);
+            self.textures = Some(textures);
         }
         let unlimited = linear(&wrench).norm();
         let (mut wrench, mut saturated) = self.limited(&wrench);
@@ -326,6 +327,45 @@ impl Coupling {
             status: projection.status,
             saturated,
         }
+    }
+
+    /// Obstacle, its feature, point and normal of every contact that touches in the answer: whichever of them were found to hold the body. Where rounds
+    /// of implicit constraints have `reached` a pose, the gaps are those there.
+    fn touched<'a>(
+        &'a self,
+        set: &'a ConstraintSet,
+        answer: &'a Projection,
+        reached: Option<&'a Pose>,
+    ) -> impl Iterator<Item = (u16, Feature, Point3<f64>, Vector3<f64>)> + 'a {
+        let nothing_held = answer.active.is_empty();
+        let center = Point3::from(self.present.god_object.translation.vector);
+        let tolerance = TOUCHING_MOTION_TOLERANCES * self.settings.motion_tolerance;
+        let rows = set.constraints.iter().zip(&self.bounds).enumerate();
+        rows.filter(move |(row, (contact, bound))| {
+            let slack = reached.map_or_else(
+                || {
+                    let row = self.basis.half_space(contact, &center);
+                    row.jacobian.dot(&answer.acceleration) - **bound
+                },
+                |reached| {
+                    let start = &self.present.god_object;
+                    let moved = contact.moved(start, reached, self.present.shaded);
+                    self.settings.k_s * (moved.gap - contact.gap) - **bound
+                },
+            );
+            let holds = || answer.active.iter().any(|held| held.row as usize == *row);
+            !nothing_held && (slack <= tolerance || holds())
+        })
+        .map(|(_, (contact, _))| {
+            let features = &contact.features;
+            let on_obstacle = features.on_obstacle;
+            (
+                features.obstacle,
+                on_obstacle,
+                contact.point,
+                contact.normal,
+            )
+        })
     }
 
     /// Bounds the work of a step, whatever the constraint sets are: at most so many visits of rows, one for each row in each step of each projection. A

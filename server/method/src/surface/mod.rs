@@ -8,8 +8,8 @@ mod shading;
 mod texture;
 mod texture_coordinates;
 
-pub(crate) use friction::StickAnchor;
 pub use friction::{Friction, FrictionProblem};
+pub(crate) use friction::{StickAnchor, TOUCHING_MOTION_TOLERANCES};
 pub use height_map::{HeightMap, HeightMapError, HeightMapTexture, UvHeightMapTexture};
 pub use passivity::EnergyObserver;
 pub use shading::{ShadedAcceleration, ShadingNormals};

@@ -69,7 +69,8 @@ impl Textures {
     /// Tilts `wrench` (N, N m, at the reference point) by the textures of the obstacles touched.
     ///
     /// `god_object` is the pose of the reference point at which the constraints hold, `moved` the felt body's displacement from
-    /// there (m, rad); `touched` yields obstacle index, its feature, point (m, world) and unit normal (world) of every active contact.
+    /// there (m, rad); `touched` yields obstacle index, its feature, point (m, world) and unit normal (world) of every contact that touches,
+    /// loaded or not: which contacts carry the load is not unique.
     /// Call it for every sample: from one to the next the speed is taken. `new_sample` is false where the device sample is that of the call
     /// before, with a newer constraint set. Obstacles without a texture count as contacts of
     /// tilt zero. Without any textured contact the wrench is returned unchanged.

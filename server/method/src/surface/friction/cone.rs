@@ -1,10 +1,9 @@
-//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method, checked by block
-//! Gauss-Seidel sweeps.
+//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method, else block Gauss-Seidel sweeps.
 //!
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
 //! more than the six unknowns, and the share of each contact is not unique: the start is the least-norm distribution, as of
-//! an elastic foundation, which neither order nor duplication of the rows changes, and the relaxation moves from there only
+//! an elastic foundation, which neither order nor duplication of the rows changes, and the iteration moves from there only
 //! where a cone forbids it.
 //!
 //! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
@@ -15,9 +14,10 @@ use nalgebra::Matrix6;
 use super::contact::{ConeContact, in_disc};
 use crate::spatial::Vector6;
 
-/// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else.
-pub(super) const MAX_CONE_CONTACTS: usize = 24;
-/// Most sweeps over the single contacts after the Newton iteration. They measure its residual and mend what little it left.
+/// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else; and each costs in
+/// every step.
+pub(super) const MAX_CONE_CONTACTS: usize = 12;
+/// Most sweeps over the single contacts where the Newton iteration came to its limit.
 const MAX_SWEEPS: usize = 8;
 /// A sweep that changes the correction by less than this share of its length is the last.
 const SWEEP_TOLERANCE: f64 = 1e-8;
@@ -37,23 +37,37 @@ pub(super) struct ConeProblem {
 pub(super) struct ConeAnswer {
     /// `L^T (a - a_u)`.
     pub(super) correction: Vector6,
-    /// Length of the last sweep's change, relative to `scale`; 0 where full stick was the answer.
+    /// Slip and penetration that are left, or length of the last sweep's change, relative to `scale`; 0 where full stick was the answer.
     pub(super) residual: f64,
 }
 
 impl ConeProblem {
-    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0.
-    pub(super) fn solve(&mut self, scale: f64) -> ConeAnswer {
+    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0; `starts` are corrections that may be
+    /// near the answer.
+    ///
+    /// Where the Newton iteration comes to its limit, sweeps go on from full stick, cut to the cones: multipliers that keep the cones whatever is
+    /// left, and a residual that says how much that is.
+    pub(super) fn solve(&mut self, scale: f64, starts: [Vector6; 2]) -> ConeAnswer {
         let cut = self.start_from_stick();
-        let mut y = self.wrench();
+        let stick = self.wrench();
         if cut <= STICK_TOLERANCE * scale {
             return ConeAnswer {
-                correction: y,
+                correction: stick,
                 residual: 0.0,
             };
         }
-        self.improve(scale);
-        y = self.wrench();
+        let residual = self
+            .balance(scale, &[starts[0], starts[1], stick])
+            .unwrap_or_else(|| self.sweep(scale));
+        ConeAnswer {
+            correction: self.wrench(),
+            residual,
+        }
+    }
+
+    /// Block Gauss-Seidel. Returns the length of the last sweep's change, relative to `scale`.
+    pub(super) fn sweep(&mut self, scale: f64) -> f64 {
+        let mut y = self.wrench();
         let mut residual = f64::INFINITY;
         for sweep in 0..MAX_SWEEPS {
             // Forwards and backwards in turn, so that the order of the rows shows as little as it can.
@@ -72,14 +86,11 @@ impl ConeProblem {
                 break;
             }
         }
-        ConeAnswer {
-            correction: y,
-            residual,
-        }
+        residual
     }
 
     /// Gives every contact its share of what full stick needs, cut to its cone. Returns the length of what was cut.
-    fn start_from_stick(&mut self) -> f64 {
+    pub(super) fn start_from_stick(&mut self) -> f64 {
         // y = A d with A = sum j j^T, and j . y = -c for each row: A A d = -sum j c; the multipliers are j . d.
         let mut gram = Matrix6::zeros();
         let mut wanted = Vector6::zeros();

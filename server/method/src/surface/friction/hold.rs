@@ -7,20 +7,24 @@
 //! No energy is made: the tangential multipliers oppose the slip since the contact stuck last, or friction is taken back.
 //! Source: beyond the paper, which is frictionless. Coulomb's law in displacements, as the motion is quasi-static (Section 4.2).
 
+use arrayvec::ArrayVec;
 use nalgebra::Point3;
 
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
-use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus};
+use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
 use crate::spatial::{Vector6, linear};
 use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
-const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
+pub(crate) const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
 /// Friction may bring other contacts to touch: so often the cone problem is set up again with them.
 const MAX_ROUNDS: usize = 3;
+/// Where the projection differs by less than this share of the scale from the cone problem, other rows that hold the body are no other contacts: of
+/// many that lie close together, the cone problem has some and the projection others.
+const SAME_ANSWER: f64 = 1e-3;
 /// A friction that would make energy is halved so often, then dropped.
 const MAX_HALVINGS: usize = 3;
 
@@ -30,9 +34,13 @@ pub struct Friction {
     /// Coefficient of each obstacle.
     coefficients: Vec<f64>,
     touching: f64,
+    /// Rows that touch.
+    touched: Vec<u32>,
     cone: ConeProblem,
     /// The rows of the cone problem's contacts, in their order.
-    rows: arrayvec::ArrayVec<u32, MAX_CONE_CONTACTS>,
+    rows: ArrayVec<u32, MAX_CONE_CONTACTS>,
+    /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
+    last: Vector6,
     residual: f64,
     slid: bool,
     acts: bool,
@@ -70,8 +78,10 @@ impl Friction {
         any.then(|| Self {
             coefficients,
             touching: TOUCHING_MOTION_TOLERANCES * settings.motion_tolerance,
+            touched: Vec::with_capacity(settings.max_constraints),
             cone: ConeProblem::default(),
-            rows: arrayvec::ArrayVec::new(),
+            rows: ArrayVec::new(),
+            last: Vector6::zeros(),
             residual: 0.0,
             slid: true,
             acts: false,
@@ -123,17 +133,20 @@ impl Friction {
             if !self.gather(problem, now) {
                 break;
             }
-            let answer = self.cone.solve(scale);
-            let Some((projection, correction)) = self.project_with_grip(problem, &mut project)
-            else {
+            let wanted = now.acceleration - problem.unconstrained;
+            let likely: ArrayVec<u32, MAX_ACTIVE> = now.active.iter().map(|row| row.row).collect();
+            let answer = self.cone.solve(scale, [metric.whiten(&wanted), self.last]);
+            self.last = answer.correction;
+            let with_grip = self.project_with_grip(problem, &likely, &mut project);
+            let Some((projection, correction)) = with_grip else {
                 self.residual = f64::INFINITY;
                 return frictionless;
             };
-            self.residual = answer.residual + (correction - answer.correction).norm() / scale;
-            let complete = projection
-                .active
-                .iter()
-                .all(|active| self.rows.contains(&active.row));
+            let difference = (correction - answer.correction).norm() / scale;
+            self.residual = answer.residual + difference;
+            let mut active = projection.active.iter();
+            let complete =
+                difference <= SAME_ANSWER || active.all(|row| self.rows.contains(&row.row));
             held = Some(projection);
             if complete {
                 break;
@@ -147,17 +160,19 @@ impl Friction {
     fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
         self.cone.contacts.clear();
         self.rows.clear();
-        let rows = || problem.rows.iter().zip(problem.constraints).enumerate();
-        let touches = |row: &HalfSpace| row.slack(&now.acceleration) <= self.touching;
+        self.touched.clear();
         let coefficient_of = |constraint: &NonPenetrationConstraint| {
             let obstacle = usize::from(constraint.features.obstacle);
             self.coefficients.get(obstacle).copied().unwrap_or(0.0)
         };
-        let touching = || rows().filter(|(_, (row, _))| touches(row));
-        let (mut count, mut frictional) = (0, false);
-        for (_, (_, constraint)) in touching() {
-            count += 1;
-            frictional |= coefficient_of(constraint) > 0.0;
+        let mut frictional = false;
+        let rows = problem.rows.iter().zip(problem.constraints);
+        for (index, (row, constraint)) in rows.enumerate() {
+            let touches = row.slack(&now.acceleration) <= self.touching;
+            if touches && self.touched.len() < self.touched.capacity() {
+                self.touched.push(index as u32);
+                frictional |= coefficient_of(constraint) > 0.0;
+            }
         }
         if !frictional {
             return false;
@@ -184,31 +199,29 @@ impl Friction {
                 tangents.map(|j| j.dot(&wished)),
             )
         };
-        let mut add = |index: usize, row: &HalfSpace, constraint: &NonPenetrationConstraint| {
-            if !self.rows.contains(&(index as u32))
+        let mut add = |index: u32| {
+            let at = index as usize;
+            if !self.rows.contains(&index)
+                && let Some(row) = problem.rows.get(at)
+                && let Some(constraint) = problem.constraints.get(at)
                 && let Some(contact) = contact(row, constraint)
                 && self.cone.contacts.try_push(contact).is_ok()
             {
-                self.rows.push(index as u32);
+                self.rows.push(index);
             }
         };
         // More contacts than the cone problem takes: those that carry the load, then every n-th of the others.
+        let count = self.touched.len();
         let stride = if count <= MAX_CONE_CONTACTS {
             1
         } else {
-            for active in &now.active {
-                let index = active.row as usize;
-                if let (Some(row), Some(constraint)) =
-                    (problem.rows.get(index), problem.constraints.get(index))
-                {
-                    add(index, row, constraint);
-                }
-            }
+            now.active.iter().for_each(|active| add(active.row));
             count.div_ceil(MAX_CONE_CONTACTS - now.active.len())
         };
-        for (index, (row, constraint)) in touching().step_by(stride) {
-            add(index, row, constraint);
-        }
+        self.touched
+            .iter()
+            .step_by(stride)
+            .for_each(|index| add(*index));
         !self.rows.is_empty()
     }
 
@@ -216,11 +229,12 @@ impl Friction {
     fn project_with_grip(
         &mut self,
         problem: &FrictionProblem<'_>,
+        likely: &[u32],
         project: &mut impl FnMut(&Vector6, &[u32]) -> Projection,
     ) -> Option<(Projection, Vector6)> {
         for _ in 0..=MAX_HALVINGS {
             let pulled = problem.unconstrained + problem.metric.unwhiten(&self.cone.grip_wrench());
-            let projection = project(&pulled, &self.rows);
+            let projection = project(&pulled, likely);
             if projection.status != ProjectionStatus::Solved {
                 return None;
             }

@@ -2,9 +2,12 @@
 
 mod anchor;
 mod cone;
+#[cfg(test)]
+mod cone_tests;
 mod contact;
 mod hold;
 mod newton;
 
 pub(crate) use anchor::StickAnchor;
+pub(crate) use hold::TOUCHING_MOTION_TOLERANCES;
 pub use hold::{Friction, FrictionProblem};

@@ -1,47 +1,75 @@
-//! The cone problem by the method of multipliers: a semi-smooth Newton iteration in the six unknowns of the correction.
+//! The cone problem with contacts that give a little: a semi-smooth Newton iteration in the six unknowns of the correction.
 //!
 //! | symbol      | name in code | unit       | meaning                                                              |
 //! |-------------|--------------|------------|----------------------------------------------------------------------|
 //! | y           | `y`          | m kg^(1/2) | `L^T (a - a_u)`                                                      |
 //! | lambda      | `Reaction`   | N s^2      | multipliers of one contact at y: `(lambda_0 - r (c + j . y))` on its cone |
-//! | lambda_0    | in the contacts |         | multipliers of the round before                                      |
+//! | lambda_0    | in the contacts |         | multipliers of full stick, cut to the cones                          |
+//! | r           | `stiffness`  |            | in units of the contact's own                                        |
 //! | G(y)        | `rest`       | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
-//! Every round solves `G(y) = 0` and takes its multipliers over; what is left of slip and penetration shrinks by about
-//! the stiffness each time. The cost of a round does not depend on how badly the contacts are conditioned, which is what sweeps over
-//! single contacts suffer from. Source: Alart and Curnier 1991, in six unknowns.
+//! What gives by a share 1/r of what is asked for has one answer, however many contacts there are and in whatever order they come. A contact
+//! whose slip turns back within a step is taken as stuck in the next: from one side of the cone to the other and back the iteration would
+//! go round for ever. Source: Alart and Curnier 1991, in six unknowns.
 
 use nalgebra::Matrix6;
 
-use super::cone::ConeProblem;
-use super::contact::{ConeContact, in_disc};
+use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
+use super::contact::ConeContact;
 use crate::spatial::Vector6;
 
-/// Stiffness of the multipliers against slip and penetration, in units of the contact's own: at first, at most, and by how much
-/// it grows after a round that balanced and shrinks after one that did not.
-const SOFTEST: f64 = 10.0;
-const STIFFEST: f64 = 1e5;
-const STIFFER: f64 = 10.0;
-const SOFTER: f64 = 4.0;
-/// Most Newton steps of one call and of one round, most halvings of one step: some 15 microseconds.
-const MAX_STEPS: usize = 40;
-const MAX_STEPS_PER_ROUND: usize = 10;
-const MAX_HALVINGS: usize = 5;
+/// Stiffness of the multipliers against slip and penetration, in units of the contact's own: slip and penetration that are left are this much
+/// smaller than the correction.
+const STIFFNESS: f64 = 1e4;
+/// Where that does not balance within [`MAX_STEPS`]: kinks are wider, and what is left is nearer to the stiff answer.
+const SOFT_STIFFNESS: f64 = 1e2;
+/// Most Newton steps: a microsecond each.
+const MAX_STEPS: usize = 12;
+const MAX_SOFT_STEPS: usize = 8;
 /// Forces balance when this share of the scale is left.
-const BALANCE_TOLERANCE: f64 = 1e-13;
-/// Slip and penetration are none below this share of the scale.
-const ROUND_TOLERANCE: f64 = 1e-10;
+const BALANCE_TOLERANCE: f64 = 1e-8;
 
 /// The multipliers of one contact at some y.
 #[derive(Clone, Copy)]
 struct Reaction {
     load: f64,
-    grip: [f64; 2],
-    /// `lambda_0 - r u` of the tangents, before the disc.
+    /// `lambda_0 - r u` of the tangents, before the disc, and its length.
     wished: [f64; 2],
+    length: f64,
+    /// Radius of the disc.
+    limit: f64,
+}
+
+impl Reaction {
+    /// False for NaN.
+    #[inline]
+    fn sticks(&self) -> bool {
+        self.length <= self.limit
+    }
+
+    #[inline]
+    fn grip(&self) -> [f64; 2] {
+        if self.sticks() {
+            self.wished
+        } else if self.length > 0.0 {
+            self.wished.map(|x| x * (self.limit / self.length))
+        } else {
+            [0.0; 2]
+        }
+    }
+
+    /// The same contact stuck, whatever its disc.
+    #[inline]
+    fn stuck(&self) -> Self {
+        Self {
+            limit: f64::INFINITY,
+            ..*self
+        }
+    }
 }
 
 impl ConeContact {
+    #[inline]
     fn reaction(&self, y: &Vector6, stiffness: f64) -> Reaction {
         let penetration = self.slack + self.normal.dot(y);
         let load = (self.load - stiffness * self.normal_step * penetration).max(0.0);
@@ -49,114 +77,132 @@ impl ConeContact {
         let wished = [0, 1].map(|i| self.grip[i] - stiffness * self.tangent_step * slip[i]);
         Reaction {
             load,
-            grip: in_disc(wished, self.coefficient * load),
             wished,
+            length: (wished[0] * wished[0] + wished[1] * wished[1]).sqrt(),
+            limit: self.coefficient * load,
         }
     }
 
+    #[inline]
     fn wrench_of(&self, reaction: &Reaction) -> Vector6 {
-        self.normal * reaction.load
-            + self.tangents[0] * reaction.grip[0]
-            + self.tangents[1] * reaction.grip[1]
+        let grip = reaction.grip();
+        self.normal * reaction.load + self.tangents[0] * grip[0] + self.tangents[1] * grip[1]
     }
 
     /// Adds `- d(j lambda)/dy` at a reaction.
+    #[inline]
     fn add_slope(&self, reaction: &Reaction, stiffness: f64, slope: &mut Matrix6<f64>) {
         if reaction.load <= 0.0 {
             return;
         }
         let normal_rate = stiffness * self.normal_step;
-        slope.ger(normal_rate, &self.normal, &self.normal, 1.0);
-        if self.coefficient <= 0.0 {
-            return;
-        }
         let rate = stiffness * self.tangent_step;
-        let (limit, norm) = (
-            self.coefficient * reaction.load,
-            reaction.wished[0].hypot(reaction.wished[1]),
-        );
-        if norm <= limit {
+        if self.coefficient <= 0.0 {
+            add_product(slope, &(self.normal * normal_rate), &self.normal);
+        } else if reaction.sticks() {
+            add_product(slope, &(self.normal * normal_rate), &self.normal);
             for tangent in &self.tangents {
-                slope.ger(rate, tangent, tangent, 1.0);
+                add_product(slope, &(tangent * rate), tangent);
             }
-            return;
+        } else {
+            // Slipping: the grip follows the load along its direction, and turns across it.
+            let [u, v] = reaction.wished.map(|x| x / reaction.length);
+            let along = self.tangents[0] * u + self.tangents[1] * v;
+            let across = self.tangents[1] * u - self.tangents[0] * v;
+            let loaded = (self.normal + along * self.coefficient) * normal_rate;
+            add_product(slope, &loaded, &self.normal);
+            let turning = rate * reaction.limit / reaction.length;
+            add_product(slope, &(across * turning), &across);
         }
-        // Slipping: the grip follows the load along its direction, and turns across it.
-        let [u, v] = reaction.wished.map(|x| x / norm);
-        let along = self.tangents[0] * u + self.tangents[1] * v;
-        let across = self.tangents[1] * u - self.tangents[0] * v;
-        slope.ger(rate * limit / norm, &across, &across, 1.0);
-        slope.ger(self.coefficient * normal_rate, &along, &self.normal, 1.0);
+    }
+}
+
+/// Adds `a b^T`.
+#[inline]
+fn add_product(sum: &mut Matrix6<f64>, a: &Vector6, b: &Vector6) {
+    for k in 0..6 {
+        let mut column = sum.column_mut(k);
+        for i in 0..6 {
+            column[i] += a[i] * b[k];
+        }
     }
 }
 
 impl ConeProblem {
-    /// Improves the multipliers in the contacts; `scale` is a length in whitened coordinates, > 0.
-    pub(super) fn improve(&mut self, scale: f64) {
-        let (mut y, mut stiffness, mut steps) = (self.wrench(), SOFTEST, 0);
-        while steps < MAX_STEPS {
-            let mut found = y;
-            if !self.balance(&mut found, stiffness, scale, &mut steps) {
-                // Too stiff to start from here: nothing is taken over.
-                stiffness /= SOFTER;
-                if stiffness < SOFTEST / SOFTER {
-                    return;
-                }
-                continue;
-            }
-            y = found;
-            let mut moved: f64 = 0.0;
-            for contact in &mut self.contacts {
-                let reaction = contact.reaction(&y, stiffness);
-                let change = Reaction {
-                    load: reaction.load - contact.load,
-                    grip: [0, 1].map(|i| reaction.grip[i] - contact.grip[i]),
-                    wished: reaction.wished,
-                };
-                moved = moved.max(contact.wrench_of(&change).norm());
-                contact.load = reaction.load;
-                contact.grip = reaction.grip;
-            }
-            if moved <= stiffness * ROUND_TOLERANCE * scale {
-                return;
-            }
-            stiffness = (stiffness * STIFFER).min(STIFFEST);
+    /// Finds the multipliers, from the one of `starts` that is nearest to balance; `scale` is a length in whitened coordinates, > 0.
+    ///
+    /// At most [`MAX_STEPS`] stiff steps, and where they do not balance [`MAX_SOFT_STEPS`] soft ones and as many stiff ones from there. Returns the slip
+    /// and penetration that are left, relative to `scale`; `None` where forces do not balance by then: the multipliers stay as they were.
+    pub(super) fn balance(&mut self, scale: f64, starts: &[Vector6]) -> Option<f64> {
+        let tolerance = BALANCE_TOLERANCE * scale;
+        let start = self.nearest(starts, STIFFNESS)?;
+        if let Some(y) = self.newton(start, STIFFNESS, MAX_STEPS, tolerance) {
+            return Some(self.take_over(&y, STIFFNESS) / scale);
         }
+        let start = self.nearest(starts, SOFT_STIFFNESS)?;
+        let soft = self.newton(start, SOFT_STIFFNESS, MAX_SOFT_STEPS, tolerance)?;
+        let left = self.take_over(&soft, SOFT_STIFFNESS);
+        let left = match self.newton(soft, STIFFNESS, MAX_SOFT_STEPS, tolerance) {
+            Some(y) => self.take_over(&y, STIFFNESS),
+            None => left,
+        };
+        Some(left / scale)
     }
 
-    /// Newton steps on G with the multipliers of the round before, halved while they make it worse. Whether forces balance.
-    fn balance(&self, y: &mut Vector6, stiffness: f64, scale: f64, steps: &mut usize) -> bool {
-        let mut rest = self.rest(y, stiffness);
-        for _ in 0..MAX_STEPS_PER_ROUND {
-            let left = rest.norm();
-            if left <= BALANCE_TOLERANCE * scale {
-                return true;
-            }
-            *steps += 1;
+    fn nearest(&self, starts: &[Vector6], stiffness: f64) -> Option<Vector6> {
+        let left = starts.iter().map(|y| (*y, self.rest(y, stiffness).norm()));
+        left.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(y, _)| y)
+    }
+
+    /// Newton steps on G from `y`. `None` where forces do not balance to `tolerance` after the last.
+    pub(super) fn newton(
+        &self,
+        mut y: Vector6,
+        stiffness: f64,
+        steps: usize,
+        tolerance: f64,
+    ) -> Option<Vector6> {
+        let mut before = [[0.0; 2]; MAX_CONE_CONTACTS];
+        for step in 0..=steps {
+            let (mut rest, mut linear) = (y, y);
             let mut slope = Matrix6::identity();
-            for contact in &self.contacts {
-                contact.add_slope(&contact.reaction(y, stiffness), stiffness, &mut slope);
-            }
-            let Some(step) = slope.lu().solve(&rest) else {
-                return false;
-            };
-            let mut share = 1.0;
-            for _ in 0..MAX_HALVINGS {
-                let tried = *y - step * share;
-                let tried_rest = self.rest(&tried, stiffness);
-                let better = tried_rest.norm() < left; // false for NaN
-                if better {
-                    (*y, rest) = (tried, tried_rest);
-                    break;
+            for (contact, before) in self.contacts.iter().zip(&mut before) {
+                let reaction = contact.reaction(&y, stiffness);
+                let wished = reaction.wished;
+                let turned = before[0] * wished[0] + before[1] * wished[1] < 0.0;
+                *before = wished;
+                let wrench = contact.wrench_of(&reaction);
+                rest -= wrench;
+                if turned && contact.coefficient > 0.0 && reaction.load > 0.0 {
+                    let stuck = reaction.stuck();
+                    linear -= contact.wrench_of(&stuck);
+                    contact.add_slope(&stuck, stiffness, &mut slope);
+                } else {
+                    linear -= wrench;
+                    contact.add_slope(&reaction, stiffness, &mut slope);
                 }
-                share *= 0.5;
             }
-            let stuck = rest.norm() >= left;
-            if stuck {
-                break;
+            if rest.norm() <= tolerance {
+                return Some(y);
+            }
+            if step < steps {
+                y -= slope.lu().solve(&linear)?;
             }
         }
-        rest.norm() <= ROUND_TOLERANCE * scale
+        None
+    }
+
+    /// The multipliers at `y` become those of the contacts. Returns the most that a contact slips or penetrates there.
+    fn take_over(&mut self, y: &Vector6, stiffness: f64) -> f64 {
+        let mut given: f64 = 0.0;
+        for contact in &mut self.contacts {
+            let reaction = contact.reaction(y, stiffness);
+            let before = contact.wrench();
+            contact.load = reaction.load;
+            contact.grip = reaction.grip();
+            given = given.max((contact.wrench() - before).norm());
+        }
+        given / stiffness
     }
 
     /// G(y).

@@ -1,0 +1,180 @@
+//! The cone problem against the laws of its contacts, and against relaxation that is run until nothing changes.
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+
+use super::cone::{ConeAnswer, ConeProblem, MAX_CONE_CONTACTS};
+use super::contact::{ConeContact, in_disc, tangents_of};
+use crate::spatial::{Vector6, six};
+
+/// Sweeps of the oracle: as many as it takes, for two contacts or three.
+const ORACLE_SWEEPS: usize = 200_000;
+/// Residual of an answer that stiff steps have found.
+const BALANCED: f64 = 1e-3;
+
+/// Contacts of a body of 1 kg and 1 kg m^2 about every axis, with a point and a normal each; a_u presses and turns, sticking since zero.
+fn problem(
+    coefficient: f64,
+    wished: &Vector6,
+    contacts: &[(Vector3<f64>, Vector3<f64>)],
+) -> ConeProblem {
+    let row =
+        |point: &Vector3<f64>, direction: &Vector3<f64>| six(direction, &point.cross(direction));
+    let contact = |(point, normal): &(Vector3<f64>, Vector3<f64>)| {
+        let normal = normal / normal.norm();
+        let tangents = tangents_of(&normal).map(|t| row(point, &t));
+        let normal = row(point, &normal);
+        let slip = tangents.map(|t| t.dot(wished));
+        ConeContact::new(coefficient, normal, tangents, normal.dot(wished), slip)
+            .expect("unit directions")
+    };
+    ConeProblem {
+        contacts: contacts.iter().map(contact).collect(),
+    }
+}
+
+/// What a block step would change in the worst contact: zero where every contact keeps its law.
+fn violation(problem: &ConeProblem) -> f64 {
+    problem.contacts.iter().fold(0.0, |worst, contact| {
+        let mut y = problem.wrench();
+        worst.max(contact.clone().relax(&mut y))
+    })
+}
+
+fn keeps_cones(problem: &ConeProblem) -> bool {
+    problem.contacts.iter().all(|contact| {
+        let grip = contact.grip[0].hypot(contact.grip[1]);
+        contact.load >= 0.0 && grip <= contact.limit() * (1.0 + 1e-12)
+    })
+}
+
+/// Block Gauss-Seidel until nothing changes; `None` where it does not come to an end.
+fn oracle(mut problem: ConeProblem) -> Option<Vector6> {
+    let mut y = problem.wrench();
+    for _ in 0..ORACLE_SWEEPS {
+        let mut change: f64 = 0.0;
+        for contact in &mut problem.contacts {
+            change = change.max(contact.relax(&mut y));
+        }
+        if change <= 1e-13 {
+            return Some(y);
+        }
+    }
+    None
+}
+
+fn solved(problem: &ConeProblem, start: Vector6, scale: f64) -> (ConeProblem, ConeAnswer) {
+    let mut problem = problem.clone();
+    let answer = problem.solve(scale, [start, Vector6::zeros()]);
+    (problem, answer)
+}
+
+fn wished() -> impl Strategy<Value = Vector6> {
+    prop::array::uniform6(-1.0..1.0_f64).prop_map(|x| {
+        let mut wished = Vector6::from(x);
+        wished[2] = -wished[2].abs() - 0.1;
+        wished
+    })
+}
+
+/// Points below a body and normals that lean by up to half a right angle.
+fn contacts(most: usize) -> impl Strategy<Value = Vec<(Vector3<f64>, Vector3<f64>)>> {
+    let one = prop::array::uniform4(-1.0..1.0_f64).prop_map(|[x, y, u, v]| {
+        let point = Vector3::new(x, y, -0.2);
+        (point, Vector3::new(u, v, 1.5))
+    });
+    prop::collection::vec(one, 1..=most)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(256))]
+
+    #[test]
+    fn every_contact_keeps_its_law(
+        wished in wished(), contacts in contacts(MAX_CONE_CONTACTS), coefficient in 0.0..0.6_f64,
+    ) {
+        let scale = wished.norm();
+        let (solved, answer) = solved(&problem(coefficient, &wished, &contacts), Vector6::zeros(), scale);
+        prop_assert!(keeps_cones(&solved));
+        if answer.residual <= BALANCED {
+            prop_assert!(violation(&solved) <= 20.0 * BALANCED * scale, "{} {}", violation(&solved), answer.residual);
+        }
+    }
+
+    #[test]
+    fn the_answer_is_that_of_relaxation_without_end(
+        wished in wished(), contacts in contacts(2), coefficient in 0.0..0.4_f64,
+    ) {
+        let scale = wished.norm();
+        let problem = problem(coefficient, &wished, &contacts);
+        let (_, answer) = solved(&problem, Vector6::zeros(), scale);
+        let balanced = answer.residual <= BALANCED;
+        if balanced && let Some(expected) = oracle(problem) {
+            let error = (answer.correction - expected).norm() / scale;
+            prop_assert!(error <= 10.0 * BALANCED, "{error} {}", answer.residual);
+        }
+    }
+
+    #[test]
+    fn neither_start_nor_order_of_contacts_changes_the_answer(
+        wished in wished(), contacts in contacts(MAX_CONE_CONTACTS), start in prop::array::uniform6(-0.5..0.5_f64),
+    ) {
+        let scale = wished.norm();
+        let (_, one) = solved(&problem(0.2, &wished, &contacts), Vector6::zeros(), scale);
+        let turned: Vec<_> = contacts.iter().rev().copied().collect();
+        let (_, other) = solved(&problem(0.2, &wished, &turned), Vector6::from(start), scale);
+        let balanced = one.residual.max(other.residual) <= 0.1 * BALANCED;
+        if balanced {
+            let difference = (one.correction - other.correction).norm() / scale;
+            prop_assert!(difference <= BALANCED, "{difference}");
+        }
+    }
+
+    #[test]
+    fn what_the_limit_leaves_keeps_the_cones_and_says_how_much_is_left(
+        wished in wished(), contacts in contacts(MAX_CONE_CONTACTS), coefficient in 0.0..1.5_f64,
+    ) {
+        let scale = wished.norm();
+        let mut problem = problem(coefficient, &wished, &contacts);
+        problem.start_from_stick();
+        let before = problem.grip_wrench();
+        prop_assert!(problem.newton(Vector6::repeat(1.0), 1e4, 0, 0.0).is_none());
+        prop_assert_eq!(problem.grip_wrench(), before);
+        let residual = problem.sweep(scale);
+        prop_assert!(keeps_cones(&problem));
+        prop_assert!(residual.is_finite());
+    }
+}
+
+/// Normals in all directions of a wide cone and slips without a rule: scenes ask for less.
+#[test]
+fn most_problems_balance_within_the_limit() {
+    let mut runner = TestRunner::deterministic();
+    let problems = (wished(), contacts(MAX_CONE_CONTACTS));
+    let (mut unbalanced, cases) = (0, 2000);
+    for _ in 0..cases {
+        let drawn = problems.new_tree(&mut runner).expect("no filter");
+        let (wished, contacts) = drawn.current();
+        let problem = problem(0.2, &wished, &contacts);
+        let (_, answer) = solved(&problem, Vector6::zeros(), wished.norm());
+        unbalanced += u32::from(answer.residual > BALANCED);
+    }
+    assert!(unbalanced <= cases / 10, "{unbalanced} of {cases}");
+}
+
+#[test]
+fn a_contact_that_stands_on_its_edge_of_slipping_holds_what_its_cone_holds() {
+    // 1 N s^2 of load, mu = 0.5, and a tangential wish on either side of the limit.
+    for wish in [0.49, 0.5, 0.51, 2.0] {
+        let wished = Vector6::new(wish, 0.0, -1.0, 0.0, 0.0, 0.0);
+        let below = [(Vector3::zeros(), Vector3::z())];
+        let (solved, answer) = solved(&problem(0.5, &wished, &below), Vector6::zeros(), 1.0);
+        let grip = solved.contacts[0].grip;
+        let held = grip[0].hypot(grip[1]);
+        assert!((held - f64::min(wish, 0.5)).abs() < 1e-3, "{wish}: {held}");
+        assert!(answer.residual < BALANCED);
+        assert_eq!(in_disc(grip, 0.5 + 1e-3), grip);
+    }
+}
