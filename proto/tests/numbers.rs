@@ -121,7 +121,7 @@ fn what_nobody_takes_nobody_sends() {
         buttons: 0,
         flags: 0,
         rendered: [0.0; 6],
-        set_sequence: 0,
+        set_made_ns: 0,
     };
     assert_eq!(sent(&Payload::Input(input)), out("PoseF64.rotation"));
     let arrive = Arrive {

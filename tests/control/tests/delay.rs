@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use taut_bridge::EventKind;
-use taut_control_tests::delay::{Growth, Rubbing, ZERO_AFTER, run};
+use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, run};
 use taut_control_tests::edge::Mode;
 
 /// What may be given beyond what is given without delay, J.
@@ -15,7 +15,7 @@ fn growing(up: bool, down: bool) -> Growth {
     Growth {
         begin: Duration::from_secs(2),
         ways: [up, down],
-        doubling: Duration::from_millis(1500),
+        course: Course::Doubling(Duration::from_millis(1500)),
         most: Duration::from_secs(2),
     }
 }
@@ -71,4 +71,32 @@ fn a_force_beside_the_device_on_a_wall() {
 #[test]
 fn a_force_beside_the_device_on_a_dome() {
     keeps_its_promise("dome", &Rubbing::over_dome(), Mode::Edge);
+}
+
+#[test]
+#[ignore]
+fn explore() {
+    let dome = Rubbing::over_dome();
+    let wall = Rubbing::on_wall();
+    for (name, rubbing) in [("dome", &dome), ("wall", &wall)] {
+        for mode in [Mode::Edge] {
+            let usual = run(rubbing, mode, Growth::NONE, Duration::from_secs(7));
+            println!("{name} {} none {:.2}", mode.name(), usual.given * 1e3);
+            for (ways_name, ways) in [("up", [true, false]), ("down", [false, true]), ("both", [true, true])] {
+                for slope in [0.05, 0.1, 0.2, 0.5, 1.0] {
+                    for most in [75, 150] {
+                        let mut worst = (0.0, 0, 0.0);
+                        for phase in 0..10 {
+                            let begin = Duration::from_millis(2000 + 200 * phase);
+                            let growth = Growth { begin, ways, course: Course::Steady(slope), most: Duration::from_millis(most) };
+                            let out = run(rubbing, mode, growth, Duration::from_secs(8));
+                            assert!(out.oldest < ZERO_AFTER);
+                            if out.given > worst.0 { worst = (out.given, phase, out.largest[1]); }
+                        }
+                        println!("{name} {} {ways_name} {slope} {most}: {:.2} mJ phase {} force {:.1}", mode.name(), worst.0 * 1e3, worst.1, worst.2);
+                    }
+                }
+            }
+        }
+    }
 }
