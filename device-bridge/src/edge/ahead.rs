@@ -10,6 +10,11 @@
 //! The server cannot see the way down. It stamps each set, and a reading brings the stamp of the set in use back: what has passed since then is
 //! the way down and the way up, whichever of the two is slow, and no second clock is in it.
 //!
+//! That is long enough but for what the delay grows meanwhile. A reading of time r is here at s and names the set made at m; what is made at s
+//! arrives at s + D(s), D being the way down, so `s - r + D(s)` is asked for. The set was there at r: `m + D(m) ≤ r`, so that
+//! `s - m ≥ s - r + D(m)`. What is missing is at most `D(s) - D(m) ≤ g (s - m)` of a delay that grows by g seconds each second: a share g
+//! of the way. A delay that jumps is known one way around later.
+//!
 //! A half-space is a plane: off its pose by s, on a surface of curvature κ, it is wrong by `κ s² / 2` in depth and `κ s` in direction. So the
 //! god-object is sent to where the hand will be, [`device_predicted`], which leaves of `s = v t` what the hand's acceleration makes of it.
 //! And the set must hold every row within [`device_ahead`], `v t + a t² / 2`, or a surface would be felt only when the hand is through it.

@@ -132,6 +132,13 @@ impl Rubbing {
         )
     }
 
+    /// Does once what the hand does in the study of coupling at the edge.
+    #[must_use]
+    pub fn once(task: Task) -> Self {
+        let path = task.intention.clone();
+        Self { task, path }
+    }
+
     fn along(task: Task, places: &[[f64; 3]; 4]) -> Self {
         let via = |time_s, place: &[f64; 3]| ViaPoint {
             time_s,
