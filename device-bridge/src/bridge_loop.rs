@@ -203,11 +203,7 @@ impl BridgeLoop {
                 buttons: sample.buttons,
                 flags: faulty | at_edge,
                 rendered: report.wrench.into(),
-                set_sequence: self
-                    .edge
-                    .as_ref()
-                    .and_then(|edge| edge.sequence())
-                    .unwrap_or(0),
+                set_made_ns: self.edge.as_ref().map_or(0, |edge| edge.set_made_ns()),
             },
             events: report.events,
         }

@@ -55,6 +55,8 @@ pub struct Felt {
     pub wrench: Vector6<f64>,
     /// It is computed at the far end of a network, from constraint sets.
     pub at_edge: bool,
+    /// When the set that it rests on was made, on the clock of `now`; `None` where there is no set, or the bridge does not say.
+    pub set_made: Option<Duration>,
 }
 
 /// What a device is: its name and its limits.

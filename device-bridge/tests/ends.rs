@@ -35,6 +35,8 @@ const BREAKS: &str = "TAUT_TEST_BREAKS";
 const FELT: f64 = 2.0;
 /// Fastest change of a force that goes away, N/s, and the most that one write may change, N.
 const SLEW: (f64, f64) = (500.0, 1.0);
+/// Most processor time between two writes, s: some ten times what a panic takes whose backtrace another thread reads.
+const MOST_WORK: f64 = 0.02;
 
 /// A simulated device in a firm hand that presses on the wall; everything written goes to a socket.
 struct Recorded {
@@ -60,11 +62,24 @@ impl Device for Recorded {
 
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>) {
         self.force = wrench.fixed_rows::<3>(0).norm();
-        let words = [now.as_secs_f64(), self.force, wrench.norm()];
+        let words = [
+            now.as_secs_f64(),
+            self.force,
+            wrench.norm(),
+            own_processor_time(),
+        ];
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let _ = self.to.send(&bytes);
         self.inner.write(now, wrench);
     }
+}
+
+/// Processor time of this thread, s: what a busy machine does not add to. Zero where the system does not say.
+fn own_processor_time() -> f64 {
+    std::fs::read_to_string("/proc/thread-self/schedstat")
+        .ok()
+        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(0.0, |nanoseconds| nanoseconds * 1e-9)
 }
 
 #[test]
@@ -104,8 +119,8 @@ struct Pressing {
     workbench: Option<Workbench>,
     bridge: Child,
     record: UdpSocket,
-    /// Time and force of every write so far, and the norm of the whole wrench.
-    written: Vec<[f64; 3]>,
+    /// Time and force of every write so far, the norm of the whole wrench, and the loop's processor time.
+    written: Vec<[f64; 4]>,
 }
 
 impl Pressing {
@@ -124,7 +139,7 @@ impl Pressing {
             .env(RECORD, record.local_addr().expect("bound").to_string())
             .stdin(Stdio::null());
         if breaks {
-            command.env(BREAKS, "1");
+            command.env(BREAKS, "1").env("RUST_BACKTRACE", "1");
         }
         if let Some(output) = output {
             let end = || Stdio::from(output.try_clone().expect("a handle"));
@@ -141,9 +156,9 @@ impl Pressing {
     }
 
     /// Takes what was written until `is_enough`.
-    fn follow(&mut self, what: &str, is_enough: impl Fn(&[[f64; 3]]) -> bool) {
+    fn follow(&mut self, what: &str, is_enough: impl Fn(&[[f64; 4]]) -> bool) {
         let begun = Instant::now();
-        let mut bytes = [0; 24];
+        let mut bytes = [0; 32];
         while !is_enough(&self.written) {
             assert!(
                 begun.elapsed() < PATIENCE,
@@ -153,7 +168,7 @@ impl Pressing {
             if self
                 .record
                 .recv(&mut bytes)
-                .is_ok_and(|length| length == 24)
+                .is_ok_and(|length| length == 32)
             {
                 let word = |at: usize| {
                     bytes[8 * at..8 * (at + 1)]
@@ -161,14 +176,14 @@ impl Pressing {
                         .map(f64::from_le_bytes)
                 };
                 self.written
-                    .push([0, 1, 2].map(|at| word(at).expect("eight bytes")));
+                    .push([0, 1, 2, 3].map(|at| word(at).expect("eight bytes")));
             }
         }
     }
 
     fn until_felt(&mut self) {
         self.follow("no force comes", |written| {
-            written.last().is_some_and(|[_, force, _]| *force > FELT)
+            written.last().is_some_and(|[_, force, ..]| *force > FELT)
         });
     }
 
@@ -182,7 +197,9 @@ impl Pressing {
     fn leaves_nothing(mut self, what: &str, mut before_its_end: impl FnMut()) {
         let felt = self.written.len() - 1;
         self.follow(what, |written| {
-            written.last().is_some_and(|[_, _, wrench]| *wrench == 0.0)
+            written
+                .last()
+                .is_some_and(|[_, _, wrench, _]| *wrench == 0.0)
         });
         let last = self.written[self.written.len() - 1][0];
         before_its_end();
@@ -191,7 +208,7 @@ impl Pressing {
             assert!(begun.elapsed() < PATIENCE, "{what}: the process goes on");
             std::thread::sleep(Duration::from_millis(10));
         }
-        let mut bytes = [0; 24];
+        let mut bytes = [0; 32];
         while self.record.recv(&mut bytes).is_ok() {
             let wrench = bytes[16..24].try_into().map(f64::from_le_bytes);
             assert!(
@@ -200,7 +217,7 @@ impl Pressing {
             );
         }
         for pair in self.written[felt..].windows(2) {
-            let [time, force, _] = pair[1];
+            let [time, force, ..] = pair[1];
             let allowed = (SLEW.0 * (time - pair[0][0])).min(SLEW.1);
             // Before the end is noticed, ordinary contact goes on.
             let falls = pair[0][1] - force;
@@ -210,6 +227,18 @@ impl Pressing {
             "{what}: {:.1} N were gone {:.0} ms after the last full force",
             self.written[felt][1],
             (last - self.written[felt][0]) * 1e3
+        );
+        let worked = self.written[felt..]
+            .windows(2)
+            .map(|pair| pair[1][3] - pair[0][3])
+            .fold(0.0, f64::max);
+        println!(
+            "{what}: at most {:.1} ms of work between two writes",
+            worked * 1e3
+        );
+        assert!(
+            worked < MOST_WORK,
+            "{what}: {worked} s of work before the force falls"
         );
         if let Some(workbench) = self.workbench.take() {
             workbench.finish();

@@ -88,7 +88,7 @@ fn a_remote_device_does_not_allocate() {
                 buttons: 0,
                 flags: 0,
                 rendered: [0.0; 6],
-                set_sequence: 0,
+                set_made_ns: 0,
             },
             received_ns: tick * 1_000_000,
             session: 1,

@@ -416,22 +416,6 @@ pub(crate) fn read_elements<T: Wire, const N: usize>(
     Ok(list)
 }
 
-/// Layout of a struct: its fields in the order given. Of what is checked where it is used: see [`wire_ranged`].
-macro_rules! wire_struct {
-    ($name:ty { $($field:ident),* $(,)? }) => {
-        impl $crate::codec::Wire for $name {
-            fn write(&self, to: &mut $crate::codec::Writer<'_>) -> Result<(), $crate::EncodeError> {
-                $( self.$field.write(to)?; )*
-                Ok(())
-            }
-            fn read(from: &mut $crate::codec::Reader<'_>) -> Result<Self, $crate::DecodeError> {
-                Ok(Self { $( $field: $crate::codec::Wire::read(from)?, )* })
-            }
-        }
-    };
-}
-pub(crate) use wire_struct;
-
 /// Layout of a message: its fields in the order given, every number `in` its range. A number without one does not compile.
 macro_rules! wire_ranged {
     ($name:ident { $($field:ident $(in $bounds:path)?),* $(,)? }) => {

@@ -2,10 +2,16 @@
 //!
 //! The bridge gets no geometry: mass properties, constants and the surfaces of the obstacles are all that the coupling asks of a world. Constraint
 //! sets follow as datagrams, see [`crate::constraints`].
+//!
+//! Each number has a range of its own here; how they fit together (gaps in order, a tensor that is one) is checked where they become the method's.
 
 use crate::{
     DecodeError, EncodeError, PoseF64, Untrusted,
-    codec::{Reader, Wire, Writer, wire_struct, wire_tag},
+    codec::{Reader, Wire, Writer, wire_ranged, wire_tag},
+    range::{
+        CAPACITY, COUNT, DEPTH, EXTENT, FRICTION, GAIN, INERTIA, LASTS, LENGTH, MASS, ROUNDS,
+        SET_RATE, SIZE, SLOPE, STEPS, STIFFNESS, STRENGTH, UNIT,
+    },
 };
 
 /// Where a device's force may be computed.
@@ -134,52 +140,52 @@ pub enum EdgeSolver {
     GaussSeidel,
 }
 
-wire_struct!(EdgeCoupling {
-    mass,
-    inertia,
-    reference_point,
-    radius,
+wire_ranged!(EdgeCoupling {
+    mass in MASS,
+    inertia in INERTIA,
+    reference_point in LENGTH,
+    radius in EXTENT,
     settings,
-    set_rate_hz,
+    set_rate_hz in SET_RATE,
     obstacles,
 });
-wire_struct!(EdgeSettings {
-    k_s,
-    k_h,
-    damping_time,
-    radius_of_gyration,
+wire_ranged!(EdgeSettings {
+    k_s in GAIN,
+    k_h in STIFFNESS,
+    damping_time in LASTS,
+    radius_of_gyration in EXTENT,
     adaptation,
     look_ahead,
     passive,
-    force_limit,
-    torque_limit,
-    rest_distance,
-    minimum_gap,
-    gap_tolerance,
-    activation_distance,
-    look_ahead_limit,
-    look_ahead_pairs,
-    motion_tolerance,
-    max_constraints,
-    max_substeps,
-    implicit_rounds,
-    max_advancement_steps,
-    work_budget,
+    force_limit in STRENGTH,
+    torque_limit in STRENGTH,
+    rest_distance in SIZE,
+    minimum_gap in SIZE,
+    gap_tolerance in SIZE,
+    activation_distance in SIZE,
+    look_ahead_limit in SIZE,
+    look_ahead_pairs in COUNT,
+    motion_tolerance in SIZE,
+    max_constraints in CAPACITY,
+    max_substeps in STEPS,
+    implicit_rounds in ROUNDS,
+    max_advancement_steps in STEPS,
+    work_budget in COUNT,
     solver,
 });
-wire_struct!(EdgeAdaptation {
-    duration,
-    threshold
+wire_ranged!(EdgeAdaptation {
+    duration in LASTS,
+    threshold in DEPTH
 });
-wire_struct!(EdgeSurface {
+wire_ranged!(EdgeSurface {
     pose,
-    friction,
+    friction in FRICTION,
     sine
 });
-wire_struct!(EdgeSine {
-    axis,
-    wavelength,
-    amplitude
+wire_ranged!(EdgeSine {
+    axis in UNIT,
+    wavelength in EXTENT,
+    amplitude in SLOPE
 });
 wire_tag!(EdgeSolver, "solver" { ActiveSet = 0, GaussSeidel = 1 });
 

@@ -25,8 +25,9 @@ pub struct InputSample {
     pub flags: u16,
     /// What the device renders from this reading on: force then torque at the reference point, N and N m, scene axes.
     pub rendered: [f64; 6],
-    /// Constraint set that `rendered` rests on; 0 where the bridge does not couple.
-    pub set_sequence: u64,
+    /// [`crate::constraints::SetHead::made_ns`] of the constraint set that `rendered` rests on, as the server stamped it: what has passed
+    /// since then when the reading arrives is the way down and the way up, on the server's clock alone. 0 for none.
+    pub set_made_ns: u64,
 }
 
 /// [`InputSample::flags`]: the device reports a fault.
@@ -43,5 +44,5 @@ wire_ranged!(InputSample {
     buttons in BITS,
     flags in BITS,
     rendered in FORCE,
-    set_sequence in COUNT
+    set_made_ns in TIME
 });

@@ -11,7 +11,7 @@
 //! |        | triangles | m × 12             | vertex indices, counter-clockwise from outside |
 //! |        | normals   | n × 12 or 0        | unit, per vertex                             |
 
-use crate::{DecodeError, EncodeError, codec::wire_struct};
+use crate::{DecodeError, EncodeError, codec::wire_ranged};
 
 /// Most bytes of an encoded mesh: 4 million triangles.
 pub const MAX_MESH_BYTES: usize = 128 << 20;
@@ -28,7 +28,7 @@ pub struct MeshHash {
     pub bytes: [u8; 32],
 }
 
-wire_struct!(MeshHash { bytes });
+wire_ranged!(MeshHash { bytes });
 
 impl MeshHash {
     /// Hash of an encoded mesh.

@@ -7,7 +7,7 @@
 //!
 //! A state machine: times and tokens are arguments.
 
-use crate::codec::wire_struct;
+use crate::{codec::wire_ranged, range::NAME};
 use std::net::{IpAddr, SocketAddr};
 
 /// Shortest distance between two challenges of one session, ns.
@@ -20,7 +20,7 @@ pub struct PathToken {
     pub token: u64,
 }
 
-wire_struct!(PathToken { token });
+wire_ranged!(PathToken { token in NAME });
 
 /// An address that is not proven yet.
 #[derive(Clone, Copy, Debug)]

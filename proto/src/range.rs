@@ -127,6 +127,39 @@ pub const SET_PART: Bounds = bounds(
 /// Place in a small enumeration.
 pub const SMALL: Bounds = bounds(0.0, u8::MAX as f64, "any");
 
+/// Mass of a body.
+pub const MASS: Bounds = bounds(1e-12, 1e12, "10^-12 to 10^12 kg");
+/// Component of an inertia tensor; that it is one is checked where it becomes a body's.
+pub const INERTIA: Bounds = bounds(-1e24, 1e24, "-10^24 to 10^24 kg m²");
+/// A length that cannot be zero.
+pub const EXTENT: Bounds = bounds(1e-12, 1e6, "10^-12 m to 1000 km");
+/// Depth as a negative gap.
+pub const DEPTH: Bounds = bounds(-1e6, 0.0, "-1000 km to 0, in m");
+/// Share of a way that is gone in a step.
+pub const GAIN: Bounds = bounds(1e-6, 1.0, "10^-6 to 1");
+/// Stiffness over mass.
+pub const STIFFNESS: Bounds = bounds(1e-6, 1e12, "10^-6 to 10^12 per s²");
+/// A time constant or a ramp.
+pub const LASTS: Bounds = bounds(0.0, 3600.0, "0 to an hour, in s");
+/// Largest force or torque.
+pub const STRENGTH: Bounds = bounds(
+    1e-9,
+    1e6,
+    "10^-9 to 10^6 N or N m; the device port limits it",
+);
+/// Constraint sets per second.
+pub const SET_RATE: Bounds = bounds(1.0, 1e5, "1 to 10^5 per second");
+/// Most rows of a set.
+pub const CAPACITY: Bounds = bounds(1.0, crate::constraints::MAX_SET_ROWS as f64, "1 to 1024");
+/// Most steps of an iteration.
+pub const STEPS: Bounds = bounds(1.0, 1e6, "1 to 10^6");
+/// Most linearisations of the rows for one force.
+pub const ROUNDS: Bounds = bounds(0.0, 3.0, "0 to 3");
+/// Coefficient of friction.
+pub const FRICTION: Bounds = bounds(0.0, 1e6, "0 to 10^6");
+/// Tangent of an angle.
+pub const SLOPE: Bounds = bounds(-1e6, 1e6, "-10^6 to 10^6");
+
 /// A number, or some of them, that can be compared with bounds.
 pub trait InBounds {
     /// Whether all are within; false for NaN.
@@ -190,9 +223,12 @@ impl Number {
     }
 }
 
-/// Every number of every message, message by message. What a device bridge is told of the coupling is checked where it is used.
+/// Every number of every message, message by message.
 pub fn numbers() -> impl Iterator<Item = &'static Number> {
-    use crate::{barrier, constraints, control, events, group, head, input, pose, scene, state};
+    use crate::{
+        barrier, constraints, control, coupling, events, group, head, input, path, pose, scene,
+        state,
+    };
     use crate::{confirmation, stats, time, wrench};
     [
         barrier::Arrive::NUMBERS,
@@ -215,12 +251,18 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         constraints::SetHead::NUMBERS,
         constraints::ConstraintPart::NUMBERS,
         constraints::ConstraintRow::NUMBERS,
+        path::PathToken::NUMBERS,
         pose::PoseF32::NUMBERS,
         pose::PoseF64::NUMBERS,
         control::Hello::NUMBERS,
         control::Welcome::NUMBERS,
         control::Refusal::NUMBERS,
         control::MeshHeader::NUMBERS,
+        coupling::EdgeCoupling::NUMBERS,
+        coupling::EdgeSettings::NUMBERS,
+        coupling::EdgeAdaptation::NUMBERS,
+        coupling::EdgeSurface::NUMBERS,
+        coupling::EdgeSine::NUMBERS,
         group::Group::NUMBERS,
         group::GroupMember::NUMBERS,
         stats::ClientStats::NUMBERS,

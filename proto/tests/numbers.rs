@@ -4,9 +4,10 @@ mod samples;
 
 use samples::*;
 use taut_proto::{
-    DecodeError, EncodeError, HeadSample, HotState, InputSample, Payload, PoseF64,
+    DecodeError, EdgeCoupling, EncodeError, HeadSample, HotState, InputSample, Payload, PoseF64,
     barrier::{Arrive, ReleaseHead},
     codec::{decode, encode_onto},
+    coupling::EdgeSine,
     header::MAX_PAYLOAD_BYTES,
     range::{MAX_NODE_PERIOD_US, MAX_PERIOD_US, numbers},
     time::TimeRequest,
@@ -121,7 +122,7 @@ fn what_nobody_takes_nobody_sends() {
         buttons: 0,
         flags: 0,
         rendered: [0.0; 6],
-        set_sequence: 0,
+        set_made_ns: 0,
     };
     assert_eq!(sent(&Payload::Input(input)), out("PoseF64.rotation"));
     let arrive = Arrive {
@@ -129,6 +130,62 @@ fn what_nobody_takes_nobody_sends() {
         ..Arrive::default()
     };
     assert_eq!(sent(&Payload::Arrive(arrive)), out("Arrive.period_us"));
+}
+
+/// The bytes of the sample of a coupling with a number at `at` replaced, read.
+fn bent_coupling(at: usize, with: &[u8]) -> &'static str {
+    let mut bytes = Vec::new();
+    assert_eq!(encode_onto(&coupling(), &mut bytes), Ok(()));
+    bytes[at..at + with.len()].copy_from_slice(with);
+    match decode::<EdgeCoupling>(&bytes) {
+        Err(DecodeError::OutOfRange { number, .. }) => number,
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+#[test]
+fn a_coupling_that_no_scene_has_is_refused_by_name() {
+    for (at, value, number) in [
+        (0, 0.0, "EdgeCoupling.mass"),
+        (8, 1e25, "EdgeCoupling.inertia"),
+        (80, -1e7, "EdgeCoupling.reference_point"),
+        (104, 0.0, "EdgeCoupling.radius"),
+        (112, 1.01, "EdgeSettings.k_s"),
+        (120, -2000.0, "EdgeSettings.k_h"),
+        (128, 1e4, "EdgeSettings.damping_time"),
+        (137, 0.0, "EdgeSettings.radius_of_gyration"),
+        (146, -1.0, "EdgeAdaptation.duration"),
+        (154, 1e-3, "EdgeAdaptation.threshold"),
+        (164, 1e300, "EdgeSettings.force_limit"),
+        (172, 0.0, "EdgeSettings.torque_limit"),
+        (180, -1.0, "EdgeSettings.rest_distance"),
+        (212, 1e7, "EdgeSettings.look_ahead_limit"),
+    ] {
+        assert_eq!(bent_coupling(at, &f64::to_le_bytes(value)), number);
+    }
+    for (at, value, number) in [
+        (236, 0, "EdgeSettings.max_constraints"),
+        (236, 1025, "EdgeSettings.max_constraints"),
+        (240, u32::MAX, "EdgeSettings.max_substeps"),
+        (244, 4, "EdgeSettings.implicit_rounds"),
+        (248, 0, "EdgeSettings.max_advancement_steps"),
+    ] {
+        assert_eq!(bent_coupling(at, &u32::to_le_bytes(value)), number);
+    }
+    let sent = |coupling: &EdgeCoupling| encode_onto(coupling, &mut Vec::new()).err();
+    let out = |number| Some(EncodeError::OutOfRange { number });
+    let mut odd = coupling();
+    odd.obstacles[0].friction = -0.1;
+    assert_eq!(sent(&odd), out("EdgeSurface.friction"));
+    let mut odd = coupling();
+    odd.set_rate_hz = 0.0;
+    assert_eq!(sent(&odd), out("EdgeCoupling.set_rate_hz"));
+    let mut odd = coupling();
+    odd.obstacles[0].sine = odd.obstacles[0].sine.map(|sine| EdgeSine {
+        axis: [1.1, 0.0, 0.0],
+        ..sine
+    });
+    assert_eq!(sent(&odd), out("EdgeSine.axis"));
 }
 
 #[test]

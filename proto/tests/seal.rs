@@ -46,7 +46,7 @@ fn input(index: u64) -> Payload {
         buttons: 1,
         flags: 0,
         rendered: [0.0; 6],
-        set_sequence: 0,
+        set_made_ns: 0,
     })
 }
 

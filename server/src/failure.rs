@@ -59,7 +59,8 @@ impl From<taut_link::LinkError> for Failure {
             | E::Refused { .. }
             | E::Protocol { .. }
             | E::KeyFile { .. }
-            | E::Content { .. } => Self::bad_input(error),
+            | E::Content { .. }
+            | E::NodeTimeout { .. } => Self::bad_input(error),
         }
     }
 }

@@ -232,7 +232,7 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
             buttons: 0,
             flags: 0,
             rendered: [0.0; 6],
-            set_sequence: 0,
+            set_made_ns: 0,
         });
     }
     assert_eq!(

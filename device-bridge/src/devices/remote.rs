@@ -101,7 +101,12 @@ impl RemoteDevice {
         let at_edge = input.sample.flags & INPUT_AT_EDGE != 0;
         let wrench = Vector6::from(input.sample.rendered);
         let finite = wrench.iter().all(|x| x.is_finite());
-        self.felt = finite.then_some(Felt { wrench, at_edge });
+        let set_made = Duration::from_nanos(input.sample.set_made_ns);
+        self.felt = finite.then_some(Felt {
+            wrench,
+            at_edge,
+            set_made: (at_edge && !set_made.is_zero()).then_some(set_made),
+        });
 
         let received = Duration::from_nanos(input.received_ns);
         let stamp = input.sample.sample_time_ns;
@@ -229,7 +234,7 @@ mod tests {
                 buttons: 5,
                 flags: 0,
                 rendered: [0.0; 6],
-                set_sequence: 0,
+                set_made_ns: 0,
             },
             received_ns: received_ms * 1_000_000,
             session: 7,
@@ -327,6 +332,7 @@ mod tests {
         let mut edge = input(900, 1000);
         edge.sample.flags = INPUT_AT_EDGE;
         edge.sample.rendered = [0.0, 0.0, 3.0, 0.0, 0.1, 0.0];
+        edge.sample.set_made_ns = 870_000_000;
         inputs.write(Some(edge));
         assert!(device.read(ms(1000)).is_ok(), "100 ms on the way");
         let wrench = Vector6::from(edge.sample.rendered);
@@ -334,7 +340,8 @@ mod tests {
             device.felt(),
             Some(Felt {
                 wrench,
-                at_edge: true
+                at_edge: true,
+                set_made: Some(ms(870)),
             })
         );
         device.write(ms(1000), &Vector6::repeat(1.0));

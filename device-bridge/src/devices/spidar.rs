@@ -332,6 +332,7 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
         Some(Felt {
             wrench: stack(&force, &torque),
             at_edge: false,
+            set_made: None,
         })
     }
 

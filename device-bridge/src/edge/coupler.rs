@@ -49,6 +49,8 @@ pub struct EdgeCoupler {
     next: ConstraintSet,
     /// When the device was read that the set answers; `None` before the first set.
     origin: Option<Duration>,
+    /// When the server made the set, or last found it to hold: its stamp, session time, ns.
+    made_ns: u64,
     paused: bool,
     most_rows: usize,
 }
@@ -66,6 +68,7 @@ impl EdgeCoupler {
             set: ConstraintSet::with_capacity(capacity),
             next: ConstraintSet::with_capacity(capacity),
             origin: None,
+            made_ns: 0,
             paused: false,
             most_rows: usize::MAX,
         })
@@ -103,6 +106,7 @@ impl EdgeCoupler {
             std::mem::swap(&mut self.set, &mut self.next);
         }
         self.origin = self.origin.max(Some(origin));
+        self.made_ns = self.made_ns.max(wire.head.made_ns);
         self.paused = wire.head.flags & SET_PAUSED != 0;
         Ok(())
     }
@@ -111,6 +115,12 @@ impl EdgeCoupler {
     #[must_use]
     pub fn sequence(&self) -> Option<u64> {
         self.origin.map(|_| self.set.sequence)
+    }
+
+    /// The server's stamp of the set in use: what it is told back. 0 before the first.
+    #[must_use]
+    pub fn set_made_ns(&self) -> u64 {
+        self.made_ns
     }
 
     /// The force for a device sample; `None` before the first set. `now` never runs back. A sample of the time of the one before is the same

@@ -23,7 +23,7 @@ mod sets;
 mod settings;
 mod work;
 
-pub use ahead::{device_ahead, device_predicted};
+pub use ahead::{device_ahead, device_predicted, way_around};
 pub use coupler::{EdgeCoupler, EdgeWrench};
 pub use offer::{OfferError, offer_of, world_of};
 pub use sets::{BrokenSet, read_set, write_set};

@@ -7,6 +7,7 @@ use god_object::nalgebra::{Matrix3, Point3, Vector3};
 use god_object::{
     Body, Mesh, Obstacle, Settings, SettingsError, SineTexture, Surface, Texture, World,
 };
+use taut_link::proto::codec::encode_onto;
 use taut_link::proto::coupling::{EdgeSine, EdgeSurface};
 use taut_link::proto::{CouplingOffer, EdgeCoupling, PoseF64};
 
@@ -56,7 +57,7 @@ pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> Couplin
     let mut rows = [0.0; 9];
     // Column by column or row by row: it is symmetric.
     rows.copy_from_slice(inertia.as_slice());
-    CouplingOffer::AtEdge(EdgeCoupling {
+    let offer = CouplingOffer::AtEdge(EdgeCoupling {
         mass: *mass,
         inertia: rows,
         reference_point: reference_point.coords.into(),
@@ -64,7 +65,11 @@ pub fn offer_of(world: &World, settings: &Settings, set_rate_hz: f64) -> Couplin
         settings,
         set_rate_hz,
         obstacles,
-    })
+    });
+    match encode_onto(&offer, &mut Vec::new()) {
+        Ok(()) => offer,
+        Err(error) => at_server(error.to_string()),
+    }
 }
 
 /// How an obstacle feels; `None` where that does not travel.
@@ -267,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_height_map_and_too_many_rows_stay_at_the_server() {
+    fn a_height_map_too_many_rows_and_what_no_bridge_takes_stay_at_the_server() {
         let (mut world, settings) = scene();
         let many = Settings {
             max_constraints: MAX_SET_ROWS + 1,
@@ -277,6 +282,18 @@ mod tests {
             offer_of(&world, &many, 1000.0),
             CouplingOffer::AtServer { .. }
         ));
+        let stiff = Settings {
+            k_h: 1e13,
+            ..settings
+        };
+        let CouplingOffer::AtServer { reason } = offer_of(&world, &stiff, 1000.0) else {
+            panic!("nobody would take it");
+        };
+        assert!(
+            reason
+                .to_string()
+                .contains("EdgeSettings.k_h out of its range")
+        );
         let map = god_object::HeightMap::new(2, &[0.0; 4]);
         world.obstacles[0].surface.texture = map.ok().map(|map| {
             Texture::HeightMap(god_object::HeightMapTexture {

@@ -1,6 +1,6 @@
 //! Why a link does not come about or fails; each text says what, where and what to do.
 
-use std::{io, net::SocketAddr, path::PathBuf};
+use std::{io, net::SocketAddr, path::PathBuf, time::Duration};
 use taut_proto::{
     ServerPin, Untrusted, VersionRange, control::RefusalCode, credential::NotAllowed,
 };
@@ -152,6 +152,14 @@ pub enum LinkError {
         path: PathBuf,
         /// Why and what to do.
         reason: String,
+    },
+    /// The silence after which a node is gone is none.
+    #[error(
+        "the node timeout is {timeout:?}, but must be from 1 ms to 60 s: change node_timeout in [network]"
+    )]
+    NodeTimeout {
+        /// What was asked for.
+        timeout: Duration,
     },
     /// The content cannot be sent.
     #[error("the scene cannot be sent to clients: {reason}")]

@@ -164,6 +164,32 @@ async fn a_second_node_of_one_name_is_refused_and_the_first_stays() {
     client(&server, Role::Render, "left").await.close().await;
 }
 
+/// Clients could not be told of it: nobody would get in.
+#[tokio::test]
+async fn a_node_timeout_that_is_none_is_refused_at_the_start() {
+    for (micros, refused) in [
+        (0, true),
+        (999, true),
+        (1000, false),
+        (60_000_000, false),
+        (60_001_000, true),
+        (u64::MAX, true),
+    ] {
+        let options = ServerOptions {
+            node_timeout: Duration::from_micros(micros),
+            ..ServerOptions::loopback(key('a'))
+        };
+        match serve(options, content()).await {
+            Err(LinkError::NodeTimeout { .. }) => assert!(refused, "{micros} us"),
+            Err(error) => panic!("{micros} us: {error}"),
+            Ok(server) => {
+                assert!(!refused, "{micros} us");
+                drop(server);
+            }
+        }
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_full_server_says_so() {
     let server = server_with(ServerOptions {

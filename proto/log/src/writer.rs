@@ -193,8 +193,9 @@ pub fn lost_lines() -> u64 {
     TERMINAL.get().map_or(0, Writer::lost)
 }
 
-/// At the end of the process: waits for what was handed over, at most about a second.
+/// At the end of the process: waits for what was handed over, at most about a second; for a backtrace that is being read, another one.
 pub fn flush() {
+    crate::panics::flush();
     if let Some(writer) = TERMINAL.get() {
         writer.flush();
     }

@@ -27,7 +27,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         buttons: 1,
         flags: 2,
         rendered: [0.0, 0.0, 1.5, 0.0, 0.25, 0.0],
-        set_sequence: 40,
+        set_made_ns: 999_000_000,
     };
     let wrench = WrenchCommand {
         time_ns: 1_000_000_500,
@@ -99,7 +99,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
     )
         .prop_map(
             |(
-                (sample_time_ns, clock_uncertainty_ns, index, buttons, flags, set_sequence),
+                (sample_time_ns, clock_uncertainty_ns, index, buttons, flags, set_made_ns),
                 pose,
                 velocity,
                 rendered,
@@ -113,7 +113,7 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                     buttons,
                     flags,
                     rendered,
-                    set_sequence,
+                    set_made_ns,
                 })
             },
         );

@@ -14,7 +14,7 @@ use crate::fidelity::FidelityWatch;
 use crate::realtime::thread_cpu_time;
 use god_object::spatial::{angular, linear};
 use god_object::{GodObject, Pose, ShadedAcceleration};
-use taut_bridge::edge::{device_ahead, device_predicted};
+use taut_bridge::edge::{device_ahead, device_predicted, way_around};
 use taut_proto::ArrayVec;
 use taut_recording::{ConstraintRecord, Tap, UpdateRecord};
 use taut_scene::BuiltMotion;
@@ -209,14 +209,15 @@ fn note_obstacles(
 ///
 /// For a hand beside a bridge that couples by itself: where it will be when the set is there. For any other its pose.
 fn followed(device: &DeviceState, now: Duration, god_object: &GodObject) -> (Pose, f64) {
-    if !device.felt.is_some_and(|felt| felt.at_edge) {
+    let Some(felt) = device.felt.filter(|felt| felt.at_edge) else {
         return (device.pose, 0.0);
-    }
-    let age = now.saturating_sub(device.time);
+    };
+    let age = |since: Duration| now.saturating_sub(since);
+    let way = way_around(age(device.time), felt.set_made.map(age));
     let (pose, velocity) = (&device.pose, &device.velocity);
     let point = god_object.reference_point();
     (
-        device_predicted(pose, velocity, point, age, SET_PERIOD),
-        device_ahead(velocity, god_object.radius(), age, SET_PERIOD),
+        device_predicted(pose, velocity, point, way, SET_PERIOD),
+        device_ahead(velocity, god_object.radius(), way, SET_PERIOD),
     )
 }

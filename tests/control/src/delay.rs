@@ -37,6 +37,15 @@ const TIME_REQUESTS: (u32, u32, u32) = (16, 5, 50);
 /// Bound of the promise: nothing is felt that rests on older data.
 pub const ZERO_AFTER: Duration = SafetySettings::ZERO_AFTER;
 
+/// How a delay grows with time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Course {
+    /// It doubles in this time, from a millisecond on.
+    Doubling(Duration),
+    /// By as many seconds each second.
+    Steady(f64),
+}
+
 /// How a network's delay grows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
@@ -44,8 +53,8 @@ pub struct Growth {
     pub begin: Duration,
     /// Whether the way up and the way down are delayed.
     pub ways: [bool; 2],
-    /// Time in which the delay doubles, from a millisecond on.
-    pub doubling: Duration,
+    /// How it grows.
+    pub course: Course,
     /// Largest delay.
     pub most: Duration,
 }
@@ -55,7 +64,7 @@ impl Growth {
     pub const NONE: Self = Self {
         begin: Duration::ZERO,
         ways: [false; 2],
-        doubling: Duration::from_secs(1),
+        course: Course::Steady(0.0),
         most: Duration::ZERO,
     };
 
@@ -64,7 +73,10 @@ impl Growth {
             return 0;
         }
         let elapsed = now.saturating_sub(self.begin).as_secs_f64();
-        let grown = 1e-3 * ((elapsed / self.doubling.as_secs_f64()).exp2() - 1.0);
+        let grown = match self.course {
+            Course::Doubling(time) => 1e-3 * ((elapsed / time.as_secs_f64()).exp2() - 1.0),
+            Course::Steady(slope) => slope * elapsed,
+        };
         (grown.min(self.most.as_secs_f64()) * 1e9) as u64
     }
 }
@@ -118,6 +130,13 @@ impl Rubbing {
                 [0.0, 0.0, 0.03],
             ],
         )
+    }
+
+    /// Does once what the hand does in the study of coupling at the edge.
+    #[must_use]
+    pub fn once(task: Task) -> Self {
+        let path = task.intention.clone();
+        Self { task, path }
     }
 
     fn along(task: Task, places: &[[f64; 3]; 4]) -> Self {

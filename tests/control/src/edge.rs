@@ -17,7 +17,9 @@ use std::time::Duration;
 
 use god_object::{Coupling, GodObject};
 use nalgebra::{Point3, Vector3, Vector6};
-use taut_bridge::edge::{EdgeCoupler, device_ahead, device_predicted, offer_of, write_set};
+use taut_bridge::edge::{
+    EdgeCoupler, device_ahead, device_predicted, offer_of, way_around, write_set,
+};
 use taut_bridge::{Device, EnergyObserver, Grip, Hand, Pose, SimulatedDevice};
 use taut_proto::constraints::SetHead;
 use taut_proto::input::INPUT_AT_EDGE;
@@ -150,11 +152,13 @@ impl Server {
             return;
         };
         if self.mode == Mode::Edge {
-            let age = Duration::from_nanos(now_ns.saturating_sub(input.sample_time_ns));
+            let age = |since_ns: u64| Duration::from_nanos(now_ns.saturating_sub(since_ns));
+            let made = (input.set_made_ns > 0).then_some(input.set_made_ns);
+            let way = way_around(age(input.sample_time_ns), made.map(age));
             let velocity = Vector6::from(input.velocity);
-            let ahead = device_ahead(&velocity, self.radius, age, TICK);
+            let ahead = device_ahead(&velocity, self.radius, way, TICK);
             self.god_object.set_device_ahead(ahead);
-            pose = device_predicted(&pose, &velocity, &self.reference_point, age, TICK);
+            pose = device_predicted(&pose, &velocity, &self.reference_point, way, TICK);
         }
         self.god_object.step(&pose, None);
         let set = self.god_object.constraint_set();
@@ -276,7 +280,7 @@ impl Bridge {
                 0
             },
             rendered: rendered.into(),
-            set_sequence: felt.map_or(0, |felt| felt.sequence),
+            set_made_ns: self.coupler.set_made_ns(),
         };
         up.send(now_ns, &Payload::Input(input));
         (sample.pose, rendered)

@@ -3,8 +3,9 @@
 use std::time::Duration;
 
 use taut_bridge::EventKind;
-use taut_control_tests::delay::{Growth, Rubbing, ZERO_AFTER, run};
+use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, run};
 use taut_control_tests::edge::Mode;
+use taut_control_tests::edge_scenes::Task;
 
 /// What may be given beyond what is given without delay, J.
 const MORE: f64 = 0.02;
@@ -15,7 +16,7 @@ fn growing(up: bool, down: bool) -> Growth {
     Growth {
         begin: Duration::from_secs(2),
         ways: [up, down],
-        doubling: Duration::from_millis(1500),
+        course: Course::Doubling(Duration::from_millis(1500)),
         most: Duration::from_secs(2),
     }
 }
@@ -71,4 +72,59 @@ fn a_force_beside_the_device_on_a_wall() {
 #[test]
 fn a_force_beside_the_device_on_a_dome() {
     keeps_its_promise("dome", &Rubbing::over_dome(), Mode::Edge);
+}
+
+/// Delays that grow by the same share of each second from none to more than anything is felt of, begun in several places of the hand's path.
+fn keeps_its_promise_at_any_slope(name: &str, rubbing: &Rubbing, begins_ms: &[u64]) {
+    let usual = run(rubbing, Mode::Edge, Growth::NONE, Duration::from_secs(6));
+    assert!(usual.largest[1] > 1.0, "{usual:?}");
+    let mut worst = (f64::NEG_INFINITY, String::new());
+    for (way, ways) in [
+        ("both", [true, true]),
+        ("up", [true, false]),
+        ("down", [false, true]),
+    ] {
+        for slope in [0.05, 0.1, 0.2, 0.5, 1.0] {
+            for begin in begins_ms.iter().copied().map(Duration::from_millis) {
+                let growth = Growth {
+                    begin,
+                    ways,
+                    course: Course::Steady(slope),
+                    most: 2 * ZERO_AFTER,
+                };
+                // Then everything is too old to be felt.
+                let until = begin + ZERO_AFTER.div_f64(slope);
+                let attacked = run(rubbing, Mode::Edge, growth, until);
+                let case = format!("{way}, {slope} s/s from {begin:?} on");
+                assert!(attacked.oldest < ZERO_AFTER, "{case}: {attacked:?}");
+                let more = attacked.given - usual.given;
+                if more > worst.0 {
+                    worst = (more, case);
+                }
+            }
+        }
+    }
+    let (more, case) = worst;
+    println!(
+        "{name}: at most {:+.2} mJ on {:.2}: {case}",
+        more * 1e3,
+        usual.given * 1e3
+    );
+    assert!(more <= MORE, "{more} J: {case}");
+}
+
+#[test]
+fn a_steadily_slower_network_and_a_wall() {
+    keeps_its_promise_at_any_slope("wall", &Rubbing::on_wall(), &[2000, 2800, 3600]);
+}
+
+#[test]
+fn a_steadily_slower_network_and_a_dome() {
+    keeps_its_promise_at_any_slope("dome", &Rubbing::over_dome(), &[2000, 3000, 3600]);
+}
+
+#[test]
+fn a_steadily_slower_network_and_a_corner() {
+    let corner = Rubbing::once(Task::corner());
+    keeps_its_promise_at_any_slope("corner", &corner, &[300, 1000, 1600]);
 }

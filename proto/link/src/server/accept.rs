@@ -263,7 +263,7 @@ fn admit(
         epoch: shared.epoch,
         udp_port: shared.udp_port,
         session_time_ns: now_ns,
-        node_timeout_ms: u32::try_from(shared.node_timeout.as_millis()).unwrap_or(u32::MAX),
+        node_timeout_ms: shared.node_timeout_ms,
     };
     Ok((session, welcome))
 }

@@ -37,7 +37,7 @@ use std::{
     time::Duration,
 };
 use taut_proto::membership::{Pace, SilenceLimits};
-use taut_proto::{JoinPolicy, ServerPin, waiting::Waiting};
+use taut_proto::{JoinPolicy, ServerPin, range::MAX_TIMEOUT_MS, waiting::Waiting};
 use tokio::time::{sleep, timeout};
 
 /// Events kept for who takes them; more are dropped and counted.
@@ -63,11 +63,20 @@ pub struct ServerLink {
     eviction: tokio::task::JoinHandle<()>,
 }
 
+/// The silence in the form in which clients are told of it, ms.
+fn told_node_timeout(timeout: Duration) -> Result<u32, LinkError> {
+    u32::try_from(timeout.as_millis())
+        .ok()
+        .filter(|ms| (1..=MAX_TIMEOUT_MS).contains(ms))
+        .ok_or(LinkError::NodeTimeout { timeout })
+}
+
 /// Listens and lets clients in, on the current tokio runtime and two threads, `taut-udp` and `taut-quic`, of the calling
 /// thread's class.
 ///
-/// Fails if an address cannot be had, or if `content` names a mesh that it does not hold; nothing is left running then.
+/// Fails if an address cannot be had, if `node_timeout` is none that clients can be told, or if `content` names a mesh that it does not hold; nothing is left running then.
 pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLink, LinkError> {
+    let node_timeout_ms = told_node_timeout(options.node_timeout)?;
     let content = content.encode(options.coupling)?;
     let quic_socket = listen(options.quic, "control")?;
     let udp = listen(options.udp, "state")?;
@@ -105,7 +114,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         unknown: Mutex::new(options.limits.unknown()),
         heads,
         clock: options.clock,
-        node_timeout: options.node_timeout,
+        node_timeout_ms,
         epoch,
         sessions: Sessions::new(Places::new(
             options.max_clients,

@@ -18,7 +18,6 @@ use std::{
         atomic::{AtomicBool, AtomicU64, Ordering},
         mpsc::SyncSender,
     },
-    time::Duration,
 };
 use taut_proto::{
     ClusterKey, JoinPolicy, Role, VersionRange,
@@ -43,8 +42,8 @@ pub(crate) struct Shared {
     pub(crate) waiting: Mutex<Waiting<Place>>,
     pub(crate) unknown: Mutex<UnknownSources>,
     pub(crate) clock: SessionClock,
-    /// Silence after which a node is gone, and after which it gives this server up.
-    pub(crate) node_timeout: Duration,
+    /// Silence after which a node is gone, and after which it gives this server up, ms; in the range of `Welcome`.
+    pub(crate) node_timeout_ms: u32,
     pub(crate) epoch: u32,
     pub(crate) content: EncodedContent,
     pub(crate) udp: UdpSocket,

@@ -150,7 +150,7 @@ pub fn input(index: u64) -> InputSample {
         buttons: 1,
         flags: 0,
         rendered: [0.0; 6],
-        set_sequence: 0,
+        set_made_ns: 0,
     }
 }
 

@@ -18,7 +18,8 @@ const MAX_CLIENTS: i64 = 256;
 const SINGLE_PLACES: usize = 3;
 /// Silence after which a node counts as gone, s: ten of its signs of life.
 const NODE_TIMEOUT: f64 = 0.5;
-/// Longest that may be asked for, s.
+/// Shortest and longest that may be asked for, s: what clients can be told.
+const MIN_NODE_TIMEOUT: f64 = 0.001;
 const MAX_NODE_TIMEOUT: f64 = 60.0;
 
 /// Group and interface of multicast; the interface must be known where multicast is asked for.
@@ -186,7 +187,7 @@ pub(super) fn network(
         admission: admission(&section),
         node_timeout: section.number_or(
             "node_timeout",
-            Range::PositiveUpTo(MAX_NODE_TIMEOUT),
+            Range::Between(MIN_NODE_TIMEOUT, MAX_NODE_TIMEOUT),
             NODE_TIMEOUT,
         ),
     };

@@ -92,7 +92,7 @@ pub fn reading(index: u64) -> InputSample {
         buttons: 0,
         flags: 0,
         rendered: [0.0; 6],
-        set_sequence: 0,
+        set_made_ns: 0,
     }
 }
 
