@@ -19,8 +19,8 @@ use super::contact::ConeContact;
 use crate::spatial::Vector6;
 
 /// Stiffness of the multipliers against slip and penetration, in units of the contact's own: slip and penetration that are left are this much
-/// smaller than the correction.
-const STIFFNESS: f64 = 1e4;
+/// smaller than the correction. With 1e4 a body that sticks on an obstacle that moves creeps by more than the god-object loop takes for rest.
+const STIFFNESS: f64 = 1e5;
 /// Where that does not balance within [`MAX_STEPS`]: kinks are wider, and what is left is nearer to the stiff answer.
 const SOFT_STIFFNESS: f64 = 1e2;
 /// Most Newton steps: a microsecond each.
