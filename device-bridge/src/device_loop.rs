@@ -20,6 +20,7 @@ use crate::edge::BrokenSet;
 use crate::port::SafetyEvent;
 use crate::realtime::{self, Awake, RealtimeGrant, Ticker, monotonic_now};
 use crate::report::Durations;
+use crate::service_manager::Turns;
 use crate::signals::EndFlag;
 
 /// What the device loop has to tell.
@@ -39,6 +40,7 @@ pub(crate) struct DeviceLoop {
     /// Set when the whole bridge is to end.
     pub(crate) asked: EndFlag,
     pub(crate) wishes: Arc<ArmSwitch>,
+    pub(crate) turns: Turns,
     pub(crate) notices: SyncSender<Notice>,
     pub(crate) period: Duration,
     pub(crate) priority: u8,
@@ -79,6 +81,7 @@ impl DeviceLoop {
         let mut set = ConstraintSet::new();
         while !self.is_over() {
             self.totals.missed += ticker.wait();
+            self.turns.count();
             let now = monotonic_now();
             self.totals.first_tick.get_or_insert(now);
             self.totals.last_tick = now;

@@ -159,6 +159,7 @@ impl Run<'_> {
             end: Arc::clone(&end_loop),
             asked: self.over.end.clone(),
             wishes: Arc::clone(&self.wishes),
+            turns: self.over.alive.device.clone(),
             notices: sender,
             period,
             priority: self.args.priority,
@@ -192,6 +193,7 @@ impl Run<'_> {
         let mut end = None;
         while end.is_none() && !thread.is_finished() {
             thread::sleep(WATCH_PERIOD);
+            self.over.alive.watch.count();
             end = self.session_end(&link, &mut watch, &notices);
         }
         if matches!(
