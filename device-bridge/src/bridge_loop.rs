@@ -12,9 +12,9 @@ use taut_link::proto::wrench::WRENCH_PAUSED;
 use taut_link::proto::{InputSample, PoseF64, SessionTime, WrenchCommand};
 
 use crate::device::DeviceFault;
-use crate::edge::EdgeCoupler;
+use crate::edge::{BrokenSet, EdgeCoupler};
 use crate::own_stamps::OwnStamps;
-use crate::port::{Command, CommandSource, DevicePort, Events};
+use crate::port::{Command, CommandSource, DevicePort, Events, Spell};
 use crate::report::Durations;
 
 /// The newest command, and when the device was read for what it comes from.
@@ -64,6 +64,9 @@ pub struct BridgeLoop {
     newest: Option<Newest>,
     /// The coupling, where it is here and not at the server.
     edge: Option<Box<EdgeCoupler>>,
+    /// Number of the set that was refused last.
+    refused: Option<u64>,
+    refusals: Spell,
 }
 
 impl BridgeLoop {
@@ -90,6 +93,8 @@ impl BridgeLoop {
             stamps: OwnStamps::default(),
             newest: None,
             edge: None,
+            refused: None,
+            refusals: Spell::default(),
         }
     }
 
@@ -118,6 +123,7 @@ impl BridgeLoop {
         self.newest = None;
         self.stamps = OwnStamps::default();
         self.edge = edge.map(Box::new);
+        self.refused = None;
         self.port.restart(source);
     }
 
@@ -127,11 +133,18 @@ impl BridgeLoop {
     }
 
     /// Takes the newest constraint set, once or again, before the tick at `now`. One that does not say which reading it answers is left alone.
-    pub fn take_set(&mut self, set: &ConstraintSet, now: Duration, session: Option<SessionTime>) {
+    ///
+    /// What is to be told: why it was refused, the first time in a run of refusals.
+    pub fn take_set(
+        &mut self,
+        set: &ConstraintSet,
+        now: Duration,
+        session: Option<SessionTime>,
+    ) -> Option<BrokenSet> {
         self.stamps.follow(now, session);
         let (Some(edge), Some(origin)) = (&mut self.edge, self.stamps.made(set.head.device_ns))
         else {
-            return;
+            return None;
         };
         let new = edge.sequence() != Some(set.head.sequence);
         match edge.take(set, origin) {
@@ -143,8 +156,14 @@ impl BridgeLoop {
                 }
             }
             Ok(()) => {}
-            Err(_) => self.stats.broken_sets += 1,
+            Err(broken) => {
+                let sequence = Some(set.head.sequence);
+                let another = std::mem::replace(&mut self.refused, sequence) != sequence;
+                self.stats.broken_sets += u64::from(another);
+                return self.refusals.begins(now, true).then_some(broken);
+            }
         }
+        None
     }
 
     /// One tick at `now`. `session` is session time, `None` while the clock is not locked; `command` is the newest one, again and again
@@ -243,6 +262,7 @@ mod tests {
     use crate::devices::{
         AtEnd, Grip, Hand, MinJerkPath, RecordedDevice, SimulatedDevice, TraceRow,
     };
+    use crate::edge::{floor, offer};
     use crate::port::{EventKind, SafetySettings};
     use nalgebra::Point3;
 
@@ -397,6 +417,33 @@ mod tests {
         assert!(lowest < 0.2, "{lowest} N");
         assert!(bridge.port().rendered().norm() < 1.01);
         assert_eq!(bridge.stats().wrenches, 1100);
+    }
+
+    #[test]
+    fn refused_sets_are_each_counted_and_told_once_a_run() {
+        let mut bridge = bridge(simulated());
+        let edge = EdgeCoupler::new(&offer()).expect("an offer");
+        bridge.begin_session(CommandSource::Other, Some(edge));
+        let _ = bridge.tick(ms(1), session(1), None);
+        let mut told = Vec::new();
+        // A good set, twenty broken ones in three ticks each, a pause, and another broken one.
+        for tick in 2..400 {
+            let number = match tick {
+                2..62 => tick / 3,
+                62..300 => continue,
+                _ => 100,
+            };
+            let mut set = floor(number, 0);
+            set.head.device_ns = 1_000_000;
+            if number > 0 {
+                set.rows[0].normal = [0.0, 0.0, 0.5];
+            }
+            let refused = bridge.take_set(&set, ms(tick), session(tick));
+            told.extend(refused.map(|broken| (tick, broken)));
+        }
+        let normal = BrokenSet::Normal;
+        assert_eq!(told, [(3, normal), (300, normal)]);
+        assert_eq!((bridge.stats().sets, bridge.stats().broken_sets), (1, 21));
     }
 
     /// Force that is felt, N, when every command comes from a reading that is `age` old, ms.

@@ -16,10 +16,21 @@ use taut_link::{ClientCounters, ClientLink};
 use crate::arm_switch::{ArmSwitch, ArmWish};
 use crate::bridge_loop::BridgeLoop;
 use crate::device::DeviceFault;
+use crate::edge::BrokenSet;
 use crate::port::SafetyEvent;
 use crate::realtime::{self, Awake, RealtimeGrant, Ticker, monotonic_now};
 use crate::report::Durations;
+use crate::service_manager::Turns;
 use crate::signals::EndFlag;
+
+/// What the device loop has to tell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Notice {
+    /// By the port.
+    Safety(SafetyEvent),
+    /// A constraint set that is not used.
+    Refused(BrokenSet),
+}
 
 /// The device loop: the only thread that touches the device.
 pub(crate) struct DeviceLoop {
@@ -29,7 +40,8 @@ pub(crate) struct DeviceLoop {
     /// Set when the whole bridge is to end.
     pub(crate) asked: EndFlag,
     pub(crate) wishes: Arc<ArmSwitch>,
-    pub(crate) notices: SyncSender<SafetyEvent>,
+    pub(crate) turns: Turns,
+    pub(crate) notices: SyncSender<Notice>,
     pub(crate) period: Duration,
     pub(crate) priority: u8,
     pub(crate) core: Option<usize>,
@@ -56,6 +68,10 @@ impl DeviceLoop {
         }
     }
 
+    fn notice(&self, notice: Notice) {
+        let _ = self.notices.try_send(notice); // full: dropped, and counted in the report
+    }
+
     fn is_over(&self) -> bool {
         self.end.load(Ordering::Relaxed) || self.asked.is_asked()
     }
@@ -65,6 +81,7 @@ impl DeviceLoop {
         let mut set = ConstraintSet::new();
         while !self.is_over() {
             self.totals.missed += ticker.wait();
+            self.turns.count();
             let now = monotonic_now();
             self.totals.first_tick.get_or_insert(now);
             self.totals.last_tick = now;
@@ -75,7 +92,9 @@ impl DeviceLoop {
             let session = self.link.session_now();
             let command = self.link.latest_wrench().map(|wrench| wrench.command);
             if bridge.couples() && self.link.newest_set(&mut set).is_some() {
-                bridge.take_set(&set, now, session);
+                if let Some(broken) = bridge.take_set(&set, now, session) {
+                    self.notice(Notice::Refused(broken));
+                }
             }
             match self.wishes.take() {
                 Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
@@ -85,7 +104,7 @@ impl DeviceLoop {
             let output = bridge.tick(now, session, command);
             self.link.send_input(&output.input);
             for event in output.events.iter() {
-                let _ = self.notices.try_send(*event); // full: dropped, and counted in the report
+                self.notice(Notice::Safety(*event));
             }
             if bridge.fault() == Some(DeviceFault::Ended) {
                 break;

@@ -27,6 +27,7 @@ mod placement;
 mod port;
 pub mod realtime;
 mod report;
+pub mod service_manager;
 pub mod signals;
 mod simulated_strings;
 mod trace_file;

@@ -50,7 +50,6 @@ pub mod rendering;
 pub mod replay;
 pub mod report;
 pub mod serve;
-pub mod service_manager;
 pub mod session;
 pub mod setup;
 pub mod shared;

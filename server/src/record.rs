@@ -7,6 +7,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use taut_bridge::service_manager::{Teller, Turns};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, LinkHealth, ReceivedState, RejoinPolicy, Renewal, Role,
     SupervisedLink,
@@ -51,8 +52,11 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         dead_after: Some(DEAD_AFTER),
         ..args.membership.policy()
     };
+    let alive = Turns::default();
+    let teller = Teller::start("the recorder runs", [alive.clone()], || false);
+    let joining = SupervisedLink::join(options, policy, |_| ready(Ok::<(), LinkError>(())));
     let joined = tokio::select! {
-        joined = SupervisedLink::join(options, policy, |_| ready(Ok::<(), LinkError>(()))) => joined?,
+        joined = alive.during(joining) => joined?,
         () = signal.given() => return Err(Failure::failed(format!(
             "ended before {} was there; nothing was written",
             args.server
@@ -67,8 +71,9 @@ pub async fn run(args: &RecordArgs) -> Result<u64, Failure> {
         lost: 0,
     };
     let recorded = recorder
-        .take_states(&supervised, args.duration, &mut signal)
+        .take_states(&supervised, args.duration, &mut signal, &alive)
         .await;
+    drop(teller);
     // Nobody is to join again for the session that is left here.
     drop(supervised);
     let lost = recorder.lost + recorder.link.counters().lost;
@@ -109,6 +114,7 @@ impl Recorder {
         supervised: &SupervisedLink<()>,
         duration: Option<f64>,
         signal: &mut EndSignal,
+        alive: &Turns,
     ) -> std::io::Result<()> {
         let mut states = Vec::new();
         let mut period = tokio::time::interval(DRAIN_PERIOD);
@@ -117,6 +123,7 @@ impl Recorder {
                 () = signal.given() => return Ok(()),
                 _ = period.tick() => {}
             }
+            alive.count();
             let now = Instant::now();
             self.link.drain_states(&mut states);
             for received in states.drain(..) {

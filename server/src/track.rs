@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use god_object::spatial::Pose;
+use taut_bridge::service_manager::{Teller, Turns};
 use taut_bridge::{
     DeviceChoice, InputChoice, Trace, TrackerFeed, UnknownDevice, VrpnSettings, read_trace,
 };
@@ -82,15 +83,26 @@ pub async fn run(args: &TrackArgs) -> Result<u64, Failure> {
         transport: args.transport.into(),
         ..ClientOptions::new(&args.server, key, Role::Tracker, &args.node)
     };
+    let alive = Turns::default();
+    let teller = Teller::start("the tracker runs", [alive.clone()], || false);
     let joining = SupervisedLink::join(options, args.membership.policy(), |_| {
         ready(Ok::<(), LinkError>(()))
     });
     let (supervised, mut link, ()) = tokio::select! {
-        joined = joining => joined?,
+        joined = alive.during(joining) => joined?,
         () = signal.given() => return Ok(0),
     };
     source.rest_as_in(&link);
-    let (sent, end) = send_readings(&supervised, &mut link, &mut source, args, &mut signal).await;
+    let sending = send_readings(
+        &supervised,
+        &mut link,
+        &mut source,
+        args,
+        &mut signal,
+        &alive,
+    );
+    let (sent, end) = sending.await;
+    drop(teller);
     // Nobody is to join again for the session that is left here.
     drop(supervised);
     link.leave().await;
@@ -110,6 +122,7 @@ async fn send_readings(
     source: &mut Source,
     args: &TrackArgs,
     signal: &mut EndSignal,
+    alive: &Turns,
 ) -> (u64, Option<SessionEnd>) {
     let looks = match source {
         Source::Tracker { .. } => args.rate * LOOKS_PER_READING,
@@ -124,6 +137,7 @@ async fn send_readings(
             () = signal.given() => return (index, None),
             _ = period.tick() => {}
         }
+        alive.count();
         let since_start = start.elapsed();
         let is_over = args
             .duration

@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 
 use support::{Workplace, workbench};
 use taut_link::proto::control::LogLevel;
-use taut_link::{ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, read_key_file};
+use taut_link::{
+    ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, create_key_file, read_key_file,
+};
 
 /// Longer than anything takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -243,6 +245,54 @@ fn a_service_manager_hears_ready_then_signs_of_life_then_stopping() {
         "{:?}",
         said.lock()
     );
+}
+
+/// A client's part of the same: it is ready while it waits for a server that is not there, alive, and stops when it is told to.
+#[test]
+fn bridge_tracker_and_recorder_tell_the_service_manager_that_they_live() {
+    let place = Workplace::new();
+    let key = place.path("lone.key");
+    create_key_file(&key).expect("a key");
+    let key = key.to_str().expect("a path").to_owned();
+    // Bound, and nobody answers.
+    let nobody = UdpSocket::bind(("127.0.0.1", 0)).expect("a port");
+    let server = nobody.local_addr().expect("bound").to_string();
+    let out = place.path("trace.csv").display().to_string();
+    let roles: [(&str, &[&str], &str); 3] = [
+        ("bridge", &["--device", "simulated"], "the bridge runs"),
+        ("track", &["--source", "still"], "the tracker runs"),
+        ("record", &["--out", &out], "the recorder runs"),
+    ];
+    for (role, more, status) in roles {
+        let path = place.path(role);
+        let manager = UnixDatagram::bind(&path).expect("a socket");
+        manager.set_read_timeout(Some(PATIENCE)).expect("a socket");
+        let hear = || {
+            let mut bytes = [0; 1024];
+            let length = manager.recv(&mut bytes).expect("a message in time");
+            String::from_utf8_lossy(&bytes[..length]).into_owned()
+        };
+        let child = Command::new(env!("CARGO_BIN_EXE_taut"))
+            .args([role, "--server", &server, "--key", &key, "--stay"])
+            .args(more)
+            .env("NOTIFY_SOCKET", &path)
+            .env("WATCHDOG_USEC", "2000000")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut child = child.expect("taut starts");
+        let first = hear();
+        assert!(first.contains("READY=1"), "{role}: {first}");
+        assert!(first.contains(status), "{role}: {first}");
+        assert!(hear().contains("WATCHDOG=1"), "{role}");
+        let asked = Command::new("kill")
+            .args(["-TERM", &child.id().to_string()])
+            .status();
+        assert!(asked.expect("kill").success());
+        wait_until(role, || hear().contains("STOPPING=1"));
+        let _ = child.wait().expect("a child"); // it says that it never joined
+    }
 }
 
 #[test]

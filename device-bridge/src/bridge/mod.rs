@@ -24,7 +24,7 @@ use taut_link::proto::SceneDescription;
 use taut_link::{ClientOptions, RejoinPolicy, Rejoiner};
 
 pub use error::BridgeError;
-use over::Over;
+use over::{Alive, Over};
 use sessions::Run;
 use setup::{behind_port, build_loop, client_options, prepare};
 
@@ -36,6 +36,7 @@ use crate::device_loop::Totals;
 use crate::placement::Placement;
 use crate::realtime::monotonic_now;
 use crate::report::BridgeReport;
+use crate::service_manager::Teller;
 use crate::signals::EndFlag;
 
 /// How often the watching thread looks.
@@ -51,9 +52,13 @@ pub fn run(args: &BridgeArgs) -> Result<BridgeReport, BridgeError> {
     let end = EndFlag::listen().map_err(BridgeError::Signals)?;
     let wishes = Arc::default();
     arm_switch::listen_at_console(&wishes);
-    let outcome = run_loop(args, options, end.clone(), wishes, |scene| {
+    let (alive, asked) = (Alive::default(), end.clone());
+    let turns = [alive.device.clone(), alive.watch.clone()];
+    let teller = Teller::start("the bridge runs", turns, move || asked.is_asked());
+    let outcome = run_loop(args, options, end.clone(), alive, wishes, |scene| {
         build_loop(args, &motion, scene)
     });
+    drop(teller);
     end.let_signals_kill();
     outcome
 }
@@ -69,7 +74,8 @@ pub fn run_device(
     make: impl FnOnce(Placement) -> Box<dyn Device>,
 ) -> Result<BridgeReport, BridgeError> {
     let options = client_options(args)?;
-    run_loop(args, options, EndFlag::of(stop), Arc::default(), |scene| {
+    let (end, alive) = (EndFlag::of(stop), Alive::default());
+    run_loop(args, options, end, alive, Arc::default(), |scene| {
         let placement = Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?;
         let device = make(placement);
         Ok(behind_port(
@@ -85,6 +91,7 @@ fn run_loop(
     args: &BridgeArgs,
     options: ClientOptions,
     end: EndFlag,
+    alive: Alive,
     wishes: Arc<ArmSwitch>,
     build: impl FnOnce(&SceneDescription) -> Result<BridgeLoop, BridgeError>,
 ) -> Result<BridgeReport, BridgeError> {
@@ -101,7 +108,11 @@ fn run_loop(
     let deadline = args
         .duration
         .map(|seconds| monotonic_now() + Duration::from_secs_f64(seconds));
-    let over = Over { end, deadline };
+    let over = Over {
+        end,
+        deadline,
+        alive,
+    };
     let mut rejoiner = Rejoiner::new(options, policy(args));
     let Some(first) = runtime.block_on(over.or(rejoiner.join())) else {
         return Err(BridgeError::NeverJoined {

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use super::WATCH_PERIOD;
 use crate::realtime::monotonic_now;
+use crate::service_manager::Turns;
 use crate::signals::EndFlag;
 
 /// When the bridge is to end.
@@ -11,6 +12,16 @@ pub(super) struct Over {
     pub(super) end: EndFlag,
     /// On the monotonic clock.
     pub(super) deadline: Option<Duration>,
+    pub(super) alive: Alive,
+}
+
+/// What the bridge does over and over, for the service manager. While it joins, both count as going round.
+#[derive(Clone, Default)]
+pub(super) struct Alive {
+    /// The device loop.
+    pub(super) device: Turns,
+    /// Who watches it.
+    pub(super) watch: Turns,
 }
 
 impl Over {
@@ -29,6 +40,8 @@ impl Over {
     pub(super) async fn or<T>(&self, work: impl Future<Output = T>) -> Option<T> {
         let ended = async {
             while !self.is_now() {
+                self.alive.device.count();
+                self.alive.watch.count();
                 tokio::time::sleep(WATCH_PERIOD).await;
             }
         };

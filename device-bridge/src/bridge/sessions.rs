@@ -17,9 +17,9 @@ use crate::arm_switch::ArmSwitch;
 use crate::bridge_loop::BridgeLoop;
 use crate::cli::{BridgeArgs, CouplingChoice};
 use crate::device::DeviceFault;
-use crate::device_loop::{DeviceLoop, Totals};
+use crate::device_loop::{DeviceLoop, Notice, Totals};
 use crate::edge::EdgeCoupler;
-use crate::port::{CommandSource, SafetyEvent, SafetySettings};
+use crate::port::{CommandSource, SafetySettings};
 use crate::report::BridgeReport;
 
 /// Notices that may wait to be told; more are dropped, the counts in the report are complete.
@@ -159,6 +159,7 @@ impl Run<'_> {
             end: Arc::clone(&end_loop),
             asked: self.over.end.clone(),
             wishes: Arc::clone(&self.wishes),
+            turns: self.over.alive.device.clone(),
             notices: sender,
             period,
             priority: self.args.priority,
@@ -192,6 +193,7 @@ impl Run<'_> {
         let mut end = None;
         while end.is_none() && !thread.is_finished() {
             thread::sleep(WATCH_PERIOD);
+            self.over.alive.watch.count();
             end = self.session_end(&link, &mut watch, &notices);
         }
         if matches!(
@@ -224,7 +226,7 @@ impl Run<'_> {
         &self,
         link: &ClientLink,
         watch: &mut LinkWatch,
-        notices: &Receiver<SafetyEvent>,
+        notices: &Receiver<Notice>,
     ) -> Option<SessionEnd> {
         tell(link, notices);
         let silent = watch.look(link, Instant::now()) == Liveness::Dead;
@@ -288,16 +290,20 @@ fn same_place(before: &SceneDescription, now: &SceneDescription) -> bool {
 }
 
 /// Logs what the device loop noticed, here and at the server.
-fn tell(link: &ClientLink, notices: &Receiver<SafetyEvent>) {
-    for event in notices.try_iter() {
-        let level = if event.kind.is_good_news() {
-            tracing::info!("{event}");
+fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
+    for notice in notices.try_iter() {
+        let (good_news, text) = match notice {
+            Notice::Safety(event) => (event.kind.is_good_news(), event.to_string()),
+            Notice::Refused(broken) => (false, broken.to_string()),
+        };
+        let level = if good_news {
+            tracing::info!("{text}");
             LogLevel::Info
         } else {
-            tracing::warn!("{event}");
+            tracing::warn!("{text}");
             LogLevel::Warning
         };
-        link.post_log(level, event.to_string());
+        link.post_log(level, text);
     }
 }
 

@@ -146,14 +146,14 @@ impl EdgeCoupler {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::device::Pose;
     use proto::PoseF64;
     use proto::constraints::{ConstraintRow, SetHead};
     use proto::coupling::{EdgeSettings, EdgeSolver};
 
-    fn offer() -> EdgeCoupling {
+    pub(crate) fn offer() -> EdgeCoupling {
         EdgeCoupling {
             mass: 1.0,
             inertia: [1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e-3],
@@ -189,7 +189,7 @@ mod tests {
     }
 
     /// A ball of 20 mm, 1 mm above the floor z = 0.
-    fn floor(sequence: u64, flags: u8) -> proto::ConstraintSet {
+    pub(crate) fn floor(sequence: u64, flags: u8) -> proto::ConstraintSet {
         let mut set = proto::ConstraintSet::new();
         set.head = SetHead {
             sequence,

@@ -24,6 +24,8 @@ mod settings;
 mod work;
 
 pub use ahead::{device_ahead, device_predicted, way_around};
+#[cfg(test)]
+pub(crate) use coupler::tests::{floor, offer};
 pub use coupler::{EdgeCoupler, EdgeWrench};
 pub use offer::{OfferError, offer_of, world_of};
 pub use sets::{BrokenSet, read_set, write_set};

@@ -312,7 +312,7 @@ impl Teller {
 
 /// Something that comes and goes: it begins with its first tick, and is over once it has been gone for [`Spell::QUIET`].
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Spell {
+pub(crate) struct Spell {
     last: Option<Duration>,
 }
 
@@ -321,7 +321,7 @@ impl Spell {
     const QUIET: Duration = Duration::from_millis(100);
 
     /// Whether a spell begins with this tick.
-    pub(super) fn begins(&mut self, now: Duration, is_on: bool) -> bool {
+    pub(crate) fn begins(&mut self, now: Duration, is_on: bool) -> bool {
         if !is_on {
             return false;
         }

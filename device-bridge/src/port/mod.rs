@@ -34,6 +34,7 @@ mod watchdog;
 pub use arming::{ArmingState, CommandSource};
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
+pub(crate) use event::Spell;
 pub use event::{EventKind, Events, MAX_EVENTS_PER_TICK, SafetyEvent, kind_of_fault};
 pub use passivity::{Passivity, PassivitySettings};
 pub use settings::{ContactBound, Rearm, SafetySettings};

@@ -3,13 +3,16 @@
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
 
 use tracing_appender::non_blocking::{ErrorCounter, NonBlocking, NonBlockingBuilder, WorkerGuard};
 
 /// Lines that wait for a terminal or a journal that is slow; further ones are lost.
 pub const MAX_WAITING: usize = 4096;
+
+/// Whoever has not taken a line for so long takes none.
+const STANDS_FROM: Duration = Duration::from_millis(500);
 
 /// Return to the first column and clear the line.
 const CLEAR_LINE: &[u8] = b"\r\x1b[2K";
@@ -25,8 +28,8 @@ pub(crate) struct Writer {
     lines: NonBlocking,
     lost: ErrorCounter,
     guard: Mutex<Option<WorkerGuard>>,
-    /// The thread is within a write.
-    busy: Arc<AtomicBool>,
+    /// Since when the thread is within a write.
+    busy: Arc<Mutex<Option<Instant>>>,
     status: Arc<Mutex<Status>>,
 }
 
@@ -42,7 +45,7 @@ impl Writer {
     /// To `to`, with at most `waiting` lines between.
     pub(crate) fn new(to: impl Write + Send + 'static, waiting: usize) -> Self {
         let lost = Arc::<OnceLock<ErrorCounter>>::default();
-        let busy = Arc::<AtomicBool>::default();
+        let busy = Arc::<Mutex<Option<Instant>>>::default();
         let status = Arc::<Mutex<Status>>::default();
         let telling = Telling {
             to,
@@ -98,8 +101,9 @@ impl Writer {
     /// Waits for what was handed over, at most about a second; nothing is written afterwards.
     pub(crate) fn flush(&self) {
         let guard = lock(&self.guard).take();
-        if self.busy.load(Ordering::Acquire) && self.lost() > 0 {
-            // Nobody reads, and the queue is full: there is nothing to wait for, and a guard that cannot say goodbye prints so.
+        let busy = *lock(&self.busy);
+        if busy.is_some_and(|since| self.lost() > 0 || since.elapsed() >= STANDS_FROM) {
+            // Nobody reads, for long or until the queue was full: there is nothing to wait for, and a guard that cannot say goodbye prints so.
             std::mem::forget(guard);
         }
     }
@@ -108,7 +112,7 @@ impl Writer {
 /// Writes, and says before the next line how many were lost since it last did.
 struct Telling<W> {
     to: W,
-    busy: Arc<AtomicBool>,
+    busy: Arc<Mutex<Option<Instant>>>,
     lost: Arc<OnceLock<ErrorCounter>>,
     status: Arc<Mutex<Status>>,
     told: usize,
@@ -140,7 +144,7 @@ impl<W: Write> Telling<W> {
 
 impl<W: Write> Write for Telling<W> {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        self.busy.store(true, Ordering::Release);
+        *lock(&self.busy) = Some(Instant::now());
         let lost = self.lost.get().map_or(0, ErrorCounter::dropped_lines);
         if lost > self.told {
             let since = lost - self.told;
@@ -154,7 +158,7 @@ impl<W: Write> Write for Telling<W> {
         }
         // A terminal that is gone has nobody to be told.
         let written = self.with_status(line);
-        self.busy.store(false, Ordering::Release);
+        *lock(&self.busy) = None;
         written.map(|()| line.len())
     }
 
@@ -219,7 +223,6 @@ fn process_writer() -> &'static Writer {
 mod tests {
     use super::*;
     use std::io::Read;
-    use std::time::{Duration, Instant};
 
     /// A pipe that nobody reads takes 64 KiB, then makes writers wait: a stopped terminal does the same.
     #[test]

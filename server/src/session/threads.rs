@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use taut_bridge::realtime::{pin_to_core, sleep_until};
+use taut_bridge::service_manager;
 use taut_link::{Broadcaster, ServerLink};
 
 use crate::broadcast::{self, BridgeCommands, StateWriter};
@@ -16,7 +17,6 @@ use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
 use crate::loops::shell::{Beat, Waker, run_at_deadlines, spawn};
 use crate::realtime::{RealtimePolicy, Scheduling};
-use crate::service_manager;
 use crate::setup::RealtimeSettings;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::fanout::Subscriber;
@@ -194,7 +194,13 @@ impl Session {
         }
         let (statistics, shutdown) = (self.statistics.clone(), self.shutdown.clone());
         self.start_thread("notify", Scheduling::Background, None, move || {
-            service_manager::run(&statistics, &shutdown);
+            let ticks = || {
+                [
+                    statistics.haptics.period.count(),
+                    statistics.god_object.update.count(),
+                ]
+            };
+            service_manager::run("the loops run", ticks, || shutdown.is_asked());
         })
     }
 
