@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -62,19 +62,6 @@ pub struct Seen {
     pub good: u64,
     pub lowest_z: f64,
     pub first_z: Option<f64>,
-    /// Heights of the hand, m, one per reading.
-    heights: Vec<f64>,
-    /// Longest time between two ticks.
-    pub longest_tick: Duration,
-}
-
-impl Seen {
-    /// The middle one of the heights in the last third of the readings, m.
-    pub fn rest(&self) -> f64 {
-        let mut last = self.heights[self.heights.len() * 2 / 3..].to_vec();
-        last.sort_by(f64::total_cmp);
-        last[last.len() / 2]
-    }
 }
 
 /// A server with a haptics loop that renders the wall.
@@ -84,6 +71,31 @@ pub struct Workbench {
     pub link: Option<ServerLink>,
     stop: Arc<AtomicBool>,
     haptics: Option<JoinHandle<Seen>>,
+    rest: Arc<Rest>,
+}
+
+/// How long the hand has stayed where it is.
+#[derive(Default)]
+struct Rest {
+    /// Height from which it has moved by no more than [`Rest::STILL`], m, as bits.
+    height: AtomicU64,
+    /// Readings since.
+    readings: AtomicU64,
+}
+
+impl Rest {
+    /// m.
+    const STILL: f64 = 1e-4;
+
+    fn note(&self, z: f64) {
+        let height = f64::from_bits(self.height.load(Ordering::Relaxed));
+        if (z - height).abs() <= Self::STILL {
+            self.readings.fetch_add(1, Ordering::Relaxed);
+        } else {
+            self.height.store(z.to_bits(), Ordering::Relaxed);
+            self.readings.store(0, Ordering::Relaxed);
+        }
+    }
 }
 
 impl Workbench {
@@ -95,13 +107,15 @@ impl Workbench {
             .block_on(serve(ServerOptions::loopback(key), content()))
             .expect("a server");
         let stop = Arc::new(AtomicBool::new(false));
-        let haptics = Some(spawn_haptics(&link, Arc::clone(&stop)));
+        let rest = Arc::default();
+        let haptics = Some(spawn_haptics(&link, Arc::clone(&stop), Arc::clone(&rest)));
         Self {
             folder,
             runtime,
             link: Some(link),
             stop,
             haptics,
+            rest,
         }
     }
 
@@ -147,7 +161,8 @@ impl Workbench {
             .block_on(serve(options, content()))
             .expect("the port is free again");
         self.stop = Arc::new(AtomicBool::new(false));
-        self.haptics = Some(spawn_haptics(&link, Arc::clone(&self.stop)));
+        let (stop, rest) = (Arc::clone(&self.stop), Arc::clone(&self.rest));
+        self.haptics = Some(spawn_haptics(&link, stop, rest));
         self.link = Some(link);
     }
 
@@ -157,6 +172,23 @@ impl Workbench {
         let begun = Instant::now();
         while link.counters().inputs < count {
             assert!(begun.elapsed() < PATIENCE, "no device readings arrive");
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Waits until the hand has rested within `heights` (m) for `readings` in a row.
+    pub fn wait_for_rest(&self, heights: std::ops::Range<f64>, readings: u64) {
+        let begun = Instant::now();
+        loop {
+            let rested = self.rest.readings.load(Ordering::Relaxed);
+            let height = f64::from_bits(self.rest.height.load(Ordering::Relaxed));
+            if rested >= readings && heights.contains(&height) {
+                return;
+            }
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "the hand does not rest: {height} m for {rested} readings"
+            );
             thread::sleep(Duration::from_millis(10));
         }
     }
@@ -187,7 +219,7 @@ impl Workbench {
     }
 }
 
-fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
+fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>, rest: Arc<Rest>) -> JoinHandle<Seen> {
     let inputs = link.device_inputs().expect("first to ask");
     let (clock, mut broadcaster) = (link.clock(), link.broadcaster());
     let (mut device, mut commands) =
@@ -195,9 +227,7 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
     let body = move || {
         let mut seen = Seen::default();
         while !stop.load(Ordering::Relaxed) {
-            let before = Instant::now();
             thread::sleep(Duration::from_millis(1));
-            seen.longest_tick = seen.longest_tick.max(before.elapsed());
             let now = Duration::from_nanos(clock.now_ns());
             let mut wrench = Vector6::zeros();
             if let Ok(sample) = device.read(now) {
@@ -205,7 +235,7 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>) -> JoinHandle<Seen> {
                 seen.good += 1;
                 seen.first_z.get_or_insert(z);
                 seen.lowest_z = seen.lowest_z.min(z);
-                seen.heights.push(z);
+                rest.note(z);
                 wrench.z = STIFFNESS * (-z).max(0.0);
                 device.comes_from(Some(sample.time));
             }

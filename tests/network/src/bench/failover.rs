@@ -16,10 +16,9 @@ use super::{BenchError, Quantiles, keep_cores_awake, request_fifo, wait_until};
 
 /// Nodes.
 pub const NODES: usize = 3;
-/// Time for clocks to lock and nodes to fall in step.
-const WARM_UP: Duration = Duration::from_secs(3);
-/// Time that each leader leads.
-const REIGN: Duration = Duration::from_secs(3);
+/// Frames in a row of one session, which a node shows while clocks lock and it falls in step, and again under each leader: three seconds, or as long as
+/// it takes on a machine that pauses this program.
+const REIGN: u64 = 3 * RATE;
 /// Time after the return that counts as part of it.
 const RETURN: Duration = Duration::from_secs(2);
 
@@ -76,28 +75,32 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
         screens.iter().all(|screen| screen.frame() > 2 * RATE)
     })?;
     let in_step = Instant::now();
-    std::thread::sleep(WARM_UP);
+    wait_in_step(&screens, node_timeout)?;
+    // A pause may have cost a node its first session.
+    let mut sessions: Vec<u64> = screens.iter().map(Screen::sessions).collect();
     let before = screens.iter().map(Screen::frame).max().unwrap_or(0);
 
     let died = Instant::now();
     drop(server); // SIGKILL
-    std::thread::sleep(REIGN);
-    // The one of the lowest session leads: it was the first.
+    wait_without_server("frames after the server's death", &screens, before)?;
+    // The one of the lowest session leads.
     let leader_died = Instant::now();
-    let first = screens.remove(0).end()?;
-    std::thread::sleep(REIGN);
+    let leader = lowest_session(&screens);
+    let (first, first_sessions) = (screens.remove(leader).end()?, sessions.remove(leader));
+    wait_without_server("frames after the leader's death", &screens, before)?;
 
     let again = Instant::now();
     let server = LeaderProcess::start(this, &path, (&quic, &udp), node_timeout)?;
     wait_until("the nodes to come back", || {
-        screens.iter().all(|screen| screen.sessions() == 2)
+        let mut each = screens.iter().zip(&sessions);
+        each.all(|(screen, before)| screen.sessions() > *before)
     })?;
     let back_s = again.elapsed().as_secs_f64();
     std::thread::sleep(RETURN);
     let end = Instant::now();
-    let mut shown = vec![first];
-    for screen in screens {
-        shown.push(screen.end()?);
+    let mut shown = vec![counted_from(first_sessions, first)];
+    for (screen, before) in screens.into_iter().zip(sessions) {
+        shown.push(counted_from(before, screen.end()?));
     }
     drop(server);
 
@@ -125,5 +128,51 @@ fn measure_here(this: &Path, node_timeout: Duration) -> Result<Failover, BenchEr
         server_skew_us: Quantiles::of(by_server.skew_us),
         different: by_all.different + by_two.different,
         back_s,
+    })
+}
+
+/// The swaps with their session counted from the one of number `first`, which is 1.
+fn counted_from(first: u64, mut shown: Vec<Swapped>) -> Vec<Swapped> {
+    for swapped in &mut shown {
+        swapped.sessions = (swapped.sessions + 1).saturating_sub(first);
+    }
+    shown
+}
+
+/// Place of the node that leads without a server.
+fn lowest_session(screens: &[Screen]) -> usize {
+    let session = |place: &usize| screens[*place].session();
+    (0..screens.len()).min_by_key(session).unwrap_or(0)
+}
+
+/// Waits until every node has shown [`REIGN`] frames of one session, none of them beside a pause for which the server may give it up.
+fn wait_in_step(screens: &[Screen], node_timeout: Duration) -> Result<(), BenchError> {
+    let now = || -> Vec<(u64, u64)> {
+        let state = |screen: &Screen| (screen.sessions(), screen.shown());
+        screens.iter().map(state).collect()
+    };
+    let (mut from, mut looked) = (now(), Instant::now());
+    wait_until("the nodes to be in step", || {
+        let (at, new) = (Instant::now(), now());
+        let paused = at - std::mem::replace(&mut looked, at) > node_timeout / 4;
+        let renewed = new.iter().zip(&from).any(|(new, from)| new.0 != from.0);
+        if paused || renewed {
+            from = new;
+            return false;
+        }
+        new.iter()
+            .zip(&from)
+            .all(|(new, from)| new.1 >= from.1 + REIGN)
+    })
+}
+
+/// Waits until every node has shown [`REIGN`] more frames, the newest of a node's reign after the frame `before`.
+fn wait_without_server(what: &str, screens: &[Screen], before: u64) -> Result<(), BenchError> {
+    let from: Vec<u64> = screens.iter().map(Screen::shown).collect();
+    wait_until(what, || {
+        let mut each = screens.iter().zip(&from);
+        each.all(|(screen, from)| {
+            screen.shown() >= from + REIGN && screen.frame() > before + FRAMES_LEFT_OUT / 2
+        })
     })
 }

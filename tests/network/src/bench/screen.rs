@@ -38,8 +38,12 @@ pub struct Screen {
     stop: Arc<AtomicBool>,
     /// Sessions that it has taken over.
     sessions: Arc<AtomicU64>,
+    /// Number of the one that it has.
+    session: Arc<AtomicU64>,
     /// Number of the newest frame.
     frame: Arc<AtomicU64>,
+    /// Frames that it has shown.
+    shown: Arc<AtomicU64>,
     link: Arc<ClientLink>,
     thread: Option<JoinHandle<Vec<Swapped>>>,
 }
@@ -61,7 +65,9 @@ impl Screen {
         let mut screen = Screen {
             stop: Arc::default(),
             sessions: Arc::new(AtomicU64::new(1)),
+            session: Arc::new(AtomicU64::new(link.session().into())),
             frame: Arc::default(),
+            shown: Arc::default(),
             link: link.clone(),
             thread: None,
         };
@@ -71,7 +77,9 @@ impl Screen {
             random: seed,
             stop: screen.stop.clone(),
             sessions: screen.sessions.clone(),
+            session: screen.session.clone(),
             frame: screen.frame.clone(),
+            count: screen.shown.clone(),
         };
         screen.thread = Some(
             std::thread::Builder::new()
@@ -93,10 +101,22 @@ impl Screen {
         self.sessions.load(Ordering::Relaxed)
     }
 
+    /// Number of the session that it has: of nodes without a server the lowest leads.
+    #[must_use]
+    pub fn session(&self) -> u64 {
+        self.session.load(Ordering::Relaxed)
+    }
+
     /// Number of the newest frame that it showed.
     #[must_use]
     pub fn frame(&self) -> u64 {
         self.frame.load(Ordering::Relaxed)
+    }
+
+    /// How many frames it has shown.
+    #[must_use]
+    pub fn shown(&self) -> u64 {
+        self.shown.load(Ordering::Relaxed)
     }
 
     /// Ends it without a word to anybody; what it showed.
@@ -127,7 +147,9 @@ struct Drawing {
     random: u64,
     stop: Arc<AtomicBool>,
     sessions: Arc<AtomicU64>,
+    session: Arc<AtomicU64>,
     frame: Arc<AtomicU64>,
+    count: Arc<AtomicU64>,
 }
 
 impl Drawing {
@@ -139,6 +161,8 @@ impl Drawing {
                 Some(Renewal::Session { link, .. }) => {
                     self.link = link;
                     gate = self.link.frame_gate(Duration::ZERO);
+                    let number = self.link.session();
+                    self.session.store(number.into(), Ordering::Relaxed);
                     self.sessions.fetch_add(1, Ordering::Relaxed);
                 }
                 Some(Renewal::Ended(_)) => break,
@@ -154,6 +178,7 @@ impl Drawing {
                 let at = Instant::now();
                 gate.swapped(at);
                 self.frame.store(released.frame, Ordering::Relaxed);
+                self.count.fetch_add(1, Ordering::Relaxed);
                 shown.push(Swapped {
                     frame: released.frame,
                     at,
