@@ -91,10 +91,11 @@ impl DeviceLoop {
 
             let session = self.link.session_now();
             let command = self.link.latest_wrench().map(|wrench| wrench.command);
-            if bridge.couples() && self.link.newest_set(&mut set).is_some() {
-                if let Some(broken) = bridge.take_set(&set, now, session) {
-                    self.notice(Notice::Refused(broken));
-                }
+            if bridge.couples()
+                && self.link.newest_set(&mut set).is_some()
+                && let Some(broken) = bridge.take_set(&set, now, session)
+            {
+                self.notice(Notice::Refused(broken));
             }
             match self.wishes.take() {
                 Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),
