@@ -15,9 +15,13 @@
 //! While the body moves within an update, the candidates' gaps are carried on by their Jacobians, and one that seems violated is
 //! looked at as it is. Pairs are collected nearest first, as far as a bound of work allows: those farther apart have no row until
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where that is not even as far as what touches,
-//! as between surfaces that conform, pairs are found along the surfaces instead ([`overlay`](super::overlay)). Where a pair that
+//! as between surfaces that conform, pairs are found along the surfaces ([`overlay`](super::overlay)), and those that the force's answer violates
+//! are searched for by how far it brings them together ([`for_violated`](super::for_violated)). Where a pair that
 //! holds the body is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid
 //! off its features, those of what it became.
+//!
+//! A row is what its [`Purpose`] makes of a pair: the force has shading normals, and what moves is nearer by the time of the next set. So friction,
+//! shading and motion choose from the same pairs.
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
