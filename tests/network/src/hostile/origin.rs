@@ -31,6 +31,12 @@ pub(super) const ATTACKS: &[Attack] = &[
         promised: PROMISE,
         run: |_| growing_delay(CouplingChoice::Edge),
     },
+    Attack {
+        name: "growing-delay-down-edge",
+        tried: "a delay on the way down alone that grows by 0.1 s each second while the bridge computes the force",
+        promised: PROMISE,
+        run: |_| growing_delay_down(),
+    },
 ];
 
 const PROMISE: &str = "at most 20 mJ more for the hand than without delay; no force from readings of 120 ms ago; an event";
@@ -66,14 +72,32 @@ const GROWTH: Growth = Growth {
 };
 
 fn growing_delay(coupling: CouplingChoice) -> Result<Finding, BenchError> {
-    let usual = run(coupling, Impairment::default())?;
-    let attacked = run(
-        coupling,
-        Impairment {
-            growth: Some(GROWTH),
+    let slower = Impairment {
+        growth: Some(GROWTH),
+        ..Impairment::default()
+    };
+    compare(coupling, Treatment::both_ways(slower))
+}
+
+fn growing_delay_down() -> Result<Finding, BenchError> {
+    let growth = Growth {
+        step: Duration::from_micros(100),
+        ..GROWTH
+    };
+    let treatment = Treatment {
+        up: Impairment::default(),
+        down: Impairment {
+            growth: Some(growth),
             ..Impairment::default()
         },
-    )?;
+    };
+    compare(CouplingChoice::Edge, treatment)
+}
+
+/// What the hand is given behind this network, and without it.
+fn compare(coupling: CouplingChoice, treatment: Treatment) -> Result<Finding, BenchError> {
+    let usual = run(coupling, Treatment::both_ways(Impairment::default()))?;
+    let attacked = run(coupling, treatment)?;
     let given = [&usual, &attacked].map(|report| report.energy_injected_j);
     // The loop of a machine that pauses it notices an age that much later.
     let late = attacked.period_us.map_or(0, |period| period.max);
@@ -95,8 +119,8 @@ fn growing_delay(coupling: CouplingChoice) -> Result<Finding, BenchError> {
     })
 }
 
-/// A session with a remote device, and a bridge to it whose datagrams are treated like this both ways.
-fn run(coupling: CouplingChoice, impairment: Impairment) -> Result<BridgeReport, BenchError> {
+/// A session with a remote device, and a bridge to it whose datagrams are treated like this.
+fn run(coupling: CouplingChoice, treatment: Treatment) -> Result<BridgeReport, BenchError> {
     let folder = tempfile::tempdir()?;
     let file = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -131,7 +155,7 @@ fn run(coupling: CouplingChoice, impairment: Impairment) -> Result<BridgeReport,
             "the session does not listen".to_owned(),
         ));
     };
-    let relay = waiting.start(udp, vec![Treatment::both_ways(impairment)], 3)?;
+    let relay = waiting.start(udp, vec![treatment], 3)?;
 
     let Some(mut args) = BridgeArgs::joining(&quic.to_string(), "hand") else {
         return Err(BenchError::Missing(
