@@ -78,8 +78,9 @@ impl GodObject {
         }
     }
 
-    /// Adds to the candidates those pairs that one of the answers violates, of obstacles whose surface conforms to the body's: nearest first, a collection
-    /// there is given up before it has seen what a motion presses against. Whether there are any.
+    /// Adds to the candidates those pairs that one of the answers violates, of obstacles that came here and whose surface conforms to the body's: nearest
+    /// first, a collection there is given up before it has seen what a motion presses against, and the pairs that pressed before are others now.
+    /// Whether there are any. Of obstacles at rest the pairs that matter are carried from update to update.
     ///
     /// No such search for motions of the god-object: a pair that is missing stops them, and becomes a row so.
     fn search(
@@ -105,7 +106,8 @@ impl GodObject {
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
         let mut any = false;
         for index in 0..at.places.len() {
-            if !at.places[index].chosen || !reduction.conforms(at, index) {
+            let carried = !self.obstacles[index].came_here();
+            if carried || !at.places[index].chosen || !reduction.conforms(at, index) {
                 continue;
             }
             let asked = Violated {
