@@ -117,14 +117,30 @@ pub(crate) fn for_nearest_triangle_pairs(
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
-    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+    visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) -> f64 {
-    let (body, obstacle) = trees;
     let scale = (1.0 / margin) as f32;
+    let band = |_, beyond: f32| Some(band_of(1.0 + beyond * scale).min(BANDS - 1));
+    let stopped_in = for_pairs_by_band(trees, volumes, (bands, turned), work, wanted, band, visit);
+    stopped_in.map_or(margin, |band| edge(band, margin))
+}
+
+/// Visits pairs of triangles in the order of the bands that `band_of_pair` puts pairs of volumes in, from what these are beyond the margin (m); `None` leaves
+/// a pair out. The band in which it ended because `visit` returned false or there was no room.
+fn for_pairs_by_band(
+    trees: (&WideTree, &WideTree),
+    volumes: &FacingVolumes,
+    (bands, turned): (&mut Bands, &mut TurnedNodes),
+    work: &mut Work,
+    wanted: impl Fn(u8, u8) -> bool,
+    band_of_pair: impl Fn((Child, Child), f32) -> Option<usize>,
+    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+) -> Option<usize> {
+    let (body, obstacle) = trees;
     bands.clear();
     let mut room = bands.push(0, (ROOT, ROOT));
     let mut band = 0;
-    while band < BANDS {
+    while band < SIGNED_BANDS {
         let Some((a, b)) = bands.pop(band) else {
             band += 1;
             continue;
@@ -132,22 +148,23 @@ pub(crate) fn for_nearest_triangle_pairs(
         if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
             work.triangle_pairs += 1;
             if !visit(t, s, work) {
-                return edge(band, margin);
+                return Some(band);
             }
             continue;
         }
         work.node_pairs += 1;
         open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
-            if wanted(body.owned(a), obstacle.owned(b)) {
-                let own = band_of(1.0 + beyond * scale);
-                room &= bands.push(own.clamp(band, BANDS - 1), (a, b));
+            if wanted(body.owned(a), obstacle.owned(b))
+                && let Some(own) = band_of_pair((a, b), beyond)
+            {
+                room &= bands.push(own.max(band), (a, b));
             }
         });
         if !room {
-            return edge(band, margin);
+            return Some(band);
         }
     }
-    margin
+    None
 }
 
 /// The band of a signed share: what is deepest comes first, what is farthest last.
@@ -170,41 +187,17 @@ pub(crate) fn for_deepest_triangle_pairs(
     (bands, turned): (&mut Bands, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
-    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+    visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
-    let (body, obstacle) = trees;
+    let obstacle = trees.1;
     let scale = (1.0 / margin) as f32;
     let margin = margin as f32;
-    bands.clear();
-    let mut room = bands.push(0, (ROOT, ROOT));
-    let mut band = 0;
-    while band < SIGNED_BANDS {
-        let Some((a, b)) = bands.pop(band) else {
-            band += 1;
-            continue;
-        };
-        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-            work.triangle_pairs += 1;
-            if !visit(t, s, work) {
-                return;
-            }
-            continue;
-        }
-        work.node_pairs += 1;
-        open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
-            if wanted(body.owned(a), obstacle.owned(b)) {
-                let short = (margin + beyond).max(0.0) + motions.least_along(obstacle, b) - target;
-                let out_of_question = short > 0.0;
-                if !out_of_question {
-                    let own = signed_band_of(short * scale);
-                    room &= bands.push(own.clamp(band, SIGNED_BANDS - 1), (a, b));
-                }
-            }
-        });
-        if !room {
-            return;
-        }
-    }
+    let band = |(_, b), beyond: f32| {
+        let short = (margin + beyond).max(0.0) + motions.least_along(obstacle, b) - target;
+        let out_of_question = short > 0.0; // false for NaN
+        (!out_of_question).then(|| signed_band_of(short * scale))
+    };
+    for_pairs_by_band(trees, volumes, (bands, turned), work, wanted, band, visit);
 }
 
 #[cfg(test)]

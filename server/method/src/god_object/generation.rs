@@ -251,8 +251,10 @@ impl GodObject {
         ahead: Option<&Ahead>,
         report: &mut StepReport,
     ) -> Option<Projected> {
-        if let (Some(mut reduction), Some(at)) = (self.reduction.take(), self.place()) {
-            if ahead.is_some() {
+        if ahead.is_some()
+            && let Some(mut reduction) = self.reduction.take()
+        {
+            if let Some(at) = self.place() {
                 reduction.set_surfaces(&at, &self.surfaces(ahead));
             }
             self.reduction = Some(reduction);
