@@ -93,7 +93,7 @@ impl Default for AdvancementSettings {
             minimum_gap: 1e-6,
             gap_tolerance: 1e-7,
             max_iterations: 200,
-            interval_edges: 0.125,
+            interval_edges: 0.0625,
             max_intervals: 256,
         }
     }
