@@ -4,9 +4,6 @@ use super::{GodObject, StepReport};
 use crate::collision::{AdvancementSettings, Motion, TimeOfImpact};
 use crate::shape;
 
-/// Motions are cut where they are too curved for a straight path; in finer cuts the volumes save less than they cost.
-const INTERVAL_EDGES: f64 = 0.5;
-
 impl GodObject {
     /// The fraction of the motion that is free of every obstacle, in [0, 1].
     pub(super) fn free_time(&mut self, mut motion: Motion, report: &mut StepReport) -> f64 {
@@ -44,7 +41,6 @@ impl GodObject {
             minimum_gap: self.settings.minimum_gap,
             gap_tolerance: self.settings.gap_tolerance,
             max_iterations: self.settings.max_advancement_steps,
-            interval_edges: INTERVAL_EDGES,
             ..AdvancementSettings::default()
         }
     }
