@@ -1,5 +1,7 @@
 //! One volume against eight of the other tree: by how much are they apart, beyond the margin? Why and how exactly: [`facing_volumes`](super::facing_volumes).
 
+use pulp::{Simd, WithSimd};
+
 use super::facing_volumes::{COSINE_ROUNDING, FacingVolumes};
 use super::single::{dot, larger, product};
 use super::turned::{Turned, aside};
@@ -24,15 +26,40 @@ impl Beyond {
     };
 }
 
-/// Volume `lane` of `turned` against each of the eight in `node`. NaN is passed over: what has no other bound is near.
+/// Volume `lane` of `turned` against each of the eight in `node`.
+pub(super) struct OneToEight<'a> {
+    pub(super) volumes: &'a FacingVolumes,
+    pub(super) turned: &'a Turned,
+    pub(super) lane: usize,
+    pub(super) node: &'a WideNode,
+}
+
+/// By how much they are apart.
+#[inline]
+pub(super) fn beyond(pairs: OneToEight) -> Beyond {
+    pairs.volumes.processor.dispatch(pairs)
+}
+
+impl WithSimd for OneToEight<'_> {
+    type Output = Beyond;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Beyond {
+        beyond_in_lanes(&self)
+    }
+}
+
+/// NaN is passed over: what has no other bound is near.
 ///
 /// One loop over the lanes, without branches: the compiler makes vectors of it.
-#[inline]
-pub(super) fn beyond(
-    volumes: &FacingVolumes,
-    turned: &Turned,
-    lane: usize,
-    node: &WideNode,
+#[inline(always)]
+fn beyond_in_lanes(
+    &OneToEight {
+        volumes,
+        turned,
+        lane,
+        node,
+    }: &OneToEight,
 ) -> Beyond {
     let lane = lane % LANES;
     let one = |x: &Lanes| x.0[lane];

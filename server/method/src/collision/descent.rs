@@ -1,6 +1,6 @@
 //! Descent of two wide trees together: the thicker of two volumes is opened, and those of its eight that may come near go on.
 
-use super::beyond::{Beyond, beyond};
+use super::beyond::{Beyond, OneToEight, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::turned::TurnedNodes;
 use super::windows::{Window, Windows, windows};
@@ -110,7 +110,12 @@ pub(super) fn open(
                 first: node * LANES as u32,
                 other: b,
                 side: Side::Body,
-                beyond: beyond(volumes, one, b as usize % LANES, body.node(node)),
+                beyond: beyond(OneToEight {
+                    volumes,
+                    turned: one,
+                    lane: b as usize % LANES,
+                    node: body.node(node),
+                }),
             }
         }
         Some((Side::Obstacle, node)) => {
@@ -119,7 +124,12 @@ pub(super) fn open(
                 first: node * LANES as u32,
                 other: a,
                 side: Side::Obstacle,
-                beyond: beyond(volumes, one, a as usize % LANES, obstacle.node(node)),
+                beyond: beyond(OneToEight {
+                    volumes,
+                    turned: one,
+                    lane: a as usize % LANES,
+                    node: obstacle.node(node),
+                }),
             }
         }
         None => Opened::NONE,
@@ -169,22 +179,32 @@ pub(super) fn open_in_motion<const TIMED: bool>(
     match opened((body, obstacle), (a, b)) {
         Some((Side::Body, node)) => {
             let one = turned.of(volumes, Side::Obstacle, obstacle, b);
-            let lane = b as usize % LANES;
+            let pairs = OneToEight {
+                volumes,
+                turned: one,
+                lane: b as usize % LANES,
+                node: body.node(node),
+            };
             OpenedInMotion {
                 first: node * LANES as u32,
                 other: b,
                 side: Side::Body,
-                windows: windows::<false, TIMED>(volumes, one, lane, body.node(node), window),
+                windows: windows::<false, TIMED>(&pairs, window),
             }
         }
         Some((Side::Obstacle, node)) => {
             let one = turned.of(volumes, Side::Body, body, a);
-            let lane = a as usize % LANES;
+            let pairs = OneToEight {
+                volumes,
+                turned: one,
+                lane: a as usize % LANES,
+                node: obstacle.node(node),
+            };
             OpenedInMotion {
                 first: node * LANES as u32,
                 other: a,
                 side: Side::Obstacle,
-                windows: windows::<true, TIMED>(volumes, one, lane, obstacle.node(node), window),
+                windows: windows::<true, TIMED>(&pairs, window),
             }
         }
         None => OpenedInMotion::NONE,

@@ -12,6 +12,7 @@
 
 use arrayvec::ArrayVec;
 use nalgebra::{Point3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::single::{dot, product, sum};
 use crate::geometry::lanes::LANES;
@@ -39,6 +40,23 @@ pub(crate) struct Motions {
     all: ArrayVec<Small, MAX_MOTIONS>,
     /// Cosine and sine of what cones are widened by.
     turn: [f32; 2],
+    processor: Arch,
+}
+
+/// What the motions do in one volume, with the instructions that the processor has.
+struct LeastAlong<'a> {
+    motions: &'a Motions,
+    tree: &'a WideTree,
+    child: Child,
+}
+
+impl WithSimd for LeastAlong<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        self.motions.least_along_by_loop(self.tree, self.child)
+    }
 }
 
 impl Motions {
@@ -63,12 +81,22 @@ impl Motions {
         Self {
             all: motions.into_iter().take(MAX_MOTIONS).map(small).collect(),
             turn: [tilt.cos() as f32, tilt.sin() as f32],
+            processor: Arch::new(),
         }
     }
 
     /// Least that any of the motions carries a point of the body along a normal in the volume, m.
     #[inline]
     pub(super) fn least_along(&self, tree: &WideTree, child: Child) -> f32 {
+        self.processor.dispatch(LeastAlong {
+            motions: self,
+            tree,
+            child,
+        })
+    }
+
+    #[inline(always)]
+    fn least_along_by_loop(&self, tree: &WideTree, child: Child) -> f32 {
         let (node, k) = (tree.node(child / LANES as u32), child as usize % LANES);
         let lane = |v: &[crate::geometry::lanes::Lanes; 3]| [v[0].0[k], v[1].0[k], v[2].0[k]];
         let (center, axis) = (lane(&node.center), lane(&node.axis));

@@ -33,6 +33,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use pulp::Arch;
+
 use super::motion::{Placement, RelativeMotion};
 use super::turned::TurnedNodes;
 use crate::geometry::wide_tree::{Child, WideTree};
@@ -62,6 +64,8 @@ pub(super) enum Side {
 pub(crate) struct FacingVolumes {
     /// Tells these volumes from others.
     pub(super) serial: u32,
+    /// The vector instructions that the processor has.
+    pub(super) processor: Arch,
     frames: [Frame; 2],
     moves: bool,
     /// By how much the path of any point of the body is curved in half the interval at most, m.
@@ -178,6 +182,7 @@ impl FacingVolumes {
         let bare_stray = bare_stray.min(MOST_STRAY);
         Self {
             serial: turned.next_serial(),
+            processor: turned.processor(),
             frames: [of_body, of_obstacle],
             moves: false,
             curved: curved as f32,
@@ -217,7 +222,7 @@ impl FacingVolumes {
     #[inline]
     pub(crate) fn strays_more_than(&self, length: f32, tree: &WideTree, child: Child) -> bool {
         let angle = self.frame(Side::Body).angle;
-        angle.mul_add(tree.radius(child), self.curved) > length
+        angle * tree.radius(child) + self.curved > length
     }
 
     /// Cosine and sine of a cone that is widened by the rotation; a cone of all directions stays one.

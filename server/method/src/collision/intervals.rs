@@ -40,7 +40,7 @@ impl Interval {
     /// The part of the search in which a time of the interval lies, `share` of its half from the middle.
     #[inline(always)]
     pub(super) fn part(&self, share: f32) -> Part {
-        Part::of(share.mul_add(self.half_share, self.middle_share))
+        Part::of(share * self.half_share + self.middle_share)
     }
 
     /// When a window of it begins and ends.

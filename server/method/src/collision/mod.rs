@@ -14,6 +14,8 @@ mod intervals;
 mod known_apart;
 mod linear;
 mod motion;
+#[cfg(test)]
+mod processors_tests;
 mod single;
 mod still_box;
 mod time_of_impact;

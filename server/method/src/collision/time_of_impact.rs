@@ -23,6 +23,8 @@
 //!
 //! Source: Ortega et al. 2007, Section 4.1; Redon et al. 2002; Mirtich 1996.
 
+use pulp::{Simd, WithSimd};
+
 use super::advancement::{Directions, PairOutcome, PairSearch, TrianglePair};
 use super::agenda::{Part, Waiting};
 use super::descent::{AT_ONCE, OpenedInMotion, at_once, for_facing_triangle_pairs, open_in_motion};
@@ -172,6 +174,31 @@ pub fn time_of_impact(
     TimeOfImpact::Impact { time: 0.0 }
 }
 
+/// A search through the trees, with the vectors that the processor has.
+struct Descent<'a, 'p> {
+    problem: &'a Problem<'p>,
+    search: &'a PairSearch<'p>,
+    first: &'a mut First,
+    workspace: &'a mut CollisionWorkspace,
+    work: &'a mut Work,
+}
+
+impl WithSimd for Descent<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            problem,
+            search,
+            first,
+            workspace,
+            work,
+        } = self;
+        problem.descend(search, first, workspace, work);
+    }
+}
+
 /// A body on its way and an obstacle.
 struct Problem<'a> {
     body: &'a Mesh,
@@ -245,7 +272,14 @@ impl Problem<'_> {
                 first.take(outcome, (a, b), 0.0);
             }
         }
-        self.descend(search, &mut first, workspace, work);
+        let processor = workspace.turned.processor();
+        processor.dispatch(Descent {
+            problem: self,
+            search,
+            first: &mut first,
+            workspace,
+            work,
+        });
         if first.overlapping {
             return Ok(TimeOfImpact::Overlapping);
         }
@@ -259,6 +293,7 @@ impl Problem<'_> {
     }
 
     /// Looks at every pair of triangles that may face each other within the gap at some time before the first impact so far.
+    #[inline(always)]
     fn descend(
         &self,
         search: &PairSearch,

@@ -3,6 +3,8 @@
 //! A descent meets the same volumes again and again, each time against other ones. So a node is turned once for all its eight, and kept until
 //! another takes its place.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::facing_volumes::{FacingVolumes, Side};
 use super::single::{apply, dot, product, sum};
 use crate::geometry::lanes::{LANES, Lanes};
@@ -42,6 +44,7 @@ pub(crate) struct TurnedNodes {
     /// Which volumes turned it, above which node it is.
     keys: Box<[u64; 2 * KEPT]>,
     serial: u32,
+    processor: Arch,
 }
 
 impl TurnedNodes {
@@ -51,7 +54,19 @@ impl TurnedNodes {
             kept: Box::new([const { Turned::zero() }; 2 * KEPT]),
             keys: Box::new([0; 2 * KEPT]),
             serial: 0,
+            processor: Arch::new(),
         }
+    }
+
+    /// The vector instructions that the processor has.
+    pub(super) fn processor(&self) -> Arch {
+        self.processor
+    }
+
+    /// Other vectors than the processor's best, to compare.
+    #[cfg(test)]
+    pub(super) fn set_processor(&mut self, processor: Arch) {
+        self.processor = processor;
     }
 
     /// A number that no volumes had whose nodes are still kept.
@@ -79,13 +94,36 @@ impl TurnedNodes {
         if self.keys[place] != key {
             self.keys[place] = key;
             let (kept, node) = (&mut self.kept[place], tree.node(node));
-            if volumes.moves() {
-                kept.turn::<true>(volumes, side, node);
-            } else {
-                kept.turn::<false>(volumes, side, node);
-            }
+            let turn = Turn {
+                kept,
+                volumes,
+                side,
+                node,
+            };
+            volumes.processor.dispatch(turn);
         }
         &self.kept[place]
+    }
+}
+
+/// Turns a node into the other tree's frame, with the vectors that the processor has.
+struct Turn<'a> {
+    kept: &'a mut Turned,
+    volumes: &'a FacingVolumes,
+    side: Side,
+    node: &'a WideNode,
+}
+
+impl WithSimd for Turn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        if self.volumes.moves() {
+            self.kept.turn::<true>(self.volumes, self.side, self.node);
+        } else {
+            self.kept.turn::<false>(self.volumes, self.side, self.node);
+        }
     }
 }
 
@@ -114,7 +152,7 @@ impl Turned {
         clippy::needless_range_loop,
         reason = "coordinates of many vectors side by side"
     )]
-    #[inline(never)]
+    #[inline(always)]
     fn turn<const MOVES: bool>(&mut self, volumes: &FacingVolumes, side: Side, node: &WideNode) {
         let frame = volumes.frame(side);
         let (n, rotation) = (node, &frame.rotation);

@@ -1,11 +1,10 @@
 //! One volume against eight of the other tree on the way of a motion: when can surfaces inside come near, facing each other? Why and how exactly:
 //! [`facing_volumes`](super::facing_volumes).
 
-use super::facing_volumes::{CHORD_ROUNDING, COSINE_ROUNDING, FacingVolumes};
+use super::beyond::OneToEight;
+use super::facing_volumes::{CHORD_ROUNDING, COSINE_ROUNDING};
 use super::single::{dot, larger, product, smaller, sum};
-use super::turned::Turned;
 use crate::geometry::lanes::{LANES, Lanes};
-use crate::geometry::wide_tree::WideNode;
 
 /// A speed along an axis that is no more than this, m in half an interval, counts as this: far below the rounding of any length.
 const LEAST_SPEED: f32 = 1e-30;
@@ -81,13 +80,15 @@ impl Windows {
 /// volumes are: the one, or the eight. Without `TIMED` only whether they may come near in the interval: then they do in all of the window.
 /// NaN is passed over: what has no other bound is near all the time.
 ///
-/// One loop over the lanes, without branches: the compiler makes vectors of it.
-#[inline]
+/// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
+#[inline(always)]
 pub(super) fn windows<const THE_ONE_MOVES: bool, const TIMED: bool>(
-    volumes: &FacingVolumes,
-    turned: &Turned,
-    lane: usize,
-    node: &WideNode,
+    &OneToEight {
+        volumes,
+        turned,
+        lane,
+        node,
+    }: &OneToEight,
     window: Window,
 ) -> Windows {
     let lane = lane % LANES;

@@ -10,6 +10,8 @@
 //! instructions per row. The rows keep the coordinates they were given in: a scan measures the acceleration that is answered,
 //! not its picture in other coordinates.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::half_space::HalfSpace;
 use super::metric::{Metric, scaled_norm};
 use crate::spatial::Vector6;
@@ -60,6 +62,7 @@ pub(crate) struct Rows {
     max_rows: usize,
     has_positive_bound: bool,
     has_impossible_row: bool,
+    processor: Arch,
 }
 
 impl Rows {
@@ -70,6 +73,7 @@ impl Rows {
             max_rows,
             has_positive_bound: false,
             has_impossible_row: false,
+            processor: Arch::new(),
         }
     }
 
@@ -82,15 +86,13 @@ impl Rows {
         if rows.len() > self.max_rows {
             return Prepared::TooManyRows;
         }
-        let (whole, rest) = rows.as_chunks::<LANES>();
         let mut found = Found::default();
-        let blocks = whole.iter().map(|rows| found.block_of(metric, rows));
-        self.blocks.extend(blocks);
-        if !rest.is_empty() {
-            let mut last = [PADDING; LANES];
-            last[..rest.len()].copy_from_slice(rest);
-            self.blocks.push(found.block_of(metric, &last));
-        }
+        self.processor.dispatch(Preparation {
+            metric,
+            rows,
+            blocks: &mut self.blocks,
+            found: &mut found,
+        });
         if !found.all_finite() {
             self.blocks.clear();
             return Prepared::NotFinite;
@@ -168,26 +170,11 @@ impl Rows {
     /// Bounds above `ceiling` count as `ceiling`.
     #[inline]
     pub(crate) fn most_violated(&self, acceleration: &Vector6, ceiling: f64) -> (usize, f64) {
-        let mut worst = [f64::NEG_INFINITY; LANES];
-        // The block's index as a double: comparison and selection stay in one kind of register.
-        let mut at = [0.0_f64; LANES];
-        let mut index = 0.0;
-        for block in &self.blocks {
-            let violation = block.violations(acceleration, ceiling);
-            for lane in 0..LANES {
-                let deeper = violation[lane] > worst[lane];
-                worst[lane] = if deeper { violation[lane] } else { worst[lane] };
-                at[lane] = if deeper { index } else { at[lane] };
-            }
-            index += 1.0;
-        }
-        let mut best = (0, f64::NEG_INFINITY);
-        for lane in 0..LANES {
-            if worst[lane] > best.1 {
-                best = (at[lane] as usize * LANES + lane, worst[lane]);
-            }
-        }
-        best
+        self.processor.dispatch(MostViolated {
+            blocks: &self.blocks,
+            acceleration,
+            ceiling,
+        })
     }
 
     /// The first row violated by more than `tolerance`, and its violation; else (0, -infinity).
@@ -204,6 +191,67 @@ impl Rows {
             }
         }
         (0, f64::NEG_INFINITY)
+    }
+}
+
+/// Makes blocks of rows.
+struct Preparation<'a> {
+    metric: &'a Metric,
+    rows: &'a [HalfSpace],
+    blocks: &'a mut Vec<Block>,
+    found: &'a mut Found,
+}
+
+impl WithSimd for Preparation<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (metric, found) = (self.metric, self.found);
+        let (whole, rest) = self.rows.as_chunks::<LANES>();
+        for rows in whole {
+            self.blocks.push(found.block_of(metric, rows));
+        }
+        if !rest.is_empty() {
+            let mut last = [PADDING; LANES];
+            last[..rest.len()].copy_from_slice(rest);
+            self.blocks.push(found.block_of(metric, &last));
+        }
+    }
+}
+
+/// Finds the row that is violated most.
+struct MostViolated<'a> {
+    blocks: &'a [Block],
+    acceleration: &'a Vector6,
+    ceiling: f64,
+}
+
+impl WithSimd for MostViolated<'_> {
+    type Output = (usize, f64);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> (usize, f64) {
+        let mut worst = [f64::NEG_INFINITY; LANES];
+        // The block's index as a double: comparison and selection stay in one kind of register.
+        let mut at = [0.0_f64; LANES];
+        let mut index = 0.0;
+        for block in self.blocks {
+            let violation = block.violations(self.acceleration, self.ceiling);
+            for lane in 0..LANES {
+                let deeper = violation[lane] > worst[lane];
+                worst[lane] = if deeper { violation[lane] } else { worst[lane] };
+                at[lane] = if deeper { index } else { at[lane] };
+            }
+            index += 1.0;
+        }
+        let mut best = (0, f64::NEG_INFINITY);
+        for lane in 0..LANES {
+            if worst[lane] > best.1 {
+                best = (at[lane] as usize * LANES + lane, worst[lane]);
+            }
+        }
+        best
     }
 }
 
@@ -285,7 +333,7 @@ impl Block {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn violations(&self, acceleration: &Vector6, ceiling: f64) -> Lanes {
         let mut violation = self.bound;
         for bound in &mut violation {

@@ -7,6 +7,7 @@
 //! | d      | `moved`      | m, rad | from the pose of collection to the present one                     |
 
 use nalgebra::{Point3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::super::Contact;
 use super::{Purpose, Surfaces, felt};
@@ -30,6 +31,7 @@ pub(super) struct Candidates {
     collected_at: Pose,
     pub(super) moved: Vector6,
     pub(super) complete_within: f64,
+    processor: Arch,
 }
 
 impl Candidates {
@@ -47,6 +49,7 @@ impl Candidates {
             collected_at: Pose::identity(),
             moved: Vector6::zeros(),
             complete_within: 0.0,
+            processor: Arch::new(),
         }
     }
 
@@ -103,7 +106,11 @@ impl Candidates {
         self.moved = pose_difference(reference, &self.collected_at, &Vector3::zeros());
         self.gap.clear();
         self.gap.extend(self.contacts.iter().map(|c| c.gap));
-        add_products(&mut self.gap, &self.jacobian, &self.moved);
+        self.processor.dispatch(AddProducts {
+            sums: &mut self.gap,
+            columns: &self.jacobian,
+            a: &self.moved,
+        });
     }
 
     /// Takes over what the scene adds to each candidate.
@@ -137,22 +144,59 @@ impl Candidates {
             .extend(self.gap.iter().map(|gap| gap.max(least_gap)));
         let shaded = self.shaded && purpose.is_felt() && self.felt[0].len() == self.gap.len();
         let rows = if shaded { &self.felt } else { &self.jacobian };
-        add_products(&mut self.clearance, rows, a);
+        self.processor.dispatch(AddProducts {
+            sums: &mut self.clearance,
+            columns: rows,
+            a,
+        });
         if !matches!(purpose, Purpose::Motion | Purpose::Force) {
             for (clearance, nearer) in self.clearance.iter_mut().zip(&self.nearer) {
                 *clearance -= nearer;
             }
         }
-        let least = self.clearance.iter().copied().fold(f64::INFINITY, f64::min);
+        let least = self.processor.dispatch(Least(&self.clearance));
         let place = self.clearance.iter().position(|c| *c == least)?;
         Some((place, least))
     }
 }
 
-fn add_products(sums: &mut [f64], columns: &[Vec<f64>; 6], a: &Vector6) {
-    for (column, x) in columns.iter().zip(a.iter()) {
-        for (sum, j) in sums.iter_mut().zip(column) {
-            *sum += j * x;
+/// Adds `J a` to numbers of which there is one for each row.
+struct AddProducts<'a> {
+    sums: &'a mut [f64],
+    columns: &'a [Vec<f64>; 6],
+    a: &'a Vector6,
+}
+
+impl WithSimd for AddProducts<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (column, x) in self.columns.iter().zip(self.a.iter()) {
+            for (sum, j) in self.sums.iter_mut().zip(column) {
+                *sum += j * x;
+            }
         }
+    }
+}
+
+/// The least of the numbers, infinite without any; NaN is passed over.
+struct Least<'a>(&'a [f64]);
+
+impl WithSimd for Least<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let smaller = |x: f64, y: f64| if y < x { y } else { x };
+        let (whole, rest) = self.0.as_chunks::<8>();
+        let mut least = [f64::INFINITY; 8];
+        for eight in whole {
+            for k in 0..8 {
+                least[k] = smaller(least[k], eight[k]);
+            }
+        }
+        let all = least.iter().chain(rest).copied();
+        all.fold(f64::INFINITY, smaller)
     }
 }

@@ -13,6 +13,7 @@
 //! go round for ever. Source: Alart and Curnier 1991, in six unknowns.
 
 use nalgebra::Matrix6;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::ConeContact;
@@ -128,6 +129,58 @@ fn add_product(sum: &mut Matrix6<f64>, a: &Vector6, b: &Vector6) {
     }
 }
 
+/// Newton steps, with the vectors that the processor has.
+struct Newton<'a> {
+    problem: &'a ConeProblem,
+    start: Vector6,
+    stiffness: f64,
+    steps: usize,
+    tolerance: f64,
+}
+
+impl WithSimd for Newton<'_> {
+    type Output = Option<Vector6>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<Vector6> {
+        let Self {
+            problem,
+            start: mut y,
+            stiffness,
+            steps,
+            tolerance,
+        } = self;
+        let mut before = [[0.0; 2]; MAX_CONE_CONTACTS];
+        for step in 0..=steps {
+            let (mut rest, mut linear) = (y, y);
+            let mut slope = Matrix6::identity();
+            for (contact, before) in problem.contacts.iter().zip(&mut before) {
+                let reaction = contact.reaction(&y, stiffness);
+                let wished = reaction.wished;
+                let turned = before[0] * wished[0] + before[1] * wished[1] < 0.0;
+                *before = wished;
+                let wrench = contact.wrench_of(&reaction);
+                rest -= wrench;
+                if turned && contact.coefficient > 0.0 && reaction.load > 0.0 {
+                    let stuck = reaction.stuck();
+                    linear -= contact.wrench_of(&stuck);
+                    contact.add_slope(&stuck, stiffness, &mut slope);
+                } else {
+                    linear -= wrench;
+                    contact.add_slope(&reaction, stiffness, &mut slope);
+                }
+            }
+            if rest.norm() <= tolerance {
+                return Some(y);
+            }
+            if step < steps {
+                y -= slope.lu().solve(&linear)?;
+            }
+        }
+        None
+    }
+}
+
 impl ConeProblem {
     /// Finds the multipliers, from the one of `starts` that is nearest to balance; `scale` is a length in whitened coordinates, > 0.
     ///
@@ -157,39 +210,18 @@ impl ConeProblem {
     /// Newton steps on G from `y`. `None` where forces do not balance to `tolerance` after the last.
     pub(super) fn newton(
         &self,
-        mut y: Vector6,
+        start: Vector6,
         stiffness: f64,
         steps: usize,
         tolerance: f64,
     ) -> Option<Vector6> {
-        let mut before = [[0.0; 2]; MAX_CONE_CONTACTS];
-        for step in 0..=steps {
-            let (mut rest, mut linear) = (y, y);
-            let mut slope = Matrix6::identity();
-            for (contact, before) in self.contacts.iter().zip(&mut before) {
-                let reaction = contact.reaction(&y, stiffness);
-                let wished = reaction.wished;
-                let turned = before[0] * wished[0] + before[1] * wished[1] < 0.0;
-                *before = wished;
-                let wrench = contact.wrench_of(&reaction);
-                rest -= wrench;
-                if turned && contact.coefficient > 0.0 && reaction.load > 0.0 {
-                    let stuck = reaction.stuck();
-                    linear -= contact.wrench_of(&stuck);
-                    contact.add_slope(&stuck, stiffness, &mut slope);
-                } else {
-                    linear -= wrench;
-                    contact.add_slope(&reaction, stiffness, &mut slope);
-                }
-            }
-            if rest.norm() <= tolerance {
-                return Some(y);
-            }
-            if step < steps {
-                y -= slope.lu().solve(&linear)?;
-            }
-        }
-        None
+        Arch::new().dispatch(Newton {
+            problem: self,
+            start,
+            stiffness,
+            steps,
+            tolerance,
+        })
     }
 
     /// The multipliers at `y` become those of the contacts. Returns the most that a contact slips or penetrates there.
