@@ -37,4 +37,4 @@ pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};
 pub(crate) use facing_volumes::FacingVolumes;
 pub(crate) use motion::{Placement, RelativeMotion};
-pub(crate) use workspace::{MAX_CANDIDATES, MAX_HINTS};
+pub(crate) use workspace::{MAX_CANDIDATES, MAX_WITNESSES};

@@ -42,7 +42,7 @@ use crate::spatial::Pose;
 
 /// Rounding of a computed distance relative to the largest coordinate on the way: see the file's head.
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
-/// Searches of one motion: with the full gap; with that of the nearest hint; with that of the nearest pair; and one for rounding.
+/// Searches of one motion: with the full gap; with that of the nearest witness; with that of the nearest pair; and one for rounding.
 const MAX_SEARCHES: u32 = 4;
 
 /// Lengths, m, and turns, rad, from here on do not fit single precision with their squares: no motion is searched that far.
@@ -261,7 +261,7 @@ impl Problem<'_> {
         let start = self.relative.at(0.0);
         let (bodies, obstacles) = (self.body.triangles().len(), self.obstacle.triangles().len());
         for &(a, b) in workspace
-            .hints
+            .witnesses
             .iter()
             .filter(|(a, b)| (*a as usize) < bodies && (*b as usize) < obstacles)
         {
@@ -305,7 +305,7 @@ impl Problem<'_> {
         let CollisionWorkspace {
             agenda,
             stack,
-            hints,
+            witnesses,
             intervals,
             turned,
             ..
@@ -385,7 +385,7 @@ impl Problem<'_> {
                     let pair = self.pair(t, s);
                     let times = [interval.from, from, to];
                     if !search.is_free(&pair, &interval.start, times, &first.lately)
-                        && !hints.contains(&(t, s))
+                        && !witnesses.contains(&(t, s))
                     {
                         let start = if from > interval.from {
                             self.relative.at(from)

@@ -14,7 +14,7 @@ use crate::constraint::Contact;
 /// Contacts looked at before the nearest are chosen. A conforming contact of dense meshes has more; the nearest survive.
 pub(crate) const MAX_CANDIDATES: usize = 8192;
 /// Triangle pairs kept from one search to the next.
-pub(crate) const MAX_HINTS: usize = 64;
+pub(crate) const MAX_WITNESSES: usize = 64;
 
 /// Buffers that the searches reuse, and the nearest triangle pairs of the last ones.
 ///
@@ -32,7 +32,7 @@ pub struct CollisionWorkspace {
     pub(crate) turned: TurnedNodes,
     pub(crate) candidates: Vec<Contact>,
     pub(crate) candidate_limit: usize,
-    pub(crate) hints: ArrayVec<(u32, u32), MAX_HINTS>,
+    pub(crate) witnesses: ArrayVec<(u32, u32), MAX_WITNESSES>,
 }
 
 impl CollisionWorkspace {
@@ -54,18 +54,18 @@ impl CollisionWorkspace {
             turned: TurnedNodes::new(),
             candidates: Vec::with_capacity(candidates),
             candidate_limit: candidates,
-            hints: ArrayVec::new(),
+            witnesses: ArrayVec::new(),
         }
     }
 
-    /// Puts a pair at the front of the hints.
+    /// Puts a pair at the front of the witnesses.
     pub(crate) fn remember(&mut self, pair: (u32, u32)) {
-        if let Some(known) = self.hints.iter().position(|h| *h == pair) {
-            self.hints.remove(known);
-        } else if self.hints.is_full() {
-            self.hints.pop();
+        if let Some(known) = self.witnesses.iter().position(|h| *h == pair) {
+            self.witnesses.remove(known);
+        } else if self.witnesses.is_full() {
+            self.witnesses.pop();
         }
-        self.hints.insert(0, pair);
+        self.witnesses.insert(0, pair);
     }
 }
 

@@ -6,7 +6,7 @@
 use super::facing::{Facing, LOOK_AHEAD_TILT, Pair};
 use super::{Collected, Contact, Feature};
 use crate::collision::{
-    CollisionWorkspace, FacingVolumes, MAX_HINTS, MAX_MOTIONS, Motions, Placement, Work,
+    CollisionWorkspace, FacingVolumes, MAX_MOTIONS, MAX_WITNESSES, Motions, Placement, Work,
     for_deepest_triangle_pairs, for_facing_triangle_pairs, for_nearest_triangle_pairs,
 };
 use crate::geometry::Mesh;
@@ -79,7 +79,7 @@ pub(crate) fn collect_bounded(
         placement: &placement,
         obstacle_index,
         activation_distance,
-        past_hollows: false,
+        past_reentrant_edges: false,
     };
     let mut nearest = Nearest {
         limit: workspace.candidate_limit,
@@ -113,10 +113,12 @@ pub(crate) fn collect_bounded(
     if truncated {
         complete_within = complete_within.min(candidates.last().map_or(0.0, |c| c.gap));
     }
-    workspace.hints.clear();
-    for contact in candidates.iter().take(MAX_HINTS) {
+    workspace.witnesses.clear();
+    for contact in candidates.iter().take(MAX_WITNESSES) {
         if let Some(triangle) = triangle_of(body, contact.features.on_body) {
-            workspace.hints.push((triangle, contact.obstacle_triangle));
+            workspace
+                .witnesses
+                .push((triangle, contact.obstacle_triangle));
         }
     }
     let gap_min = candidates.first().map_or(f64::INFINITY, |c| c.gap);
@@ -169,7 +171,7 @@ pub(crate) fn for_violated(
         placement: &placement,
         obstacle_index,
         activation_distance: asked.reach,
-        past_hollows: false,
+        past_reentrant_edges: false,
     };
     let into = obstacle_pose.rotation.inverse();
     let in_obstacle = asked

@@ -14,7 +14,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::collect::triangle_of;
-use super::hollow;
+use super::reentrant;
 use super::{Contact, Feature, FeaturePair};
 use crate::collision::Placement;
 use crate::geometry::Mesh;
@@ -42,8 +42,8 @@ pub(super) struct Facing<'a> {
     pub(super) placement: &'a Placement,
     pub(super) obstacle_index: u16,
     pub(super) activation_distance: f64,
-    /// Rows count beyond the end of their feature, too, where that is a hollow ([`hollow`]): for rows that are known.
-    pub(super) past_hollows: bool,
+    /// Rows count beyond the end of their feature, too, where that is reentrant ([`reentrant`]): for rows that are known.
+    pub(super) past_reentrant_edges: bool,
 }
 
 /// One triangle of each, corners in both frames where needed.
@@ -64,9 +64,9 @@ impl Facing<'_> {
         let gap = normal.dot(&(pair.x[k] - pair.y[0]));
         let over = self.is_near(gap)
             && (is_over(&pair.x[k], &pair.y, &normal, gap)
-                || self.past_hollows && {
+                || self.past_reentrant_edges && {
                     let place = |t| self.obstacle.corners(t);
-                    hollow::covers_foot(self.obstacle, pair.b, place, &pair.x[k])
+                    reentrant::covers_foot(self.obstacle, pair.b, place, &pair.x[k])
                 });
         if !over {
             return None;
@@ -94,9 +94,9 @@ impl Facing<'_> {
         let gap = normal.dot(&(pair.x[0] - pair.y[k]));
         let over = self.is_near(gap)
             && (is_over(&pair.y[k], &pair.x, &-normal, gap)
-                || self.past_hollows && {
+                || self.past_reentrant_edges && {
                     let place = |t| self.pair(t, pair.b).x;
-                    hollow::covers_foot(self.body, pair.a, place, &pair.y[k])
+                    reentrant::covers_foot(self.body, pair.a, place, &pair.y[k])
                 });
         if !over {
             return None;
@@ -129,7 +129,7 @@ impl Facing<'_> {
         let (c, f) = (u.dot(&r), v.dot(&r));
         let (s, t) = ((b * f - c * e) / denominator, (a * f - b * c) / denominator);
         let inside = [s, t].map(|at| (0.0..=1.0).contains(&at));
-        if inside != [true; 2] && !self.past_hollows {
+        if inside != [true; 2] && !self.past_reentrant_edges {
             return None;
         }
         let cross = u.cross(&v);
@@ -151,12 +151,12 @@ impl Facing<'_> {
             && (inside[0] || {
                 let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
                 let way = self.placement.rotation.tr_mul(&(u * past_end(s)));
-                hollow::covers_way(self.body, end, &way, &into_body)
+                reentrant::covers_way(self.body, end, &way, &into_body)
             })
             && (inside[1] || {
                 let end =
                     self.obstacle.triangles()[pair.b as usize][(j + usize::from(t > 0.5)) % 3];
-                hollow::covers_way(self.obstacle, end, &(v * past_end(t)), &normal)
+                reentrant::covers_way(self.obstacle, end, &(v * past_end(t)), &normal)
             });
         facing.then(|| {
             self.contact(

@@ -5,9 +5,9 @@ mod collect;
 mod contact;
 mod facing;
 mod feature;
-mod hollow;
 mod overlay;
 mod reduction;
+mod reentrant;
 mod separation;
 mod set;
 

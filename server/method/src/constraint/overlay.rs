@@ -270,8 +270,8 @@ fn look_at_edges(
 }
 
 /// The face that a point is over, from face to face towards it.
-fn foot_of(mesh: &Mesh, hint: u32, x: &Point3<f64>, work: &mut Work) -> Option<Foot> {
-    let (mut face, mut from) = (hint, NONE);
+fn foot_of(mesh: &Mesh, start_face: u32, x: &Point3<f64>, work: &mut Work) -> Option<Foot> {
+    let (mut face, mut from) = (start_face, NONE);
     for _ in 0..MAX_STEPS {
         work.feature_pairs += 1;
         let corners = mesh.corners(face);
@@ -444,7 +444,7 @@ mod tests {
                     placement: &Placement::of(&pose, &Pose::identity()),
                     obstacle_index: index,
                     activation_distance: NEAR,
-                    past_hollows: false,
+                    past_reentrant_edges: false,
                 };
                 let expected = by_trees(&body, &pose, &obstacle, index);
                 let seeds = &expected[..usize::from(seeded)];

@@ -49,12 +49,12 @@ impl GodObject {
         };
         if let Some(at) = self.place() {
             let stopped = std::mem::take(&mut self.stopped);
-            let hints = if stopped {
-                &self.collision.hints[..]
+            let witnesses = if stopped {
+                &self.collision.witnesses[..]
             } else {
                 &[]
             };
-            reduction.move_to((&at, &self.surfaces(None)), hints, work);
+            reduction.move_to((&at, &self.surfaces(None)), witnesses, work);
             let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;

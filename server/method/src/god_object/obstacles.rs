@@ -282,8 +282,8 @@ impl GodObject {
                 continue;
             }
             let made = self.motion_length(&projected.acceleration);
-            let worth_moving = made > self.settings.motion_tolerance; // false for NaN
-            if !worth_moving {
+            let long_enough = made > self.settings.motion_tolerance; // false for NaN
+            if !long_enough {
                 return Some(0.0);
             }
             return Some(made * self.go(&projected, &projected.acceleration, report));

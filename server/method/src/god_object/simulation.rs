@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::collection::GivenRows;
 use super::obstacles::PlacedObstacle;
-use super::substep::{Going, Update};
+use super::substep::{StepMemory, Update};
 use super::{StartError, StepReport};
 use crate::collision::{CollisionWorkspace, Work};
 use crate::constraint::{ConstraintSet, Contact, Place, RowReduction};
@@ -41,7 +41,7 @@ pub struct GodObject {
     pub(super) radius: f64,
     pub(super) trust_length: f64,
     /// What the last update's motions showed, for the next one: where the hand rests, updates go on from each other.
-    pub(super) going: Going,
+    pub(super) step_memory: StepMemory,
     pub(super) last_device: Option<Pose>,
     /// Motion of the device since the update before, m and rad.
     pub(super) device_step: Vector6,
@@ -111,7 +111,7 @@ impl GodObject {
             turn: TurnMemory::default(),
             radius,
             trust_length: f64::INFINITY,
-            going: Going::default(),
+            step_memory: StepMemory::default(),
             last_device: None,
             device_step: Vector6::zeros(),
             wanted: settings.activation_distance,
@@ -181,12 +181,12 @@ impl GodObject {
             all_moved,
             look_ahead: all_moved,
             made: 0.0,
-            going: if all_moved <= self.settings.rest_distance {
-                self.going
+            step_memory: if all_moved <= self.settings.rest_distance {
+                self.step_memory
             } else {
-                Going::default()
+                StepMemory::default()
             },
-            turns: 0,
+            reversals: 0,
         };
         report.unfinished = true;
         while report.substeps < self.settings.max_substeps {
@@ -205,7 +205,7 @@ impl GodObject {
                 break;
             }
         }
-        self.going = update.going;
+        self.step_memory = update.step_memory;
         // Sets between sub-steps serve the next sub-step alone; the one that is published looks ahead.
         let published = self.published_distance(&update);
         if self.collected_within < published {

@@ -14,19 +14,19 @@ use crate::spatial::{
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
-/// A motion that is a smaller share of the way that the update has made is not worth a search.
-const WORTH_SHARE: f64 = 0.1;
+/// A motion that is a smaller share of the way that the update has made is left to the next update.
+const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
 const TIGHT_GAP_SHARE: f64 = 0.5;
 /// Motions that turn back on each other more often than this go to and fro about where they end: the next update is nearer.
-const MAX_TURNS: u32 = 2;
+const MAX_REVERSALS: u32 = 2;
 /// Most by which motions become shorter when one turns back on the last.
 const LARGEST_DAMPING: f64 = 16.0;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
 const LOST_GAP_SHARE: f64 = 0.5;
-/// One that loses less than this was as the rows foretold.
+/// One that loses less than this was as the rows predicted.
 const HELD_GAP_SHARE: f64 = 0.1;
-/// How much farther the rows are trusted after a motion that was free; after one that was as foretold, so that what one stop took is won back in
+/// How much farther the rows are trusted after a motion that was free; after one that was as predicted, so that what one stop took is regained in
 /// two sub-steps and not in six.
 const SLOW_GROWTH: f64 = 2.0;
 const FAST_GROWTH: f64 = 8.0;
@@ -41,22 +41,22 @@ pub(super) struct Update {
     /// Way made by the sub-steps so far, m.
     pub(super) made: f64,
     /// Last motion and damping.
-    pub(super) going: Going,
+    pub(super) step_memory: StepMemory,
     /// How often a motion has turned back on the last.
-    pub(super) turns: u32,
+    pub(super) reversals: u32,
 }
 
 /// What one motion says about the next. Where the hand rests it outlives the update: motions that turn back on each other would else
 /// do the same in every update, and end in a cycle instead of at the minimum.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Going {
+pub(super) struct StepMemory {
     /// Motion of the sub-step before.
     last_motion: Vector6,
     /// Share of the projected motion that is made; shrinks while motions turn back on each other.
     damping: f64,
 }
 
-impl Default for Going {
+impl Default for StepMemory {
     fn default() -> Self {
         Self {
             last_motion: Vector6::zeros(),
@@ -92,27 +92,30 @@ impl GodObject {
         // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
         // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
         // little that was cut to what is trusted, or that begins a fall.
-        if update.going.relax(&projected.acceleration, self.radius) {
-            update.turns += 1;
+        if update
+            .step_memory
+            .relax(&projected.acceleration, self.radius)
+        {
+            update.reversals += 1;
         }
         let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
         let little = if tight || cut {
             0.0
         } else {
-            WORTH_SHARE * update.made
+            LEAST_STEP_SHARE * update.made
         };
-        let settling = update.turns > MAX_TURNS && !tight && !cut;
-        let worth_moving = !settling
+        let settling = update.reversals > MAX_REVERSALS && !tight && !cut;
+        let long_enough = !settling
             && covered > self.settings.motion_tolerance
-            && (covered * update.going.damping > little // false for NaN
+            && (covered * update.step_memory.damping > little // false for NaN
                 || self.tips_over(&projected.acceleration, left, report));
-        if !worth_moving {
+        if !long_enough {
             return false;
         }
 
         // 4. Move as far as continuous collision detection allows.
-        let constrained = projected.acceleration * update.going.damping;
-        let covered = covered * update.going.damping;
+        let constrained = projected.acceleration * update.step_memory.damping;
+        let covered = covered * update.step_memory.damping;
         let gap_before = self.set.gap_min.min(self.settings.rest_distance);
         let known_within = self.set.complete_within;
         let time = self.go(&projected, &constrained, report);
@@ -139,8 +142,8 @@ impl GodObject {
         } else if !true_rows {
             self.trust_length = (TRUSTED_SHARE * covered).max(self.settings.motion_tolerance);
         } else if time >= 1.0 {
-            let as_foretold = lost <= HELD_GAP_SHARE * self.settings.rest_distance; // false for NaN
-            self.trust_length *= if as_foretold {
+            let as_predicted = lost <= HELD_GAP_SHARE * self.settings.rest_distance; // false for NaN
+            self.trust_length *= if as_predicted {
                 FAST_GROWTH
             } else {
                 SLOW_GROWTH
@@ -148,7 +151,7 @@ impl GodObject {
         }
         if time < TRUSTED_SHARE || !true_rows {
             // What comes next is a way out, and no turning back.
-            update.going.last_motion = Vector6::zeros();
+            update.step_memory.last_motion = Vector6::zeros();
         }
         true
     }
@@ -227,7 +230,7 @@ impl GodObject {
     }
 }
 
-impl Going {
+impl StepMemory {
     /// Takes note of a projected motion, before it is made: one that turns back on the last, for which this is true, says that the last went
     /// too far.
     fn relax(&mut self, motion: &Vector6, radius: f64) -> bool {

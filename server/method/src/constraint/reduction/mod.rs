@@ -17,7 +17,7 @@
 //! they are near or stop the body: continuous collision detection names the pair, which becomes a row. Where that is not even as far as what touches,
 //! as between surfaces that conform, pairs are found along the surfaces ([`overlay`](super::overlay)), and those that the force's answer violates
 //! are searched for by how far it brings them together ([`for_violated`](super::for_violated)). Where a pair that
-//! holds the body is about to slide across a corner of a hollow, the row of what it turns into is added, though it does not face yet; where one has slid
+//! holds the body is about to slide across a reentrant corner, the row of what it turns into is added, though it does not face yet; where one has slid
 //! off its features, those of what it became.
 //!
 //! A row is what its [`Purpose`] makes of a pair: the force has shading normals, and what moves is nearer by the time of the next set. So friction,
@@ -53,9 +53,9 @@ const FEW: usize = 64;
 const MAX_ROUNDS: u32 = 24;
 /// Most candidates that turn out to face no more, in one round.
 const MAX_STALE: u32 = 64;
-/// Hints that are looked at, and how near a pair there must be to become a row.
-const HINTS_TAKEN: usize = 2;
-const HINT_REST_DISTANCES: f64 = 4.0;
+/// Witnesses that are looked at, and how near a pair there must be to become a row.
+const WITNESSES_TAKEN: usize = 2;
+const WITNESS_REST_DISTANCES: f64 = 4.0;
 /// Most pairs that have slid off their features which are followed, in one motion.
 const MAX_FOLLOWED: usize = 16;
 /// Updates that a row outlives its last use: rows do not come and go with every tremor.
@@ -73,7 +73,7 @@ struct Known {
     /// How much nearer than its gap says the pair counts, m: its obstacle moves.
     nearer: f64,
     idle: u32,
-    /// Its pair faces no more: it slid into a hollow, where the row is implied by those that are there.
+    /// Its pair faces no more: it slid past a reentrant edge, where the row is implied by those that are there.
     implied: bool,
 }
 
@@ -89,7 +89,7 @@ const ALONG_REST_DISTANCES: f64 = 1.5;
 const ALONG_PER_PLACE: usize = 2;
 
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
-const HOPED_WITHIN: f64 = 2.0;
+const REACH_GROWTH: f64 = 2.0;
 
 /// Where an obstacle is, and whether its rows are chosen: of exact primitives, which have few, every pair is a row, given from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,7 +182,7 @@ pub(crate) struct RowReduction {
     truncated: bool,
     asked: f64,
     /// How far the next collection of each obstacle's pairs is to reach, m.
-    hoped: Vec<f64>,
+    next_reach: Vec<f64>,
     /// A pair that mattered faces no more: its neighbours were no candidates where they were collected.
     outdated: bool,
     /// How far the points of each obstacle may have gone since the candidates were collected, m.
@@ -204,7 +204,7 @@ impl RowReduction {
             error: 0.0,
             truncated: false,
             asked: 0.0,
-            hoped: vec![f64::INFINITY; world.obstacles.len()],
+            next_reach: vec![f64::INFINITY; world.obstacles.len()],
             outdated: false,
             gone: vec![0.0; world.obstacles.len()],
         }
@@ -227,11 +227,11 @@ impl RowReduction {
 
     /// Takes the rows to a new pose: pairs that face no more are let go, the candidates' gaps are carried on by their Jacobians.
     ///
-    /// `hints` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
+    /// `witnesses` are the triangle pairs that stopped the last motion, if any did, and those before: what faces there becomes a row.
     pub(crate) fn move_to(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
-        hints: &[(u32, u32)],
+        witnesses: &[(u32, u32)],
         work: &mut Work,
     ) {
         self.error = 0.0;
@@ -259,8 +259,8 @@ impl RowReduction {
             self.follow((at, surfaces), pair, work);
         }
         self.candidates.move_to(&at.reference);
-        for &hint in hints.iter().take(HINTS_TAKEN) {
-            self.take_hint((at, surfaces), hint, work);
+        for &witness in witnesses.iter().take(WITNESSES_TAKEN) {
+            self.take_witness((at, surfaces), witness, work);
         }
     }
 
@@ -364,7 +364,7 @@ impl RowReduction {
 
     /// How far the pairs of an obstacle are to be collected of a distance asked for, m: what the work did not allow last time it will hardly allow now.
     pub(crate) fn reach(&self, obstacle: usize, asked: f64) -> f64 {
-        asked.min(self.hoped[obstacle])
+        asked.min(self.next_reach[obstacle])
     }
 
     /// Takes note of how far a collection came that was to reach so far of what was asked for, m.
@@ -376,10 +376,10 @@ impl RowReduction {
         within: f64,
     ) {
         let whole = within >= reach && reach >= asked; // false for NaN
-        self.hoped[obstacle] = if whole {
+        self.next_reach[obstacle] = if whole {
             f64::INFINITY
         } else {
-            HOPED_WITHIN * within.max(at.rest_distance)
+            REACH_GROWTH * within.max(at.rest_distance)
         };
     }
 
@@ -429,7 +429,7 @@ impl RowReduction {
     /// Whether the trees did not find every pair of an obstacle that a walk along the surfaces would, the last time.
     pub(crate) fn conforms(&self, at: &At, obstacle: usize) -> bool {
         let along = ALONG_REST_DISTANCES * at.rest_distance;
-        self.hoped[obstacle] < HOPED_WITHIN * along
+        self.next_reach[obstacle] < REACH_GROWTH * along
     }
 
     /// Adds contacts of the present pose that are found along the surfaces; how many vertices were looked at.
@@ -441,7 +441,7 @@ impl RowReduction {
             placement: &Placement::of(&at.pose, pose),
             obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
             activation_distance: ALONG_REST_DISTANCES * at.rest_distance,
-            past_hollows: false,
+            past_reentrant_edges: false,
         };
         let (candidates, known) = (&mut self.candidates, &self.known);
         let near = known.iter().map(|row| &row.contact);
@@ -529,7 +529,7 @@ impl RowReduction {
                 &at.world.body.mesh,
                 &obstacle.mesh,
                 &pair,
-                Sides::Hollow,
+                Sides::Reentrant,
                 |features| {
                     if self.known.len() == MAX_ROWS || self.knows(&features) {
                         return;
@@ -669,13 +669,13 @@ impl RowReduction {
     }
 
     /// Adds what faces between two triangles that stopped a motion.
-    fn take_hint(
+    fn take_witness(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
         (a, b): (u32, u32),
         work: &mut Work,
     ) {
-        // A hint does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
+        // A witness does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
         for index in 0..at.places.len() {
             let (mesh, pose) = at.obstacle(index);
             let body = &at.world.body.mesh;
@@ -690,8 +690,8 @@ impl RowReduction {
                 obstacle: mesh,
                 placement: &placement,
                 obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-                activation_distance: HINT_REST_DISTANCES * at.rest_distance,
-                past_hollows: false,
+                activation_distance: WITNESS_REST_DISTANCES * at.rest_distance,
+                past_reentrant_edges: false,
             };
             // The features that touch may be other triangles' to look at.
             for a in owners(body, a) {
@@ -722,8 +722,13 @@ fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
     owners
 }
 
-/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid into a hollow.
-fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) -> Option<Contact> {
+/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid past a reentrant edge.
+fn face(
+    at: &At,
+    features: &FeaturePair,
+    past_reentrant_edges: bool,
+    work: &mut Work,
+) -> Option<Contact> {
     let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
     let placement = Placement::of(&at.pose, pose);
     let facing = Facing {
@@ -732,7 +737,7 @@ fn face(at: &At, features: &FeaturePair, past_hollows: bool, work: &mut Work) ->
         placement: &placement,
         obstacle_index: features.obstacle,
         activation_distance: f64::INFINITY,
-        past_hollows,
+        past_reentrant_edges,
     };
     work.feature_pairs += 1;
     facing

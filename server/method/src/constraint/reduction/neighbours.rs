@@ -1,4 +1,4 @@
-//! Pairs that a row's pair turns into where it slides off its feature into a hollow.
+//! Pairs that a row's pair turns into where it slides off its feature past a reentrant edge.
 //!
 //! In the corner of two walls the rows of both hold, but only the one under the foot faces. A motion that crosses the corner would
 //! find the other wall by running into it, and the next would run back into the first: to and fro, because no projection knew both.
@@ -19,7 +19,7 @@ const GOES_ON: f64 = 0.5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sides {
     /// Those that do not stand out: across them the row of the neighbour is implied before it faces.
-    Hollow,
+    Reentrant,
     All,
 }
 
@@ -113,7 +113,7 @@ fn go_on(mesh: &Mesh, e: u32, end: usize, found: &mut ArrayVec<Feature, MAX_NEIG
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constraint::hollow::tests::notched;
+    use crate::constraint::reentrant::tests::notched;
 
     /// The faces at the ridge, left or right of the notch.
     fn at_ridge(mesh: &Mesh, right: bool) -> Vec<u32> {
@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn faces_lead_on_across_a_notch_and_only_of_all_sides_across_a_peak() {
-        for (depth, hollow) in [(0.1, true), (-0.1, false)] {
+        for (depth, reentrant) in [(0.1, true), (-0.1, false)] {
             let mesh = notched(depth);
             let right = at_ridge(&mesh, true);
             let crosses = |sides| {
@@ -137,7 +137,7 @@ mod tests {
                         .any(|f| right.iter().any(|s| *f == Feature::Face(*s)))
                 })
             };
-            assert_eq!(crosses(Sides::Hollow), hollow, "{depth}");
+            assert_eq!(crosses(Sides::Reentrant), reentrant, "{depth}");
             assert!(crosses(Sides::All), "{depth}");
         }
     }
@@ -153,7 +153,7 @@ mod tests {
             found.expect("an edge of the ridge") as u32
         };
         let (left, right) = (ridge([2, 5]), ridge([5, 8]));
-        let found = neighbours(&mesh, Feature::Edge(left), Sides::Hollow);
+        let found = neighbours(&mesh, Feature::Edge(left), Sides::Reentrant);
         assert_eq!(found.as_slice(), [Feature::Edge(right)]);
     }
 }

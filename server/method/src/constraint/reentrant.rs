@@ -1,6 +1,6 @@
-//! Rows that outlive the end of their feature: what slides off an edge or a face into a hollow is still held by it.
+//! Rows that outlive the end of their feature: what slides off an edge or a face past a reentrant edge is still held by it.
 //!
-//! An edge that ends at a notch goes on, as a line, beneath the surface behind the notch; a face that ends at a hollow edge does, as a
+//! An edge that ends at a notch goes on, as a line, beneath the surface behind the notch; a face that ends at a reentrant edge does, as a
 //! plane. Whatever is outside that surface is on the outer side of line and plane, too: their row is implied there, never false. It is
 //! not one that faces any more, and no collection finds it. But a body that rests in the notch is held by the rows of both sides, each of which faces
 //! on its own side alone: without the row it came from, it would go to and fro between the two.
@@ -157,7 +157,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_foot_beyond_a_hollow_side_is_covered_and_one_beyond_a_convex_side_is_not() {
+    fn a_foot_beyond_a_reentrant_side_is_covered_and_one_beyond_a_convex_side_is_not() {
         for (depth, expected) in [(0.1, true), (-0.1, false)] {
             let mesh = notched(depth);
             let covered = (0..mesh.triangles().len() as u32).any(|t| {
