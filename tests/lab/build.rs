@@ -7,14 +7,15 @@ use std::process::Command;
 /// What an answer of the method depends on.
 const METHOD: [&str; 1] = ["../../server/method/src"];
 /// What else a result of a recipe depends on: recipes and methods, the independent check, shapes, versions of crates.
-const LABORATORY: [&str; 4] = [
+const LABORATORY: [&str; 5] = [
     "src",
+    "data/costs.csv",
     "../method/src",
     "../../server/scene/src",
     "../../Cargo.lock",
 ];
 /// What only shows results: a page that looks better makes nothing be run again.
-const SHOWS: [&str; 10] = [
+const SHOWS: [&str; 11] = [
     "src/page.rs",
     "src/page",
     "src/plot.rs",
@@ -23,6 +24,7 @@ const SHOWS: [&str; 10] = [
     "src/maps",
     "src/report.rs",
     "src/run.rs",
+    "src/score.rs",
     "src/main.rs",
     "src/sweeps",
 ];

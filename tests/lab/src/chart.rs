@@ -1,4 +1,4 @@
-//! Error against time: J over the 99th percentile of an update, a panel for each recipe, with the Pareto front.
+//! Error against cost: J over the share of one core that updates and forces take, a panel for each recipe, with the Pareto front.
 //!
 //! J below 0.001 is drawn there: nobody feels the difference. Every point is a row of `chart.csv`.
 
@@ -17,10 +17,26 @@ use crate::plot::{Frame, Mark, PANEL, front};
 use crate::report::{KEYS, keys};
 use crate::row::{Row, Verdict};
 
-/// Range of the axes: us and just-noticeable differences.
-const TIMES: [f64; 2] = [0.5, 3000.0];
+/// Range of the axes: shares of a core and just-noticeable differences.
+const SHARES: [f64; 2] = [1e-4, 3.0];
 const ERRORS: [f64; 2] = [0.7e-3, 500.0];
 const COLUMNS: usize = 3;
+/// The scenes of `tradeoff.svg`: every method that turns its body has a part in them.
+const CANONICAL: [(&str, &str); 10] = [
+    ("R02", "ball on a plane"),
+    ("R04", "box on a plane, tilted"),
+    ("R06", "ball in a groove of 45 degrees"),
+    ("R08", "edge of 90 degrees"),
+    ("R09", "plate of 0.1 mm"),
+    ("R11", "0.3 m/s"),
+    ("R12", "radius 20 mm, 0.2 m/s"),
+    ("R13", "end of a plate"),
+    ("R18", "in the hole, clearance 0.1 mm"),
+    ("R25", "combs, clearance 0.05 mm"),
+];
+const CANONICAL_COLUMNS: usize = 2;
+/// Height of title and legend, pixels.
+const CANONICAL_HEAD: u32 = 112;
 /// Sizes of points, by rate.
 const SIZES: [i32; 3] = [7, 5, 3];
 
@@ -34,12 +50,13 @@ pub(crate) fn colour(method: Method) -> RGBColor {
         Method::Penalty => RGBColor(110, 110, 60),
         Method::Discrete => RGBColor(140, 60, 150),
         Method::Point => RGBColor(190, 40, 70),
+        Method::DoesNothing | Method::RandomForce => BLACK,
     }
 }
 
-/// A point: time of an update, us, and J.
+/// A point: share of one core that the method takes, and J.
 fn point(outcome: &Outcome) -> (f64, f64) {
-    (outcome.times.update[1], outcome.worst(Measure::Felt))
+    (outcome.load.core, outcome.worst(Measure::JndP95))
 }
 
 /// Whether every row of an outcome is passed.
@@ -75,11 +92,11 @@ pub(crate) fn panel(
 ) -> (Frame, Vec<Mark>) {
     let frame = Frame {
         title: format!("{recipe}: {case}"),
-        costs: TIMES,
-        cost: "p99 of an update, us",
-        cost_line: Some(1000.0),
+        costs: SHARES,
+        cost: "share of one core",
+        cost_line: Some(1.0),
         errors: ERRORS,
-        unit: "error felt, J",
+        unit: "error felt, J at p95",
         error_line: Some(1.0),
     };
     let of_panel = |o: &&Outcome| (o.recipe, o.case.as_str()) == (recipe, case);
@@ -97,8 +114,62 @@ pub(crate) fn panel(
     (frame, marks.collect())
 }
 
-/// Writes `speed-accuracy.svg` and `chart.csv`.
+/// Writes `tradeoff.svg`: the panels of ten canonical scenes, as far as they were run.
+fn write_canonical(
+    rows: &[Row],
+    outcomes: &[Outcome],
+    directory: &Path,
+) -> Result<(), Box<dyn Error>> {
+    let drawn: Vec<_> = (CANONICAL.iter())
+        .filter(|panel| panels(outcomes).contains(panel))
+        .collect();
+    if drawn.is_empty() {
+        return Ok(());
+    }
+    let lines = drawn.len().div_ceil(CANONICAL_COLUMNS);
+    let width = PANEL.0 * CANONICAL_COLUMNS as u32;
+    let svg = directory.join("tradeoff.svg");
+    let root = SVGBackend::new(&svg, (width, PANEL.1 * lines as u32 + CANONICAL_HEAD));
+    let root = root.into_drawing_area();
+    root.fill(&WHITE)?;
+    let (head, grid) = root.split_vertically(CANONICAL_HEAD);
+    let lines_of_head = [
+        "Error felt against the share of one core that a method takes, all its loops",
+        "down is better, left is cheaper; dot: every pass line is kept, cross: one is missed; black line: Pareto front",
+    ];
+    for (index, text) in lines_of_head.iter().enumerate() {
+        let size = [19, 14][index];
+        let place = (16, 8 + 28 * index as i32);
+        head.draw(&Text::new(*text, place, ("sans-serif", size)))?;
+    }
+    for (index, method) in Method::ALL.into_iter().enumerate() {
+        let (column, line) = ((index % 4) as i32, (index / 4) as i32);
+        let (x, y) = (24 + 170 * column, 68 + 22 * line);
+        head.draw(&Circle::new((x, y), 6, colour(method).filled()))?;
+        head.draw(&Text::new(
+            method.name(),
+            (x + 12, y - 8),
+            ("sans-serif", 15),
+        ))?;
+    }
+    for (index, (rate, size)) in RATES.iter().zip(SIZES).enumerate() {
+        let y = 62 + 20 * index as i32;
+        head.draw(&Circle::new((720, y), size, BLACK))?;
+        let label = format!("at most {rate} Hz");
+        head.draw(&Text::new(label, (734, y - 8), ("sans-serif", 15)))?;
+    }
+    let areas = grid.split_evenly((lines, CANONICAL_COLUMNS));
+    for (area, name) in areas.iter().zip(drawn) {
+        let (frame, marks) = panel(*name, outcomes, rows);
+        frame.draw(area, &marks)?;
+    }
+    root.present()?;
+    Ok(())
+}
+
+/// Writes `speed-accuracy.svg`, `tradeoff.svg` and `chart.csv`.
 pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(), Box<dyn Error>> {
+    write_canonical(rows, outcomes, directory)?;
     let panels = panels(outcomes);
     let lines = panels.len().div_ceil(COLUMNS).max(1);
     let svg = directory.join("speed-accuracy.svg");
@@ -106,12 +177,12 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
     let root = SVGBackend::new(&svg, size).into_drawing_area();
     root.fill(&WHITE)?;
     let root = root.titled(
-        "Error felt against time of an update (CPU, 99th percentile)",
+        "Error felt against the share of one core that a method takes",
         ("sans-serif", 22),
     )?;
     let (legend, grid) = root.split_vertically(50);
     draw_legend(&legend)?;
-    let mut csv = format!("panel,{KEYS},j,update_p99_us,on_front\n");
+    let mut csv = format!("panel,{KEYS},held_hz,j_p95,core_share,on_front\n");
     for (index, (area, panel)) in grid
         .split_evenly((lines, COLUMNS))
         .iter()
@@ -128,10 +199,14 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> Result<(),
         let (frame, marks) = self::panel(*panel, outcomes, rows);
         frame.draw(area, &marks)?;
         for outcome in of_panel {
-            let (time, felt) = point(outcome);
-            let on_front = front.contains(&(time, felt));
+            let (share, felt) = point(outcome);
+            let on_front = front.contains(&(share, felt));
+            let held = outcome.load.held;
             let keys = keys(outcome);
-            writeln!(csv, "{index},{keys},{felt:.6e},{time:.2},{on_front}")?;
+            writeln!(
+                csv,
+                "{index},{keys},{held:.1},{felt:.6e},{share:.4e},{on_front}"
+            )?;
         }
     }
     root.present()?;
@@ -153,7 +228,7 @@ fn draw_legend(area: &DrawingArea<SVGBackend<'_>, Shift>) -> Result<(), Box<dyn 
         area.draw(&Text::new(label, (x + 12, 9), ("sans-serif", 16)))?;
         x += 80;
     }
-    let note = "grey: J = 1 and 1 ms; black: Pareto front; cross: a pass line is missed; J below 0.001 is drawn at 0.001";
+    let note = "grey: J = 1 and a whole core; black: Pareto front; cross: a pass line is missed; J below 0.001 is drawn at 0.001";
     area.draw(&Text::new(note, (24, 32), ("sans-serif", 14)))?;
     Ok(())
 }

@@ -11,17 +11,22 @@
 //! - [`outcome`]: a recipe run for one method at one rate, against its pass lines.
 //! - [`measured`]: what is measured of runs from every start phase; [`store`]: results that a later run need not make again.
 //! - [`sweeps`]: one setting of this project's method at a time, error against time; [`maps`]: stability, method by method.
+//! - [`costs`]: what updates cost, from a committed table; [`felt`]: the error in what people feel, millisecond by millisecond.
 //! - [`crew`]: work side by side; [`run`]: all of it, with progress; [`page`]: the report as one HTML file; [`provenance`]: on what it was made.
 //! - [`row`]: the one type of row that tables and files are made of.
+//! - [`replay`]: measured contact forces of a person's hand, and what each method renders for the same motion.
 //! - [`fidelity`]: is what a scene chooses for itself the cheapest that is good enough?
-//! - [`report`]: table and CSV; [`chart`]: error against time, recipe by recipe; [`overview`]: all of them in one picture.
+//! - [`score`]: the headline; [`report`]: table and CSV; [`chart`]: error against time, recipe by recipe; [`overview`]: all of them in one picture.
 //!
-//! Same machine type, same answers: only times differ between runs, and those stand in a file of their own.
+//! Same machine type, same answers, and same pictures: what an update costs is drawn from the committed table. Times that a run took stand in
+//! a file of their own.
 
 pub mod chart;
 pub mod clock;
+pub mod costs;
 pub mod cpu_time;
 pub mod crew;
+pub mod felt;
 pub mod fidelity;
 pub mod maps;
 pub mod measure;
@@ -36,9 +41,11 @@ pub mod provenance;
 pub mod recipe;
 pub mod recipes;
 pub mod reference;
+pub mod replay;
 pub mod report;
 pub mod row;
 pub mod run;
+pub mod score;
 pub mod store;
 pub mod study;
 pub mod sweeps;

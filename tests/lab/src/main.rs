@@ -13,6 +13,7 @@ use std::process::ExitCode;
 use taut_lab::crew;
 use taut_lab::method::Method;
 use taut_lab::recipes::Extent;
+use taut_lab::replay;
 use taut_lab::report;
 use taut_lab::run::{Plan, own_failure};
 use taut_lab::store::Store;
@@ -47,6 +48,12 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     if std::env::args().nth(1).as_deref() == Some("fidelity") {
         return taut_lab::fidelity::command::run(std::env::args().skip(2));
     }
+    if std::env::args().nth(1).as_deref() == Some("--measure") {
+        return measure(std::env::args().nth(2));
+    }
+    if std::env::args().nth(1).as_deref() == Some("measured") {
+        return measured(std::env::args().nth(2));
+    }
     let Arguments {
         plan,
         directory,
@@ -61,6 +68,7 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     };
     let results = plan.run(&store);
     results.write(&directory, page)?;
+    print!("{}", report::headlines(&results.scores));
     print!("{}", report::table(&results.rows));
     println!("\nfiles in {}", directory.display());
     if store.read() > 0 {
@@ -70,6 +78,42 @@ fn run() -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::from(u8::from(failed)))
 }
 
+/// Replays every measured trial through every method that turns its body, and writes the figures.
+fn measured(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
+    let path = path.map_or_else(
+        || PathBuf::from(DIRECTORY).join("measured-forces.csv"),
+        PathBuf::from,
+    );
+    let mut all = Vec::new();
+    for method in Method::SIX_DEGREES {
+        for trial in replay::TRIALS {
+            all.push(replay::replay(trial, method)?);
+            eprintln!("{trial}, {}", method.name());
+        }
+    }
+    let table = replay::csv(&all);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)?;
+    }
+    std::fs::write(&path, &table)?;
+    print!("{table}");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the table of costs anew, at the path that is given or where it is committed.
+fn measure(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
+    let path = path.map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/data/costs.csv")),
+        PathBuf::from,
+    );
+    let table = taut_lab::costs::measure(&Method::ALL, |total, lines| {
+        eprintln!("{lines} rows of one of {total} recipes");
+    });
+    std::fs::write(&path, table)?;
+    println!("{}", path.display());
+    Ok(ExitCode::SUCCESS)
+}
+
 fn help() -> String {
     format!(
         "\
@@ -77,9 +121,13 @@ Runs the recipes for every method and rate; prints the table, and writes it with
 
 taut-lab [report] [OPTION...] [RECIPE...]
 taut-lab fidelity [--quick] [--out DIRECTORY]
+taut-lab --measure [FILE]
+taut-lab measured [FILE]
 
   report           adds all sweeps and maps, and writes report.html, a page of everything
   fidelity         what the choice of a scene's settings costs, beside every setting
+  measured         replays measured contact forces through every method (tests/data/measured)
+  --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine
   --quick          a part of the cases
   --out DIRECTORY  where files go (default: {DIRECTORY})
   --threads N      how many at once (default: one for each core)

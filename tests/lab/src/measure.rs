@@ -8,7 +8,8 @@
 //! | e_tau  | [`Measure::TorqueP95`]    | N m   | norm of the difference of torques                                  |
 //! | dF     | [`Measure::Step`]         | N     | largest change of F in a millisecond                               |
 //! | E_inj  | [`Measure::Energy`]       | J     | most that the hand has got out, hold of the samples left out        |
-//! | J      | [`Measure::Felt`]         | –     | the largest of the errors in just-noticeable differences            |
+//! | J      | [`Measure::JndP95`]       | –     | 95th percentile over milliseconds of the error that is felt: [`Felt`] |
+//! | J1     | [`Measure::Felt`]         | –     | its first version: the largest of the 95th percentiles and any step  |
 //!
 //! Thresholds: 18.4 degrees for direction (Barbagli et al. 2006), 7 % for magnitude (Pang, Tan, Durlach 1991), 12.7 % for torque at 60 mN m
 //! (Jandura and Srinivasan 1994), and 7 % of the force or 0.1 N for a step.
@@ -19,18 +20,19 @@ use nalgebra::Vector3;
 
 use crate::clock::Tick;
 use crate::cpu_time::quantile;
+use crate::felt::Felt;
 use crate::recipe::Recipe;
 
 /// Ideal forces below this have no direction to compare with, and smaller errors are not felt, N.
-const FELT_FORCE: f64 = 0.1;
+pub(crate) const FELT_FORCE: f64 = 0.1;
 /// Just-noticeable differences: of direction, degrees; of magnitude and torque, shares.
 pub(crate) const JND_DIRECTION: f64 = 18.4;
 pub(crate) const JND_MAGNITUDE: f64 = 0.07;
-const JND_TORQUE: f64 = 0.127;
+pub(crate) const JND_TORQUE: f64 = 0.127;
 /// The torque at which [`JND_TORQUE`] was measured, N m; smaller ones are compared as if they were this.
 const REFERENCE_TORQUE: f64 = 0.06;
 /// A force is one above this, N: a rest distance away it is less.
-const FIRST_FORCE: f64 = 1e-6;
+pub(crate) const FIRST_FORCE: f64 = 1e-6;
 
 macro_rules! measures {
     ($($(#[$doc:meta])* $name:ident $key:literal $unit:literal,)*) => {
@@ -90,8 +92,16 @@ measures! {
     StepFelt "step_felt" "JND",
     /// 95th percentile of the error of torque in just-noticeable differences.
     TorqueFelt "torque_felt" "JND",
-    /// Error in just-noticeable differences, J: the largest of direction, magnitude, torque and step.
+    /// Its first version: the largest of direction, magnitude, torque and step, each by itself.
     Felt "felt" "JND",
+    /// 95th percentile of J, the error in just-noticeable differences.
+    JndP95 "j_p95" "JND",
+    /// Largest J of a millisecond.
+    JndMax "j_max" "JND",
+    /// Share of the time with J above 1.
+    JndShare "j_share_above_1" "-",
+    /// Largest delay of a force behind a step of the right answer that it was matched with.
+    StepDelay "step_delay" "s",
 }
 
 /// All measures of one run.
@@ -108,6 +118,9 @@ impl Measures {
     pub fn of(recipe: &Recipe, ticks: &[Tick]) -> Self {
         let ideal = &recipe.answer().wrenches;
         let errors = ForceErrors::new(ticks, ideal);
+        let body = &recipe.scene.world.body;
+        let arm = body.mesh.radius_about(&body.reference_point);
+        let felt = Felt::new(ticks, ideal, arm);
         let values = Measure::ALL
             .iter()
             .map(|measure| match measure {
@@ -132,6 +145,10 @@ impl Measures {
                 Measure::StepFelt => errors.step_jnd,
                 Measure::TorqueFelt => quantile(&errors.torque_jnd, 0.95),
                 Measure::Felt => errors.felt(),
+                Measure::JndP95 => felt.p95(),
+                Measure::JndMax => felt.most(),
+                Measure::JndShare => felt.share_above_one(),
+                Measure::StepDelay => felt.step_delay,
             })
             .collect();
         let probes = recipe.probes.iter().map(|probe| (probe.value)(ticks));

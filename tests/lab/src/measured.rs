@@ -1,9 +1,10 @@
 //! What is measured of runs of one recipe from every start phase, whoever runs it.
 
-use crate::clock;
+use crate::clock::{self, Charge, TICK};
+use crate::costs::{self, Cost};
 use crate::cpu_time::quantile;
 use crate::measure::{Measure, Measures};
-use crate::method::HapticMethod;
+use crate::method::{HapticMethod, Method, Tuning};
 use crate::recipe::Recipe;
 
 /// Median and 99th percentile of CPU times, us.
@@ -15,6 +16,24 @@ pub struct Times {
     pub force: [f64; 2],
 }
 
+/// What a method takes on the virtual clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// Updates a second that it held, Hz.
+    pub held: f64,
+    /// Share of one core that its updates and forces take.
+    pub core: f64,
+}
+
+/// Whose costs are charged.
+#[derive(Clone, Copy, Debug)]
+pub struct Payer {
+    /// Who runs.
+    pub method: Method,
+    /// With what.
+    pub tuning: Tuning,
+}
+
 /// Measures and times.
 #[derive(Clone, Debug)]
 pub struct Measured {
@@ -22,27 +41,43 @@ pub struct Measured {
     pub phases: Vec<Measures>,
     /// CPU times of the thread.
     pub times: Times,
+    /// On the virtual clock; NaN where no costs are known.
+    pub load: Load,
 }
 
 impl Measured {
-    /// Runs a recipe at a rate, Hz, from `count` phases, each with a method that `start` gives.
+    /// Runs a recipe at a rate, Hz, from `count` phases, each with a method that `start` gives. Without a `payer`, or where its costs
+    /// are not known, every update takes its whole period.
     pub fn of(
         recipe: &Recipe,
         rate: u32,
         count: u32,
+        payer: Option<Payer>,
         start: impl Fn() -> Box<dyn HapticMethod>,
     ) -> Self {
         let (mut updates, mut forces) = (Vec::new(), Vec::new());
+        let cost = payer.and_then(|by| costs::of(recipe, by.method, by.tuning, rate));
+        let charge = |phase: u32| match (payer, cost) {
+            (Some(by), Some(cost)) => {
+                let seed = costs::seed(recipe, by.method, by.tuning, rate, phase);
+                Charge::Drawn(cost, seed)
+            }
+            _ => Charge::WholePeriod,
+        };
+        let (mut charged, mut spanned) = (0.0, 0.0);
         let phases = (0..count)
             .map(|k| {
                 let phase = (f64::from(k) + 0.5) / f64::from(count);
-                let run = clock::run(start().as_mut(), recipe, rate, phase);
+                let run = clock::run(start().as_mut(), recipe, rate, phase, &mut charge(k));
+                charged += run.charged;
+                spanned += run.spanned;
                 updates.extend(run.update_us);
                 forces.extend(run.force_us);
                 Measures::of(recipe, &run.ticks)
             })
             .collect();
         Self {
+            load: load(updates.len(), charged, spanned, cost),
             phases,
             times: Times {
                 update: [0.5, 0.99].map(|share| quantile(&updates, share)),
@@ -64,8 +99,8 @@ impl Measured {
     }
 
     /// Times, number of probes, then measures and probes phase by phase.
-    pub(crate) fn to_numbers(phases: &[Measures], times: &Times) -> Vec<f64> {
-        let mut numbers = [times.update, times.force].concat();
+    pub(crate) fn to_numbers(phases: &[Measures], times: &Times, load: &Load) -> Vec<f64> {
+        let mut numbers = [times.update, times.force, [load.held, load.core]].concat();
         numbers.push(phases.first().map_or(0, |phase| phase.probes.len()) as f64);
         for phase in phases {
             numbers.extend(phase.values().iter().chain(&phase.probes));
@@ -75,7 +110,7 @@ impl Measured {
 
     /// `None` where these are no such numbers.
     pub(crate) fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let ([u50, u99, f50, f99, probes], rest) = numbers.split_first_chunk::<5>()?;
+        let ([u50, u99, f50, f99, held, core, probes], rest) = numbers.split_first_chunk::<7>()?;
         let measures = Measure::ALL.len();
         let width = measures + *probes as usize;
         let phases: Option<Vec<Measures>> = rest
@@ -88,10 +123,23 @@ impl Measured {
         let whole = !rest.is_empty() && rest.len().is_multiple_of(width);
         Some(Self {
             phases: phases.filter(|_| whole)?,
+            load: Load {
+                held: *held,
+                core: *core,
+            },
             times: Times {
                 update: [*u50, *u99],
                 force: [*f50, *f99],
             },
         })
+    }
+}
+
+/// Of so many updates, which took `charged` of `spanned` s on the virtual clock.
+fn load(updates: usize, charged: f64, spanned: f64, cost: Option<Cost>) -> Load {
+    let forces = cost.map_or(f64::NAN, |cost| 1e-6 * cost.force / TICK);
+    Load {
+        held: updates as f64 / spanned,
+        core: charged / spanned + forces,
     }
 }

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use god_object::{Pose, Settings, Vector6, World};
 
-use crate::methods::{Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling};
+use crate::methods::{
+    Control, Discrete, GodObjectMethod, Penalty, PointGodObject, VirtualCoupling,
+};
 
 /// How far this project's method looks ahead: as far as the device goes in this many periods. 1/k_s that the body lags behind it, one while
 /// an update is made, and one while it is used.
@@ -111,6 +113,10 @@ pub enum Method {
     Penalty,
     /// A god-object of three degrees of freedom: the body moves, held by up to three planes, and never turns.
     Point,
+    /// A control: the body never moves, and there is no force.
+    DoesNothing,
+    /// A control: the body never moves, and the force is random.
+    RandomForce,
 }
 
 impl Method {
@@ -126,6 +132,20 @@ impl Method {
         Self::Point,
     ];
 
+    /// Those that turn their body: a case that they all have a part in is common.
+    pub const SIX_DEGREES: [Self; 7] = [
+        Self::Ours,
+        Self::OursByDefault,
+        Self::Paper,
+        Self::PaperAdapted,
+        Self::VirtualCoupling,
+        Self::Discrete,
+        Self::Penalty,
+    ];
+
+    /// They are no methods: every recipe must fail them.
+    pub const CONTROLS: [Self; 2] = [Self::DoesNothing, Self::RandomForce];
+
     /// Name in tables and files.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -138,6 +158,8 @@ impl Method {
             Self::Discrete => "discrete",
             Self::Penalty => "penalty",
             Self::Point => "3-dof god-object",
+            Self::DoesNothing => "does nothing",
+            Self::RandomForce => "random force",
         }
     }
 
@@ -145,7 +167,11 @@ impl Method {
     #[must_use]
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
-            Self::Ours | Self::OursByDefault | Self::Discrete => vec![Tuning::Default],
+            Self::Ours
+            | Self::OursByDefault
+            | Self::Discrete
+            | Self::DoesNothing
+            | Self::RandomForce => vec![Tuning::Default],
             Self::Paper | Self::PaperAdapted => {
                 let touching = TOUCHING.map(Tuning::Touching);
                 [Tuning::Default].into_iter().chain(touching).collect()
@@ -209,6 +235,8 @@ impl Method {
                 Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
             }
             Self::Discrete => Box::new(Discrete::new(scene)),
+            Self::DoesNothing => Box::new(Control::does_nothing(scene)),
+            Self::RandomForce => Box::new(Control::random_force(scene)),
             Self::Penalty => {
                 let (force, spacing) = match tuning {
                     Tuning::Shell { force, spacing } => (force, spacing),

@@ -2,7 +2,7 @@
 
 use crate::clock::RATES;
 use crate::measure::{Measure, Measures};
-use crate::measured::{Measured, Times};
+use crate::measured::{Load, Measured, Payer, Times};
 use crate::method::{Method, Tuning};
 use crate::recipe::{Ideal, Line, Recipe};
 use crate::reference::{FORCE_ERROR, TORQUE_ERROR};
@@ -30,6 +30,8 @@ pub struct Outcome {
     pub trials: Vec<Trial>,
     /// CPU times of the thread.
     pub times: Times,
+    /// On the virtual clock.
+    pub load: Load,
 }
 
 /// A tuning that was tried, from one start phase.
@@ -59,7 +61,7 @@ impl Outcome {
         let trial = |tried: &Self| Trial {
             tuning: tried.tuning,
             missed: tried.missed(recipe),
-            felt: tried.worst(Measure::Felt),
+            felt: tried.worst(Measure::JndP95),
         };
         let trials: Vec<Trial> = tried.iter().map(trial).collect();
         // NaN, where nothing is felt to be compared, is the same for all.
@@ -84,7 +86,8 @@ impl Outcome {
     fn from_phases(recipe: &Recipe, method: Method, rate: u32, tuning: Tuning, count: u32) -> Self {
         let period = 1.0 / f64::from(rate);
         let start = || method.start(&recipe.scene, period, tuning);
-        let measured = Measured::of(recipe, rate, count, start);
+        let payer = Some(Payer { method, tuning });
+        let measured = Measured::of(recipe, rate, count, payer, start);
         Self::judged(recipe, method, rate, tuning, measured)
     }
 
@@ -106,8 +109,10 @@ impl Outcome {
             lines: Vec::new(),
             trials: Vec::new(),
             times: measured.times,
+            load: measured.load,
         };
-        for line in (recipe.lines)(rate) {
+        let common = recipe.felt_lines();
+        for line in (recipe.lines)(rate).into_iter().chain(common) {
             let passes = outcome.worst(line.measure) <= line.limit; // false for NaN
             outcome.lines.push((line, passes));
         }
@@ -143,7 +148,7 @@ impl Outcome {
         for trial in &self.trials {
             numbers.extend([index(trial.tuning), trial.missed as f64, trial.felt]);
         }
-        numbers.extend(Measured::to_numbers(&self.phases, &self.times));
+        numbers.extend(Measured::to_numbers(&self.phases, &self.times, &self.load));
         numbers
     }
 
@@ -217,12 +222,13 @@ impl Outcome {
             settings: self.tuning.to_string(),
             rate: Some(self.rate),
             p99_us: self.times.update[1],
+            load: Some(self.load),
             ..Row::new(self.recipe, &self.case, self.method.name())
         };
         let limited = |key: &'static str, value: f64, unit: &str, limit: f64| {
             let mut row = base.clone().at_most(key, value, unit, limit);
             let open = recipe.open.iter().find(|open| {
-                open.key == key && open.rate == self.rate && self.method == Method::Ours
+                open.key == key && open.rate == self.rate && self.method == open.method
             });
             if let (Some(open), Verdict::Fail) = (open, &row.verdict) {
                 row.verdict = Verdict::Open(open.reason);

@@ -1,4 +1,4 @@
-//! All recipes in one picture: what each method passes, and its error felt against the time of its updates.
+//! All recipes in one picture: what each method passes, and its error felt against the share of one core that it takes.
 //!
 //! A point is a method at a rate, at the medians over all cases that have a right answer; its arms reach from quartile to quartile. The bars beside
 //! are the shares of cases that are passed. Every number is a row of `overview.csv`, made of the rows of `chart.csv` and `rows.csv`.
@@ -23,8 +23,8 @@ use crate::row::{Row, Verdict};
 const SIZE: (u32, u32) = (960, 500);
 const SCATTER: u32 = 590;
 const HEAD: u32 = 64;
-/// Ranges: us, just-noticeable differences.
-const TIMES: [f64; 2] = [0.5, 3000.0];
+/// Ranges: shares of a core, just-noticeable differences.
+const SHARES: [f64; 2] = [1e-4, 3.0];
 const ERRORS: [f64; 2] = [4e-3, 300.0];
 /// Radii of points by rate, pixels.
 const SIZES: [i32; 3] = [8, 6, 4];
@@ -43,8 +43,8 @@ pub struct Summary {
     pub passed: usize,
     /// Lower quartile, median and upper quartile of J, over the cases that have a right answer.
     pub felt: [f64; 3],
-    /// The same of the 99th percentile of an update, us, over all cases.
-    pub update_us: [f64; 3],
+    /// The same of the share of one core, over all cases.
+    pub core: [f64; 3],
 }
 
 /// Every method at every rate that was run.
@@ -70,17 +70,17 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
         let quartiles = |values: &[f64]| [0.25, 0.5, 0.75].map(|share| quantile(values, share));
         let felt: Vec<f64> = its
             .iter()
-            .map(|outcome| outcome.worst(Measure::Felt))
+            .map(|outcome| outcome.worst(Measure::JndP95))
             .filter(|felt| !felt.is_nan())
             .collect();
-        let times: Vec<f64> = its.iter().map(|outcome| outcome.times.update[1]).collect();
+        let shares: Vec<f64> = its.iter().map(|outcome| outcome.load.core).collect();
         (!its.is_empty()).then(|| Summary {
             method,
             rate,
             cases: its.len(),
             passed: its.iter().filter(passes).count(),
             felt: quartiles(&felt),
-            update_us: quartiles(&times),
+            core: quartiles(&shares),
         })
     })
     .collect()
@@ -91,15 +91,15 @@ pub fn summaries(rows: &[Row], outcomes: &[Outcome]) -> Vec<Summary> {
 pub fn csv(summaries: &[Summary]) -> String {
     let mut text = String::from(
         "method,rate_hz,cases,passed,j_quarter,j_median,j_three_quarters,\
-         update_p99_us_quarter,update_p99_us_median,update_p99_us_three_quarters,on_front\n",
+         core_share_quarter,core_share_median,core_share_three_quarters,on_front\n",
     );
     let front = front(&summaries.iter().map(place).collect::<Vec<_>>());
     for summary in summaries {
         let [j25, j50, j75] = summary.felt;
-        let [t25, t50, t75] = summary.update_us;
+        let [t25, t50, t75] = summary.core;
         let _ = writeln!(
             text,
-            "{},{},{},{},{j25:.6e},{j50:.6e},{j75:.6e},{t25:.2},{t50:.2},{t75:.2},{}",
+            "{},{},{},{},{j25:.6e},{j50:.6e},{j75:.6e},{t25:.4e},{t50:.4e},{t75:.4e},{}",
             summary.method.name(),
             summary.rate,
             summary.cases,
@@ -111,7 +111,7 @@ pub fn csv(summaries: &[Summary]) -> String {
 }
 
 fn place(summary: &Summary) -> (f64, f64) {
-    (summary.update_us[1], summary.felt[1])
+    (summary.core[1], summary.felt[1])
 }
 
 /// Writes `overview.svg` and `overview.csv`.
@@ -134,7 +134,8 @@ pub(crate) fn svg(summaries: &[Summary]) -> Result<String, Box<dyn Error>> {
         cases.unwrap_or(0)
     );
     head.draw(&Text::new(title, (16, 10), ("sans-serif", 19)))?;
-    let note = "points: medians, arms: quartiles; black: Pareto front; grey: J = 1 and 1 ms";
+    let note =
+        "points: medians, arms: quartiles; black: Pareto front; grey: J = 1 and a whole core";
     head.draw(&Text::new(note, (16, 38), ("sans-serif", 14)))?;
     let mut x = 600;
     for (rate, size) in RATES.iter().zip(SIZES) {
@@ -163,13 +164,13 @@ fn scatter(
         .x_label_area_size(38)
         .y_label_area_size(56)
         .build_cartesian_2d(
-            (TIMES[0]..TIMES[1]).log_scale(),
+            (SHARES[0]..SHARES[1]).log_scale(),
             (ERRORS[0]..ERRORS[1]).log_scale(),
         )?;
     chart
         .configure_mesh()
-        .x_desc("p99 of an update, us")
-        .y_desc("error felt, just-noticeable differences J")
+        .x_desc("share of one core")
+        .y_desc("error felt, J at p95")
         .x_labels(5)
         .y_labels(6)
         .label_style(("sans-serif", 15))
@@ -177,11 +178,11 @@ fn scatter(
         .bold_line_style(RGBColor(236, 236, 236))
         .draw()?;
     let grey = GREY.stroke_width(1);
-    chart.draw_series(LineSeries::new([(TIMES[0], 1.0), (TIMES[1], 1.0)], grey))?;
-    chart.draw_series(LineSeries::new([(1e3, ERRORS[0]), (1e3, ERRORS[1])], grey))?;
+    chart.draw_series(LineSeries::new([(SHARES[0], 1.0), (SHARES[1], 1.0)], grey))?;
+    chart.draw_series(LineSeries::new([(1.0, ERRORS[0]), (1.0, ERRORS[1])], grey))?;
     let shown = |(time, felt): (f64, f64)| {
         (
-            time.clamp(TIMES[0], TIMES[1]),
+            time.clamp(SHARES[0], SHARES[1]),
             felt.clamp(ERRORS[0], ERRORS[1]),
         )
     };
@@ -192,7 +193,7 @@ fn scatter(
         let ink = colour(summary.method);
         let (time, felt) = place(summary);
         let arms = [
-            [(summary.update_us[0], felt), (summary.update_us[2], felt)],
+            [(summary.core[0], felt), (summary.core[2], felt)],
             [(time, summary.felt[0]), (time, summary.felt[2])],
         ];
         for arm in arms {

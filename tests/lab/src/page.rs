@@ -259,7 +259,7 @@ fn legend(page: &mut String) {
         page.push_str(&key(RGBColor(0, 0, 0), across, &format!("{rate} Hz")));
     }
     page.push_str(
-        "<br><small>Error felt, in just-noticeable differences J, against the 99th percentile of an update. Grey: J = 1 and 1 ms. Black: \
+        "<br><small>Error felt, in just-noticeable differences J, against the share of one core. Grey: J = 1 and a whole core. Black: \
          Pareto front. Cross: a pass line is missed. What is beyond an axis is drawn at its end.</small></p>\n",
     );
 }
@@ -316,7 +316,7 @@ fn cell_of(page: &mut String, results: &Results, cell: &[Row], wide: usize) -> s
     if short.starts_with("out") {
         return write!(page, ": {}", escaped(long));
     }
-    if let Some(felt) = cell.iter().find(|row| row.measure == Measure::Felt.key())
+    if let Some(felt) = cell.iter().find(|row| row.measure == Measure::JndP95.key())
         && !felt.value.is_nan()
     {
         write!(page, ", J {}", brief(felt.value))?;

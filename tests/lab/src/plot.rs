@@ -81,6 +81,8 @@ impl Frame {
         let grey = RGBColor(120, 120, 120).stroke_width(1);
         if let Some(error) = self.error_line {
             chart.draw_series(LineSeries::new([(left, error), (right, error)], grey))?;
+            let label = Text::new("J = 1", (2, -14), ("sans-serif", 12));
+            chart.draw_series([EmptyElement::at((left, error)) + label])?;
         }
         if let Some(cost) = self.cost_line.filter(|cost| *cost < right) {
             let line = [(cost, bottom), (cost, top)];

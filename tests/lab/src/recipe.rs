@@ -5,10 +5,14 @@ use std::sync::OnceLock;
 use god_object::{Pose, Vector6};
 use taut_method_tests::checker::PenetrationChecker;
 
-use crate::clock::{TICK, Tick};
+use crate::clock::{RATES, TICK, Tick};
 use crate::measure::Measure;
 use crate::method::{Method, Scene};
 use crate::reference::{self, Answer};
+
+/// Error that a scene may spend at the 95th percentile, in just-noticeable differences, and share of the time above one of them.
+const JND_BUDGET: f64 = 0.5;
+const JND_SHARE: f64 = 0.01;
 
 /// A limit for a measure, over all start phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,11 +86,28 @@ impl Ideal {
     }
 }
 
+/// The same line at every rate, with this project's settings fitted or not.
+pub(crate) fn open_everywhere(key: &'static str, reason: &'static str) -> Vec<Open> {
+    let ours = [Method::Ours, Method::OursByDefault];
+    let each = ours
+        .into_iter()
+        .flat_map(|method| RATES.map(|rate| (method, rate)));
+    each.map(|(method, rate)| Open {
+        key,
+        method,
+        rate,
+        reason,
+    })
+    .collect()
+}
+
 /// A pass line that this project's method does not keep, said openly: it is shown with its figure and is not a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Open {
     /// Which line or probe, by its key.
     pub key: &'static str,
+    /// By which of this project's.
+    pub method: Method,
     /// At this rate of updates, Hz.
     pub rate: u32,
     /// Why, as far as it is known.
@@ -127,6 +148,8 @@ pub struct Recipe {
     pub check_every: u32,
     /// Lines that this project's method is known not to keep.
     pub open: Vec<Open>,
+    /// Name and case of the recipe that does the same work, where its costs are another's.
+    pub costs_as: Option<(&'static str, String)>,
     pub(crate) answer: OnceLock<Answer>,
     pub(crate) checker: OnceLock<PenetrationChecker>,
 }
@@ -158,6 +181,7 @@ impl Recipe {
             moving: None,
             check_every: 1,
             open: Vec::new(),
+            costs_as: None,
             answer: OnceLock::new(),
             checker: OnceLock::new(),
         }
@@ -178,6 +202,19 @@ impl Recipe {
             Ideal::Reference => reference::of(self),
             Ideal::None => Answer::exact(std::iter::empty()),
         })
+    }
+
+    /// What every recipe with a right answer asks of what is felt: half a just-noticeable difference at the 95th percentile, and
+    /// above one at most a hundredth of the time.
+    #[must_use]
+    pub fn felt_lines(&self) -> Vec<Line> {
+        if matches!(self.ideal, Ideal::None) {
+            return Vec::new();
+        }
+        vec![
+            Line::at_most(Measure::JndP95, JND_BUDGET),
+            Line::at_most(Measure::JndShare, JND_SHARE),
+        ]
     }
 
     /// The independent check for intersections, made on the first call.

@@ -15,9 +15,11 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use crate::costs;
 use crate::measure::Measure;
 use crate::outcome::Outcome;
 use crate::row::{Row, Verdict};
+use crate::score::Score;
 
 /// What was missed of these rows, each by how much; `pass` where nothing was, `open` where that is known.
 #[must_use]
@@ -53,20 +55,41 @@ pub fn verdict(rows: &[Row]) -> String {
     }
 }
 
-/// The table for people: no times, the same in every run.
+/// What each method came to in the cases that all of them can run, and whose costs were charged.
+#[must_use]
+pub fn headlines(scores: &[Score]) -> String {
+    let mut text = format!("Costs of updates: {}.\n\n", costs::machine());
+    for score in scores {
+        let _ = writeln!(text, "- {}", score.headline());
+    }
+    text.push('\n');
+    text
+}
+
+/// The table for people: costs are those of the committed table, so it is the same in every run.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
-    let mut text = String::from("| recipe | case | method | settings | rate | J | verdict |\n");
-    text.push_str("|--------|------|--------|----------|------|---|---------|\n");
+    let mut text = String::from(
+        "| recipe | case | method | settings | asked | held | of a core | J p95 | verdict |\n",
+    );
+    text.push_str(
+        "|--------|------|--------|----------|-------|------|-----------|-------|---------|\n",
+    );
     for group in rows.chunk_by(|a, b| player(a) == player(b)) {
         let (recipe, case, method, settings, rate) = player(&group[0]);
         let rate = rate.map_or_else(String::new, |rate| format!("{rate} Hz"));
-        let felt = group.iter().find(|row| row.measure == Measure::Felt.key());
+        let felt = group
+            .iter()
+            .find(|row| row.measure == Measure::JndP95.key());
         let felt = felt.map_or_else(String::new, |row| brief(row.value));
         let verdict = verdict(group);
+        let load = group[0].load.map_or_else(
+            || "|".to_owned(),
+            |load| format!("{:.0} Hz | {} %", load.held, brief(100.0 * load.core)),
+        );
         let _ = writeln!(
             text,
-            "| {recipe} | {case} | {method} | {settings} | {rate} | {felt} | {verdict} |"
+            "| {recipe} | {case} | {method} | {settings} | {rate} | {load} | {felt} | {verdict} |"
         );
     }
     text
@@ -77,9 +100,15 @@ fn player(row: &Row) -> (&str, &str, &str, &str, Option<u32>) {
 }
 
 /// Writes all files but those of the chart.
-pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> io::Result<()> {
+pub fn write(
+    rows: &[Row],
+    outcomes: &[Outcome],
+    scores: &[Score],
+    directory: &Path,
+) -> io::Result<()> {
     fs::create_dir_all(directory)?;
-    fs::write(directory.join("table.md"), table(rows))?;
+    let table = format!("{}{}", headlines(scores), table(rows));
+    fs::write(directory.join("table.md"), table)?;
     fs::write(directory.join("rows.csv"), rows_csv(rows))?;
     fs::write(directory.join("measures.csv"), measures(outcomes))?;
     fs::write(directory.join("trials.csv"), trials(outcomes))?;
@@ -90,11 +119,14 @@ pub fn write(rows: &[Row], outcomes: &[Outcome], directory: &Path) -> io::Result
 #[must_use]
 pub fn rows_csv(rows: &[Row]) -> String {
     let mut text = String::from(
-        "recipe,case,method,settings,rate_hz,measure,value,unit,limit,verdict,reason\n",
+        "recipe,case,method,settings,rate_hz,held_hz,core_share,measure,value,unit,limit,verdict,reason\n",
     );
     for row in rows {
         let rate = row.rate.map_or_else(String::new, |rate| rate.to_string());
         let limit = row.limit.map_or_else(String::new, |l| format!("{l:.6e}"));
+        let (held, core) = row.load.map_or_else(Default::default, |load| {
+            (format!("{:.1}", load.held), format!("{:.4e}", load.core))
+        });
         let reason = match &row.verdict {
             Verdict::Open(reason) => reason,
             Verdict::OutOfScope(reason) => reason.as_str(),
@@ -102,7 +134,7 @@ pub fn rows_csv(rows: &[Row]) -> String {
         };
         let _ = writeln!(
             text,
-            "{},{},{},{},{rate},{},{:.6e},{},{limit},{},{}",
+            "{},{},{},{},{rate},{held},{core},{},{:.6e},{},{limit},{},{}",
             row.recipe,
             quoted(&row.case),
             quoted(&row.method),

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::measured::Load;
+
 /// What came of one measure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
@@ -52,6 +54,8 @@ pub struct Row {
     pub limit: Option<f64>,
     /// What came of it.
     pub verdict: Verdict,
+    /// What it took on the virtual clock; `None` where there are no updates.
+    pub load: Option<Load>,
     /// 99th percentile of the CPU time of an update, us; NaN where none was taken. No other field differs between runs.
     pub p99_us: f64,
 }
@@ -71,6 +75,7 @@ impl Row {
             unit: String::new(),
             limit: None,
             verdict: Verdict::Shown,
+            load: None,
             p99_us: f64::NAN,
         }
     }

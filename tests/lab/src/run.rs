@@ -12,6 +12,7 @@ use crate::page::traces::{self, Trace};
 use crate::recipe::{Ideal, Recipe};
 use crate::recipes::{Extent, STUDIES, all};
 use crate::row::{Row, Verdict};
+use crate::score::{Score, scores};
 use crate::store::Store;
 use crate::study::Study;
 use crate::sweeps::{self, Point, Sweep};
@@ -56,6 +57,8 @@ pub struct Results {
     pub rows: Vec<Row>,
     /// Those that are runs along a path.
     pub outcomes: Vec<Outcome>,
+    /// What each method came to in the cases that all can run.
+    pub scores: Vec<Score>,
     /// Points of each sweep.
     pub sweeps: Vec<(Sweep, Vec<Point>)>,
     /// Points of the stability maps.
@@ -148,6 +151,7 @@ impl Plan {
         }
         let abouts = studies.iter().map(|study| (study.name, study.about));
         results.about.extend(abouts);
+        results.scores = scores(&wanted, &results.outcomes, &Method::SIX_DEGREES);
         let mut rest = results.outcomes.as_slice();
         for recipe in wanted {
             let (its, others) = rest.split_at(runs(&&recipe));
@@ -182,7 +186,7 @@ impl Results {
     pub fn write(&self, directory: &Path, page: bool) -> Result<(), Box<dyn Error>> {
         std::fs::create_dir_all(directory)?;
         if !self.about.is_empty() {
-            report::write(&self.rows, &self.outcomes, directory)?;
+            report::write(&self.rows, &self.outcomes, &self.scores, directory)?;
             chart::write(&self.rows, &self.outcomes, directory)?;
             overview::write(&self.rows, &self.outcomes, directory)?;
             if !self.traces.is_empty() {

@@ -60,7 +60,7 @@ fn the_page_stands_alone_and_has_every_case_point_and_miss() {
     }
     // A dot or a cross of two lines for every outcome and point of a sweep that has an error.
     let outcomes = results.outcomes.iter().filter(|o| {
-        let felt = o.worst(taut_lab::measure::Measure::Felt);
+        let felt = o.worst(taut_lab::measure::Measure::JndP95);
         !felt.is_nan()
     });
     let points = results.sweeps.iter().flat_map(|(_, points)| points);

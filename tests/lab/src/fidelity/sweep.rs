@@ -10,7 +10,7 @@ use taut_scene::{BuiltScene, FidelityPlan, Scene as SceneFile, SceneError};
 
 use super::counted::Counted;
 use super::scenes::FidelityScene;
-use crate::clock::{TICK, run};
+use crate::clock::{Charge, TICK, run};
 use crate::measure::{JND_DIRECTION, JND_MAGNITUDE, Measure, Measures};
 use crate::method::Scene;
 use crate::recipe::{Ideal, Recipe};
@@ -237,7 +237,13 @@ fn measure(
     let (mut j, mut parts, mut work) = (0.0_f64, [0.0_f64; 4], 0);
     for phase in PHASES {
         let mut method = Counted::new(&recipe.scene);
-        let ran = run(&mut method, &recipe, setting.rate as u32, phase);
+        let ran = run(
+            &mut method,
+            &recipe,
+            setting.rate as u32,
+            phase,
+            &mut Charge::WholePeriod,
+        );
         let measures = Measures::of(&recipe, &ran.ticks);
         let felt = measures.get(Measure::Felt);
         // What is not a number is no small error.

@@ -59,7 +59,7 @@ fn matrix(page: &mut String, results: &Results, rate: u32) -> std::fmt::Result {
                 write!(page, "{passed}/{run}")?;
             }
             let felt = |rows: &&[Row]| {
-                let its = rows.iter().find(|row| row.measure == Measure::Felt.key());
+                let its = rows.iter().find(|row| row.measure == Measure::JndP95.key());
                 its.map(|row| row.value).filter(|value| !value.is_nan())
             };
             if let Some(most) = cells.iter().filter_map(felt).reduce(f64::max) {

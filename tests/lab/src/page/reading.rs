@@ -25,6 +25,9 @@ fn about(method: Method) -> &'static str {
         Method::Penalty => {
             "points of the body pushed out of a signed distance, as in voxel sampling"
         }
+        Method::DoesNothing | Method::RandomForce => {
+            "a control: its body never moves, and its force is none or random; it must fail every recipe"
+        }
         Method::Point => {
             "Zilles and Salisbury 1995: the body moves, held by up to three planes, and never turns"
         }

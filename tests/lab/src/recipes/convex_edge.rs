@@ -8,7 +8,7 @@ use taut_method_tests::solids::obstacle;
 use super::Extent;
 use super::bodies::{Path, ball, drawn_out, force, ghost_time, ours_alone, sound};
 use crate::clock::{TICK, Tick};
-use crate::measure::Measure;
+use crate::measure::{JND_MAGNITUDE, Measure};
 use crate::method::{Method, Scene};
 use crate::recipe::{Ideal, Line, Probe, Recipe};
 
@@ -70,24 +70,37 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
             .filter_map(|pair| Some(felt(&pair[0])?.angle(&felt(&pair[1])?).to_degrees()));
         turns.fold(0.0, f64::max)
     };
+    let right = stiffness * DEPTH;
+    // The device is at its depth, and the ball has come to rest.
+    let (from, to) = (0.08 + 0.05, 0.08 + 0.1);
+    let before = move |ticks: &[Tick]| {
+        let held = ticks.iter().filter(|t| (from..to).contains(&t.time));
+        let off = held.map(|tick| 100.0 * (linear(&tick.wrench).norm() / right - 1.0).abs());
+        off.fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
+    };
     let limit = if shaded { TURN } else { f64::INFINITY };
     Recipe {
-        ideal: Ideal::closed(move |time| {
-            let place = ideal.at(time);
-            if place.x < 0.0 {
-                return force(0.0, 0.0, stiffness * (TIP - place.z).max(0.0));
-            }
-            // Past the edge only the slope holds it, or the edge itself, or nothing.
-            let out = Vector3::new(sine, 0.0, cosine);
-            let along = Vector3::new(cosine, 0.0, -sine);
-            let push = if along.dot(&place) >= 0.0 {
-                out * (TIP - out.dot(&place)).max(0.0)
-            } else {
-                let apart = place.norm();
-                place * ((TIP - apart).max(0.0) / apart)
-            } * stiffness;
-            force(push.x, push.y, push.z)
-        }),
+        // How a shaded normal turns is the shading's own choice: there is no right answer to compare with, but for the force before the edge.
+        ideal: if shaded {
+            Ideal::None
+        } else {
+            Ideal::closed(move |time| {
+                let place = ideal.at(time);
+                if place.x < 0.0 {
+                    return force(0.0, 0.0, stiffness * (TIP - place.z).max(0.0));
+                }
+                // Past the edge only the slope holds it, or the edge itself, or nothing.
+                let out = Vector3::new(sine, 0.0, cosine);
+                let along = Vector3::new(cosine, 0.0, -sine);
+                let push = if along.dot(&place) >= 0.0 {
+                    out * (TIP - out.dot(&place)).max(0.0)
+                } else {
+                    let apart = place.norm();
+                    place * ((TIP - apart).max(0.0) / apart)
+                } * stiffness;
+                force(push.x, push.y, push.z)
+            })
+        },
         phases: extent.choose(20, 2),
         lines: Box::new(move |rate| {
             let mut lines = sound();
@@ -97,7 +110,10 @@ fn recipe(extent: Extent, degrees: f64, shaded: bool) -> Recipe {
             }
             lines
         }),
-        probes: vec![Probe::at_most("turn_of_force", "deg/ms", limit, turn)],
+        probes: vec![
+            Probe::at_most("turn_of_force", "deg/ms", limit, turn),
+            Probe::at_most("force_before_edge", "%", 100.0 * JND_MAGNITUDE, before),
+        ],
         out_of_scope: if shaded {
             |method| match method {
                 Method::Paper | Method::PaperAdapted => None,

@@ -8,6 +8,7 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::Extent;
 use super::bodies::{block, cube, force, largest_from, sound};
+use crate::clock::TICK;
 use crate::method::Scene;
 use crate::recipe::{Ideal, Probe, Recipe};
 
@@ -37,11 +38,22 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let scene = Scene::new(world, 2.0 * HALF, speed, device(0.0));
     let case = ("R01", "Lissajous figure".to_owned());
     let about = "free space: no force and no torque";
+    let k_s = scene.settings.k_s;
+    // The body goes with the device: behind it by 1/k_s updates, one that is made and one that is used.
+    let lag = Probe {
+        key: "lag",
+        unit: "m",
+        value: Box::new(largest_from(0.0, |tick| {
+            (tick.device.translation.vector - tick.body.translation.vector).norm()
+        })),
+        limit: Box::new(move |rate| speed * ((1.0 / k_s + 2.0) / f64::from(rate) + TICK)),
+    };
     let duration = extent.choose(4.0, 1.0);
     vec![Recipe {
         ideal: Ideal::closed(|_| force(0.0, 0.0, 0.0)),
         lines: Box::new(|_| sound()),
         probes: vec![
+            lag,
             Probe::at_most(
                 "force_at_a_distance",
                 "N",

@@ -19,6 +19,7 @@ mod moving_plate;
 mod nut;
 mod oracles;
 mod peg;
+mod prism;
 mod push_slide_lift;
 mod scale;
 mod shading_energy;

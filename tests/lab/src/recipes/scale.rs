@@ -122,6 +122,7 @@ fn scaled(recipe: Recipe, factor: f64) -> Recipe {
         out_of_scope,
         ..
     } = recipe;
+    let original = (name, case.clone());
     let case = ("R34", format!("{name} {case}, times {factor:e}"));
     Recipe {
         ideal: match ideal {
@@ -144,6 +145,7 @@ fn scaled(recipe: Recipe, factor: f64) -> Recipe {
             lines
         }),
         out_of_scope,
+        costs_as: Some(original),
         ..Recipe::new(case, about, scene, duration, move |time| {
             pose(&device(time), factor)
         })

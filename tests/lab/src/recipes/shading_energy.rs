@@ -4,15 +4,17 @@ use std::f64::consts::TAU;
 
 use god_object::spatial::linear;
 use god_object::{ForceShading, Pose, World};
-use nalgebra::Vector3;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{mesh, obstacle};
 use taut_scene::shapes::{Axis, cylinder};
 
 use super::Extent;
 use super::bodies::{ball, force, ours_alone, sound};
+use super::prism::Prism;
 use crate::clock::Tick;
+use crate::measure::{JND_MAGNITUDE, Measure};
 use crate::method::{Method, Scene};
-use crate::recipe::{Ideal, Probe, Recipe};
+use crate::recipe::{Ideal, Probe, Recipe, open_everywhere};
 
 const RADIUS: f64 = 0.02;
 const TIP: f64 = 2e-3;
@@ -31,10 +33,21 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
 }
 
 fn recipe(extent: Extent, shaded: bool) -> Recipe {
+    let prism = Prism {
+        sides: SIDES,
+        radius: RADIUS,
+        tip: TIP,
+    };
+    // The ball comes down on the middle of a side.
+    let half_side = Vector3::y() * (0.5 * prism.side());
+    let turned = Pose::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_scaled_axis(half_side),
+    );
     let mut round = obstacle(
         "cylinder",
         mesh(cylinder(RADIUS, 0.05, SIDES, Axis::Y)),
-        Pose::identity(),
+        turned,
     );
     round.surface.shading = shaded.then_some(ForceShading { crease_angle: 1.0 });
     let world = World {
@@ -44,6 +57,8 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
     let turns = extent.choose(10, 1);
     let deep = RADIUS + TIP - DEPTH;
     let (begin, period) = (APPROACH + WAIT, TAU * deep / SPEED);
+    let out = |angle: f64| Vector3::new(angle.sin(), 0.0, angle.cos());
+    // Depth, angle, and the largest angle so far.
     let place = move |time: f64| {
         let depth = -1e-3 + (DEPTH + 1e-3) * (time / APPROACH).min(1.0);
         let gone = ((time - begin) / period).max(0.0);
@@ -55,11 +70,11 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
             } else {
                 2.0 * whole - gone
             };
-        (depth, Vector3::new(angle.sin(), 0.0, angle.cos()))
+        (depth, angle, if gone < whole { angle } else { TAU * whole })
     };
     let device = move |time: f64| {
-        let (depth, out) = place(time);
-        let at = out * (RADIUS + TIP - depth);
+        let (depth, angle, _) = place(time);
+        let at = out(angle) * (RADIUS + TIP - depth);
         Pose::translation(at.x, at.y, at.z)
     };
     let scene = Scene::new(world, 2.0 * TIP, SPEED, device(0.0));
@@ -78,18 +93,42 @@ fn recipe(extent: Extent, shaded: bool) -> Recipe {
         }
         of_turn.into_iter().fold(f64::NEG_INFINITY, f64::max)
     };
+    // What gives no force gives no energy, and is no answer: its size is that of the depth, on the average of a side.
+    let mean = move |ticks: &[Tick]| {
+        let turning = ticks.iter().filter(|tick| tick.time >= begin);
+        let sizes: Vec<f64> = turning.map(|tick| linear(&tick.wrench).norm()).collect();
+        let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
+        100.0 * (mean / (stiffness * DEPTH) - 1.0).abs()
+    };
     let surface = if shaded { "shaded" } else { "plain" };
     let case = ("R31", format!("cylinder of {SIDES} sides, {surface}"));
     let about = "energy of a closed path: nothing to be got out of it";
     let duration = begin + 2.0 * f64::from(turns) * period;
     Recipe {
-        ideal: Ideal::closed(move |time| {
-            let (depth, out) = place(time);
-            let push = out * (stiffness * depth.max(0.0));
-            force(push.x, push.y, push.z)
-        }),
+        // How a shaded normal turns is the shading's own choice: there is no right answer to compare with, but for the size of the force.
+        ideal: if shaded {
+            Ideal::None
+        } else {
+            Ideal::closed(move |time| {
+                let (depth, angle, most) = place(time);
+                let (deep, normal) = prism.depth(angle, most, RADIUS + TIP - depth);
+                let push = out(normal) * (stiffness * deep);
+                force(push.x, push.y, push.z)
+            })
+        },
         lines: Box::new(|_| sound()),
-        probes: vec![Probe::at_most("work_of_a_turn", "J", ROUNDING, most)],
+        probes: vec![
+            Probe::at_most("work_of_a_turn", "J", ROUNDING, most),
+            Probe::at_most("mean_force", "%", 100.0 * JND_MAGNITUDE, mean),
+        ],
+        open: if shaded {
+            Vec::new()
+        } else {
+            open_everywhere(
+                Measure::JndP95.key(),
+                "the force turns by 11 degrees at a corner, an update after the right answer does; there is a corner in 19 ms",
+            )
+        },
         out_of_scope: if shaded {
             |method| match method {
                 Method::Paper | Method::PaperAdapted => None,

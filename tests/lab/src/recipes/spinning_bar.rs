@@ -9,7 +9,7 @@ use super::Extent;
 use super::bodies::{sound, turns};
 use crate::measure::Measure;
 use crate::method::Scene;
-use crate::recipe::{Ideal, Line, Recipe};
+use crate::recipe::{Ideal, Line, Recipe, open_everywhere};
 
 /// Of the bar, m.
 const HALF: [f64; 3] = [0.1, 1e-3, 1e-3];
@@ -21,8 +21,10 @@ const ANGLE: f64 = 1.0;
 const SPIN: f64 = 25.0;
 /// How far the device turns on behind the pin, rad.
 const BEYOND: f64 = 0.2;
-/// Farthest that the pin may get into the bar, or through it, m.
+/// Farthest from first contact that the bar may come to rest, before the pin or behind it, m along the way of the pin's place.
 const ASTRAY: f64 = 1e-5;
+/// How long before the end the bar is at rest, s.
+const AT_REST: f64 = 0.1;
 
 pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
     let at = Point3::new(PLACE * ANGLE.cos(), PLACE * ANGLE.sin(), 0.0);
@@ -65,12 +67,15 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             );
             (PIN - (pin - nearest).norm()).max(0.0)
         }),
-        astray: Box::new(move |_, bar| {
-            // It belongs before the bar's leading face.
+        astray: Box::new(move |time, bar| {
+            // It belongs before the bar's leading face, and in the end at it.
             let pin = seen(bar);
             let over_it = pin.x.abs() < HALF[0];
-            if over_it {
-                (HALF[1] + PIN - pin.y).max(0.0)
+            let beyond = HALF[1] + PIN - pin.y;
+            if time > duration - AT_REST {
+                beyond.abs()
+            } else if over_it {
+                beyond.max(0.0)
             } else {
                 0.0
             }
@@ -81,6 +86,10 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             lines.push(Line::at_most(Measure::Astray, ASTRAY));
             lines
         }),
+        open: open_everywhere(
+            Measure::Astray.key(),
+            "it comes to rest at its rest distance, which grows with the body: 20 um for one of 0.2 m",
+        ),
         out_of_scope: turns,
         ..Recipe::new(case, about, scene, duration, device)
     }]

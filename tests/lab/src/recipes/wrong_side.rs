@@ -5,7 +5,8 @@ use nalgebra::{Point3, Vector3};
 use taut_method_tests::solids::{cells, mesh, obstacle};
 
 use super::Extent;
-use super::bodies::{Path, ball, force, sound};
+use super::bodies::{Path, ball, force, ghost_time, sound};
+use crate::clock::TICK;
 use crate::measure::Measure;
 use crate::method::Scene;
 use crate::recipe::{Ideal, Line, Recipe};
@@ -16,6 +17,8 @@ const INNER: f64 = 0.020;
 const OUTER: f64 = 0.021;
 const RIM: f64 = 0.1;
 const SPEED: f64 = 0.1;
+/// Ticks that sampling may add at either end of a push.
+const TICKS: f64 = 2.0;
 /// How far beyond the wall's face the ball may be, m: as for penetration.
 const ASTRAY: f64 = 1e-6;
 
@@ -37,6 +40,7 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
         .hold(0.2);
     let scene = Scene::new(world, 2.0 * RADIUS, SPEED, path.pose(0.0));
     let (stiffness, limit) = (scene.stiffness(), scene.settings.force_limit);
+    let k_s = scene.settings.k_s;
     let ideal = path.clone();
     let device = path.clone();
     let duration = path.duration();
@@ -69,9 +73,12 @@ pub(super) fn recipes(extent: Extent) -> Vec<Recipe> {
             if held { beyond } else { 0.0 }
         }),
         phases: extent.choose(20, 4),
-        lines: Box::new(|_| {
+        lines: Box::new(move |rate| {
             let mut lines = sound();
             lines.push(Line::at_most(Measure::Astray, ASTRAY));
+            // It points back all the time that the wall is between them, and no longer.
+            let late = ghost_time(k_s, rate) + TICKS * TICK;
+            lines.push(Line::at_most(Measure::FalseForce, late));
             lines
         }),
         ..Recipe::new(

@@ -225,8 +225,8 @@ fn run(recipe: &Recipe, rate: u32, settings: &Settings, store: &Store) -> Measur
     let key = format!("sweep {} {rate} {settings:?}", recipe_key(recipe));
     store.get(recipe.name, &key, Measured::from_numbers, || {
         let start = || Box::new(GodObjectMethod::new(&recipe.scene, settings)) as _;
-        let measured = Measured::of(recipe, rate, recipe.phases, start);
-        let numbers = Measured::to_numbers(&measured.phases, &measured.times);
+        let measured = Measured::of(recipe, rate, recipe.phases, None, start);
+        let numbers = Measured::to_numbers(&measured.phases, &measured.times, &measured.load);
         (measured, numbers)
     })
 }
