@@ -32,7 +32,7 @@ pub enum Command {
     #[command(
         after_help = "Example: taut render --server haptic-pc:4857 --node front --key render-front.key"
     )]
-    Render(crate::rendering::RenderArgs),
+    Render(crate::commands::arguments::RenderArgs),
     /// The device side, on this or another PC
     Bridge(taut_bridge::BridgeArgs),
     /// Runs the method offline on a device trace; the same input gives the same bytes
@@ -322,7 +322,7 @@ pub struct TrackArgs {
     pub key: Option<PathBuf>,
     /// Where the head's poses come from: `still`, `trace:FILE` (workbench frame), `vrpn:TRACKER@HOST` with the options of `taut bridge`
     #[arg(long, value_name = "SOURCE")]
-    pub source: crate::track::HeadFrom,
+    pub source: crate::commands::arguments::HeadFrom,
     /// Name of this node, unique in the workbench
     #[arg(long, value_name = "NAME", default_value = "tracker")]
     pub node: String,
