@@ -7,7 +7,7 @@ pub(crate) const BUILT_IN: bool = cfg!(feature = "render");
 
 /// Draws one node of the workbench until the session ends.
 #[cfg(feature = "render")]
-pub fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
+pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
     use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
     match taut_render::run(args) {
         Ok(report) => {
@@ -29,7 +29,7 @@ pub(crate) fn run(_args: RenderArgs) -> Result<(), crate::shared::failure::Failu
 
 /// What this machine draws with, or why it does not; `None` in a build that cannot draw.
 #[cfg(feature = "render")]
-pub fn adapter() -> Option<Result<String, String>> {
+pub(crate) fn adapter() -> Option<Result<String, String>> {
     let gpu = taut_render::renderer::Gpu::open();
     Some(
         gpu.map(|gpu| gpu.chosen())

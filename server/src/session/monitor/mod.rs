@@ -13,7 +13,7 @@ mod streaming;
 #[cfg(not(feature = "monitor"))]
 pub(crate) use absent::MonitorFeed;
 #[cfg(feature = "monitor")]
-pub use streaming::MonitorFeed;
+pub(crate) use streaming::MonitorFeed;
 
 use std::net::IpAddr;
 use std::path::PathBuf;
