@@ -1,19 +1,64 @@
-//! The command line of `taut`: one sub-command per role; none is `demo`.
+//! The command line of `taut`: one sub-command per role; none prints what to start with.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use taut_link::RejoinPolicy;
 
+/// Version and commit.
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("TAUT_BUILD_COMMIT"),
+    ")"
+);
+/// Whether a feature of this build is there, as a word in a list.
+macro_rules! feature {
+    ($name:literal) => {
+        if cfg!(feature = $name) {
+            concat!(" ", $name)
+        } else {
+            ""
+        }
+    };
+}
+/// Version, commit, features and target.
+static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
+    let features = [feature!("monitor"), feature!("render"), feature!("zenoh")].concat();
+    format!(
+        "{}\ncommit   {}\nfeatures {}\ntarget   {}",
+        env!("CARGO_PKG_VERSION"),
+        env!("TAUT_BUILD_COMMIT"),
+        if features.is_empty() {
+            "none"
+        } else {
+            features.trim()
+        },
+        env!("TAUT_BUILD_TARGET"),
+    )
+});
+
+/// What `taut` alone prints.
+pub const FIRST_STEPS: &str = "taut: six-degree-of-freedom god-object haptics for a cluster of screens
+
+  taut demo                          the whole workbench on this machine, with a simulated device and hand
+  taut doctor                        what this machine lacks for real time and for rendering
+  taut serve --config workbench.toml the haptic PC; then `taut render` on each screen's PC
+
+taut --help lists all commands, taut COMMAND --help shows each with an example.
+";
+
 /// Six-degree-of-freedom haptics for a cluster of screens.
 #[derive(Debug, Parser)]
 #[command(
     name = "taut",
-    version,
+    version = VERSION,
+    long_version = LONG_VERSION.as_str(),
     about = "Six-degree-of-freedom god-object haptics for a cluster of screens",
-    after_help = "Without a command it is `taut demo`: the whole workbench on this machine.\n\nExample: taut demo --duration 20"
+    after_help = "Example: taut demo --duration 20"
 )]
 pub struct Cli {
     /// The role.
@@ -92,6 +137,10 @@ pub struct DemoArgs {
     /// Start although the scene is stiffer than the device bears
     #[arg(long)]
     pub allow_unstable: bool,
+    /// First of four ports: control, poses, the monitor's stream and page; 0 takes any that are free (default: 4857, 4858, 9876 and 9090; one
+    /// that is in use is replaced by a free one)
+    #[arg(long, value_name = "N", value_parser = first_port)]
+    pub port: Option<u16>,
     /// Print the end report on standard output
     #[arg(long)]
     pub json: bool,
@@ -398,6 +447,8 @@ pub enum MethodChoice {
     GodObject,
 }
 
+/// Ports of a demo: control, poses, the monitor's stream and page.
+const DEMO_PORTS: u16 = 4;
 /// A day is longer than any session; NaN and infinity are no durations.
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
@@ -409,6 +460,17 @@ const MAX_TRACKING_RATE_HZ: f64 = 1000.0;
 fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
     text.parse::<taut_bridge::DeviceChoice>()
         .map(|_| text.to_owned())
+}
+
+/// The first of [`DEMO_PORTS`] ports in a row, or 0.
+fn first_port(text: &str) -> Result<u16, String> {
+    let largest = u16::MAX - (DEMO_PORTS - 1);
+    match text.parse() {
+        Ok(port) if port <= largest => Ok(port),
+        _ => Err(format!(
+            "give a port from 1 to {largest}, or 0 for free ones"
+        )),
+    }
 }
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
@@ -454,8 +516,46 @@ mod tests {
     }
 
     #[test]
-    fn no_argument_is_the_demo() {
+    fn the_first_steps_are_commands_that_there_are() {
         assert!(Cli::try_parse_from(["taut"]).is_ok_and(|cli| cli.command.is_none()));
+        let shown = FIRST_STEPS
+            .lines()
+            .filter(|line| line.starts_with("  taut "));
+        let mut count = 0;
+        for line in shown {
+            let words = line.split_whitespace();
+            // The command ends where its explanation begins.
+            let takes = if line.contains("--config") { 4 } else { 2 };
+            let command: Vec<&str> = words.take(takes).collect();
+            assert!(Cli::try_parse_from(&command).is_ok(), "{command:?}");
+            count += 1;
+        }
+        assert_eq!(count, 3);
+    }
+
+    #[test]
+    fn the_version_says_commit_features_and_target() {
+        for part in [
+            "commit   ",
+            "features ",
+            "target   ",
+            env!("CARGO_PKG_VERSION"),
+        ] {
+            assert!(LONG_VERSION.contains(part), "{}", *LONG_VERSION);
+        }
+    }
+
+    #[test]
+    fn a_demo_takes_four_ports_in_a_row_or_free_ones() {
+        for (port, good) in [
+            ("0", true),
+            ("65532", true),
+            ("65533", false),
+            ("-1", false),
+        ] {
+            let parsed = Cli::try_parse_from(["taut", "demo", &format!("--port={port}")]);
+            assert_eq!(parsed.is_ok(), good, "{port}");
+        }
     }
 
     #[test]

@@ -12,6 +12,8 @@
 //!
 //! Imports go down this table, never up: `commands`, `session`, `report`, `loops`, `shared`.
 
+#![cfg_attr(not(test), warn(clippy::print_stdout))]
+
 pub mod cli;
 pub mod commands;
 pub mod loops;

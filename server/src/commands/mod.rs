@@ -25,7 +25,8 @@ use serde::Serialize;
 use taut_bridge::console;
 
 use crate::cli::{
-    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, KeysArgs, RecordArgs, ReplayArgs, TrackArgs,
+    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, KeysArgs, RecordArgs, ReplayArgs,
+    TrackArgs,
 };
 use crate::report::terminal::Terminal;
 use crate::report::{ReplayReport, SessionReport};
@@ -38,7 +39,11 @@ pub fn main() -> ExitCode {
     taut_link::keep_memory_private();
     let cli = Cli::parse();
     taut_log::start("warn");
-    let code = match run(cli.command.unwrap_or(Command::Demo(Default::default()))) {
+    let done = match cli.command {
+        Some(command) => run(command),
+        None => print(FIRST_STEPS).map(|()| ExitCode::SUCCESS),
+    };
+    let code = match done {
         Ok(code) => code,
         Err(error) => {
             taut_log::say(&format!("taut: {error:#}"));
@@ -77,11 +82,11 @@ fn end_session(
     (report, failure): (SessionReport, Option<Failure>),
     json: bool,
 ) -> Result<ExitCode> {
-    if json {
-        print_json(&report)?;
+    console::report(if json {
+        as_json(&report)?
     } else {
-        console::report(report.to_string());
-    }
+        report.to_string()
+    });
     match failure {
         Some(failure) => Err(failure.into()),
         None => Ok(ExitCode::SUCCESS),
@@ -96,7 +101,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
     if args.json {
         print_json(&report)?;
     } else {
-        println!("{report}");
+        print(report.to_string())?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -108,7 +113,7 @@ fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
     if args.json {
         print_json(&report)?;
     } else {
-        println!("{report}");
+        print(report.to_string())?;
     }
     Ok(if report.first_difference.is_none() {
         ExitCode::SUCCESS
@@ -124,7 +129,7 @@ fn record_command(args: &RecordArgs) -> Result<ExitCode> {
         .build()
         .context("the network's threads cannot be started")?;
     let rows = runtime.block_on(record::run(args))?;
-    println!("{}: {rows} samples", args.out.display());
+    print(format!("{}: {rows} samples", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -134,7 +139,7 @@ fn arm_command(args: &ArmArgs) -> Result<ExitCode> {
         .enable_all()
         .build()
         .context("the network's threads cannot be started")?;
-    println!("{}", runtime.block_on(arm::run(args))?);
+    print(runtime.block_on(arm::run(args))?)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -144,7 +149,7 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
         print_json(&reports)?;
     } else {
         for report in &reports {
-            println!("{report}");
+            print(report.to_string())?;
         }
     }
     let good = reports.iter().all(taut_scene::FileReport::is_good);
@@ -161,7 +166,7 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
         if args.json {
             print_json(&report)?;
         } else {
-            println!("{report}");
+            print(report.to_string())?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -170,13 +175,13 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
     if args.json {
         print_json(&report)?;
     } else {
-        println!("{report}");
+        print(report.to_string())?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
-    println!("{}", keys::run(args)?);
+    print(keys::run(args)?)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -187,13 +192,22 @@ fn track_command(args: &TrackArgs) -> Result<ExitCode> {
         .build()
         .context("the network's threads cannot be started")?;
     let sent = runtime.block_on(track::run(args))?;
-    println!("{sent} readings of the head sent to {}", args.server);
+    print(format!(
+        "{sent} readings of the head sent to {}",
+        args.server
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn print_json(value: &impl Serialize) -> Result<()> {
-    let text =
-        serde_json::to_string_pretty(value).context("the report cannot be written as JSON")?;
-    console::report(text);
-    Ok(())
+    print(as_json(value)?)
+}
+
+fn as_json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string_pretty(value).context("the report cannot be written as JSON")
+}
+
+/// Prints the result of a command that holds no session.
+fn print(text: impl Into<String>) -> Result<()> {
+    console::print(text).context("standard output cannot be written; check the free space")
 }

@@ -11,7 +11,7 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failur
     use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
     match taut_render::run(args) {
         Ok(report) => {
-            println!("{report}");
+            taut_bridge::console::report(report.to_string());
             Ok(())
         }
         Err(error) if error.exit_code() == EXIT_BAD_INPUT => Err(Failure::bad_input(error)),

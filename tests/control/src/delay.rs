@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::GodObject;
-use taut::session::edge_sets::EdgeSets;
 use taut::loops::wiring::WiredLoops;
+use taut::session::edge_sets::EdgeSets;
 use taut_bridge::edge::{EdgeCoupler, offer_of};
 use taut_bridge::{
     BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand,

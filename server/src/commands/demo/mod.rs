@@ -105,6 +105,9 @@ pub(super) fn run(
         // Drawing shares the processor with the mouse; a pose that is late harms nobody who feels no force.
         *max_age = MOUSE_MAX_AGE;
     }
+    if let Some(first) = args.port {
+        use_ports(&mut setup, first);
+    }
     take_free_ports(&mut setup, terminal);
     let end = EndFlag::listen().map_err(Failure::failed)?;
     let mut session = Session::start(setup)?;
@@ -152,6 +155,22 @@ pub(super) fn run(
         ));
     }
     Ok(ended)
+}
+
+/// Puts the demo on four ports from `first` on, or on free ones where that is 0.
+fn use_ports(setup: &mut SessionSetup, first: u16) {
+    let port = |index: u16| {
+        if first == 0 {
+            0
+        } else {
+            first.saturating_add(index)
+        }
+    };
+    setup.link.quic.set_port(port(0));
+    setup.link.udp.set_port(port(1));
+    if let Some(monitor) = &mut setup.monitor {
+        (monitor.grpc_port, monitor.web_port) = (port(2), port(3));
+    }
 }
 
 /// Replaces every port that somebody else has by a free one, and says so.
