@@ -107,13 +107,13 @@ mod tests {
         let mut file = tempfile::NamedTempFile::new().expect("a temporary file");
         io::Write::write_all(
             &mut file,
-            b"# hand\nt,x,y,z,qw,qx,qy,qz\n0,0,0,0,0.9,0,0,0\n",
+            b"# hand\nt,x,y,z,qw,qx,qy,qz\n\n# pressed\n0,0,0,0,0.9,0,0,0\n",
         )
         .expect("written");
         let error = read_trace(file.path()).expect_err("a broken trace");
         let sentence = error.to_string();
         assert!(
-            sentence.contains(":3: the quaternion has norm 0.9"),
+            sentence.contains(":5: the quaternion has norm 0.9"),
             "{sentence}"
         );
         let missing = read_trace(Path::new("no/such/trace.csv")).expect_err("a missing file");

@@ -65,7 +65,7 @@ pub fn parse_trace(text: &str) -> Result<TraceRows, Vec<TraceFault>> {
         .comment(Some(b'#'))
         .from_reader(text.as_bytes());
     let header = reader.headers().map_err(|error| vec![no_csv(error)])?;
-    let columns = Columns::find(header).map_err(|fault| vec![fault])?;
+    let columns = Columns::find(text, header).map_err(|fault| vec![fault])?;
     let (mut faults, mut samples) = (Vec::new(), Vec::<TraceSample>::new());
     let mut record = csv::StringRecord::new();
     while faults.len() < MAX_FAULTS {
@@ -74,7 +74,7 @@ pub fn parse_trace(text: &str) -> Result<TraceRows, Vec<TraceFault>> {
             Ok(true) => match columns.sample(&record, samples.last().map(|last| last.time)) {
                 Ok(sample) => samples.push(sample),
                 Err(text) => faults.push(TraceFault {
-                    line: Some(line(&record)),
+                    line: Some(line(text, &record)),
                     text,
                 }),
             },
@@ -94,8 +94,16 @@ pub fn parse_trace(text: &str) -> Result<TraceRows, Vec<TraceFault>> {
     }
 }
 
-fn line(record: &csv::StringRecord) -> usize {
-    record.position().map_or(1, |place| place.line() as usize)
+/// The line of a record, from 1. The reader's position is where it began to look: before the comments and empty lines that it skipped.
+fn line(text: &str, record: &csv::StringRecord) -> usize {
+    record.position().map_or(1, |begun| {
+        let rest = text.get(begun.byte() as usize..).unwrap_or_default();
+        let skipped = rest
+            .lines()
+            .take_while(|line| line.starts_with('#') || line.is_empty())
+            .count();
+        begun.line() as usize + skipped
+    })
 }
 
 /// Where the columns stand.
@@ -106,7 +114,7 @@ struct Columns {
 }
 
 impl Columns {
-    fn find(header: &csv::StringRecord) -> Result<Self, TraceFault> {
+    fn find(text: &str, header: &csv::StringRecord) -> Result<Self, TraceFault> {
         let place = |name| header.iter().position(|column| column == name);
         let numbers = TRACE_COLUMNS.map(place);
         let buttons = place(BUTTONS);
@@ -115,7 +123,7 @@ impl Columns {
             let names: Vec<&str> = header.iter().collect();
             let found: String = names.join(",").chars().take(MAX_QUOTED).collect();
             return Err(TraceFault {
-                line: Some(line(header)),
+                line: Some(line(text, header)),
                 text: format!(
                     "the header is `{found}`, but must be `{}` and optionally `{BUTTONS}`",
                     TRACE_COLUMNS.join(",")
