@@ -73,9 +73,9 @@ pub fn parse_trace(text: &str) -> Result<TraceRows, Vec<TraceFault>> {
             Ok(false) => break,
             Ok(true) => match columns.sample(&record, samples.last().map(|last| last.time)) {
                 Ok(sample) => samples.push(sample),
-                Err(text) => faults.push(TraceFault {
+                Err(fault) => faults.push(TraceFault {
                     line: Some(line(text, &record)),
-                    text,
+                    text: fault,
                 }),
             },
             Err(error) => faults.push(no_csv(error)),
