@@ -41,6 +41,20 @@ static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
     )
 });
 
+/// Columns and example of `taut replay`.
+const REPLAY_HELP: &str = "Columns of the answer, one row per row of the trace; m, N, N m, s, world axes; empty where there is no value:
+  t                      time of the row
+  hx..hqz                pose of the device as used (position, quaternion w x y z)
+  sx..sqz                pose of the god-object
+  fx fy fz tx ty tz      force and torque at the reference point
+  contacts active        rows in the constraint set, and of these in the active set
+  gap_min                smallest distance between the bodies; empty where nothing is near
+  kkt                    relative residual of the force's projection
+  stale                  time since the constraint set was made
+  update_us force_us     thread CPU times, with --timings
+
+Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0";
+
 /// What `taut` alone prints.
 pub const FIRST_STEPS: &str = "taut: six-degree-of-freedom god-object haptics for a cluster of screens
 
@@ -94,6 +108,14 @@ pub enum Command {
     Track(TrackArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
+    /// Prints completions for a shell
+    #[command(
+        after_help = "Example: taut completions bash > /usr/share/bash-completion/completions/taut"
+    )]
+    Completions(CompletionsArgs),
+    /// Writes the manual pages, one per command, into a directory
+    #[command(after_help = "Example: taut man --out /usr/share/man/man1")]
+    Man(ManArgs),
 }
 
 /// `taut demo`.
@@ -141,7 +163,10 @@ pub struct DemoArgs {
     /// that is in use is replaced by a free one)
     #[arg(long, value_name = "N", value_parser = first_port)]
     pub port: Option<u16>,
-    /// Print the end report on standard output
+    /// Add a histogram of the haptics loop's periods to the end report
+    #[arg(long, conflicts_with = "json")]
+    pub histogram: bool,
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
 }
@@ -180,7 +205,10 @@ pub struct ServeArgs {
     /// Start although the scene is stiffer than the device bears
     #[arg(long)]
     pub allow_unstable: bool,
-    /// Print the end report on standard output
+    /// Add a histogram of the haptics loop's periods to the end report
+    #[arg(long, conflicts_with = "json")]
+    pub histogram: bool,
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
     /// Append a line of JSON with everything measured so far to this file, again and again; - is standard output
@@ -194,7 +222,7 @@ pub struct ServeArgs {
 /// `taut replay`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0"
+    after_help = REPLAY_HELP
 )]
 pub struct ReplayArgs {
     /// A shipped scene by its name, or a scene file
@@ -231,7 +259,7 @@ pub struct ReplayArgs {
     /// Add the columns update_us and force_us, the only ones that differ from run to run
     #[arg(long)]
     pub timings: bool,
-    /// Print the end report on standard output
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
 }
@@ -355,6 +383,22 @@ pub struct KeysArgs {
     /// Instead, say what this key file allows and its fingerprint
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "master"])]
     pub show: Option<PathBuf>,
+}
+
+/// `taut completions`.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// `taut man`.
+#[derive(Clone, Debug, Args)]
+pub struct ManArgs {
+    /// The directory; files of the same name are replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// `taut track`.
@@ -555,6 +599,19 @@ mod tests {
         ] {
             let parsed = Cli::try_parse_from(["taut", "demo", &format!("--port={port}")]);
             assert_eq!(parsed.is_ok(), good, "{port}");
+        }
+    }
+
+    #[test]
+    fn the_help_of_replay_explains_every_column() {
+        let columns = taut_scene::REPLAY_COLUMNS.split(',');
+        for column in columns.filter(|column| {
+            ![
+                "hy", "hz", "hqw", "hqx", "hqy", "sy", "sz", "sqw", "sqx", "sqy",
+            ]
+            .contains(column)
+        }) {
+            assert!(REPLAY_HELP.contains(column), "{column} is not explained");
         }
     }
 

@@ -117,6 +117,30 @@ fn without_a_command_it_says_how_to_begin_and_starts_nothing() {
 }
 
 #[test]
+fn completions_and_manual_pages_name_every_command() {
+    let place = Workplace::new();
+    let commands = [
+        "demo", "serve", "bridge", "replay", "record", "check", "doctor", "keys",
+    ];
+    for shell in ["bash", "zsh", "fish"] {
+        let output = taut(&["completions", shell]);
+        let script = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            commands.iter().all(|command| script.contains(command)),
+            "{shell}"
+        );
+    }
+    let directory = place.text("man1");
+    assert!(taut(&["man", "--out", &directory]).status.success());
+    for command in commands {
+        let page = place.path("man1").join(format!("taut-{command}.1"));
+        let text = std::fs::read_to_string(&page).unwrap_or_default();
+        assert!(text.contains("Example"), "{}", page.display());
+    }
+    assert!(place.path("man1").join("taut.1").exists());
+}
+
+#[test]
 fn bad_usage_is_exit_code_2() {
     for arguments in [
         ["demo", "--no-such-option"].as_slice(),

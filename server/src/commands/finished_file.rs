@@ -15,6 +15,10 @@ pub(super) struct FinishedFile {
 impl FinishedFile {
     /// Begins the file; the directory must be there.
     pub(super) fn create(path: &Path) -> io::Result<Self> {
+        if path == Path::new("-") {
+            let why = "`-` is no file here: the answer is renamed when it is whole, which standard output cannot be; name a file, such as ./out.csv";
+            return Err(io::Error::new(io::ErrorKind::InvalidFilename, why));
+        }
         let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let mut partial_name = std::ffi::OsString::from(".");
         partial_name.push(name);
@@ -63,6 +67,12 @@ impl Drop for FinishedFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_dash_is_refused_by_name() {
+        let error = FinishedFile::create(Path::new("-")).map_err(|error| error.to_string());
+        assert!(error.is_err_and(|error| error.contains("name a file")));
+    }
 
     #[test]
     fn the_name_appears_only_when_the_file_is_finished() {

@@ -9,6 +9,7 @@ mod doctor;
 mod finished_file;
 mod key;
 mod keys;
+mod manual;
 mod record;
 pub(crate) mod render;
 pub mod replay;
@@ -61,8 +62,10 @@ pub fn main() -> ExitCode {
 fn run(command: Command) -> Result<ExitCode> {
     let terminal = Terminal::standard_error();
     match command {
-        Command::Demo(args) => end_session(demo::run(&args, &terminal)?, args.json),
-        Command::Serve(args) => end_session(serve::run(&args, &terminal)?, args.json),
+        Command::Demo(args) => end_session(demo::run(&args, &terminal)?, args.json, args.histogram),
+        Command::Serve(args) => {
+            end_session(serve::run(&args, &terminal)?, args.json, args.histogram)
+        }
         Command::Render(args) => {
             render::run(args)?;
             Ok(ExitCode::SUCCESS)
@@ -75,17 +78,22 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),
+        Command::Completions(args) => {
+            print(manual::completions(args.shell)?).map(|()| ExitCode::SUCCESS)
+        }
+        Command::Man(args) => print(manual::write_pages(&args.out)?).map(|()| ExitCode::SUCCESS),
     }
 }
 
 fn end_session(
     (report, failure): (SessionReport, Option<Failure>),
     json: bool,
+    histogram: bool,
 ) -> Result<ExitCode> {
-    console::report(if json {
-        as_json(&report)?
-    } else {
-        report.to_string()
+    console::report(match (json, histogram) {
+        (true, _) => as_json(&report)?,
+        (false, true) => format!("{report}{}", report.histogram()),
+        (false, false) => report.to_string(),
     });
     match failure {
         Some(failure) => Err(failure.into()),

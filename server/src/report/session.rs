@@ -80,6 +80,65 @@ pub struct SessionReport {
     pub fidelity: Option<FidelityReport>,
 }
 
+/// Share of missed deadlines from which the verdict names them: a hand feels one late tick in a thousand as nothing.
+const NOTABLE_MISSES: f64 = 1e-3;
+
+impl SessionReport {
+    /// In one line: whether the session was as it should be, or what was not.
+    pub fn verdict(&self) -> String {
+        let mut faults = Vec::new();
+        if self.penetrations > 0 {
+            faults.push(format!(
+                "the bodies intersected in {} of {} poses",
+                self.penetrations, self.penetration_checks
+            ));
+        }
+        let ticks = self.haptics_period_us.count + self.deadline_misses;
+        let missed = self.deadline_misses as f64 / ticks.max(1) as f64;
+        if missed > NOTABLE_MISSES {
+            faults.push(format!(
+                "the haptics loop missed {:.1} % of its deadlines (`taut doctor` says what the machine lacks)",
+                100.0 * missed
+            ));
+        }
+        for client in &self.clients {
+            if client.free_running {
+                faults.push(format!("{} draws fewer frames than it should", client.node));
+            }
+            if client.state_hash_mismatches > 0 {
+                faults.push(format!(
+                    "{} drew {} frames of another state",
+                    client.node, client.state_hash_mismatches
+                ));
+            }
+        }
+        if self.safety_events > 0 {
+            faults.push(format!("{} safety events, in the log", self.safety_events));
+        }
+        if faults.is_empty() {
+            "verdict             good: deadlines kept, no penetration, no safety event".to_owned()
+        } else {
+            format!("verdict             look at this: {}", faults.join("; "))
+        }
+    }
+
+    /// The periods of the haptics loop as a histogram, one line per bin that is not empty.
+    pub fn histogram(&self) -> String {
+        let ticks = self.haptics_period_us.count.max(1) as f64;
+        let bins = self.haptics_period_bins_us.iter();
+        bins.filter(|bin| bin.count > 0)
+            .map(|bin| {
+                let share = 100.0 * bin.count as f64 / ticks;
+                let range = match bin.to {
+                    Some(to) => format!("{:.0} to {to:.0} us", bin.from),
+                    None => format!("from {:.0} us", bin.from),
+                };
+                format!("\n  period {range:<16} {share:7.3} %")
+            })
+            .collect()
+    }
+}
+
 impl fmt::Display for SessionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (period, update, force, age) = (
@@ -88,25 +147,13 @@ impl fmt::Display for SessionReport {
             &self.force_us,
             &self.constraint_age_us,
         );
+        writeln!(f, "{}", self.verdict())?;
         writeln!(f, "ran for             {:.1} s", self.duration_s)?;
         writeln!(
             f,
             "haptics             {:.1} Hz, period p50 {:.0} us, p99 {:.0} us, p99.9 {:.0} us, max {:.0} us, {} deadlines missed",
             self.haptics_hz, period.p50, period.p99, period.p999, period.max, self.deadline_misses
         )?;
-        let ticks = period.count.max(1) as f64;
-        for bin in self
-            .haptics_period_bins_us
-            .iter()
-            .filter(|bin| bin.count > 0)
-        {
-            let share = 100.0 * bin.count as f64 / ticks;
-            let range = match bin.to {
-                Some(to) => format!("{:.0} to {to:.0} us", bin.from),
-                None => format!("from {:.0} us", bin.from),
-            };
-            writeln!(f, "  period {range:<16} {share:7.3} %")?;
-        }
         writeln!(
             f,
             "god-object          {:.0} Hz, update p50 {:.0} us, p99 {:.0} us, max {:.0} us",
@@ -190,5 +237,53 @@ impl fmt::Display for SessionReport {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_names_what_was_wrong_and_comes_first() {
+        let mut report = SessionReport {
+            haptics_period_us: Distribution {
+                count: 10_000,
+                ..Distribution::default()
+            },
+            deadline_misses: 5,
+            ..SessionReport::default()
+        };
+        assert!(report.verdict().contains("good"), "{}", report.verdict());
+        report.deadline_misses = 200;
+        report.penetrations = 1;
+        report.clients = vec![ClientReport {
+            node: "table".into(),
+            free_running: true,
+            ..ClientReport::default()
+        }];
+        let text = report.to_string();
+        let first = text.lines().next().unwrap_or_default();
+        for part in [
+            "intersected in 1",
+            "2.0 % of its deadlines",
+            "table draws fewer",
+        ] {
+            assert!(first.contains(part), "{first}");
+        }
+    }
+
+    #[test]
+    fn the_histogram_is_apart_from_the_report() {
+        let report = SessionReport {
+            haptics_period_bins_us: vec![Bin {
+                from: 0.0,
+                to: Some(500.0),
+                count: 3,
+            }],
+            ..SessionReport::default()
+        };
+        assert!(!report.to_string().contains("0 to 500 us"));
+        assert!(report.histogram().contains("0 to 500 us"));
     }
 }

@@ -34,12 +34,14 @@ impl Session {
             let to_be_logged = self.audit.follow(&event, now);
             let line = self.clients.follow(&event);
             if to_be_logged {
-                lines.extend(line.map(|line| (severity(&event), line)));
+                lines.extend(line.map(|line| (severity(&event), concerns_presence(&event), line)));
             }
         }
-        for (severity, line) in lines {
+        for (severity, concerns_presence, line) in lines {
             if severity == Severity::Error {
                 terminal.say(&format!("taut: {line}"));
+            } else if concerns_presence {
+                terminal.say(&line);
             }
             tracing::info!("{line}");
             if let Some(recorder) = &self.recorder {
@@ -77,10 +79,10 @@ impl Session {
             if event.kind.is_fault() || is_about_arming(event.kind) {
                 self.audit.follow_port(&text, event.kind.is_fault());
             }
-            if event.kind.is_good_news() {
-                tracing::info!("{text}");
-            } else {
+            if event.kind.is_warning() {
                 tracing::warn!("{text}");
+            } else {
+                tracing::info!("{text}");
             }
             if let Some(recorder) = &self.recorder {
                 recorder.events().send(EventRecord {
@@ -151,6 +153,14 @@ fn is_about_arming(kind: EventKind) -> bool {
             | EventKind::DeadManReleased
             | EventKind::ArmRefused
             | EventKind::RearmNeeded
+    )
+}
+
+/// Whether a node came, went, or may be going: whoever stands at the haptic PC is told.
+fn concerns_presence(event: &LinkEvent) -> bool {
+    matches!(
+        event,
+        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Silent { .. }
     )
 }
 

@@ -101,10 +101,10 @@ impl EventLog {
             let Some(newest) = incidents.newest(kind) else {
                 continue;
             };
-            let severity = if kind.is_good_news() {
-                Severity::Info
-            } else {
+            let severity = if kind.is_warning() {
                 Severity::Warning
+            } else {
+                Severity::Info
             };
             say(severity, &line(&newest, growth));
         }
