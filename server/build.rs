@@ -17,8 +17,6 @@ fn main() {
 /// The commit of the repository that this package is in, with `-dirty` where tracked files differ from it.
 fn of_repository() -> Option<String> {
     let top = git(&["rev-parse", "--show-toplevel"])?;
-    // An archive unpacked inside another repository is not of that repository's commit.
-    git(&["ls-files", "--error-unmatch", "build.rs"])?;
     for file in ["HEAD", "index"] {
         let path = git(&["rev-parse", "--path-format=absolute", "--git-path", file])?;
         println!("cargo::rerun-if-changed={path}");
@@ -33,6 +31,8 @@ fn of_repository() -> Option<String> {
     ] {
         println!("cargo::rerun-if-changed={top}/{folder}");
     }
+    // An archive unpacked inside another repository is not of that repository's commit.
+    git(&["ls-files", "--error-unmatch", "build.rs"])?;
     let commit = git(&["rev-parse", "--short=10", "HEAD"])?;
     let changed = git(&["status", "--porcelain", "--untracked-files=no"]);
     let dirty = changed.is_none_or(|changed| !changed.is_empty());
