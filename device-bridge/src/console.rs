@@ -1,4 +1,4 @@
-//! The end report of a process on standard output. Lines while it runs go by [`taut_log`], whose thread loses them rather than time.
+//! What a process prints on standard output. Lines while it runs go by [`taut_log`], whose thread loses them rather than time.
 
 use std::io::{self, Write};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -8,6 +8,29 @@ use std::time::Duration;
 /// whoever takes nothing for a second is not reading.
 const REPORT_TIME: Duration = Duration::from_secs(1);
 
+/// Prints the result of a command that only prints, and a line's end; waits for whoever reads. A reader that has gone away (`| head`) has what it
+/// wanted and is no fault.
+///
+/// # Errors
+/// Standard output cannot be written: a full disk.
+pub fn print(text: impl Into<String>) -> io::Result<()> {
+    forgive_closed(write_line(io::stdout().lock(), text.into()))
+}
+
+fn forgive_closed(written: io::Result<()>) -> io::Result<()> {
+    match written {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written,
+    }
+}
+
+fn write_line(mut out: impl Write, mut text: String) -> io::Result<()> {
+    if !text.ends_with('\n') {
+        text.push('\n');
+    }
+    out.write_all(text.as_bytes()).and_then(|()| out.flush())
+}
+
 /// Writes a report to standard output, and waits for that at most a second; whether it was written. For the end of a process, when
 /// there is no force any more.
 pub fn report(text: impl Into<String>) -> bool {
@@ -15,22 +38,19 @@ pub fn report(text: impl Into<String>) -> bool {
 }
 
 fn written_in_time(out: impl Write + Send + 'static, text: String) -> bool {
-    let (told, answer) = sync_channel(2);
+    let (progress, answer) = sync_channel(2);
     let thread = std::thread::Builder::new().name("report".to_owned());
-    let started = thread.spawn(move || write(out, text, &told));
+    let started = thread.spawn(move || write(out, text, &progress));
     // A busy machine may be slow to start the thread: that is no terminal's fault and does not count.
     let begun = started.is_ok() && answer.recv().is_ok();
     begun && answer.recv_timeout(REPORT_TIME).unwrap_or(false)
 }
 
-/// Tells when it begins, and whether all was taken.
-fn write(mut out: impl Write, mut text: String, told: &SyncSender<bool>) {
-    if !text.ends_with('\n') {
-        text.push('\n');
-    }
-    let _ = told.send(true);
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    let _ = told.send(written.is_ok()); // who waited has given up
+/// Sends when it begins, and whether all was taken.
+fn write(out: impl Write, text: String, progress: &SyncSender<bool>) {
+    let _ = progress.send(true);
+    let written = write_line(out, text);
+    let _ = progress.send(written.is_ok()); // who waited has given up
 }
 
 #[cfg(test)]
@@ -46,6 +66,17 @@ mod tests {
         let mut text = String::new();
         reader.read_to_string(&mut text).expect("text");
         assert_eq!(text, "all went well\n");
+    }
+
+    #[test]
+    fn a_reader_that_went_away_is_no_fault_and_a_full_disk_is() {
+        let (reader, writer) = pipe().expect("a pipe");
+        drop(reader);
+        assert!(forgive_closed(write_line(&writer, "x".to_owned())).is_ok());
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+        if let Ok(full) = full {
+            assert!(forgive_closed(write_line(full, "x".to_owned())).is_err());
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ fn main() -> ExitCode {
     taut_log::start("warn,taut_render=info");
     let code = match run(command_line.args) {
         Ok(report) => {
-            println!("{report}");
+            taut_bridge::console::report(report.to_string());
             ExitCode::SUCCESS
         }
         Err(error) => {

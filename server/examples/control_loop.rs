@@ -13,8 +13,8 @@ use std::time::Duration;
 
 use god_object::Vector6;
 use god_object::nalgebra::Vector3;
-use taut::realtime::thread_cpu_time;
-use taut::timing::{Distribution, Histogram};
+use taut::loops::realtime::thread_cpu_time;
+use taut::shared::timing::{Distribution, Histogram};
 use taut_bridge::realtime::{
     CLEAR_OF_KERNEL_TICK, first_on_beat, keep_cores_awake, lock_memory, monotonic_now,
     request_fifo, sleep_until,

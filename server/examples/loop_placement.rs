@@ -14,12 +14,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use taut::config::{Overrides, session_setup};
 use taut::loops::shell::Phases;
 use taut::report::SessionReport;
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::terminal::Terminal;
-use taut::timing::Distribution;
+use taut::session::setup::workbench::{Overrides, session_setup};
+use taut::shared::timing::Distribution;
 use taut_link::ClusterKey;
 use taut_scene::{Device, Workbench};
 

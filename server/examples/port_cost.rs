@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::{Pose, Vector6};
-use taut::realtime::thread_cpu_time;
-use taut::timing::distribution_of;
+use taut::loops::realtime::thread_cpu_time;
+use taut::shared::timing::distribution_of;
 use taut_bridge::{
     Command, Device, DeviceFault, DeviceInfo, DeviceLimits, DevicePort, DeviceSample, Passivity,
     PassivitySettings, SafetySettings,

@@ -10,9 +10,9 @@ use std::time::Duration;
 
 use god_object::nalgebra::UnitQuaternion;
 use god_object::{GodObject, Vector6};
+use taut::loops::realtime::thread_cpu_time;
 use taut::loops::wiring::WiredLoops;
-use taut::realtime::thread_cpu_time;
-use taut::timing::{Histogram, distribution_of};
+use taut::shared::timing::{Histogram, distribution_of};
 use taut_bridge::{
     Device, DeviceFault, DeviceInfo, DeviceSample, Felt, Hand, HeldStrings, MinJerkPath,
     SafetySettings, SpidarDevice, ViaPoint, simulated_spidar, string_geometry,

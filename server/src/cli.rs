@@ -1,19 +1,78 @@
-//! The command line of `taut`: one sub-command per role; none is `demo`.
+//! The command line of `taut`: one sub-command per role; none prints what to start with.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use taut_link::RejoinPolicy;
 
+/// Version and commit.
+const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("TAUT_BUILD_COMMIT"),
+    ")"
+);
+/// Whether a feature of this build is there, as a word in a list.
+macro_rules! feature {
+    ($name:literal) => {
+        if cfg!(feature = $name) {
+            concat!(" ", $name)
+        } else {
+            ""
+        }
+    };
+}
+/// Version, commit, features and target.
+static LONG_VERSION: LazyLock<String> = LazyLock::new(|| {
+    let features = [feature!("monitor"), feature!("render"), feature!("zenoh")].concat();
+    format!(
+        "{}\ncommit   {}\nfeatures {}\ntarget   {}",
+        env!("CARGO_PKG_VERSION"),
+        env!("TAUT_BUILD_COMMIT"),
+        if features.is_empty() {
+            "none"
+        } else {
+            features.trim()
+        },
+        env!("TAUT_BUILD_TARGET"),
+    )
+});
+
+/// Columns and example of `taut replay`.
+const REPLAY_HELP: &str = "Columns of the answer, one row per row of the trace; m, N, N m, s, world axes; empty where there is no value:
+  t                      time of the row
+  hx..hqz                pose of the device as used (position, quaternion w x y z)
+  sx..sqz                pose of the god-object
+  fx fy fz tx ty tz      force and torque at the reference point
+  contacts active        rows in the constraint set, and of these in the active set
+  gap_min                smallest distance between the bodies; empty where nothing is near
+  kkt                    relative residual of the force's projection
+  stale                  time since the constraint set was made
+  update_us force_us     thread CPU times, with --timings
+
+Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0";
+
+/// What `taut` alone prints.
+pub const FIRST_STEPS: &str = "taut: six-degree-of-freedom god-object haptics for a cluster of screens
+
+  taut demo                          the whole workbench on this machine, with a simulated device and hand
+  taut doctor                        what this machine lacks for real time and for rendering
+  taut serve --config workbench.toml the haptic PC; then `taut render` on each screen's PC
+
+taut --help lists all commands, taut COMMAND --help shows each with an example.
+";
+
 /// Six-degree-of-freedom haptics for a cluster of screens.
 #[derive(Debug, Parser)]
 #[command(
     name = "taut",
-    version,
+    version = VERSION,
+    long_version = LONG_VERSION.as_str(),
     about = "Six-degree-of-freedom god-object haptics for a cluster of screens",
-    after_help = "Without a command it is `taut demo`: the whole workbench on this machine.\n\nExample: taut demo --duration 20"
+    after_help = "Example: taut demo --duration 20"
 )]
 pub struct Cli {
     /// The role.
@@ -32,7 +91,7 @@ pub enum Command {
     #[command(
         after_help = "Example: taut render --server haptic-pc:4857 --node front --key render-front.key"
     )]
-    Render(crate::rendering::RenderArgs),
+    Render(crate::commands::arguments::RenderArgs),
     /// The device side, on this or another PC
     Bridge(taut_bridge::BridgeArgs),
     /// Runs the method offline on a device trace; the same input gives the same bytes
@@ -49,6 +108,14 @@ pub enum Command {
     Track(TrackArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
+    /// Prints completions for a shell
+    #[command(
+        after_help = "Example: taut completions bash > /usr/share/bash-completion/completions/taut"
+    )]
+    Completions(CompletionsArgs),
+    /// Writes the manual pages, one per command, into a directory
+    #[command(after_help = "Example: taut man --out /usr/share/man/man1")]
+    Man(ManArgs),
 }
 
 /// `taut demo`.
@@ -92,7 +159,14 @@ pub struct DemoArgs {
     /// Start although the scene is stiffer than the device bears
     #[arg(long)]
     pub allow_unstable: bool,
-    /// Print the end report on standard output
+    /// First of four ports: control, poses, the monitor's stream and page; 0 takes any that are free (default: 4857, 4858, 9876 and 9090; one
+    /// that is in use is replaced by a free one)
+    #[arg(long, value_name = "N", value_parser = first_port)]
+    pub port: Option<u16>,
+    /// Add a histogram of the haptics loop's periods to the end report
+    #[arg(long, conflicts_with = "json")]
+    pub histogram: bool,
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
 }
@@ -131,7 +205,10 @@ pub struct ServeArgs {
     /// Start although the scene is stiffer than the device bears
     #[arg(long)]
     pub allow_unstable: bool,
-    /// Print the end report on standard output
+    /// Add a histogram of the haptics loop's periods to the end report
+    #[arg(long, conflicts_with = "json")]
+    pub histogram: bool,
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
     /// Append a line of JSON with everything measured so far to this file, again and again; - is standard output
@@ -145,7 +222,7 @@ pub struct ServeArgs {
 /// `taut replay`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Example: taut replay --scene peg-in-a-hole --trace hand.csv --out answer.csv --set coupling.k_s=1.0"
+    after_help = REPLAY_HELP
 )]
 pub struct ReplayArgs {
     /// A shipped scene by its name, or a scene file
@@ -182,7 +259,7 @@ pub struct ReplayArgs {
     /// Add the columns update_us and force_us, the only ones that differ from run to run
     #[arg(long)]
     pub timings: bool,
-    /// Print the end report on standard output
+    /// Print the end report as JSON on standard output
     #[arg(long)]
     pub json: bool,
 }
@@ -308,6 +385,22 @@ pub struct KeysArgs {
     pub show: Option<PathBuf>,
 }
 
+/// `taut completions`.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// `taut man`.
+#[derive(Clone, Debug, Args)]
+pub struct ManArgs {
+    /// The directory; files of the same name are replaced
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
 /// `taut track`.
 #[derive(Clone, Debug, Args)]
 #[command(
@@ -322,7 +415,7 @@ pub struct TrackArgs {
     pub key: Option<PathBuf>,
     /// Where the head's poses come from: `still`, `trace:FILE` (workbench frame), `vrpn:TRACKER@HOST` with the options of `taut bridge`
     #[arg(long, value_name = "SOURCE")]
-    pub source: crate::track::HeadFrom,
+    pub source: crate::commands::arguments::HeadFrom,
     /// Name of this node, unique in the workbench
     #[arg(long, value_name = "NAME", default_value = "tracker")]
     pub node: String,
@@ -398,6 +491,8 @@ pub enum MethodChoice {
     GodObject,
 }
 
+/// Ports of a demo: control, poses, the monitor's stream and page.
+const DEMO_PORTS: u16 = 4;
 /// A day is longer than any session; NaN and infinity are no durations.
 const MAX_SECONDS: f64 = 86_400.0;
 /// No loop turns faster.
@@ -409,6 +504,17 @@ const MAX_TRACKING_RATE_HZ: f64 = 1000.0;
 fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
     text.parse::<taut_bridge::DeviceChoice>()
         .map(|_| text.to_owned())
+}
+
+/// The first of [`DEMO_PORTS`] ports in a row, or 0.
+fn first_port(text: &str) -> Result<u16, String> {
+    let largest = u16::MAX - (DEMO_PORTS - 1);
+    match text.parse() {
+        Ok(port) if port <= largest => Ok(port),
+        _ => Err(format!(
+            "give a port from 1 to {largest}, or 0 for free ones"
+        )),
+    }
 }
 
 fn positive_seconds(text: &str) -> Result<f64, String> {
@@ -454,8 +560,59 @@ mod tests {
     }
 
     #[test]
-    fn no_argument_is_the_demo() {
+    fn the_first_steps_are_commands_that_there_are() {
         assert!(Cli::try_parse_from(["taut"]).is_ok_and(|cli| cli.command.is_none()));
+        let shown = FIRST_STEPS
+            .lines()
+            .filter(|line| line.starts_with("  taut "));
+        let mut count = 0;
+        for line in shown {
+            let words = line.split_whitespace();
+            // The command ends where its explanation begins.
+            let takes = if line.contains("--config") { 4 } else { 2 };
+            let command: Vec<&str> = words.take(takes).collect();
+            assert!(Cli::try_parse_from(&command).is_ok(), "{command:?}");
+            count += 1;
+        }
+        assert_eq!(count, 3);
+    }
+
+    #[test]
+    fn the_version_says_commit_features_and_target() {
+        for part in [
+            "commit   ",
+            "features ",
+            "target   ",
+            env!("CARGO_PKG_VERSION"),
+        ] {
+            assert!(LONG_VERSION.contains(part), "{}", *LONG_VERSION);
+        }
+    }
+
+    #[test]
+    fn a_demo_takes_four_ports_in_a_row_or_free_ones() {
+        for (port, good) in [
+            ("0", true),
+            ("65532", true),
+            ("65533", false),
+            ("-1", false),
+        ] {
+            let parsed = Cli::try_parse_from(["taut", "demo", &format!("--port={port}")]);
+            assert_eq!(parsed.is_ok(), good, "{port}");
+        }
+    }
+
+    #[test]
+    fn the_help_of_replay_explains_every_column() {
+        let columns = taut_scene::REPLAY_COLUMNS.split(',');
+        for column in columns.filter(|column| {
+            ![
+                "hy", "hz", "hqw", "hqx", "hqy", "sy", "sz", "sqw", "sqx", "sqy",
+            ]
+            .contains(column)
+        }) {
+            assert!(REPLAY_HELP.contains(column), "{column} is not explained");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod support;
 
 use std::net::UdpSocket;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use support::{Workplace, start, taut, workbench};
@@ -43,6 +43,101 @@ fn every_command_has_help_with_an_example() {
             "{command}"
         );
     }
+}
+
+/// Who reads may stop reading: `taut doctor | head -1`.
+#[test]
+fn a_reader_that_goes_away_ends_a_command_quietly() {
+    let place = Workplace::new();
+    let (key, trace, out) = (
+        place.text("other.key"),
+        place.text("hand.csv"),
+        place.text("out.csv"),
+    );
+    place.write(
+        "hand.csv",
+        "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.1,1,0,0,0\n1,0,0,0.1,1,0,0,0\n",
+    );
+    let workbench = place.text("workbench.toml");
+    let replay = [
+        "replay",
+        "--json",
+        "--scene",
+        "sphere-on-plane",
+        "--trace",
+        &trace,
+        "--out",
+        &out,
+    ];
+    for arguments in [
+        [].as_slice(),
+        &["--help"],
+        &["doctor"],
+        &["doctor", "--json"],
+        &["check", "--json", &workbench],
+        &["check", &workbench],
+        &["keys", "--out", &key],
+        &replay,
+    ] {
+        let mut child = match Command::new(env!("CARGO_BIN_EXE_taut"))
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+        {
+            Ok(child) => child,
+            Err(error) => panic!("{error}"),
+        };
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap_or_else(|e| panic!("{e}"));
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {error}");
+        assert!(!error.contains("panic"), "{arguments:?}: {error}");
+    }
+}
+
+#[test]
+fn the_version_names_the_build() {
+    let output = taut(&["--version"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["commit ", "features ", "target "] {
+        assert!(text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn without_a_command_it_says_how_to_begin_and_starts_nothing() {
+    let output = taut::<&str>(&[]);
+    assert_eq!(output.status.code(), Some(0));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        text.contains("taut demo") && text.contains("taut --help"),
+        "{text}"
+    );
+}
+
+#[test]
+fn completions_and_manual_pages_name_every_command() {
+    let place = Workplace::new();
+    let commands = [
+        "demo", "serve", "bridge", "replay", "record", "check", "doctor", "keys",
+    ];
+    for shell in ["bash", "zsh", "fish"] {
+        let output = taut(&["completions", shell]);
+        let script = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(
+            commands.iter().all(|command| script.contains(command)),
+            "{shell}"
+        );
+    }
+    let directory = place.text("man1");
+    assert!(taut(&["man", "--out", &directory]).status.success());
+    for command in commands {
+        let page = place.path("man1").join(format!("taut-{command}.1"));
+        let text = std::fs::read_to_string(&page).unwrap_or_default();
+        assert!(text.contains("Example"), "{}", page.display());
+    }
+    assert!(place.path("man1").join("taut.1").exists());
 }
 
 #[test]

@@ -18,10 +18,10 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use relay::{Impairment, Waiting};
-use taut::config::{Overrides, session_setup};
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::setup::DeviceSource;
-use taut::terminal::Terminal;
+use taut::session::setup::DeviceSource;
+use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_bridge::{BridgeArgs, BridgeReport, DeviceLimits, MAX_EDGE_DELAY};
 use taut_link::{ClientOptions, Role, connect, create_key_file};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use god_object::nalgebra::Vector3;
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose};
-use taut::checker::PenetrationChecker;
+use taut::loops::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
     ArmWish, Device, DeviceFault, DeviceInfo, DeviceSample, EventKind, Grip, Hand, MinJerkPath,
@@ -93,7 +93,7 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
         let mut largest: f64 = 0.0;
         for _ in 0..3500 {
             session.tick(god_object_ticks);
-            let contacts = session.loops.observers.monitor.contacts.newest();
+            let contacts = session.loops.readers.monitor.contacts.newest();
             let pose = contacts.set.god_object_pose;
             assert!(
                 pose.translation.z >= 0.019,
@@ -101,7 +101,7 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
                 pose.translation.z
             );
             assert_eq!(checker.penetrated_obstacle(&pose, &contacts.moving), None);
-            let force = linear(&session.loops.observers.monitor.wrench.newest().wrench);
+            let force = linear(&session.loops.readers.monitor.wrench.newest().wrench);
             // Frictionless, so nothing but along the normal.
             assert!(force.xy().norm() < 1e-3 * force.norm().max(1.0), "{force}");
             largest = largest.max(force.z);
@@ -112,21 +112,14 @@ fn pressing_on_a_plane_gives_a_force_without_penetration_at_any_god_object_rate(
             "largest force {largest} N at every {god_object_ticks} ticks"
         );
         assert_eq!(
-            session
-                .loops
-                .observers
-                .monitor
-                .wrench
-                .newest()
-                .wrench
-                .norm(),
+            session.loops.readers.monitor.wrench.newest().wrench.norm(),
             0.0,
             "no force in free space"
         );
         assert!(
             session
                 .loops
-                .observers
+                .readers
                 .monitor
                 .device
                 .newest()
@@ -195,7 +188,7 @@ fn a_lost_device_gets_no_force_and_is_told_as_faulty() {
         assert_eq!(felt() == 0.0, gone, "{} N after {age} ms", felt());
         before = felt();
     }
-    assert!(session.loops.observers.monitor.device.newest().faulty);
+    assert!(session.loops.readers.monitor.device.newest().faulty);
     assert_eq!(
         count(&session, EventKind::DeviceLost),
         1,

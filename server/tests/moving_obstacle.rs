@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use god_object::spatial::linear;
 use god_object::{GodObject, Pose, World};
-use taut::broadcast::StateWriter;
-use taut::checker::PenetrationChecker;
-use taut::head::{HeadMotion, HeadSource};
+use taut::commands::replay::Replay;
+use taut::loops::checker::PenetrationChecker;
 use taut::loops::wiring::WiredLoops;
-use taut::replay::Replay;
+use taut::session::broadcast::StateWriter;
+use taut::session::head::{HeadMotion, HeadSource};
 use taut_bridge::{
     AtEnd, Device, Grip, Hand, MinJerkPath, RecordedDevice, SafetySettings, SimulatedDevice,
     TraceRow, ViaPoint,
@@ -120,7 +120,7 @@ fn the_plate_pushes_the_hand_without_penetration_at_any_god_object_rate() {
         let begun = session.now;
         for _ in 0..8000 {
             session.tick(god_object_ticks);
-            let monitor = &mut session.loops.observers.monitor;
+            let monitor = &mut session.loops.readers.monitor;
             let contacts = monitor.contacts.newest();
             let pose = contacts.set.god_object_pose;
             assert_eq!(
@@ -153,7 +153,7 @@ fn the_plate_pushes_the_hand_without_penetration_at_any_god_object_rate() {
                 "a step of {largest_step} N at every {god_object_ticks} ticks"
             );
         }
-        let monitor = &mut session.loops.observers.monitor;
+        let monitor = &mut session.loops.readers.monitor;
         assert_eq!(monitor.wrench.newest().wrench.norm(), 0.0, "the plate left");
     }
 }
@@ -173,7 +173,7 @@ fn an_update_that_comes_late_moves_the_plate_the_whole_way_and_through_nothing()
         session.loops.coupling.tick(session.now);
     }
     session.tick(1);
-    let contacts = session.loops.observers.monitor.contacts.newest();
+    let contacts = session.loops.readers.monitor.contacts.newest();
     let (body, plate) = (contacts.set.god_object_pose, contacts.moving[0].pose);
     assert_eq!(plate.translation.z, 0.030, "where the trace is by now");
     assert!(
@@ -200,11 +200,11 @@ fn clients_are_told_where_the_trace_is_at_the_time_of_each_update() {
         mut god_object,
         mut coupling,
         mut haptics,
-        observers,
+        readers,
         ..
     } = session.loops;
     let reference_point = scene.reference_point();
-    let mut states = StateWriter::new(observers.broadcast, head, &reference_point, 1);
+    let mut states = StateWriter::new(readers.broadcast, head, &reference_point, 1);
     let first = session.now + TICK;
     let (mut now, mut told) = (session.now, 0);
     for _ in 0..9000 {
@@ -253,7 +253,7 @@ fn the_loops_and_the_replay_move_everything_alike() {
         session.tick(1);
         let elapsed = (session.now - first).as_secs_f64();
         let row = replay.row(elapsed, &scene.start);
-        let contacts = session.loops.observers.monitor.contacts.newest();
+        let contacts = session.loops.readers.monitor.contacts.newest();
         assert_eq!(
             contacts.set.god_object_pose, row.god_object_pose,
             "at {elapsed}"
@@ -341,7 +341,7 @@ fn a_body_that_is_squeezed_holds_the_plate_up_and_clients_are_told_where_it_is()
     let first = session.now + TICK;
     for _ in 0..2300 {
         session.tick(1);
-        let contacts = session.loops.observers.monitor.contacts.newest();
+        let contacts = session.loops.readers.monitor.contacts.newest();
         let place = contacts.moving[0].pose;
         let there = motion(&built).pose_at((session.now - first).as_secs_f64());
         lags = lags.max(there.translation.z - place.translation.z);

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use god_object::{GodObject, Pose};
-use taut::devices::device;
 use taut::loops::wiring::WiredLoops;
-use taut::setup::DeviceSource;
+use taut::session::setup::DeviceSource;
+use taut::session::setup::devices::device;
 use taut_bridge::{EventKind, SafetySettings};
 use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
 use taut_scene::{Device, Scene};
@@ -82,7 +82,7 @@ fn loops_two_and_three_allocate_nothing() {
             loops.god_object.tick(|| now);
             most_contacts = most_contacts.max(
                 loops
-                    .observers
+                    .readers
                     .monitor
                     .contacts
                     .newest()

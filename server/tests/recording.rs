@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use taut::config::{Overrides, session_setup};
-use taut::failure::Failure;
-use taut::recorded_session;
+use taut::commands::replay::recorded;
 use taut::report::RecordedReport;
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::shutdown::Shutdown;
-use taut::terminal::Terminal;
+use taut::session::setup::workbench::{Overrides, session_setup};
+use taut::shared::failure::Failure;
+use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
@@ -62,7 +62,7 @@ fn record(scene: &str, directory: &Path) {
 }
 
 fn again(directory: &Path) -> Result<RecordedReport, Failure> {
-    recorded_session::run(directory, None, false, &Shutdown::default())
+    recorded::run(directory, None, false, &Shutdown::default())
 }
 
 fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
@@ -82,7 +82,7 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
         let mut attempts = (0..ATTEMPTS).map(|attempt| {
             let recording = directory.path().join(format!("{scene}-{attempt}"));
             record(scene, &recording);
-            match recorded_session::run(&recording, Some(&out), false, &Shutdown::default()) {
+            match recorded::run(&recording, Some(&out), false, &Shutdown::default()) {
                 Ok(report) => report,
                 Err(error) => panic!("{error}"),
             }

@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 use god_object::nalgebra::Point3;
 use god_object::{Pose, Vector6};
-use taut::arm;
 use taut::cli::ArmArgs;
-use taut::config::{Overrides, session_setup};
+use taut::commands::arm;
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::setup::{DeviceSource, SessionSetup};
-use taut::terminal::Terminal;
+use taut::session::setup::workbench::{Overrides, session_setup};
+use taut::session::setup::{DeviceSource, SessionSetup};
 use taut_bridge::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample};
 use taut_link::{
     ClientOptions, ClusterKey, ReceivedState, Role, connect, create_key_file, read_key_file,
@@ -107,7 +107,7 @@ fn a_loop_that_breaks_ends_the_session_without_force_and_says_why() {
         panic!("the failure was not told");
     };
     assert!(failure.to_string().contains("haptics"), "{failure}");
-    assert_eq!(failure.exit_code(), taut::failure::EXIT_FAILED);
+    assert_eq!(failure.exit_code(), taut::shared::failure::EXIT_FAILED);
     assert!(report.haptics_period_us.count > 10);
     assert_eq!(
         written.lock().ok().and_then(|wrench| *wrench),
@@ -322,16 +322,16 @@ fn line_of(
 #[test]
 fn those_who_look_on_see_the_session_without_taut_s_client() {
     let mut setup = setup();
-    setup.looking_on.vrpn.enabled = true;
-    setup.looking_on.vrpn.port = 0;
-    setup.looking_on.stream.enabled = true;
-    setup.looking_on.stream.port = 0;
+    setup.observers.vrpn.enabled = true;
+    setup.observers.vrpn.port = 0;
+    setup.observers.stream.enabled = true;
+    setup.observers.stream.port = 0;
     let session = match Session::start(setup) {
         Ok(session) => session,
         Err(error) => panic!("{error}"),
     };
-    assert_eq!(session.looking_on().lines().len(), 2);
-    let (Some(stream), Some(vrpn)) = (session.looking_on().stream(), session.looking_on().vrpn())
+    assert_eq!(session.observers().lines().len(), 2);
+    let (Some(stream), Some(vrpn)) = (session.observers().stream(), session.observers().vrpn())
     else {
         panic!("not served");
     };

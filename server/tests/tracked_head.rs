@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use taut::cli::{Cli, Command, TrackArgs};
-use taut::config::{Overrides, session_setup};
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::terminal::Terminal;
+use taut::session::setup::workbench::{Overrides, session_setup};
 use taut_link::{
     ClientLink, ClientOptions, ClusterKey, Holder, LinkError, Role, connect, write_credential_file,
 };
@@ -115,7 +115,7 @@ fn a_tracker_moves_the_head_of_every_screen_and_when_it_leaves_the_head_comes_ba
             .unwrap_or_else(|error| panic!("{error}"));
         head_at(&observer, 0.0).await;
         let args = track_arguments(&server, &tracker_key, &trace, "--duration=4");
-        let tracking = tokio::spawn(async move { taut::track::run(&args).await });
+        let tracking = tokio::spawn(async move { taut::commands::track::run(&args).await });
         head_at(&observer, 0.5).await;
         match tracking.await {
             Ok(Ok(sent)) => assert!(sent > 0),
@@ -165,7 +165,7 @@ fn a_tracker_that_stays_moves_the_head_of_the_next_session_too() {
         observer.close().await;
     };
     let args = track_arguments(&server, &tracker_key, &trace, "--stay");
-    let tracking = runtime.spawn(async move { taut::track::run(&args).await });
+    let tracking = runtime.spawn(async move { taut::commands::track::run(&args).await });
     runtime.block_on(watch());
     drop(first);
     let second = session(key.clone(), address.port());

@@ -292,16 +292,16 @@ fn same_place(before: &SceneDescription, now: &SceneDescription) -> bool {
 /// Logs what the device loop noticed, here and at the server.
 fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
     for notice in notices.try_iter() {
-        let (good_news, text) = match notice {
-            Notice::Safety(event) => (event.kind.is_good_news(), event.to_string()),
-            Notice::Refused(broken) => (false, broken.to_string()),
+        let (warning, text) = match notice {
+            Notice::Safety(event) => (event.kind.is_warning(), event.to_string()),
+            Notice::Refused(broken) => (true, broken.to_string()),
         };
-        let level = if good_news {
-            tracing::info!("{text}");
-            LogLevel::Info
-        } else {
+        let level = if warning {
             tracing::warn!("{text}");
             LogLevel::Warning
+        } else {
+            tracing::info!("{text}");
+            LogLevel::Info
         };
         link.post_log(level, text);
     }

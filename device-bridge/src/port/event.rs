@@ -196,6 +196,13 @@ impl EventKind {
         )
     }
 
+    /// Whether it is worth a warning: neither part of normal work, nor the limit of change. A contact that slips off an edge lets go of its force at once;
+    /// the limit makes a ramp of that, as it is there to do.
+    #[must_use]
+    pub fn is_warning(self) -> bool {
+        !self.is_good_news() && !matches!(self, Self::ForceSlewLimited | Self::TorqueSlewLimited)
+    }
+
     /// Whether it is a fault: of the device's samples, or of the computed wrench.
     #[must_use]
     pub fn is_fault(self) -> bool {

@@ -18,6 +18,7 @@
 //! queue full is counted and makes the recording incomplete; [`Recording`] says so when it is read.
 
 mod columns;
+mod device_trace;
 mod error;
 mod identity;
 mod manifest;
@@ -26,6 +27,10 @@ mod recorder;
 mod records;
 mod tap;
 
+pub use device_trace::{
+    MAX_TRACE_BYTES, MAX_TRACE_TIME, NORM_TOLERANCE, TRACE_COLUMNS, TraceFault, TraceRows,
+    TraceSample, parse_trace, unit_quaternion,
+};
 pub use error::RecordingError;
 pub use identity::identity_of;
 pub use manifest::{FORMAT, Lost, Manifest, SceneOrigin};

@@ -10,8 +10,6 @@ use crate::problem::Problem;
 pub const MAX_TOML_BYTES: u64 = 1 << 20;
 /// Largest mesh file, bytes: some ten million triangles, more than the memory of a workbench is for.
 pub const MAX_MESH_BYTES: u64 = 1 << 29;
-/// Largest trace, bytes: more than an hour at 1 kHz.
-pub const MAX_TRACE_BYTES: u64 = 1 << 29;
 
 /// Name of the variable that names the data directory.
 pub const DATA_VARIABLE: &str = "TAUT_DATA";

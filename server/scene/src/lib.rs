@@ -11,7 +11,6 @@ mod files;
 mod height_map_file;
 mod mesh_file;
 mod problem;
-mod rotation;
 mod scene;
 pub mod shapes;
 mod simplify;
@@ -21,12 +20,9 @@ mod workbench;
 pub use check::{FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
 pub use fidelity::FidelityPlan;
-pub use files::{
-    DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dir, data_dirs, data_file,
-};
+pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
-pub use rotation::{NORM_TOLERANCE, unit_quaternion};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
     GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,
@@ -34,6 +30,7 @@ pub use scene::{
     SceneSource, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::{Simplified, simplify};
+pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,
     TraceSample,

@@ -62,6 +62,11 @@ impl FileError {
         }
     }
 
+    /// Of at least one fault.
+    pub(crate) fn of_all(problems: Vec<Problem>) -> Self {
+        Self { problems }
+    }
+
     /// Every fault, the first one first.
     pub fn problems(&self) -> &[Problem] {
         &self.problems

@@ -7,15 +7,15 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::realtime::thread_cpu_time;
+use crate::loops::realtime::thread_cpu_time;
 use god_object::{Coupling, ProjectionStatus, ShadedAcceleration};
 use taut_recording::{ForceRecord, Tap};
 
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
+use crate::shared::timing::Histogram;
 use crate::shared::wrench_command::WrenchCommand;
-use crate::timing::Histogram;
 
 /// Loop 2 with its ends of the shared data.
 #[derive(Debug)]

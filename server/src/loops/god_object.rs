@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::fidelity::FidelityWatch;
-use crate::realtime::thread_cpu_time;
+use crate::loops::fidelity::FidelityWatch;
+use crate::loops::realtime::thread_cpu_time;
 use god_object::spatial::{angular, linear};
 use god_object::{GodObject, Pose, ShadedAcceleration};
 use taut_bridge::edge::{device_ahead, device_predicted, way_around};
@@ -22,7 +22,7 @@ use taut_scene::BuiltMotion;
 use crate::shared::contact_snapshot::{ContactSnapshot, MAX_MOVING, MovingObstacle};
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
-use crate::timing::Histogram;
+use crate::shared::timing::Histogram;
 
 /// Sets reach a bridge that couples by itself at least this often.
 const SET_PERIOD: Duration = Duration::from_millis(1);

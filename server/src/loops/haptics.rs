@@ -16,8 +16,8 @@ use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
+use crate::shared::timing::Histogram;
 use crate::shared::wrench_command::WrenchCommand;
-use crate::timing::Histogram;
 
 /// Loop 3 with its device and its ends of the shared data.
 pub struct HapticsLoop {
@@ -153,8 +153,8 @@ impl HapticsLoop {
         self.port.release_step(now)
     }
 
-    /// What of the energy given is the obstacles', and what nobody's.
-    fn tell_obstacle_work(&self) {
+    /// Publishes the work of the obstacles on the hand, and the energy that neither hand nor obstacles account for.
+    fn publish_obstacle_work(&self) {
         let given = self.port.energy().delivered();
         let work = self.wrench.held().obstacle_work;
         let generated = (given - work).max(self.statistics.energy_generated()); // NaN: as before
@@ -203,7 +203,7 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
-        self.tell_obstacle_work();
+        self.publish_obstacle_work();
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
@@ -258,8 +258,8 @@ fn newest_command(wrench: &mut Subscriber<WrenchCommand>, is_felt: bool) -> Comm
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shared::timing::Distribution;
     use crate::shared::{device_state, wrench_command};
-    use crate::timing::Distribution;
     use god_object::nalgebra::Point3;
     use god_object::spatial::Vector6;
     use taut_bridge::{

@@ -1,4 +1,4 @@
-//! The events of the device port, by kind: counted in the haptics loop without waiting, told elsewhere.
+//! The events of the device port, by kind: counted in the haptics loop without waiting, logged elsewhere.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -53,33 +53,33 @@ impl IncidentCounts {
 
 /// What one listener has heard of the counts.
 #[derive(Debug)]
-pub struct IncidentNews([u64; EventKind::ALL.len()]);
+pub(crate) struct IncidentCursor([u64; EventKind::ALL.len()]);
 
-impl Default for IncidentNews {
+impl Default for IncidentCursor {
     fn default() -> Self {
         Self([0; EventKind::ALL.len()])
     }
 }
 
-impl IncidentNews {
+impl IncidentCursor {
     /// The newest event of each kind that happened since the last call, with how often it did, in the order of their numbers.
-    pub fn since_last(&mut self, counts: &IncidentCounts) -> Vec<(SafetyEvent, u64)> {
-        let mut news = Vec::new();
-        for (kind, told) in EventKind::ALL.into_iter().zip(&mut self.0) {
+    pub(crate) fn since_last(&mut self, counts: &IncidentCounts) -> Vec<(SafetyEvent, u64)> {
+        let mut fresh = Vec::new();
+        for (kind, last) in EventKind::ALL.into_iter().zip(&mut self.0) {
             let count = counts.of(kind);
-            let grown = count - *told;
-            *told = count;
+            let grown = count - *last;
+            *last = count;
             if grown > 0 {
-                news.extend(counts.newest(kind).map(|event| (event, grown)));
+                fresh.extend(counts.newest(kind).map(|event| (event, grown)));
             }
         }
-        news.sort_by_key(|(event, _)| event.number);
-        news
+        fresh.sort_by_key(|(event, _)| event.number);
+        fresh
     }
 }
 
 /// The line that tells of an event that happened `times` times.
-pub fn line(event: &SafetyEvent, times: u64) -> String {
+pub(crate) fn line(event: &SafetyEvent, times: u64) -> String {
     let time_s = event.time.as_secs_f64();
     let line = format!("{event} at {time_s:.3} s, no. {}", event.number);
     if times > 1 {
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn a_listener_hears_of_each_kind_once_and_how_often() {
-        let (counts, mut news) = (IncidentCounts::default(), IncidentNews::default());
+        let (counts, mut cursor) = (IncidentCounts::default(), IncidentCursor::default());
         let event = |number, kind| SafetyEvent {
             number,
             time: Duration::from_millis(1500),
@@ -128,7 +128,7 @@ mod tests {
         counts.count(&event(1, EventKind::DeviceLost));
         counts.count(&event(2, EventKind::Arming));
         counts.count(&event(3, EventKind::DeviceLost));
-        let heard = news.since_last(&counts);
+        let heard = cursor.since_last(&counts);
         let lines: Vec<_> = heard
             .iter()
             .map(|(event, times)| line(event, *times))
@@ -140,6 +140,6 @@ mod tests {
                 "device: lost, the force fades (0.021 s) at 1.500 s, no. 3 (2 times)"
             ]
         );
-        assert!(news.since_last(&counts).is_empty());
+        assert!(cursor.since_last(&counts).is_empty());
     }
 }

@@ -9,9 +9,13 @@
 //! Each is a struct whose `tick(now)` does one round, so that a virtual clock can drive it; a thread of [`shell`] does it in time.
 //! [`wiring`] puts them together.
 
+pub mod checker;
 pub mod coupling;
+pub(crate) mod fidelity;
 pub mod god_object;
 pub mod haptics;
-pub mod incidents;
+pub(crate) mod incidents;
+pub mod realtime;
 pub mod shell;
+pub(crate) mod statistics;
 pub mod wiring;

@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use taut_bridge::realtime::{CLEAR_OF_KERNEL_TICK, first_on_beat, sleep_until};
 
-use crate::clock::SessionClock;
-use crate::shutdown::Shutdown;
+use crate::shared::clock::SessionClock;
+use crate::shared::shutdown::Shutdown;
 
 /// Wakes the thread that waits in [`Waker::wait`]. Clones wake the same thread.
 #[derive(Clone, Debug, Default)]

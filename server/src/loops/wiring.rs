@@ -11,12 +11,12 @@ use super::coupling::CouplingLoop;
 use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
+use crate::loops::statistics::Statistics;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::Subscriber;
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
-use crate::statistics::Statistics;
 
 /// The loops, ready to be ticked.
 pub struct WiredLoops {
@@ -30,15 +30,15 @@ pub struct WiredLoops {
     pub coupling_waker: Waker,
     /// Asks loop 3 for force or for none.
     pub arm_switch: Arc<ArmSwitch>,
-    /// For those who look on.
-    pub observers: Observers,
+    /// Read ends for broadcaster, monitor, checker and status line.
+    pub readers: SharedDataReaders,
     /// What all of them count.
     pub statistics: Statistics,
 }
 
 /// The reading ends that belong to no loop.
 #[derive(Debug)]
-pub struct Observers {
+pub struct SharedDataReaders {
     /// For the broadcaster.
     pub broadcast: SharedView,
     /// For the monitor.
@@ -49,7 +49,7 @@ pub struct Observers {
     pub status: Subscriber<WrenchCommand>,
 }
 
-/// One observer's ends of all that the loops publish.
+/// One reader's ends of all that the loops publish.
 #[derive(Debug)]
 pub struct SharedView {
     /// From loop 3.
@@ -116,7 +116,7 @@ impl WiredLoops {
             god_object: god_object.statistics(),
             ..Statistics::default()
         };
-        let observers = Observers {
+        let readers = SharedDataReaders {
             broadcast: SharedView {
                 device: device_readers.broadcast,
                 contacts: contact_readers.broadcast,
@@ -136,7 +136,7 @@ impl WiredLoops {
             haptics,
             coupling_waker,
             arm_switch,
-            observers,
+            readers,
             statistics,
         }
     }

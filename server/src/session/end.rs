@@ -2,12 +2,12 @@
 
 use taut_link::ServerLink;
 
-use crate::failure::Failure;
-use crate::frames::FramesReport;
-use crate::looking_on::LookingOn;
-use crate::monitor::{MonitorFeed, Severity};
 use crate::report::SessionReport;
-use crate::terminal::Terminal;
+use crate::report::frames::FramesReport;
+use crate::report::terminal::Terminal;
+use crate::session::monitor::{MonitorFeed, Severity};
+use crate::session::observers::ObserverServices;
+use crate::shared::failure::Failure;
 
 use super::Session;
 
@@ -68,7 +68,7 @@ impl Session {
             let _ = thread.join();
         }
         let monitor = self.monitor.take().map(MonitorFeed::stop);
-        self.looking_on = LookingOn::default();
+        self.observers = ObserverServices::default();
         if let Some(link) = self.link.take() {
             self.runtime.block_on(link.shutdown());
         }

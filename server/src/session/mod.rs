@@ -4,8 +4,19 @@
 //! then the threads: coupling, god-object, checker, broadcast, and haptics last, which sets everything moving. Stopped the other way
 //! round. A start that fails on the way leaves nothing running.
 
+pub(crate) mod admission;
+pub mod audit;
+pub mod broadcast;
+mod clients;
+pub mod edge_sets;
 mod end;
-mod news;
+mod frames;
+pub mod head;
+pub(crate) mod monitor;
+pub(crate) mod observers;
+mod remote_head;
+mod reporting;
+pub mod setup;
 mod start;
 mod threads;
 
@@ -22,25 +33,25 @@ use taut_recording::Recorder;
 use taut_scene::FidelityPlan;
 use tokio::runtime::Runtime;
 
-use crate::audit::AuditTrail;
-use crate::clients::ClientLedger;
-use crate::clock::SessionClock;
-use crate::fidelity::FidelityWatch;
-use crate::looking_on::LookingOn;
-use crate::loops::incidents::IncidentNews;
-use crate::monitor::{MonitorFeed, NetworkCounts};
-use crate::realtime::RealtimeLedger;
-use crate::report::RealtimeReport;
+use crate::loops::fidelity::FidelityWatch;
+use crate::loops::incidents::IncidentCursor;
+use crate::loops::realtime::RealtimeLedger;
+use crate::loops::realtime::RealtimeReport;
+use crate::loops::statistics::Statistics;
+use crate::session::audit::AuditTrail;
+use crate::session::clients::ClientLedger;
+use crate::session::monitor::{MonitorFeed, NetworkCounts};
+use crate::session::observers::ObserverServices;
+use crate::shared::clock::SessionClock;
 use crate::shared::fanout::Subscriber;
+use crate::shared::shutdown::Shutdown;
 use crate::shared::wrench_command::WrenchCommand;
-use crate::shutdown::Shutdown;
-use crate::statistics::Statistics;
 
 /// The scene's choice of its fidelity, and the watch over it.
 struct Fidelity {
     plan: FidelityPlan,
     watch: Arc<FidelityWatch>,
-    told: [bool; 2],
+    reported: [bool; 2],
 }
 
 /// A running session. Dropped, it ends.
@@ -52,7 +63,7 @@ pub struct Session {
     statistics: Statistics,
     wrench: Subscriber<WrenchCommand>,
     arm_switch: Arc<ArmSwitch>,
-    incidents: IncidentNews,
+    incidents: IncidentCursor,
     fidelity: Option<Fidelity>,
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
@@ -61,7 +72,7 @@ pub struct Session {
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
     recorder: Option<Recorder>,
-    looking_on: LookingOn,
+    observers: ObserverServices,
     link: Option<ServerLink>,
     runtime: Runtime,
     /// While it is held, idle cores wait at work.
@@ -90,8 +101,8 @@ impl Session {
     }
 
     /// Those who look on without taut's own client.
-    pub fn looking_on(&self) -> &LookingOn {
-        &self.looking_on
+    pub fn observers(&self) -> &ObserverServices {
+        &self.observers
     }
 
     /// The running monitor.

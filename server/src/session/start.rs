@@ -11,21 +11,21 @@ use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
 use tokio::runtime::Runtime;
 
-use crate::audit::AuditTrail;
-use crate::broadcast::{BridgeCommands, StateWriter};
-use crate::checker::PenetrationChecker;
-use crate::clients::ClientLedger;
-use crate::clock::SessionClock;
-use crate::edge_sets::EdgeSets;
-use crate::failure::Failure;
-use crate::fidelity::FidelityWatch;
-use crate::looking_on::LookingOn;
-use crate::loops::incidents::IncidentNews;
+use crate::loops::checker::PenetrationChecker;
+use crate::loops::fidelity::FidelityWatch;
+use crate::loops::incidents::IncidentCursor;
+use crate::loops::realtime::{RealtimeLedger, Scheduling};
 use crate::loops::wiring::WiredLoops;
-use crate::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
-use crate::realtime::{RealtimeLedger, Scheduling};
-use crate::setup::{DeviceSource, SessionSetup};
-use crate::shutdown::Shutdown;
+use crate::session::audit::AuditTrail;
+use crate::session::broadcast::{BridgeCommands, StateWriter};
+use crate::session::clients::ClientLedger;
+use crate::session::edge_sets::EdgeSets;
+use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
+use crate::session::observers::ObserverServices;
+use crate::session::setup::{DeviceSource, SessionSetup};
+use crate::shared::clock::SessionClock;
+use crate::shared::failure::Failure;
+use crate::shared::shutdown::Shutdown;
 
 use super::{Fidelity, Session};
 
@@ -79,8 +79,8 @@ impl Session {
             idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
             ..options
         };
-        let (looking_on, outlets) =
-            LookingOn::start(&setup.looking_on, &setup.content.description)?;
+        let (observers, outlets) =
+            ObserverServices::start(&setup.observers, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
@@ -101,7 +101,7 @@ impl Session {
         let fidelity = setup.fidelity.map(|plan| Fidelity {
             watch: Arc::new(FidelityWatch::new(&plan)),
             plan,
-            told: [false; 2],
+            reported: [false; 2],
         });
         let most_contacts = fidelity
             .as_ref()
@@ -129,9 +129,9 @@ impl Session {
             shutdown: Shutdown::default(),
             ledger,
             statistics: loops.statistics.clone(),
-            wrench: loops.observers.status,
+            wrench: loops.readers.status,
             arm_switch: loops.arm_switch.clone(),
-            incidents: IncidentNews::default(),
+            incidents: IncidentCursor::default(),
             fidelity,
             network: Arc::default(),
             clients: ClientLedger::default(),
@@ -139,7 +139,7 @@ impl Session {
             threads: Vec::new(),
             monitor: None,
             recorder,
-            looking_on,
+            observers,
             link: Some(link),
             runtime,
             _awake: awake,
@@ -149,7 +149,7 @@ impl Session {
         if let Some(settings) = &setup.monitor {
             let sources = MonitorSources {
                 head: watched_head,
-                shared: loops.observers.monitor,
+                shared: loops.readers.monitor,
                 statistics: loops.statistics.clone(),
                 clock,
             };
@@ -166,7 +166,7 @@ impl Session {
             session.ledger.note("process", lock_memory());
         }
         let states = StateWriter::new(
-            loops.observers.broadcast,
+            loops.readers.broadcast,
             head,
             &setup.world.body.reference_point,
             scene_revision,
@@ -180,7 +180,7 @@ impl Session {
         let watch = session.fidelity.as_ref().map(|f| f.watch.clone());
         let god_object = loops.god_object.with_fidelity(watch);
         session.start_god_object(god_object, loops.coupling_waker, &setup.realtime)?;
-        session.start_checker(checker, loops.observers.checker)?;
+        session.start_checker(checker, loops.readers.checker)?;
         session.start_broadcast(
             states,
             broadcaster,
@@ -195,12 +195,12 @@ impl Session {
         session.start_haptics(loops.haptics, &setup.realtime)?;
         session.start_service_manager()?;
         session.enforce(setup.realtime.policy)?;
-        session.tell_start(&opening);
+        session.log_start(&opening);
         Ok(session)
     }
 
     /// What runs here, and what of real time is in force, to the monitor's log.
-    pub(super) fn tell_start(&self, opening: &str) {
+    pub(super) fn log_start(&self, opening: &str) {
         let Some(monitor) = &self.monitor else {
             return;
         };

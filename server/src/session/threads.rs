@@ -8,17 +8,17 @@ use taut_bridge::realtime::{pin_to_core, sleep_until};
 use taut_bridge::service_manager;
 use taut_link::{Broadcaster, ServerLink};
 
-use crate::broadcast::{self, BridgeCommands, StateWriter};
-use crate::checker::{self, PenetrationChecker};
-use crate::failure::Failure;
-use crate::looking_on::Outlets;
+use crate::loops::checker::{self, PenetrationChecker};
 use crate::loops::coupling::CouplingLoop;
 use crate::loops::god_object::GodObjectLoop;
 use crate::loops::haptics::HapticsLoop;
+use crate::loops::realtime::{RealtimePolicy, Scheduling};
 use crate::loops::shell::{Beat, Waker, run_at_deadlines, spawn};
-use crate::realtime::{RealtimePolicy, Scheduling};
-use crate::setup::RealtimeSettings;
+use crate::session::broadcast::{self, BridgeCommands, StateWriter};
+use crate::session::observers::Outlets;
+use crate::session::setup::RealtimeSettings;
 use crate::shared::contact_snapshot::ContactSnapshot;
+use crate::shared::failure::Failure;
 use crate::shared::fanout::Subscriber;
 
 use super::Session;

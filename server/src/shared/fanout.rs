@@ -23,7 +23,7 @@ pub struct Subscriber<T: Send> {
 /// Ends that share a value, `initial` until the first one is published.
 ///
 /// Every buffer is brought to the capacity of `initial` by `clone_from`.
-pub fn fanout<T: Clone + Send, const READERS: usize>(
+pub(crate) fn fanout<T: Clone + Send, const READERS: usize>(
     initial: &T,
 ) -> (Publisher<T>, [Subscriber<T>; READERS]) {
     let mut inputs = Vec::with_capacity(READERS);

@@ -9,10 +9,15 @@
 //!     └───────────────────────────── wrench_command ──────────────────────┘
 //! ```
 //!
-//! Broadcast, monitor and checker read the same data and write none.
+//! Broadcast, monitor and checker read the same data and write none. Beside the arrows stand what every thread uses: session time, timing,
+//! the request to stop, and why a command failed.
 
+pub(crate) mod clock;
 pub mod contact_snapshot;
 pub mod device_state;
-pub mod fanout;
+pub mod failure;
+pub(crate) mod fanout;
 pub mod shaded_acceleration;
+pub mod shutdown;
+pub mod timing;
 pub mod wrench_command;

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::GodObject;
-use taut::edge_sets::EdgeSets;
 use taut::loops::wiring::WiredLoops;
+use taut::session::edge_sets::EdgeSets;
 use taut_bridge::edge::{EdgeCoupler, offer_of};
 use taut_bridge::{
     BridgeLoop, CommandSource, DEFAULT_MAX_AGE, DeviceLimits, DevicePort, EventKind, Grip, Hand,
@@ -266,7 +266,7 @@ impl Server {
         loops.coupling.tick(now);
         loops.god_object.tick(|| now);
         loops.coupling.tick(now);
-        let view = &mut loops.observers.broadcast;
+        let view = &mut loops.readers.broadcast;
         let armed = !view.device.newest().safety.arming.is_off();
         let fresh = self.wrenches.update();
         let command = self.wrenches.output_buffer();

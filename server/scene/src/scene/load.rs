@@ -12,7 +12,7 @@ use super::spec::{
     ObstacleSpec, Shape, View,
 };
 use crate::document::{At, Document};
-use crate::files::{MAX_TOML_BYTES, MAX_TRACE_BYTES, data_dirs, read_text};
+use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
 use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
 use crate::problem::{FileError, Problem};
@@ -193,7 +193,7 @@ impl Scene {
             return DeviceTrace::parse(name, text);
         }
         let path = self.locate(name, at)?;
-        let text = read_text(&path, MAX_TRACE_BYTES)?;
+        let text = read_text(&path, taut_recording::MAX_TRACE_BYTES)?;
         DeviceTrace::parse(&path.display().to_string(), &text)
     }
 

@@ -5,8 +5,8 @@ use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
 use super::spec::{HeightMapMapping, HeightMapSpec, Shape};
 use crate::document::{Range, Section, Value};
-use crate::rotation::unit_quaternion;
 use crate::shapes::{Axis, PLATE, hole_circumradius};
+use taut_recording::unit_quaternion;
 
 /// Sides of a prism: fewer make no prism, more make slivers that no hand feels.
 const FACETS: (i64, i64) = (3, 4096);

@@ -6,32 +6,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Duration;
 
-use god_object::Pose;
-use nalgebra::Translation3;
+use taut_recording::{
+    MAX_TRACE_BYTES, MAX_TRACE_TIME, TRACE_COLUMNS, TraceFault, TraceSample, parse_trace,
+};
 
-use crate::files::{MAX_TRACE_BYTES, read_text};
+use crate::files::read_text;
 use crate::problem::{FileError, Problem};
-use crate::rotation::unit_quaternion;
-
-/// The columns that every trace has.
-const COLUMNS: [&str; 8] = ["t", "x", "y", "z", "qw", "qx", "qy", "qz"];
-/// The optional last column.
-const BUTTONS: &str = "buttons";
-/// Most faults reported of one file: after these, it is broken throughout.
-const MAX_PROBLEMS: usize = 20;
-/// Largest magnitude of a time, s: thirty years, and nanoseconds still fit into 64 bits.
-pub const MAX_TRACE_TIME: f64 = 1e9;
-
-/// One line of a trace.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TraceSample {
-    /// Time, s, exactly as in the file.
-    pub time: f64,
-    /// Pose of the device, that is of the held body's own frame.
-    pub pose: Pose,
-    /// One bit each; 0 if the trace has none.
-    pub buttons: u16,
-}
 
 /// A motion of the device. At least one sample, times finite and strictly increasing, rotations unit.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,47 +61,13 @@ impl DeviceTrace {
 
     /// Reads text; `file` is its name in messages. Up to 20 faults are reported, each with its line.
     pub fn parse(file: &str, text: &str) -> Result<Self, FileError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .comment(Some(b'#'))
-            .from_reader(text.as_bytes());
-        let header = reader
-            .headers()
-            .map_err(|e| Problem::of_file(file, format!("is no CSV ({e}); repair it")))?
-            .clone();
-        let names: Vec<&str> = header.iter().collect();
-        let has_buttons = names.len() == COLUMNS.len() + 1 && names[COLUMNS.len()] == BUTTONS;
-        if !names.starts_with(&COLUMNS) || (names.len() > COLUMNS.len() && !has_buttons) {
-            let line = header.position().map_or(1, |p| p.line() as usize);
-            let found: String = names.join(",").chars().take(100).collect();
-            let text = format!(
-                "the header is `{found}`, but must be `{}` and optionally `{BUTTONS}`",
-                COLUMNS.join(",")
-            );
-            return Err(Problem::at_line(file, line, text).into());
-        }
-        let mut problems = Vec::new();
-        let mut samples: Vec<TraceSample> = Vec::new();
-        let mut record = csv::StringRecord::new();
-        while problems.len() < MAX_PROBLEMS {
-            match reader.read_record(&mut record) {
-                Ok(false) => break,
-                Ok(true) => {
-                    let line = record.position().map_or(0, |p| p.line() as usize);
-                    match sample(&record, has_buttons, samples.last().map(|s| s.time)) {
-                        Ok(sample) => samples.push(sample),
-                        Err(text) => problems.push(Problem::at_line(file, line, text)),
-                    }
-                }
-                Err(e) => problems.push(Problem::of_file(
-                    file,
-                    format!("is no CSV ({e}); repair it"),
-                )),
-            }
-        }
-        FileError::unless_empty(problems)?;
-        Self::new(file, samples, has_buttons)
+        let problem = |fault: TraceFault| match fault.line {
+            Some(line) => Problem::at_line(file, line, fault.text),
+            None => Problem::of_file(file, fault.text),
+        };
+        let rows = parse_trace(text)
+            .map_err(|faults| FileError::of_all(faults.into_iter().map(problem).collect()))?;
+        Self::new(file, rows.samples, rows.has_buttons)
     }
 
     /// At least one, in order.
@@ -147,7 +93,7 @@ impl DeviceTrace {
     /// The trace as CSV. Numbers are the shortest that read back as the same: what is written is read back bit for bit,
     /// but for quaternions, whose norm is restored.
     pub fn to_csv(&self) -> String {
-        let mut text = COLUMNS.join(",");
+        let mut text = TRACE_COLUMNS.join(",");
         text.push_str(if self.has_buttons { ",buttons\n" } else { "\n" });
         for sample in &self.samples {
             let (p, q) = (
@@ -167,57 +113,6 @@ impl DeviceTrace {
         }
         text
     }
-}
-
-fn sample(
-    record: &csv::StringRecord,
-    has_buttons: bool,
-    previous: Option<f64>,
-) -> Result<TraceSample, String> {
-    let wanted = COLUMNS.len() + usize::from(has_buttons);
-    if record.len() != wanted {
-        return Err(format!(
-            "the line has {} values, but must have {wanted}; repair the line",
-            record.len()
-        ));
-    }
-    let mut numbers = [0.0; 8];
-    for ((number, name), word) in numbers.iter_mut().zip(COLUMNS).zip(record) {
-        *number = word
-            .parse()
-            .map_err(|_| format!("`{name}` is `{word}`, which is no number; repair the line"))?;
-        if !f64::is_finite(*number) {
-            return Err(format!(
-                "`{name}` is {number}, but must be finite; repair the line"
-            ));
-        }
-    }
-    let [time, x, y, z, qw, qx, qy, qz] = numbers;
-    if time.abs() > MAX_TRACE_TIME {
-        return Err(format!(
-            "`t` is {time}, but times are seconds and at most {MAX_TRACE_TIME:e}; convert them"
-        ));
-    }
-    if let Some(previous) = previous.filter(|previous| time <= *previous) {
-        return Err(format!(
-            "`t` is {time} after {previous}, but times must increase; remove or reorder the line"
-        ));
-    }
-    let buttons = match record.get(COLUMNS.len()) {
-        Some(word) => word.parse().map_err(|_| {
-            format!("`{BUTTONS}` is `{word}`, but must be 0 to 65535; repair the line")
-        })?,
-        None => 0,
-    };
-    let pose = Pose::from_parts(
-        Translation3::new(x, y, z),
-        unit_quaternion([qw, qx, qy, qz])?,
-    );
-    Ok(TraceSample {
-        time,
-        pose,
-        buttons,
-    })
 }
 
 #[cfg(test)]

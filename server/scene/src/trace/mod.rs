@@ -3,5 +3,6 @@
 mod device_trace;
 mod replay_output;
 
-pub use device_trace::{DeviceTrace, MAX_TRACE_TIME, TraceSample};
+pub use device_trace::DeviceTrace;
 pub use replay_output::{REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS};
+pub use taut_recording::{MAX_TRACE_TIME, TraceSample};

@@ -203,7 +203,7 @@ fn stall(stalled: Stalled, milliseconds: u32) -> Option<Seen> {
         seen.largest_travel = seen.largest_travel.max((held() - held_last).norm());
         (last, held_last) = (felt(), held());
         seen.lowest = seen.lowest.min(last.norm());
-        let age = loops.observers.monitor.wrench.newest().constraint_age;
+        let age = loops.readers.monitor.wrench.newest().constraint_age;
         seen.oldest_ms = seen.oldest_ms.max(age.as_millis() as u32);
     }
     seen.haptics_ticks = ticked(&loops) - ticked_before;

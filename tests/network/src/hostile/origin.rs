@@ -6,10 +6,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use taut::config::{Overrides, session_setup};
-use taut::failure::Failure;
+use taut::report::terminal::Terminal;
 use taut::session::Session;
-use taut::terminal::Terminal;
+use taut::session::setup::workbench::{Overrides, session_setup};
+use taut::shared::failure::Failure;
 use taut_bridge::{BridgeArgs, BridgeReport, CouplingChoice, HandPreset};
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 

@@ -1,0 +1,44 @@
+//! The render node as a sub-command: whether and with what this build can draw (feature `render`).
+
+use crate::commands::arguments::RenderArgs;
+
+/// Whether this build can draw.
+pub(crate) const BUILT_IN: bool = cfg!(feature = "render");
+
+/// Draws one node of the workbench until the session ends.
+#[cfg(feature = "render")]
+pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
+    use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
+    match taut_render::run(args) {
+        Ok(report) => {
+            taut_bridge::console::report(report.to_string());
+            Ok(())
+        }
+        Err(error) if error.exit_code() == EXIT_BAD_INPUT => Err(Failure::bad_input(error)),
+        Err(error) => Err(Failure::failed(error)),
+    }
+}
+
+/// Says that this build cannot draw.
+#[cfg(not(feature = "render"))]
+pub(crate) fn run(_args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
+    Err(crate::shared::failure::Failure::BadInput(
+        "this program was built without drawing: build it with `--features render`, or use the program `taut-render`".into(),
+    ))
+}
+
+/// What this machine draws with, or why it does not; `None` in a build that cannot draw.
+#[cfg(feature = "render")]
+pub(crate) fn adapter() -> Option<Result<String, String>> {
+    let gpu = taut_render::renderer::Gpu::open();
+    Some(
+        gpu.map(|gpu| gpu.chosen())
+            .map_err(|error| error.to_string()),
+    )
+}
+
+/// What this machine draws with, or why it does not; `None` in a build that cannot draw.
+#[cfg(not(feature = "render"))]
+pub(crate) fn adapter() -> Option<Result<String, String>> {
+    None
+}

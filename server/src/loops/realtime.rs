@@ -1,0 +1,250 @@
+//! What the threads of the server ask of the operating system, and what came of it.
+//!
+//! A request that is refused is written down; with [`RealtimePolicy::Enforce`] the server does not start without it.
+//! Requests that other roles need too are in `taut_bridge::realtime`; here are the server's own.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use taut_bridge::realtime::{RealtimeGrant, request_fifo, sharpen_timers};
+
+/// Ahead of all normal work, behind the real-time class.
+const AHEAD_NICE: i32 = -10;
+/// A little behind normal work: a third of its share where both want a core.
+const BEHIND_NICE: i32 = 5;
+/// Behind all normal work, before idle.
+const BACKGROUND_NICE: i32 = 15;
+
+/// How a refusal by the operating system is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RealtimePolicy {
+    /// It stops the start.
+    Enforce,
+    /// It is reported, and the work goes on without.
+    Waive,
+}
+
+/// How a thread wants to be scheduled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scheduling {
+    /// Real-time class, first in first out, with this priority; timers as sharp as they get either way.
+    Fifo(u8),
+    /// The normal class, ahead of everybody else in it, with sharp timers: for work that may take long. A thread of the real-time
+    /// class that used up a core would be throttled, and the loops with it.
+    Ahead,
+    /// The normal class, a little behind everybody else: for what strangers can cause.
+    Behind,
+    /// The normal class, behind everybody else.
+    Background,
+}
+
+/// What was enforced of the operating system, and what was not, and why.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RealtimeReport {
+    /// In force.
+    pub enforced: Vec<String>,
+    /// Not in force, with the reason.
+    pub waived: Vec<String>,
+}
+
+/// What was asked of the operating system so far, and the answers. Written at the start of each thread, never in a loop.
+#[derive(Clone, Debug, Default)]
+pub struct RealtimeLedger(Arc<Mutex<RealtimeReport>>);
+
+impl RealtimeLedger {
+    /// Schedules the calling thread and notes the answer under the thread's `name`; false when it was refused.
+    pub fn schedule(&self, name: &str, scheduling: Scheduling) -> bool {
+        match scheduling {
+            Scheduling::Fifo(priority) => {
+                let granted = self.note(name, request_fifo(priority));
+                if !granted {
+                    // Without the real-time class the sharpness of timers matters; with it, it is given.
+                    self.note(name, sharpen_timers());
+                }
+                granted
+            }
+            Scheduling::Ahead => {
+                self.note(name, sharpen_timers());
+                self.note(name, request_nice(AHEAD_NICE))
+            }
+            Scheduling::Behind => request_nice(BEHIND_NICE).is_granted(),
+            Scheduling::Background => request_nice(BACKGROUND_NICE).is_granted(),
+        }
+    }
+
+    /// Writes an answer down; whether it was granted.
+    pub fn note(&self, name: &str, grant: RealtimeGrant) -> bool {
+        let mut report = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match grant {
+            RealtimeGrant::Granted { what } => {
+                note_once(&mut report.enforced, format!("{name}: {what}"));
+                true
+            }
+            RealtimeGrant::Waived { what, why } => {
+                note_once(&mut report.waived, format!("{name}: {what}: {why}"));
+                false
+            }
+        }
+    }
+
+    /// Everything noted so far, in the order of names.
+    pub fn report(&self) -> RealtimeReport {
+        let mut report = self
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
+        report.enforced.sort();
+        report.waived.sort();
+        report
+    }
+}
+
+/// Asks for this nice value for the calling thread.
+fn request_nice(value: i32) -> RealtimeGrant {
+    let what = format!("nice {value}");
+    if os::set_nice(value) {
+        RealtimeGrant::Granted { what }
+    } else {
+        let why = "this user may not; run as root, or grant it: LimitNICE=-10 in the service unit"
+            .to_owned();
+        RealtimeGrant::Waived { what, why }
+    }
+}
+
+/// Threads of one name have one answer.
+fn note_once(lines: &mut Vec<String>, line: String) {
+    if !lines.contains(&line) {
+        lines.push(line);
+    }
+}
+
+/// CPU time that the calling thread has used: what its work costs, whoever else is running.
+#[inline]
+pub fn thread_cpu_time() -> Duration {
+    os::thread_cpu_time()
+}
+
+/// Ties a child process to the calling thread: the system kills it when that ends, however it ends.
+pub fn die_with_parent(command: &mut std::process::Command) {
+    os::die_with_parent(command);
+}
+
+/// Lets a child process work after this process's normal threads where both want a core.
+pub fn after_parent(command: &mut std::process::Command) {
+    os::after_parent(command);
+}
+
+#[cfg(target_os = "linux")]
+#[allow(
+    unsafe_code,
+    reason = "thread clock, nice value and parent-death signal are system calls"
+)]
+mod os {
+    use std::os::unix::process::CommandExt;
+    use std::time::Duration;
+
+    /// Behind this process's normal threads, before background work.
+    const CHILD_NICE: libc::c_int = 5;
+
+    pub(super) fn thread_cpu_time() -> Duration {
+        let mut time = libc::timespec {
+            tv_sec: 0,
+            tv_nsec: 0,
+        };
+        // SAFETY: `time` is a valid timespec for the kernel to fill; the calling thread's clock always exists.
+        unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &raw mut time) };
+        Duration::new(time.tv_sec.unsigned_abs(), time.tv_nsec as u32)
+    }
+
+    pub(super) fn set_nice(value: i32) -> bool {
+        // SAFETY: takes integers only; 0 names the calling thread (on Linux the nice value is the thread's).
+        unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, value) == 0 }
+    }
+
+    pub(super) fn after_parent(command: &mut std::process::Command) {
+        // SAFETY: between fork and exec only one system call is made, which is safe there; nothing is allocated or locked.
+        unsafe {
+            command.pre_exec(|| {
+                // A refusal costs smoothness only.
+                libc::setpriority(libc::PRIO_PROCESS, 0, CHILD_NICE);
+                Ok(())
+            });
+        }
+    }
+
+    pub(super) fn die_with_parent(command: &mut std::process::Command) {
+        let parent = std::process::id();
+        // SAFETY: between fork and exec only system calls are made that are safe there; nothing is allocated or locked.
+        unsafe {
+            command.pre_exec(move || {
+                libc::prctl(
+                    libc::PR_SET_PDEATHSIG,
+                    libc::SIGKILL as libc::c_ulong,
+                    0,
+                    0,
+                    0,
+                );
+                // The parent may have died before the request.
+                if libc::getppid() as u32 == parent {
+                    Ok(())
+                } else {
+                    Err(std::io::Error::from_raw_os_error(libc::ESRCH))
+                }
+            });
+        }
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod os {
+    use std::sync::OnceLock;
+    use std::time::{Duration, Instant};
+
+    static START: OnceLock<Instant> = OnceLock::new();
+
+    pub(super) fn thread_cpu_time() -> Duration {
+        START.get_or_init(Instant::now).elapsed()
+    }
+
+    pub(super) fn set_nice(_value: i32) -> bool {
+        false
+    }
+
+    pub(super) fn die_with_parent(_command: &mut std::process::Command) {}
+
+    pub(super) fn after_parent(_command: &mut std::process::Command) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_takes_thread_time_and_sleep_does_not() {
+        let before = thread_cpu_time();
+        std::thread::sleep(Duration::from_millis(20));
+        let slept = thread_cpu_time() - before;
+        assert!(slept < Duration::from_millis(15), "{slept:?}");
+        let mut sum = 0u64;
+        while thread_cpu_time() - before < slept + Duration::from_micros(100) {
+            sum = std::hint::black_box(sum + 1);
+        }
+        assert!(sum > 0);
+    }
+
+    #[test]
+    fn what_is_refused_is_written_down_with_its_reason() {
+        let ledger = RealtimeLedger::default();
+        // Above the largest priority: refused to everybody.
+        assert!(!ledger.schedule("haptics", Scheduling::Fifo(200)));
+        let report = ledger.report();
+        assert!(
+            report
+                .waived
+                .iter()
+                .any(|line| line.contains("haptics: SCHED_FIFO priority 200"))
+        );
+    }
+}

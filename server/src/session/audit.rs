@@ -1,0 +1,330 @@
+//! The audit trail: who joined, who was refused, who armed, what failed. For the journal, under the target `taut::audit`.
+//!
+//! One line per event, with its fields by name and the peer's address. It is not chatty: of the refusals of one address the first
+//! is logged at once and the others as a sum, once a minute; so is what was turned away before it had said anything.
+
+use std::net::{IpAddr, SocketAddr};
+use std::time::Duration;
+
+use taut_link::proto::proof::Grant;
+use taut_link::{Act, ClientStatus, Counters, LinkEvent, Role, Untrusted};
+
+/// Time over which refusals of one address are summed.
+const SUM_PERIOD: Duration = Duration::from_secs(60);
+/// Addresses whose refusals are counted apart; those of further ones are summed together.
+const MAX_SOURCES: usize = 256;
+/// Clients that are known by name; more are never in.
+const MAX_PRESENT: usize = 4096;
+
+/// Something that belongs into the audit trail.
+#[derive(Debug)]
+enum Audit<'e> {
+    /// A client was let in.
+    Joined(&'e ClientStatus),
+    /// It is gone, by itself, because it was silent, or because it was shut out.
+    Left(&'e ClientStatus, &'e str),
+    /// One was not let in.
+    Refused {
+        address: SocketAddr,
+        node: &'e Untrusted,
+        why: &'e str,
+    },
+    /// Further ones were not let in; `None`: from many addresses.
+    RefusedMore { address: Option<IpAddr>, times: u64 },
+    /// Attempts to join were turned away before anything was read of them.
+    TurnedAway { times: u64 },
+    /// A client tried what its role may not.
+    Forbidden { who: Peer, act: Act },
+    /// An operator asked for force, or for none.
+    Arm { who: Peer, arm: bool },
+    /// A node keeps frames by itself or in step, or names forged states.
+    Frames { node: &'e str, what: &'static str },
+    /// The device port did something.
+    Port { what: &'e str, is_fault: bool },
+}
+
+/// A client, as the trail names it.
+#[derive(Clone, Debug)]
+struct Peer {
+    session: u16,
+    node: String,
+    role: Role,
+    credential: String,
+    address: SocketAddr,
+}
+
+impl From<&ClientStatus> for Peer {
+    fn from(status: &ClientStatus) -> Self {
+        Self {
+            session: status.session,
+            node: status.node.clone(),
+            role: status.role,
+            credential: credential(status),
+            address: status.address,
+        }
+    }
+}
+
+/// What it showed, as `[network] revoked` names it.
+fn credential(status: &ClientStatus) -> String {
+    let role = status.role;
+    match status.grant {
+        Grant::Master => "the cluster key".to_owned(),
+        Grant::Node { issue } => format!("{role}:{}#{issue}", status.node),
+        Grant::AnyNode { issue } => format!("{role}:*#{issue}"),
+    }
+}
+
+impl Audit<'_> {
+    /// Writes it.
+    fn record(&self) {
+        macro_rules! record {
+            ($event:literal, $($fields:tt)*) => {
+                tracing::info!(target: taut_log::AUDIT_TARGET, event = $event, $($fields)*)
+            };
+        }
+        match self {
+            Self::Joined(status) => {
+                let who = Peer::from(*status);
+                record!("joined", node = %who.node, role = %who.role, credential = %who.credential, address = %who.address, session = who.session);
+            }
+            Self::Left(status, reason) => {
+                let who = Peer::from(*status);
+                record!("left", node = %who.node, role = %who.role, address = %who.address, session = who.session, reason);
+            }
+            Self::Refused { address, node, why } => {
+                record!("refused", %node, %address, reason = why);
+            }
+            Self::RefusedMore {
+                address: Some(address),
+                times,
+            } => record!("refused", %address, times),
+            Self::RefusedMore {
+                address: None,
+                times,
+            } => record!("refused", address = "many", times),
+            Self::TurnedAway { times } => record!("turned-away", times),
+            Self::Forbidden { who, act } => {
+                record!("forbidden", node = %who.node, role = %who.role, credential = %who.credential, address = %who.address, %act);
+            }
+            Self::Arm { who, arm } => {
+                let event_is = if *arm { "arm" } else { "disarm" };
+                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %who.node, role = %who.role, credential = %who.credential, address = %who.address);
+            }
+            Self::Frames { node, what } => record!("frames", %node, what),
+            Self::Port { what, is_fault } => {
+                let event_is = if *is_fault { "fault" } else { "device" };
+                tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, what);
+            }
+        }
+    }
+}
+
+/// Writes the trail of one session.
+#[derive(Debug, Default)]
+pub struct AuditTrail {
+    present: Vec<Peer>,
+    refusals: Refusals,
+    turned_away: u64,
+    looked: Duration,
+}
+
+impl AuditTrail {
+    /// Takes an event at session time `now`; whether it is one to tell people of: a refusal like those before is not.
+    pub fn follow(&mut self, event: &LinkEvent, now: Duration) -> bool {
+        match event {
+            LinkEvent::Joined(status) => {
+                if self.present.len() < MAX_PRESENT {
+                    self.present.push(status.into());
+                }
+                Audit::Joined(status).record();
+            }
+            LinkEvent::Left { status, reason } => {
+                self.present.retain(|who| who.session != status.session);
+                Audit::Left(status, reason).record();
+            }
+            LinkEvent::Refused {
+                address,
+                node,
+                text,
+                ..
+            } => {
+                if !self.refusals.is_first(address.ip(), now) {
+                    return false;
+                }
+                let address = *address;
+                Audit::Refused {
+                    address,
+                    node,
+                    why: text,
+                }
+                .record();
+            }
+            LinkEvent::Forbidden { node, act, .. } => {
+                if let Some(who) = self.who(node) {
+                    Audit::Forbidden { who, act: *act }.record();
+                }
+            }
+            LinkEvent::Arm { node, arm } => {
+                if let Some(who) = self.who(node) {
+                    Audit::Arm { who, arm: *arm }.record();
+                }
+            }
+            LinkEvent::FreeRunning { node, free } => {
+                Audit::Frames {
+                    node,
+                    what: if *free { "free-running" } else { "in-step" },
+                }
+                .record();
+            }
+            LinkEvent::NoPlace { node } => {
+                Audit::Frames {
+                    node,
+                    what: "no-place",
+                }
+                .record();
+            }
+            LinkEvent::StatesForged { node } => {
+                Audit::Frames {
+                    node,
+                    what: "forged-states",
+                }
+                .record();
+            }
+            LinkEvent::Silent { .. } | LinkEvent::Stats { .. } | LinkEvent::Log { .. } => {}
+        }
+        true
+    }
+
+    /// Takes an event of the device port.
+    pub fn follow_port(&mut self, what: &str, is_fault: bool) {
+        Audit::Port { what, is_fault }.record();
+    }
+
+    /// Tells the sums that are due at session time `now`.
+    pub fn look(&mut self, counters: &Counters, now: Duration) {
+        for (address, times) in self.refusals.due(now) {
+            Audit::RefusedMore { address, times }.record();
+        }
+        let times = counters.turned_away - self.turned_away;
+        if times > 0 && now >= self.looked + SUM_PERIOD {
+            Audit::TurnedAway { times }.record();
+            (self.turned_away, self.looked) = (counters.turned_away, now);
+        }
+    }
+
+    /// Tells the sums that are left at the end.
+    pub fn end(&mut self) {
+        for (address, times) in self.refusals.due(Duration::MAX) {
+            Audit::RefusedMore { address, times }.record();
+        }
+    }
+
+    fn who(&self, node: &str) -> Option<Peer> {
+        self.present.iter().find(|who| who.node == node).cloned()
+    }
+}
+
+/// How many were refused, by address.
+#[derive(Debug, Default)]
+struct Refusals {
+    sources: Vec<Source>,
+    /// Beyond [`MAX_SOURCES`].
+    others: u64,
+    others_told: Duration,
+}
+
+#[derive(Debug)]
+struct Source {
+    address: IpAddr,
+    since: Duration,
+    more: u64,
+}
+
+impl Refusals {
+    /// Counts one; whether it is to be logged at once.
+    fn is_first(&mut self, address: IpAddr, now: Duration) -> bool {
+        if let Some(source) = self
+            .sources
+            .iter_mut()
+            .find(|source| source.address == address)
+        {
+            source.more += 1;
+            return false;
+        }
+        if self.sources.len() < MAX_SOURCES {
+            self.sources.push(Source {
+                address,
+                since: now,
+                more: 0,
+            });
+            return true;
+        }
+        self.others += 1;
+        false
+    }
+
+    /// The sums whose time is over. An address that was quiet meanwhile is forgotten.
+    fn due(&mut self, now: Duration) -> Vec<(Option<IpAddr>, u64)> {
+        let mut sums = Vec::new();
+        self.sources.retain_mut(|source| {
+            if now < source.since + SUM_PERIOD {
+                return true;
+            }
+            if source.more == 0 {
+                return false;
+            }
+            sums.push((Some(source.address), std::mem::take(&mut source.more)));
+            source.since = now;
+            true
+        });
+        if self.others > 0 && now >= self.others_told + SUM_PERIOD {
+            sums.push((None, std::mem::take(&mut self.others)));
+            self.others_told = now;
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const S: Duration = Duration::from_secs(1);
+
+    fn address(last: u32) -> IpAddr {
+        IpAddr::from((0x0a00_0000 | last).to_be_bytes())
+    }
+
+    #[test]
+    fn of_an_address_that_keeps_knocking_one_refusal_is_told_and_the_others_are_summed() {
+        let mut refusals = Refusals::default();
+        assert!(refusals.is_first(address(1), 10 * S));
+        for _ in 0..1000 {
+            assert!(!refusals.is_first(address(1), 11 * S));
+        }
+        assert!(refusals.is_first(address(2), 12 * S), "another address");
+        assert!(refusals.due(69 * S).is_empty(), "not yet");
+        assert_eq!(refusals.due(71 * S), [(Some(address(1)), 1000)]);
+        // It goes on: summed still. Then it is quiet, and is forgotten.
+        assert!(!refusals.is_first(address(1), 72 * S));
+        assert_eq!(refusals.due(140 * S), [(Some(address(1)), 1)]);
+        assert!(refusals.due(210 * S).is_empty());
+        assert!(refusals.is_first(address(1), 211 * S));
+    }
+
+    #[test]
+    fn addresses_without_number_take_no_memory_without_bound_and_none_is_lost() {
+        let mut refusals = Refusals::default();
+        let logged = (0..100_000)
+            .filter(|last| refusals.is_first(address(*last), S))
+            .count();
+        assert_eq!((logged, refusals.sources.len()), (MAX_SOURCES, MAX_SOURCES));
+        let summed: u64 = refusals
+            .due(Duration::MAX)
+            .iter()
+            .map(|(_, times)| times)
+            .sum();
+        assert_eq!(logged as u64 + summed, 100_000);
+    }
+}

@@ -1,0 +1,556 @@
+//! The broadcaster: the newest shared data as one state, 1000 times a second, to every client.
+//!
+//! On a thread of its own: a slow socket costs the loops nothing. Here the method's types end and the wire's begin.
+
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
+
+use god_object::nalgebra::{Point3, Vector3};
+use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
+use god_object::{ConstraintSet, NonPenetrationConstraint};
+use taut_bridge::ArmingState;
+use taut_link::Broadcaster;
+use taut_proto::state::{
+    BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS,
+    RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED, ToolState, event_code,
+};
+use taut_proto::wrench::WRENCH_PAUSED;
+use taut_proto::{HotState, PoseF32, WrenchCommand as WireWrench};
+
+use crate::loops::shell::{Beat, run_at_deadlines};
+use crate::loops::wiring::SharedView;
+use crate::session::edge_sets::EdgeSets;
+use crate::session::head::Head;
+use crate::session::observers::Outlets;
+use crate::shared::clock::{SessionClock, nanoseconds};
+use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
+use crate::shared::device_state::{DeviceState, RECENT_EVENTS};
+use crate::shared::shutdown::Shutdown;
+use crate::shared::wrench_command::WrenchCommand;
+
+/// Buttons of a device, one bit each.
+const BUTTONS: u32 = u16::BITS;
+/// The number of a button in an event's code.
+const BUTTON_SHIFT: u32 = 16;
+/// Events that may wait for their state.
+const MAX_WAITING: usize = 64;
+/// Most events that one sample brings: contact, fault, every button, everything that the port keeps.
+const MAX_AT_ONCE: usize = 2 + BUTTONS as usize + RECENT_EVENTS;
+
+/// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
+#[derive(Debug)]
+pub struct BridgeCommands {
+    /// From the haptics loop.
+    pub wrenches: triple_buffer::Output<WireWrench>,
+    /// For a bridge that couples by itself.
+    pub sets: EdgeSets,
+}
+
+/// Sends states, and the wrenches of a remote device, until the end is asked for.
+pub fn run(
+    mut states: StateWriter,
+    mut broadcaster: Broadcaster,
+    mut bridge_commands: Option<BridgeCommands>,
+    mut outlets: Outlets,
+    clock: SessionClock,
+    beat: Beat,
+    shutdown: &Shutdown,
+) {
+    // A state that comes late is followed by the next one; nothing is owed to anybody.
+    let late = AtomicU64::new(0);
+    run_at_deadlines(clock, beat, shutdown, &late, |now| {
+        if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
+            let fresh = wrenches.update();
+            let command = wrenches.output_buffer();
+            let armed = states.is_armed();
+            let at_edge = sets.tick(now, command, armed, states.contacts(), |part| {
+                broadcaster.send_constraints(part);
+            });
+            if fresh && !at_edge {
+                broadcaster.send_wrench(command);
+            }
+        }
+        if let Some(state) = states.newest(now) {
+            // What could not be sent is counted by the link.
+            let _ = broadcaster.send(state);
+            outlets.publish(state);
+        }
+    });
+    if let Some(commands) = &mut bridge_commands {
+        commands.sets.pause(&mut broadcaster);
+        broadcaster.send_wrench(&WireWrench {
+            time_ns: nanoseconds(clock.now()),
+            origin_ns: 0,
+            wrench: [0.0; 6],
+            flags: WRENCH_PAUSED,
+        });
+    }
+}
+
+/// Reads the shared data and keeps the state that is sent. No allocation.
+#[derive(Debug)]
+pub struct StateWriter {
+    shared: SharedView,
+    head: Head,
+    reference_point: Point3<f64>,
+    scene_revision: u32,
+    state: HotState,
+    motion: MotionEstimate,
+    events: EventSource,
+    most_contacts: usize,
+}
+
+impl StateWriter {
+    /// A writer of states of one scene.
+    pub fn new(
+        shared: SharedView,
+        head: Head,
+        reference_point: &Point3<f64>,
+        scene_revision: u32,
+    ) -> Self {
+        Self {
+            shared,
+            head,
+            reference_point: *reference_point,
+            scene_revision,
+            state: HotState::empty(),
+            motion: MotionEstimate::default(),
+            events: EventSource::default(),
+            most_contacts: MAX_CONTACTS,
+        }
+    }
+
+    /// The same with no more than so many contacts in a state, the nearest.
+    #[must_use]
+    pub fn with_most_contacts(self, most_contacts: usize) -> Self {
+        Self {
+            most_contacts,
+            ..self
+        }
+    }
+
+    /// Whether the haptics loop's port gives force, as of the last state.
+    pub fn is_armed(&self) -> bool {
+        !self.shared.device.held().safety.arming.is_off()
+    }
+
+    /// The newest of the god-object loop.
+    pub fn contacts(&mut self) -> &ContactSnapshot {
+        self.shared.contacts.newest()
+    }
+
+    /// The state now; `None` while the device has not been sampled since the last one.
+    pub fn newest(&mut self, now: Duration) -> Option<&HotState> {
+        if !self.shared.device.refresh() {
+            return None;
+        }
+        let device = self.shared.device.held();
+        let contacts = self.shared.contacts.newest();
+        let wrench = self.shared.wrench.newest();
+        self.motion.follow(contacts, &self.reference_point);
+        self.events.follow(device, contacts);
+
+        let state = &mut self.state;
+        state.sample_time_ns = nanoseconds(device.time);
+        state.tick = device.sequence;
+        state.scene_revision = self.scene_revision;
+        state.run = run_state(device);
+        state.constraint_age_us =
+            u32::try_from(wrench.constraint_age.as_micros()).unwrap_or(u32::MAX);
+        state.head = head_state(&mut self.head, now, device.time);
+        state.tools.clear();
+        state
+            .tools
+            .push(tool_state(device, contacts, wrench, &self.motion.velocity));
+        state.bodies.clear();
+        state.bodies.extend(contacts.moving.iter().map(body_state));
+        nearest_contacts(&contacts.set, &mut state.contacts);
+        state.contacts.truncate(self.most_contacts);
+        self.events.take(&mut state.events);
+        Some(&self.state)
+    }
+}
+
+/// Whether there are forces.
+fn run_state(device: &DeviceState) -> RunState {
+    match device.safety.arming {
+        _ if device.faulty => RunState::Fault,
+        ArmingState::Faulted => RunState::Fault,
+        ArmingState::Disarmed => RunState::Paused,
+        _ => RunState::Running,
+    }
+}
+
+fn head_state(head: &mut Head, now: Duration, sampled: Duration) -> HeadState {
+    let pose = PoseF32::from_isometry(&head.pose(now));
+    let older = nanoseconds(sampled) as i64 - nanoseconds(head.read_at(now)) as i64;
+    HeadState {
+        pose,
+        age_us: i32::try_from(older / 1000).unwrap_or(i32::MIN),
+        eye_separation: head.eye_separation as f32,
+        flags: if head.moves() { HEAD_TRACKED } else { 0 },
+    }
+}
+
+fn tool_state(
+    device: &DeviceState,
+    contacts: &ContactSnapshot,
+    wrench: &WrenchCommand,
+    velocity: &Vector6,
+) -> ToolState {
+    let limited = if wrench.saturated {
+        TOOL_FORCE_LIMITED
+    } else {
+        0
+    };
+    let silent = if device.faulty { TOOL_DEVICE_SILENT } else { 0 };
+    // What a bridge says that it renders is the truth; what was computed here answers a pose that is older.
+    let felt = device.felt.map_or(wrench.wrench, |felt| felt.wrench);
+    ToolState {
+        god_object: PoseF32::from_isometry(&contacts.set.god_object_pose),
+        device: PoseF32::from_isometry(&device.pose),
+        linear_velocity: single(&linear(velocity)),
+        angular_velocity: single(&angular(velocity)),
+        force: single(&linear(&felt)),
+        torque: single(&angular(&felt)),
+        buttons: device.buttons,
+        flags: limited | silent,
+        id: 0,
+    }
+}
+
+fn body_state(moving: &MovingObstacle) -> BodyState {
+    BodyState {
+        id: moving.obstacle,
+        flags: 0,
+        pose: PoseF32::from_isometry(&moving.pose),
+    }
+}
+
+/// The contacts with the smallest gaps, nearest first. Forces of single contacts are not unique and not told.
+fn nearest_contacts(
+    set: &ConstraintSet,
+    nearest: &mut taut_proto::ArrayVec<ContactState, MAX_CONTACTS>,
+) {
+    nearest.clear();
+    for constraint in &set.constraints {
+        let contact = contact_state(constraint);
+        let place = nearest
+            .iter()
+            .take_while(|other| other.gap <= contact.gap)
+            .count();
+        if place < MAX_CONTACTS {
+            if nearest.is_full() {
+                nearest.pop();
+            }
+            nearest.insert(place, contact);
+        }
+    }
+}
+
+fn contact_state(constraint: &NonPenetrationConstraint) -> ContactState {
+    ContactState {
+        pair: [0, constraint.features.obstacle],
+        point: single(&constraint.point.coords),
+        normal: single(&constraint.normal),
+        force: 0.0,
+        gap: constraint.gap as f32,
+    }
+}
+
+fn single(vector: &Vector3<f64>) -> [f32; 3] {
+    [vector.x as f32, vector.y as f32, vector.z as f32]
+}
+
+/// Velocity of the god-object at the reference point, from its last two poses.
+#[derive(Debug, Default)]
+struct MotionEstimate {
+    last: Option<(Duration, Pose)>,
+    velocity: Vector6,
+}
+
+impl MotionEstimate {
+    fn follow(&mut self, contacts: &ContactSnapshot, reference_point: &Point3<f64>) {
+        let pose = at_reference_point(&contacts.set.god_object_pose, reference_point);
+        match &self.last {
+            Some((time, _)) if *time >= contacts.published => return,
+            Some((time, last)) => {
+                let passed = (contacts.published - *time).as_secs_f64();
+                self.velocity = pose_difference(&pose, last, &Vector3::zeros()) / passed;
+            }
+            None => {}
+        }
+        self.last = Some((contacts.published, pose));
+    }
+}
+
+/// Discrete events out of what changed; each goes into one state, and the link sees to it that no client misses it.
+#[derive(Debug, Default)]
+struct EventSource {
+    /// Oldest first.
+    waiting: taut_proto::ArrayVec<EventRecord, MAX_WAITING>,
+    count: u32,
+    touching: bool,
+    buttons: u16,
+    faulty: bool,
+    /// Number of the newest event of the port that was taken.
+    safety: u64,
+}
+
+impl EventSource {
+    fn follow(&mut self, device: &DeviceState, contacts: &ContactSnapshot) {
+        // What changed is compared with what was told: without room it is found with a later sample.
+        if self.waiting.remaining_capacity() < MAX_AT_ONCE {
+            return;
+        }
+        let tick = device.sequence as u32;
+        let touching = contacts.report.active > 0;
+        if touching != self.touching {
+            let code = if touching {
+                event_code::CONTACT_ON
+            } else {
+                event_code::CONTACT_OFF
+            };
+            self.push(tick, code);
+        }
+        let changed = device.buttons ^ self.buttons;
+        for button in (0..BUTTONS).filter(|button| changed >> button & 1 == 1) {
+            let down = device.buttons >> button & 1 == 1;
+            let code = if down {
+                event_code::BUTTON_DOWN
+            } else {
+                event_code::BUTTON_UP
+            };
+            self.push(tick, code | button << BUTTON_SHIFT);
+        }
+        if device.faulty != self.faulty {
+            let code = if device.faulty {
+                event_code::FAULT
+            } else {
+                event_code::RESUMED
+            };
+            self.push(tick, code);
+        }
+        for event in device.safety.after(self.safety) {
+            self.push(tick, event_code::safety(event.kind as u8, event.value));
+            self.safety = event.number;
+        }
+        (self.touching, self.buttons, self.faulty) = (touching, device.buttons, device.faulty);
+    }
+
+    fn push(&mut self, tick: u32, code: u32) {
+        self.count = self.count.wrapping_add(1);
+        self.waiting.push(EventRecord {
+            id: self.count,
+            tick,
+            code,
+        });
+    }
+
+    /// Moves the oldest that wait into a state, as many as it holds.
+    fn take(&mut self, into: &mut taut_proto::ArrayVec<EventRecord, MAX_EVENTS>) {
+        into.clear();
+        let count = self.waiting.len().min(MAX_EVENTS);
+        into.extend(self.waiting.drain(..count));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::device_state::SafetyState;
+    use crate::shared::{contact_snapshot, device_state, wrench_command};
+    use god_object::constraint::{Feature, FeaturePair};
+    use taut_bridge::{EventKind, SafetyEvent};
+
+    fn constraint(obstacle: u16, gap: f64) -> NonPenetrationConstraint {
+        NonPenetrationConstraint {
+            features: FeaturePair {
+                obstacle,
+                on_body: Feature::Vertex(0),
+                on_obstacle: Feature::Face(u32::from(obstacle)),
+            },
+            point: Point3::new(gap, 0.0, 0.0),
+            normal: Vector3::z(),
+            gap,
+            separation: Default::default(),
+            came: 0.0,
+            shading_normal: None,
+        }
+    }
+
+    /// A port in full force that has just limited one.
+    fn armed_after_a_limit() -> SafetyState {
+        let mut safety = SafetyState {
+            arming: ArmingState::Armed,
+            ..SafetyState::default()
+        };
+        safety.events[1] = Some(SafetyEvent {
+            number: 1,
+            time: Duration::from_millis(4),
+            kind: EventKind::ForceLimited,
+            value: 23.5,
+        });
+        safety
+    }
+
+    #[test]
+    fn a_state_carries_the_newest_of_everything_and_comes_once_per_sample() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let (mut states, state_readers) = device_state::channel(&start);
+        let (mut contacts, contact_readers) = contact_snapshot::channel(&start, 32);
+        let (mut wrenches, wrench_readers) = wrench_command::channel();
+        let source = crate::session::head::HeadSource {
+            rest: Pose::translation(0.0, -1.0, 1.0),
+            eye_separation: 0.064,
+            motion: crate::session::head::HeadMotion::Still,
+        };
+        let [head] = source.start(None).expect("nothing to start");
+        let shared = SharedView {
+            device: state_readers.broadcast,
+            contacts: contact_readers.broadcast,
+            wrench: wrench_readers.broadcast,
+        };
+        let mut writer = StateWriter::new(shared, head, &Point3::origin(), 7);
+        assert!(writer.newest(Duration::ZERO).is_none(), "no sample yet");
+
+        let device = DeviceState {
+            sequence: 5,
+            time: Duration::from_millis(5),
+            pose: Pose::translation(0.0, 0.0, 0.05),
+            buttons: 0b10,
+            safety: armed_after_a_limit(),
+            ..DeviceState::at_start(&start)
+        };
+        states.publish(&device);
+        let mut snapshot = ContactSnapshot::at_start(&start, 32);
+        snapshot
+            .set
+            .constraints
+            .extend((0..12).map(|k| constraint(k, 0.012 - 1e-3 * f64::from(k))));
+        snapshot.published = Duration::from_millis(6);
+        snapshot.report.active = 1;
+        snapshot.moving.push(MovingObstacle {
+            obstacle: 3,
+            pose: Pose::translation(0.0, 0.25, 0.0),
+        });
+        contacts.publish(&snapshot);
+        let wrench = WrenchCommand {
+            wrench: Vector6::new(0.0, 0.0, 3.0, 0.1, 0.0, 0.0),
+            saturated: true,
+            constraint_age: Duration::from_micros(250),
+            ..WrenchCommand::at_start()
+        };
+        wrenches.publish(&wrench);
+
+        let Some(state) = writer.newest(Duration::from_millis(7)) else {
+            panic!("a sample was published");
+        };
+        assert_eq!(
+            (state.tick, state.sample_time_ns, state.scene_revision),
+            (5, 5_000_000, 7)
+        );
+        assert_eq!(
+            (state.run, state.constraint_age_us),
+            (RunState::Running, 250)
+        );
+        let tool = &state.tools[0];
+        assert_eq!(
+            (tool.device.position[2], tool.god_object.position[2]),
+            (0.05, 0.1)
+        );
+        assert_eq!(
+            (tool.force[2], tool.torque[0], tool.flags),
+            (3.0, 0.1, TOOL_FORCE_LIMITED)
+        );
+        let obstacles: Vec<u16> = state
+            .contacts
+            .iter()
+            .map(|contact| contact.pair[1])
+            .collect();
+        assert_eq!(obstacles, [11, 10, 9, 8, 7, 6, 5, 4], "nearest first");
+        let bodies: Vec<_> = state
+            .bodies
+            .iter()
+            .map(|body| (body.id, body.pose))
+            .collect();
+        let plate = PoseF32::from_isometry(&Pose::translation(0.0, 0.25, 0.0));
+        assert_eq!(bodies, [(3, plate)], "by the obstacle's number");
+        let codes: Vec<u32> = state.events.iter().map(|event| event.code).collect();
+        assert_eq!(
+            codes,
+            [
+                event_code::CONTACT_ON,
+                event_code::BUTTON_DOWN | 1 << BUTTON_SHIFT,
+                event_code::safety(EventKind::ForceLimited as u8, 23.5)
+            ]
+        );
+        assert_eq!(state.head.age_us, -2000);
+        assert!(
+            writer.newest(Duration::from_millis(8)).is_none(),
+            "nothing new"
+        );
+
+        // The god-object moves 2 mm in 2 ms.
+        snapshot.set.god_object_pose = Pose::translation(0.0, 0.0, 0.098);
+        snapshot.published = Duration::from_millis(8);
+        contacts.publish(&snapshot);
+        states.publish(&DeviceState {
+            sequence: 6,
+            faulty: true,
+            ..device
+        });
+        let Some(state) = writer.newest(Duration::from_millis(9)) else {
+            panic!("a sample was published");
+        };
+        assert!((state.tools[0].linear_velocity[2] + 1.0).abs() < 1e-6);
+        assert_eq!(state.bodies.len(), 1, "told again, not added");
+        assert_eq!(state.run, RunState::Fault);
+        assert_eq!(
+            state.tools[0].flags & TOOL_DEVICE_SILENT,
+            TOOL_DEVICE_SILENT
+        );
+        assert_eq!(
+            state.events.last().map(|event| event.code),
+            Some(event_code::FAULT)
+        );
+    }
+
+    #[test]
+    fn more_events_than_a_state_holds_go_into_the_next_ones() {
+        let start = Pose::translation(0.0, 0.0, 0.1);
+        let contacts = ContactSnapshot::at_start(&start, 32);
+        let mut device = DeviceState::at_start(&start);
+        let mut source = EventSource::default();
+        let mut state = taut_proto::ArrayVec::new();
+        let mut told = Vec::new();
+        let mut send = |source: &mut EventSource| {
+            source.take(&mut state);
+            told.extend(state.iter().map(|event| (event.id, event.code)));
+        };
+
+        // All buttons at once, then a storm of them that is more than the states can carry.
+        for press in 0..100 {
+            device.buttons = if press % 2 == 0 { u16::MAX } else { 0 };
+            source.follow(&device, &contacts);
+            send(&mut source);
+        }
+        for _ in 0..2 * MAX_WAITING {
+            source.follow(&device, &contacts);
+            send(&mut source);
+        }
+        let ids: Vec<u32> = told.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=told.len() as u32).collect::<Vec<_>>());
+        for button in 0..BUTTONS {
+            let of_button: Vec<u32> = told
+                .iter()
+                .filter(|(_, code)| code >> BUTTON_SHIFT == button)
+                .map(|(_, code)| code & 0xffff)
+                .collect();
+            assert_eq!(of_button.last(), Some(&event_code::BUTTON_UP), "{button}");
+            let kinds = [event_code::BUTTON_DOWN, event_code::BUTTON_UP];
+            let down_and_up = of_button.iter().zip(kinds.iter().cycle());
+            assert!(down_and_up.clone().all(|(kind, expected)| kind == expected));
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! The viewer's head: still, swaying as people do who stand and look, or where a tracker sees it: a VRPN tracker that the server listens to,
+//! or `taut track` on another PC ([`crate::session::remote_head`]).
+//!
+//! | symbol | name in code | unit | meaning                                              |
+//! |--------|--------------|------|------------------------------------------------------|
+//! | A      | `amplitude`  | m    | largest displacement to either side                  |
+//! | T      | `period`     | s    | time of one sway from side to side and back          |
+//!
+//! A swaying head is a pure function of session time, so that every reader at the same time sees the same head. A tracked
+//! head is at rest until the first report; when the tracker falls silent or loses the sensor, the head stays where it was
+//! seen last: a picture that jumps is worse than one that is a little off.
+
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+use god_object::nalgebra::Vector3;
+use god_object::spatial::Pose;
+use taut_bridge::{TrackerFeed, VrpnSource};
+use taut_link::HeadOutput;
+use taut_vrpn::SensorMapping;
+
+use crate::session::remote_head::RemoteHead;
+
+/// Sway fore and aft takes this much longer than from side to side: the path does not repeat at once.
+const FORE_AFT_PERIODS: f64 = 1.618;
+/// Sway fore and aft is this share of that from side to side.
+const FORE_AFT_SHARE: f64 = 0.5;
+
+/// What moves the viewer's head, before anything is started.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeadSource {
+    /// The head at rest, workbench frame: between the eyes, x to the right ear, y up, -z ahead.
+    pub rest: Pose,
+    /// Distance between the pupils, m.
+    pub eye_separation: f64,
+    /// How it moves.
+    pub motion: HeadMotion,
+}
+
+/// How a head moves.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HeadMotion {
+    /// Not at all.
+    Still,
+    /// Simulated.
+    Sway(Sway),
+    /// Tracked.
+    Tracker(Box<TrackerSource>),
+    /// Tracked by a client of the role tracker.
+    Remote,
+}
+
+/// Simulated movement of a head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sway {
+    /// Largest displacement to either side, m.
+    pub amplitude: f64,
+    /// Time of one sway, s.
+    pub period: f64,
+}
+
+/// A sensor on the viewer's head.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackerSource {
+    /// Which.
+    pub source: VrpnSource,
+    /// From its reports to the head in the workbench frame.
+    pub mapping: SensorMapping,
+}
+
+/// One reader's view of where the viewer's head is.
+#[derive(Debug)]
+pub struct Head {
+    /// The head at rest, workbench frame.
+    pub rest: Pose,
+    /// Distance between the pupils, m.
+    pub eye_separation: f64,
+    motion: Motion,
+}
+
+#[derive(Debug)]
+enum Motion {
+    Still,
+    Sway(Sway),
+    Tracker(Box<Tracked>),
+    Remote(Box<RemoteHead>),
+}
+
+#[derive(Debug)]
+struct Tracked {
+    feed: TrackerFeed,
+    mapping: SensorMapping,
+    /// Where it was seen last.
+    last: Pose,
+}
+
+impl HeadSource {
+    /// Starts to listen to the tracker, if there is one: a head for each reader. `remote` are the link's ends for a tracker on the network;
+    /// without them such a head stays at rest.
+    ///
+    /// # Errors
+    /// No thread or no socket can be had. A tracker that is not there yet is waited for.
+    pub fn start<const READERS: usize>(
+        self,
+        remote: Option<[HeadOutput; READERS]>,
+    ) -> std::io::Result<[Head; READERS]> {
+        let Self {
+            rest,
+            eye_separation,
+            motion,
+        } = self;
+        let head = |motion| Head {
+            rest,
+            eye_separation,
+            motion,
+        };
+        Ok(match motion {
+            HeadMotion::Still => std::array::from_fn(|_| head(Motion::Still)),
+            HeadMotion::Sway(sway) => std::array::from_fn(|_| head(Motion::Sway(sway))),
+            HeadMotion::Remote => match remote {
+                Some(outputs) => outputs
+                    .map(|output| head(Motion::Remote(Box::new(RemoteHead::new(output, rest))))),
+                None => std::array::from_fn(|_| head(Motion::Still)),
+            },
+            HeadMotion::Tracker(tracker) => {
+                let TrackerSource { source, mapping } = *tracker;
+                TrackerFeed::start_for::<READERS>(source)?.map(|feed| {
+                    head(Motion::Tracker(Box::new(Tracked {
+                        feed,
+                        mapping,
+                        last: rest,
+                    })))
+                })
+            }
+        })
+    }
+}
+
+impl Head {
+    /// The head at session time `now`, workbench frame. Neither waits nor allocates.
+    pub fn pose(&mut self, now: Duration) -> Pose {
+        match &mut self.motion {
+            Motion::Still => self.rest,
+            Motion::Sway(sway) => self.rest * sway.displacement(now),
+            Motion::Tracker(tracked) => {
+                let report = tracked.feed.newest().pose;
+                if let Some(pose) = report.and_then(|report| tracked.mapping.pose(&report)) {
+                    tracked.last = pose;
+                }
+                tracked.last
+            }
+            Motion::Remote(remote) => remote.look().pose(now),
+        }
+    }
+
+    /// When the pose that [`Self::pose`] gave at `now` was read, session time; `now` where nothing tells.
+    pub fn read_at(&mut self, now: Duration) -> Duration {
+        match &mut self.motion {
+            Motion::Remote(remote) => remote.look().read_at(now),
+            Motion::Still | Motion::Sway(_) | Motion::Tracker(_) => now,
+        }
+    }
+
+    /// Whether its pose changes.
+    pub fn moves(&self) -> bool {
+        !matches!(self.motion, Motion::Still)
+    }
+}
+
+impl Sway {
+    /// At session time `now`, in the frame of the head at rest.
+    fn displacement(&self, now: Duration) -> Pose {
+        let turn = TAU * now.as_secs_f64() / self.period;
+        let fore_aft = self.amplitude * FORE_AFT_SHARE * (turn / FORE_AFT_PERIODS).sin();
+        let in_head = Vector3::new(self.amplitude * turn.sin(), 0.0, fore_aft);
+        Pose::translation(in_head.x, in_head.y, in_head.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn head(rest: Pose, motion: HeadMotion) -> Head {
+        let source = HeadSource {
+            rest,
+            eye_separation: 0.064,
+            motion,
+        };
+        let [head] = source.start(None).expect("nothing to start");
+        head
+    }
+
+    #[test]
+    fn a_swaying_head_starts_at_rest_and_stays_within_its_amplitude() {
+        let rest = Pose::new(Vector3::new(0.0, -0.6, 0.7), Vector3::x() * 0.8);
+        let mut head = head(
+            rest,
+            HeadMotion::Sway(Sway {
+                amplitude: 0.05,
+                period: 6.0,
+            }),
+        );
+        assert_eq!(head.pose(Duration::ZERO), rest);
+        let mut farthest: f64 = 0.0;
+        for tick in 0..10_000 {
+            let pose = head.pose(Duration::from_millis(tick));
+            assert_eq!(pose.rotation, rest.rotation);
+            let offset =
+                rest.inverse_transform_vector(&(pose.translation.vector - rest.translation.vector));
+            assert!(offset.y.abs() < 1e-12);
+            farthest = farthest.max(offset.x.abs());
+        }
+        assert!((farthest - 0.05).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_still_head_stays() {
+        let mut head = head(Pose::identity(), HeadMotion::Still);
+        assert_eq!(head.pose(Duration::from_secs(3)), Pose::identity());
+        assert!(!head.moves());
+    }
+
+    /// Nobody listens on port 1 of this machine: the head rests, for both readers, and dropping them ends the thread.
+    #[test]
+    fn a_head_whose_tracker_is_not_there_is_at_rest() {
+        let rest = Pose::translation(0.0, -1.0, 1.2);
+        let source = HeadSource {
+            rest,
+            eye_separation: 0.064,
+            motion: HeadMotion::Tracker(Box::new(TrackerSource {
+                source: VrpnSource {
+                    address: "Head@127.0.0.1:1".parse().expect("valid"),
+                    sensor: 0,
+                    mode: taut_bridge::VrpnMode::Tcp,
+                },
+                mapping: SensorMapping::identity(),
+            })),
+        };
+        let mut heads = source.start::<2>(None).expect("a thread");
+        for head in &mut heads {
+            assert!(head.moves());
+            assert_eq!(head.pose(Duration::from_secs(1)), rest);
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The monitor: samples of the shared data to rerun, 50 times a second, on a thread of its own.
+//!
+//! The one place that knows whether this build has a monitor (feature `monitor`).
+
+#[cfg(not(feature = "monitor"))]
+mod absent;
+// Needs nothing of the monitor, so its tests run in every build.
+#[cfg(any(test, feature = "monitor"))]
+mod events;
+#[cfg(feature = "monitor")]
+mod streaming;
+
+#[cfg(not(feature = "monitor"))]
+pub(crate) use absent::MonitorFeed;
+#[cfg(feature = "monitor")]
+pub(crate) use streaming::MonitorFeed;
+
+use std::net::IpAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use god_object::World;
+use god_object::spatial::Pose;
+use taut_proto::scene::ScreenDescription;
+
+use crate::loops::statistics::Statistics;
+use crate::loops::wiring::SharedView;
+use crate::session::head::Head;
+use crate::shared::clock::SessionClock;
+
+/// Where the monitor is served and recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MonitorSettings {
+    /// Address to listen on.
+    pub bind: IpAddr,
+    /// TCP port of the stream; 0 takes a free one.
+    pub grpc_port: u16,
+    /// TCP port of the web page; 0 takes a free one.
+    pub web_port: u16,
+    /// Also write everything to this `.rrd` file.
+    pub record: Option<PathBuf>,
+    /// Most bytes of history kept for late observers.
+    pub memory_limit_bytes: u64,
+    /// Serve the stream and the page; otherwise it is only recorded.
+    pub serve: bool,
+}
+
+/// What the monitor draws once.
+#[derive(Clone, Debug)]
+pub struct MonitorPicture {
+    /// The scene's name.
+    pub name: String,
+    /// Bodies and their meshes.
+    pub world: Arc<World>,
+    /// Indices of the obstacles that move.
+    pub moving: Vec<usize>,
+    /// Where the god-object starts.
+    pub start: Pose,
+    /// The screens, workbench frame.
+    pub screens: Vec<ScreenDescription>,
+    /// Workbench from scene, without the magnification.
+    pub workbench_from_scene: Pose,
+    /// Size of the scene on the workbench over its size in the simulation.
+    pub display_scale: f64,
+    /// The viewer's head at rest, workbench frame.
+    pub head: Pose,
+    /// Gap at which bodies touch, m.
+    pub rest_distance: f64,
+}
+
+/// The shared data that the monitor reads.
+#[derive(Debug)]
+pub struct MonitorSources {
+    /// Where the viewer's head is.
+    pub head: Head,
+    /// What the loops publish.
+    pub shared: SharedView,
+    /// All counters.
+    pub statistics: Statistics,
+    /// Session time.
+    pub clock: SessionClock,
+}
+
+/// The network's counts, which the main thread tells the monitor.
+#[derive(Debug, Default)]
+pub struct NetworkCounts {
+    /// Datagrams sent.
+    pub packets_sent: std::sync::atomic::AtomicU64,
+    /// Datagrams received and accepted.
+    pub packets_received: std::sync::atomic::AtomicU64,
+    /// Connected clients.
+    pub clients: std::sync::atomic::AtomicU32,
+}
+
+/// How serious a line for the log is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// Something happened.
+    Info,
+    /// Something that should not happen often.
+    Warning,
+    /// Something is broken.
+    Error,
+}

@@ -1,0 +1,190 @@
+//! What happens in a session: network, safety events and fidelity, to the log, the recording and the monitor.
+
+use std::sync::atomic::Ordering;
+
+use god_object::spatial::linear;
+use taut_bridge::EventKind;
+use taut_link::{LinkEvent, ServerLink, proto};
+use taut_recording::EventRecord;
+
+use crate::loops::incidents::{self};
+use crate::report::metrics::{self, ClientLink, Metrics};
+use crate::report::terminal::Terminal;
+use crate::session::monitor::Severity;
+
+use super::Session;
+
+impl Session {
+    /// Reports what happened on the network since the last call: errors here, everything to monitor and log. Call it a few times a
+    /// second.
+    pub fn follow_network(&mut self, terminal: &Terminal) {
+        self.log_incidents();
+        if let Some(fidelity) = &mut self.fidelity {
+            for line in fidelity.watch.notices(&mut fidelity.reported) {
+                terminal.say(&line);
+                tracing::info!("{line}");
+            }
+        }
+        let Some(link) = &self.link else {
+            return;
+        };
+        let mut lines = Vec::new();
+        let now = self.clock.now();
+        while let Some(event) = link.try_event() {
+            let to_be_logged = self.audit.follow(&event, now);
+            let line = self.clients.follow(&event);
+            if to_be_logged {
+                lines.extend(line.map(|line| (severity(&event), concerns_presence(&event), line)));
+            }
+        }
+        for (severity, concerns_presence, line) in lines {
+            if severity == Severity::Error {
+                terminal.say(&format!("taut: {line}"));
+            } else if concerns_presence {
+                terminal.say(&line);
+            }
+            tracing::info!("{line}");
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: self.clock.now(),
+                    kind: "network".to_owned(),
+                    text: line.clone(),
+                });
+            }
+            if let Some(monitor) = &self.monitor {
+                monitor.log(severity, &line);
+            }
+        }
+        let clients = link.clients();
+        self.clients.look_at(&clients);
+        let counters = link.counters();
+        self.audit.look(&counters, now);
+        self.network
+            .packets_sent
+            .store(counters.packets_sent, Ordering::Relaxed);
+        self.network
+            .packets_received
+            .store(counters.packets_received, Ordering::Relaxed);
+        self.network.clients.store(
+            u32::try_from(clients.len()).unwrap_or(u32::MAX),
+            Ordering::Relaxed,
+        );
+    }
+
+    /// Writes the device port's events to the log and the recording; the monitor reads them itself.
+    pub(super) fn log_incidents(&mut self) {
+        let counts = &self.statistics.haptics.incidents;
+        for (event, times) in self.incidents.since_last(counts) {
+            let text = incidents::line(&event, times);
+            if event.kind.is_fault() || is_about_arming(event.kind) {
+                self.audit.follow_port(&text, event.kind.is_fault());
+            }
+            if event.kind.is_warning() {
+                tracing::warn!("{text}");
+            } else {
+                tracing::info!("{text}");
+            }
+            if let Some(recorder) = &self.recorder {
+                recorder.events().send(EventRecord {
+                    time: event.time,
+                    kind: "safety".to_owned(),
+                    text,
+                });
+            }
+        }
+    }
+
+    /// Everything measured so far.
+    pub fn metrics(&self) -> Metrics {
+        let counters = self.link.as_ref().map(ServerLink::counters);
+        let clients = self.link.as_ref().map(ServerLink::clients);
+        let client_links: Vec<ClientLink> = clients.iter().flatten().map(ClientLink::of).collect();
+        let mut session = self.statistics.report(self.age());
+        if let Some(counters) = &counters {
+            session.packets_sent = counters.packets_sent;
+            session.packets_refused = counters.garbage
+                + counters.wrong_version
+                + counters.forged
+                + counters.replayed
+                + counters.inputs_refused;
+        }
+        let (memory_bytes, open_files) = metrics::process();
+        Metrics {
+            time_s: metrics::wall_clock_s(),
+            session,
+            network: counters.iter().flat_map(|c| c.named()).collect(),
+            clients_present: client_links.len() as u64,
+            client_links,
+            stream_observers: self.observers.stream_observers(),
+            stream_observers_dropped: self.observers.stream_observers_dropped(),
+            log_lines_lost: taut_log::lost_lines(),
+            memory_bytes,
+            open_files,
+        }
+    }
+
+    /// One line of what goes on.
+    pub fn status_line(&mut self) -> String {
+        let statistics = &self.statistics;
+        let seconds = self.age().as_secs_f64();
+        let period = statistics.haptics.period.distribution_us();
+        let update = statistics.god_object.update.distribution_us();
+        let force = linear(&self.wrench.newest().wrench).norm();
+        let checks = &statistics.checks;
+        format!(
+            "{seconds:5.0} s  haptics {:.0} Hz, p99 {:.2} ms  god-object p99 {:.2} ms  contacts {}  force {force:.2} N  clients {}  penetrations {} of {}",
+            period.count as f64 / seconds.max(f64::MIN_POSITIVE),
+            period.p99 * 1e-3,
+            update.p99 * 1e-3,
+            statistics.god_object.contacts.newest(),
+            self.network.clients.load(Ordering::Relaxed),
+            checks.penetrations.load(Ordering::Relaxed),
+            checks.checks.load(Ordering::Relaxed),
+        )
+    }
+}
+
+/// Whether somebody let force in, or kept it out.
+fn is_about_arming(kind: EventKind) -> bool {
+    matches!(
+        kind,
+        EventKind::Armed
+            | EventKind::Disarmed
+            | EventKind::DeadManReleased
+            | EventKind::ArmRefused
+            | EventKind::RearmNeeded
+    )
+}
+
+/// Whether a node came, went, or may be going: whoever stands at the haptic PC is told.
+fn concerns_presence(event: &LinkEvent) -> bool {
+    matches!(
+        event,
+        LinkEvent::Joined(_) | LinkEvent::Left { .. } | LinkEvent::Silent { .. }
+    )
+}
+
+fn severity(event: &LinkEvent) -> Severity {
+    use proto::control::LogLevel;
+    match event {
+        LinkEvent::Joined(_)
+        | LinkEvent::Left { .. }
+        | LinkEvent::Stats { .. }
+        | LinkEvent::Arm { .. } => Severity::Info,
+        LinkEvent::Silent { .. } => Severity::Warning,
+        // The wall is not what it was, and somebody should know.
+        LinkEvent::FreeRunning { free, .. } => match free {
+            true => Severity::Error,
+            false => Severity::Info,
+        },
+        LinkEvent::NoPlace { .. } | LinkEvent::StatesForged { .. } => Severity::Error,
+        // Whoever stands at the haptic PC should know that somebody knocked.
+        LinkEvent::Refused { .. } => Severity::Error,
+        LinkEvent::Forbidden { .. } => Severity::Warning,
+        LinkEvent::Log { event, .. } => match event.level {
+            LogLevel::Info => Severity::Info,
+            LogLevel::Warning => Severity::Warning,
+            LogLevel::Error => Severity::Error,
+        },
+    }
+}

@@ -1,0 +1,258 @@
+//! From the workbench file's device to one that the haptics loop can read.
+
+use std::path::Path;
+
+use std::time::Duration;
+
+use god_object::nalgebra::{Point3, Similarity3, UnitQuaternion};
+use god_object::spatial::Pose;
+use taut_bridge::{
+    Anchor, AtEnd, CapMode, CapSettings, Device, DeviceLimits, Grip, Hand, HeldStrings,
+    InputChoice, MinJerkPath, Placement, RecordedDevice, SimulatedDevice, SpidarDevice, TraceRow,
+    Tremor, ViaPoint, VrpnMode, VrpnSettings, VrpnSource, simulated_spidar, string_geometry,
+};
+use taut_scene::{BuiltScene, DeviceTrace, HandPreset, VrpnSensor};
+
+use crate::loops::realtime::thread_cpu_time;
+use crate::session::setup::DeviceSource;
+use crate::shared::failure::Failure;
+
+/// A hand without a path sways this far to either side, in a cycle of this time: m, s.
+const SWAY: (f64, f64) = (0.02, 8.0);
+
+/// Makes the device that the workbench names. A remote one is found once the network is up.
+///
+/// `workbench_from_scene` says where the scene stands, without its display scale.
+pub fn device(
+    wanted: &taut_scene::Device,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+) -> Result<DeviceSource, Failure> {
+    match wanted {
+        taut_scene::Device::Vrpn {
+            sensor,
+            on_workbench,
+        } => {
+            let settings = vrpn_settings(sensor, *on_workbench);
+            input(
+                &InputChoice::Vrpn(Box::new(settings)),
+                scene,
+                workbench_from_scene,
+            )
+        }
+        taut_scene::Device::SpaceMouse { .. } => {
+            let settings = cap_settings(wanted);
+            input(
+                &InputChoice::SpaceMouse(settings),
+                scene,
+                workbench_from_scene,
+            )
+        }
+        taut_scene::Device::Simulated {
+            hand,
+            path,
+            tremor,
+            seed,
+            strings,
+        } => {
+            let (hand, intention) = hand_and_intention(scene, *hand, path.as_deref())?;
+            let tremor = (*tremor > 0.0).then(|| Tremor::new(*tremor, *seed));
+            let device: Box<dyn Device> = match strings {
+                None => Box::new(simulated(scene, hand, intention, tremor)),
+                Some(named) => {
+                    // Its axes are those of the workbench, around which it stands.
+                    let turned = workbench_from_scene.rotation.inverse();
+                    Box::new(made_of_strings(
+                        named, scene, turned, hand, intention, tremor,
+                    )?)
+                }
+            };
+            Ok(DeviceSource::Local(device))
+        }
+        taut_scene::Device::Trace { path, repeat } => {
+            recorded(path, *repeat, &scene.reference_point())
+                .map(|device| DeviceSource::Local(Box::new(device)))
+        }
+        taut_scene::Device::Remote => Ok(DeviceSource::Remote {
+            limits: DeviceLimits::UNLIMITED,
+            max_age: taut_bridge::DEFAULT_MAX_AGE,
+        }),
+    }
+}
+
+/// Opens an input device without force.
+pub fn input(
+    choice: &InputChoice,
+    scene: &BuiltScene,
+    workbench_from_scene: &Pose,
+) -> Result<DeviceSource, Failure> {
+    let scale = scene.view.display_scale;
+    let placement = Placement {
+        start: scene.start,
+        reference_point: scene.reference_point(),
+        workbench_from_world: Similarity3::from_isometry(*workbench_from_scene, scale),
+    };
+    let device = choice.open(placement).map_err(Failure::bad_input)?;
+    Ok(DeviceSource::Local(device))
+}
+
+/// The sensor of a workbench file as the driver takes it.
+pub fn vrpn_source(sensor: &VrpnSensor) -> VrpnSource {
+    VrpnSource {
+        address: sensor.address.clone(),
+        sensor: sensor.sensor,
+        mode: if sensor.udp {
+            VrpnMode::Udp
+        } else {
+            VrpnMode::Tcp
+        },
+    }
+}
+
+fn vrpn_settings(sensor: &VrpnSensor, on_workbench: bool) -> VrpnSettings {
+    VrpnSettings {
+        source: vrpn_source(sensor),
+        mapping: sensor.mapping,
+        anchor: if on_workbench {
+            Anchor::Workbench
+        } else {
+            Anchor::Start
+        },
+        max_age: Duration::from_secs_f64(sensor.max_age),
+    }
+}
+
+/// The gains of a workbench file, the driver's own where it names none.
+fn cap_settings(device: &taut_scene::Device) -> CapSettings {
+    let standard = CapSettings::default();
+    let taut_scene::Device::SpaceMouse {
+        position,
+        dead_zone,
+        speed,
+        turn_rate,
+        reach,
+        tilt,
+        yield_force,
+        yield_torque,
+    } = *device
+    else {
+        return standard;
+    };
+    CapSettings {
+        mode: if position {
+            CapMode::Position
+        } else {
+            CapMode::Rate
+        },
+        dead_zone: dead_zone.unwrap_or(standard.dead_zone),
+        speed: speed.unwrap_or(standard.speed),
+        turn_rate: turn_rate.unwrap_or(standard.turn_rate),
+        reach: reach.unwrap_or(standard.reach),
+        tilt: tilt.unwrap_or(standard.tilt),
+        yield_force: yield_force.unwrap_or(standard.yield_force),
+        yield_torque: yield_torque.unwrap_or(standard.yield_torque),
+    }
+}
+
+/// The simulated hand and what it intends; path and hand are the workbench's, else the scene's.
+fn hand_and_intention(
+    scene: &BuiltScene,
+    hand: Option<HandPreset>,
+    path: Option<&Path>,
+) -> Result<(Hand, MinJerkPath), Failure> {
+    let scene_hand = scene.hand.as_ref();
+    let preset = hand
+        .or(scene_hand.map(|hand| hand.preset))
+        .unwrap_or_default();
+    let (trace, repeat, named) = match (path, scene_hand) {
+        (Some(path), _) => (
+            Some(DeviceTrace::load(path)?),
+            true,
+            path.display().to_string(),
+        ),
+        (None, Some(hand)) => (
+            Some(hand.path.clone()),
+            hand.repeat,
+            format!("the hand's path of scene \"{}\"", scene.name),
+        ),
+        (None, None) => (None, true, String::new()),
+    };
+    let intention = match trace {
+        Some(trace) => MinJerkPath::new(via_points(&trace), repeat)
+            .map_err(|error| Failure::BadInput(format!("{named}: {error}")))?,
+        None => MinJerkPath::sway(scene.start, SWAY.0, SWAY.1),
+    };
+    Ok((impedance(preset), intention))
+}
+
+fn simulated(
+    scene: &BuiltScene,
+    hand: Hand,
+    intention: MinJerkPath,
+    tremor: Option<Tremor>,
+) -> SimulatedDevice {
+    let device = SimulatedDevice::new(Grip::workbench(), hand, intention, scene.reference_point());
+    match tremor {
+        Some(tremor) => device.with_tremor(tremor),
+        None => device,
+    }
+}
+
+fn made_of_strings(
+    named: &str,
+    scene: &BuiltScene,
+    turned: UnitQuaternion<f64>,
+    hand: Hand,
+    intention: MinJerkPath,
+    tremor: Option<Tremor>,
+) -> Result<SpidarDevice<HeldStrings>, Failure> {
+    let geometry = string_geometry(named).map_err(Failure::bad_input)?;
+    let made = simulated_spidar(
+        geometry,
+        turned,
+        scene.reference_point(),
+        hand,
+        intention,
+        tremor,
+    )
+    .map_err(|error| Failure::BadInput(format!("scene \"{}\": {error}", scene.name)))?;
+    if let Some(warning) = made.warning {
+        tracing::warn!("scene \"{}\": {warning}", scene.name);
+    }
+    Ok(made.device.with_clock(thread_cpu_time))
+}
+
+fn recorded(
+    path: &Path,
+    repeat: bool,
+    reference_point: &Point3<f64>,
+) -> Result<RecordedDevice, Failure> {
+    let trace = DeviceTrace::load(path)?;
+    let rows = trace.samples().iter().map(|sample| TraceRow {
+        time_s: sample.time,
+        pose: sample.pose,
+        buttons: sample.buttons,
+    });
+    let at_end = if repeat { AtEnd::Loop } else { AtEnd::Hold };
+    RecordedDevice::new(rows.collect(), at_end, *reference_point)
+        .map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
+}
+
+fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
+    let start = trace.samples().first().map_or(0.0, |first| first.time);
+    let point = |sample: &taut_scene::TraceSample| ViaPoint {
+        time_s: sample.time - start,
+        pose: sample.pose,
+    };
+    trace.samples().iter().map(point).collect()
+}
+
+/// The hand of this name.
+pub(crate) fn impedance(preset: HandPreset) -> Hand {
+    match preset {
+        HandPreset::Released => Hand::RELEASED,
+        HandPreset::Light => Hand::LIGHT,
+        HandPreset::Firm => Hand::FIRM,
+        HandPreset::Arm => Hand::ARM,
+    }
+}

@@ -1,0 +1,242 @@
+//! Whether a device bears what a scene asks of it: the stiffness of its walls against the loop's limits, before anything starts.
+//!
+//! | symbol | name in code | unit    | meaning                                                        |
+//! |--------|--------------|---------|----------------------------------------------------------------|
+//! | K_t    |              | N/m     | `k_h k_s m`: the stiffest that a wall can be along an axis     |
+//! | K_r    |              | N m/rad | `k_h k_s I`: the same about one, I the largest principal moment |
+//! | T      | `PERIOD_S`   | s       | of the haptics loop                                            |
+//!
+//! Any contact is at most as stiff as both together, so one axis of each kind tells. The force of a sample is rendered one tick
+//! later, to which a device adds its own delay.
+
+use god_object::{Body, RotationMetric, Settings};
+use nalgebra::SymmetricEigen;
+use taut_bridge::{Grip, Hand, SpidarPlacement, string_geometry, string_grip};
+use taut_plant::stability::{DeclaredAxis, SampledLoop};
+use taut_scene::{Device, DeviceDynamics, HandPreset};
+use taut_spidar::Geometry;
+
+use crate::session::setup::devices::impedance;
+use crate::shared::failure::Failure;
+
+/// Period of the haptics loop, s.
+const PERIOD_S: f64 = 1e-3;
+
+/// What is known of the device: `None` where nothing is declared, or where no force is rendered.
+pub(super) fn declared(
+    device: &Device,
+    dynamics: Option<&DeviceDynamics>,
+    scene_hand: Option<HandPreset>,
+) -> Result<Option<DeviceDynamics>, Failure> {
+    match (device, dynamics) {
+        (Device::Simulated { .. }, Some(_)) => Err(Failure::bad_input(
+            "the workbench file has [dynamics], which declares a real device, and a simulated device, which has its own; leave one out",
+        )),
+        (
+            Device::Simulated {
+                hand,
+                strings: Some(strings),
+                ..
+            },
+            None,
+        ) => {
+            let geometry = string_geometry(strings).map_err(Failure::bad_input)?;
+            Ok(Some(of_strings(&geometry, hand.or(scene_hand))))
+        }
+        (Device::Simulated { hand, .. }, None) => {
+            let grip = Grip::workbench();
+            Ok(Some(DeviceDynamics {
+                mass: grip.mass,
+                damping: grip.damping.min(),
+                friction: grip.coulomb_force.min(),
+                resolution: 0.0,
+                inertia: grip.rotational_inertia,
+                rotational_damping: grip.rotational_damping.min(),
+                rotational_friction: grip.coulomb_torque.min(),
+                angular_resolution: 0.0,
+                delay: 0.0,
+                motor_lag: 0.0,
+                hand: hand.or(scene_hand).unwrap_or_default(),
+            }))
+        }
+        // They feel nothing.
+        (Device::Trace { .. } | Device::Vrpn { .. } | Device::SpaceMouse { .. }, _) => Ok(None),
+        (_, dynamics) => Ok(dynamics.copied()),
+    }
+}
+
+/// What a string-driven device is along and about its weakest axis, with the grip at the centre.
+fn of_strings(geometry: &Geometry, hand: Option<HandPreset>) -> DeviceDynamics {
+    let grip = string_grip(geometry, &SpidarPlacement::default());
+    let inertia = grip.inertia();
+    let least = |axes: std::ops::Range<usize>| {
+        axes.map(|axis| inertia[(axis, axis)])
+            .fold(f64::INFINITY, f64::min)
+    };
+    let count = geometry
+        .metres_per_count
+        .iter()
+        .fold(0.0_f64, |most, count| most.max(count.abs()));
+    DeviceDynamics {
+        mass: least(0..3),
+        damping: grip.damping.min(),
+        friction: grip.coulomb_force.min(),
+        resolution: count,
+        inertia: least(3..6),
+        rotational_damping: grip.rotational_damping.min(),
+        rotational_friction: grip.coulomb_torque.min(),
+        angular_resolution: count / geometry.arm(),
+        delay: 0.0,
+        motor_lag: geometry.motor_time_constant,
+        hand: hand.unwrap_or_default(),
+    }
+}
+
+/// What to tell the user of the scene's stiffness: warnings, or the refusal where it cannot be stable.
+///
+/// # Errors
+/// A wall of the scene is beyond the largest stable stiffness with the declared hand, and `allow_unstable` is not set.
+pub(super) fn judge(
+    device: &DeviceDynamics,
+    settings: &Settings,
+    body: &Body,
+    allow_unstable: bool,
+) -> Result<Vec<String>, Failure> {
+    let hand = impedance(device.hand);
+    let mut warnings = Vec::new();
+    let [along, about] = stiffnesses(settings, body);
+    for (stiffness, unit, what) in [
+        (along, "N/m", "stiffness"),
+        (about, "N m/rad", "rotational stiffness"),
+    ] {
+        let linear = what == "stiffness";
+        let axis = |hand: &Hand| {
+            let damped = SampledLoop {
+                delay: PERIOD_S + device.delay,
+                motor_lag: device.motor_lag,
+                virtual_damping: stiffness * settings.damping_time,
+                ..SampledLoop::at_period(PERIOD_S)
+            };
+            if linear {
+                DeclaredAxis {
+                    sampled: SampledLoop {
+                        mass: device.mass,
+                        damping: device.damping,
+                        ..damped
+                    }
+                    .held_along(hand),
+                    coulomb: device.friction,
+                    resolution: device.resolution,
+                }
+            } else {
+                DeclaredAxis {
+                    sampled: SampledLoop {
+                        mass: device.inertia,
+                        damping: device.rotational_damping,
+                        ..damped
+                    }
+                    .held_about(hand),
+                    coulomb: device.rotational_friction,
+                    resolution: device.angular_resolution,
+                }
+            }
+        };
+        let held = axis(&hand).verdict();
+        let released = axis(&Hand::RELEASED).verdict();
+        let asked = format!("the scene's {what} of {stiffness:.3} {unit}");
+        if stiffness > held.stable {
+            let sentence = format!(
+                "{asked} is above the {:.3} {unit} that this device bears in this hand: {}; lower coupling.k_h or the mass, or raise coupling.damping_time",
+                held.stable, held.stable_limit
+            );
+            if !allow_unstable {
+                return Err(Failure::BadInput(format!(
+                    "{sentence}; --allow-unstable starts all the same"
+                )));
+            }
+            warnings.push(sentence);
+        } else if stiffness > released.stable {
+            warnings.push(format!(
+                "{asked} is stable in this hand, but not above {:.3} {unit} when the hand lets go: {}",
+                released.stable, released.stable_limit
+            ));
+        } else if stiffness > held.passive {
+            warnings.push(format!(
+                "{asked} is stable, but above the largest passive one of {:.3} {unit}: {}; it may hum",
+                held.passive, held.passive_limit
+            ));
+        }
+    }
+    Ok(warnings)
+}
+
+/// `K_t` and `K_r`.
+pub(crate) fn stiffnesses(settings: &Settings, body: &Body) -> [f64; 2] {
+    let along = settings.stiffness(body.mass);
+    let moment = match settings.rotation_metric {
+        RotationMetric::Inertia => SymmetricEigen::new(body.inertia).eigenvalues.max(),
+        RotationMetric::RadiusOfGyration(radius) => body.mass * radius * radius,
+    };
+    [along, settings.k_h * settings.k_s * moment]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_scene::Scene;
+
+    fn scene() -> taut_scene::BuiltScene {
+        Scene::named_or_file("peg-in-a-hole")
+            .and_then(|scene| scene.build())
+            .unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn light() -> DeviceDynamics {
+        let simulated = Device::Simulated {
+            hand: Some(HandPreset::Firm),
+            path: None,
+            tremor: 0.0,
+            seed: 0,
+            strings: None,
+        };
+        declared(&simulated, None, None)
+            .ok()
+            .flatten()
+            .expect("a simulated device is known")
+    }
+
+    #[test]
+    fn the_shipped_scene_suits_the_simulated_device() {
+        let scene = scene();
+        assert_eq!(
+            judge(&light(), &scene.settings, &scene.world.body, false),
+            Ok(vec![])
+        );
+    }
+
+    #[test]
+    fn what_only_a_hand_holds_stable_is_a_warning_and_what_nobody_does_is_refused() {
+        let scene = scene();
+        let asked = |stiffness: f64| Settings {
+            k_h: stiffness / (scene.settings.k_s * scene.world.body.mass),
+            ..scene.settings
+        };
+        let body = &scene.world.body;
+        let warned = judge(&light(), &asked(2000.0), body, false).expect("the hand holds it");
+        assert!(warned.iter().any(|w| w.contains("lets go")), "{warned:?}");
+        let refused = judge(&light(), &asked(50_000.0), body, false).expect_err("far too stiff");
+        assert!(refused.to_string().contains("--allow-unstable"));
+        assert!(judge(&light(), &asked(50_000.0), body, true).is_ok_and(|w| !w.is_empty()));
+    }
+
+    #[test]
+    fn an_encoder_without_friction_is_said_to_hum() {
+        let scene = scene();
+        let counted = DeviceDynamics {
+            resolution: 3e-5,
+            ..light()
+        };
+        let warned = judge(&counted, &scene.settings, &scene.world.body, false).expect("stable");
+        assert!(warned.iter().any(|w| w.contains("encoder")), "{warned:?}");
+    }
+}

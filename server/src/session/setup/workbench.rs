@@ -1,0 +1,311 @@
+//! From the workbench file to what a session is made of.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use taut_bridge::{
+    ContactBound, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
+    ValidationSettings,
+};
+use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
+use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
+use taut_scene::{
+    BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, TransportKind, Viewer,
+    Workbench,
+};
+
+use crate::loops::realtime::RealtimePolicy;
+use crate::loops::shell::Phases;
+use crate::session::frames;
+use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
+use crate::session::monitor::MonitorSettings;
+use crate::session::observers::ObserverSettings;
+use crate::session::setup::content::content;
+use crate::session::setup::devices::{device, input, vrpn_source};
+use crate::session::setup::stability::{declared, judge, stiffnesses};
+use crate::session::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
+use crate::shared::contact_snapshot::MAX_MOVING;
+use crate::shared::failure::Failure;
+
+/// Period of the haptics loop: the device's rate, 1 kHz.
+const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
+/// God-object updates per second unless the workbench says otherwise: more than the device's rate brings nothing new.
+const GOD_OBJECT_RATE_HZ: f64 = 1000.0;
+/// Real-time priority of the broadcaster: below the coupling, above all normal work.
+const BROADCAST_PRIORITY: u8 = 50;
+
+/// The thread that reads the device's own socket is so much above the haptics loop, which reads what it brings.
+const DEVICE_INPUT_ABOVE_HAPTICS: u8 = 5;
+/// The highest real-time priority.
+const MAX_PRIORITY: u8 = 99;
+
+/// What the command line says instead of the workbench file.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// A shipped scene's name, or a scene file.
+    pub scene: Option<String>,
+    /// Address of the control plane.
+    pub quic: Option<SocketAddr>,
+    /// Address of the state plane.
+    pub udp: Option<SocketAddr>,
+    /// Start although the scene is stiffer than the device bears.
+    pub allow_unstable: bool,
+    /// Without monitor.
+    pub no_monitor: bool,
+    /// Where the monitor records.
+    pub record: Option<PathBuf>,
+    /// An input device instead of the workbench's.
+    pub input: Option<InputChoice>,
+    /// Where the session is recorded.
+    pub recording: Option<PathBuf>,
+}
+
+/// Puts the session together. Files are read and checked, nothing is started.
+pub fn session_setup(
+    workbench: &Workbench,
+    key: ClusterKey,
+    overrides: &Overrides,
+) -> Result<SessionSetup, Failure> {
+    let scene = match &overrides.scene {
+        Some(named) => Scene::named_or_file(named)?,
+        None => workbench.load_scene()?,
+    };
+    let built = scene.build()?;
+    if built.motions.len() > MAX_MOVING {
+        return Err(Failure::BadInput(format!(
+            "the scene \"{}\" has {} obstacles with a motion, but a session can tell its clients of {MAX_MOVING}; leave some `motion` out, or use `taut replay`",
+            built.name,
+            built.motions.len()
+        )));
+    }
+    let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
+    if let Some(dynamics) = declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)? {
+        let body = &built.world.body;
+        for warning in judge(&dynamics, &built.settings, body, overrides.allow_unstable)? {
+            tracing::warn!("{warning}");
+        }
+    }
+    let workbench_from_scene = workbench.workbench_from_scene(&scene);
+    let content = content(&built, workbench, &workbench_from_scene)?;
+    let network = &workbench.network;
+    let link = LinkSettings {
+        quic: overrides
+            .quic
+            .unwrap_or(SocketAddr::new(network.bind, network.quic_port)),
+        udp: overrides
+            .udp
+            .unwrap_or(SocketAddr::new(network.bind, network.udp_port)),
+        announced_udp_port: None,
+        key,
+        also: also_key(network)?,
+        multicast: (network.transport == TransportKind::Multicast).then_some(MulticastOptions {
+            group: network.multicast_group,
+            announced: None,
+            interface: network.multicast_interface,
+        }),
+        policy: network.admission.clone(),
+        max_clients: network.max_clients,
+        frames: frames::settings(&workbench.frames),
+        node_timeout: Duration::from_secs_f64(network.node_timeout),
+    };
+    let safety = safety(workbench, &built.settings, &built.world.body);
+    let recording = overrides
+        .recording
+        .as_ref()
+        .map(|directory| recording(directory.clone(), &scene, &built));
+    let mut realtime = realtime(workbench);
+    let mut fidelity = built.fidelity.clone();
+    if let Some(plan) = &mut fidelity {
+        let rate_is_set = workbench.realtime.god_object_rate.is_some();
+        let at_bridge = overrides.input.is_none() && workbench.device == Device::Remote;
+        crate::session::setup::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
+    }
+    Ok(SessionSetup {
+        fidelity,
+        recording,
+        device: match &overrides.input {
+            Some(choice) => input(choice, &built, &workbench_from_scene)?,
+            None => device(&workbench.device, &built, &workbench_from_scene)?,
+        },
+        motions: built.motions,
+        settings: built.settings,
+        start: built.start,
+        world: Arc::new(built.world),
+        safety,
+        head: head(&workbench.viewer),
+        content,
+        link,
+        observers: ObserverSettings::of(workbench)?,
+        realtime,
+        monitor: monitor(&workbench.monitoring, overrides),
+    })
+}
+
+/// The second cluster key, while its time is not over.
+fn also_key(network: &taut_scene::Network) -> Result<Option<AlsoKey>, Failure> {
+    let Some(also) = &network.also_key else {
+        return Ok(None);
+    };
+    let also = AlsoKey {
+        key: read_key_file(&also.file)?,
+        until: also.until,
+    };
+    if !also.counts() {
+        tracing::warn!(
+            "the time of `also_key` in [network] is over: it opens nothing; take it out"
+        );
+        return Ok(None);
+    }
+    Ok(Some(also))
+}
+
+fn recording(directory: PathBuf, scene: &Scene, built: &BuiltScene) -> RecordingSettings {
+    let source = scene.source();
+    RecordingSettings {
+        directory,
+        manifest: Manifest {
+            format: FORMAT,
+            program: format!("taut {}", env!("CARGO_PKG_VERSION")),
+            scene: scene.name().to_owned(),
+            origin: source.directory.map_or(SceneOrigin::Shipped, |directory| {
+                // Where it is now counts; a directory that vanished meanwhile is told when it is looked into.
+                SceneOrigin::Directory(std::path::absolute(&directory).unwrap_or(directory))
+            }),
+            overrides: source.overrides,
+            identity: identity_of(&built.world, &built.settings, &built.start),
+            complete: false,
+            reason: Some("the session did not come to its end".to_owned()),
+            lost: Lost::default(),
+        },
+        scene: source.text,
+    }
+}
+
+fn head(viewer: &Viewer) -> HeadSource {
+    HeadSource {
+        rest: viewer.head,
+        eye_separation: viewer.eye_separation,
+        motion: match &viewer.tracking {
+            HeadTracking::Fixed => HeadMotion::Still,
+            HeadTracking::Sway { amplitude, period } => HeadMotion::Sway(Sway {
+                amplitude: *amplitude,
+                period: *period,
+            }),
+            HeadTracking::Remote => HeadMotion::Remote,
+            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
+                source: vrpn_source(sensor),
+                mapping: sensor.mapping,
+            })),
+        },
+    }
+}
+
+/// The stiffest contact of the scene: what the port lets the device's motion explain.
+fn contact_bound(scene: &god_object::Settings, body: &god_object::Body) -> ContactBound {
+    let [along, about] = stiffnesses(scene, body);
+    ContactBound {
+        stiffness: along,
+        radius_of_gyration: (about / along).sqrt(),
+    }
+}
+
+/// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
+fn safety(
+    workbench: &Workbench,
+    scene: &god_object::Settings,
+    body: &god_object::Body,
+) -> SafetySettings {
+    let wanted = &workbench.safety;
+    let nobody_is_hurt = matches!(
+        workbench.device,
+        Device::Simulated { .. }
+            | Device::Trace { .. }
+            | Device::Vrpn { .. }
+            | Device::SpaceMouse { .. }
+            | Device::Remote
+    );
+    let rearm = match wanted.rearm {
+        Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
+        Some(taut_scene::Rearm::Manual) => Rearm::Manual,
+        // Behind a bridge the bridge decides.
+        None if nobody_is_hurt => Rearm::Automatic,
+        None => Rearm::Manual,
+    };
+    // What comes over a network is stamped there and may be late; the device drops what is too late, which for a bridge that couples
+    // by itself is later.
+    let time_slack = match workbench.device {
+        Device::Remote => MAX_EDGE_DELAY,
+        _ => Duration::ZERO,
+    };
+    let default = ValidationSettings::default();
+    let within = |wanted: Option<f64>, scene: f64| wanted.map_or(scene, |wanted| wanted.min(scene));
+    SafetySettings {
+        max_force: within(wanted.max_force, scene.force_limit),
+        max_torque: within(wanted.max_torque, scene.torque_limit),
+        force_rate: wanted.force_slew * 1e3,
+        torque_rate: wanted.torque_slew * 1e3,
+        contact: contact_bound(scene, body),
+        ramp_in: Duration::from_secs_f64(wanted.ramp_in),
+        period: HAPTICS_PERIOD,
+        rearm,
+        dead_man: wanted.dead_man,
+        arm_button: wanted.arm_button,
+        validation: ValidationSettings {
+            max_speed: wanted.max_speed,
+            max_turn_rate: wanted.max_turn_rate,
+            max_age: default.max_age + time_slack,
+            time_slack,
+            ..default
+        },
+        passivity: PassivitySettings {
+            mode: match wanted.passivity {
+                taut_scene::Passivity::Observe => Passivity::Observe,
+                taut_scene::Passivity::Control => Passivity::Control,
+            },
+            ..PassivitySettings::default()
+        },
+        ..SafetySettings::default()
+    }
+}
+
+fn realtime(workbench: &Workbench) -> RealtimeSettings {
+    let wanted = &workbench.realtime;
+    let god_object_rate = wanted.god_object_rate.unwrap_or(GOD_OBJECT_RATE_HZ);
+    RealtimeSettings {
+        policy: match wanted.mode {
+            RealTimeMode::Enforce => RealtimePolicy::Enforce,
+            RealTimeMode::Waive => RealtimePolicy::Waive,
+        },
+        haptics_period: HAPTICS_PERIOD,
+        god_object_period: Duration::from_secs_f64(god_object_rate.recip()),
+        broadcast_period: Duration::from_secs_f64(workbench.network.broadcast_rate.recip()),
+        phases: Phases::default(),
+        haptics_priority: wanted.haptics_priority,
+        coupling_priority: wanted.coupling_priority,
+        broadcast_priority: BROADCAST_PRIORITY,
+        device_input_priority: wanted
+            .haptics_priority
+            .saturating_add(DEVICE_INPUT_ABOVE_HAPTICS)
+            .min(MAX_PRIORITY),
+        god_object_priority: wanted.god_object_priority,
+        haptics_core: wanted.haptics_core,
+        coupling_core: wanted.coupling_core,
+        god_object_core: wanted.god_object_core,
+        lock_memory: true,
+    }
+}
+
+fn monitor(wanted: &Monitoring, overrides: &Overrides) -> Option<MonitorSettings> {
+    let record = overrides.record.clone().or_else(|| wanted.record.clone());
+    let serve = wanted.enabled && !overrides.no_monitor;
+    (serve || overrides.record.is_some()).then_some(MonitorSettings {
+        bind: wanted.bind,
+        grpc_port: wanted.grpc_port,
+        web_port: wanted.web_port,
+        record,
+        memory_limit_bytes: wanted.memory_limit,
+        serve,
+    })
+}
