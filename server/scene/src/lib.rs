@@ -12,6 +12,7 @@ mod height_map_file;
 mod mesh_file;
 mod problem;
 mod rotation;
+mod runner;
 mod scene;
 pub mod shapes;
 mod simplify;
@@ -27,6 +28,7 @@ pub use files::{
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
 pub use rotation::{NORM_TOLERANCE, unit_quaternion};
+pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
     GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,
