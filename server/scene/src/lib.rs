@@ -11,6 +11,7 @@ mod files;
 mod height_map_file;
 mod mesh_file;
 mod problem;
+mod runner;
 mod scene;
 pub mod shapes;
 mod simplify;
@@ -23,6 +24,7 @@ pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
+pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
     GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,

@@ -38,6 +38,19 @@ pub struct ReplayRow {
     pub timings_us: (f64, f64),
 }
 
+impl ReplayWriter<Vec<u8>> {
+    /// One row as a line, with its end and without timings.
+    pub fn line(row: &ReplayRow) -> String {
+        let mut writer = Self {
+            sink: Vec::new(),
+            timings: false,
+            line: String::new(),
+        };
+        let _ = writer.write(row); // writing to a Vec cannot fail
+        writer.line
+    }
+}
+
 /// Writes rows as CSV.
 #[derive(Debug)]
 pub struct ReplayWriter<W> {

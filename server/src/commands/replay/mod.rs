@@ -1,13 +1,7 @@
 //! `taut replay`: the very same method code on a device trace, under a virtual clock; no network, no threads.
 //!
-//! Per row of the trace, in this order:
-//! 1. the device is at the row's pose, the virtual clock at the row's time;
-//! 2. obstacles with a motion are sent to where their traces, which begin at the first row, are at that time;
-//! 3. loop 1 updates the god-object, as often as its virtual period has passed since its last update (by default: once);
-//! 4. loop 2 computes the force from the device pose and the newest constraint set.
-//!
-//! The shaded acceleration of a row reaches loop 1 at its next update. Everything is a function of scene, trace and options, so the same
-//! input gives the same bytes; only the columns of `--timings` are of this machine.
+//! What happens in a row: [`taut_scene::Runner`].
+//! Everything is a function of scene, trace and options, so the same input gives the same bytes; only the columns of `--timings` are of this machine.
 
 pub mod recorded;
 
@@ -18,11 +12,11 @@ use std::time::{Duration, Instant};
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, angular, at_reference_point, linear, pose_difference};
 use god_object::surface::EnergyObserver;
-use god_object::{
-    Coupling, GodObject, Settings, ShadedAcceleration, StartError, StepReport, World,
-};
+use god_object::{Settings, StartError, StepReport, World};
 use indicatif::ProgressBar;
-use taut_scene::{BuiltMotion, DeviceTrace, FidelityPlan, ReplayRow, ReplayWriter, Scene};
+use taut_scene::{
+    BuiltMotion, DeviceTrace, FidelityPlan, Onlooker, ReplayRow, ReplayWriter, Runner, Scene,
+};
 
 use crate::cli::{MethodChoice, ReplayArgs};
 use crate::commands::finished_file::FinishedFile;
@@ -36,8 +30,6 @@ use crate::shared::timing::distribution_of;
 
 /// A replay that takes longer shows its progress.
 const SILENT_TIME: Duration = Duration::from_secs(2);
-/// A share of the virtual period by which a row may come early and still trigger the update: traces are written in decimals.
-const EARLY_SHARE: f64 = 1e-6;
 
 /// `taut replay`: the trace through the scene, the answer into a file. Nothing is left of a replay that does not end.
 pub fn run(args: &ReplayArgs) -> Result<ReplayReport, Failure> {
@@ -126,13 +118,7 @@ fn write_answers(
 /// The two loops of the method under a virtual clock, and what they were measured to do.
 #[derive(Debug)]
 pub struct Replay {
-    god_object: GodObject,
-    coupling: Coupling,
-    clock: UpdateClock,
-    motions: Vec<BuiltMotion>,
-    /// Virtual time of the first row, at which the obstacles' traces begin, s.
-    began: Option<f64>,
-    shaded: Option<ShadedAcceleration>,
+    runner: Runner,
     reference_point: Point3<f64>,
     energy: EnergyObserver,
     last_force: Option<Vector3<f64>>,
@@ -142,18 +128,6 @@ pub struct Replay {
     /// Speed and turn rate of the device at this row, m/s and rad/s.
     rates: [f64; 2],
     measured: Measured,
-}
-
-/// When loop 1 updates.
-#[derive(Clone, Copy, Debug)]
-struct UpdateClock {
-    /// Virtual period, s; `None` updates once per row.
-    period: Option<f64>,
-    start: Option<f64>,
-    /// Updates made.
-    updates: u64,
-    /// Virtual time of the last update.
-    last: f64,
 }
 
 /// Everything that the report sums up.
@@ -175,20 +149,9 @@ impl Replay {
         start: Pose,
         god_object_rate: Option<f64>,
     ) -> Result<Self, StartError> {
-        let coupling = Coupling::new(&world, &settings);
         let reference_point = world.body.reference_point;
         Ok(Self {
-            god_object: GodObject::new(world, settings, start)?,
-            coupling,
-            clock: UpdateClock {
-                period: god_object_rate.map(f64::recip),
-                start: None,
-                updates: 0,
-                last: 0.0,
-            },
-            motions: Vec::new(),
-            began: None,
-            shaded: None,
+            runner: Runner::new(world, settings, start, god_object_rate)?,
             reference_point,
             energy: EnergyObserver::new(),
             last_force: None,
@@ -205,7 +168,7 @@ impl Replay {
     /// The same with obstacles that move, from the first row on.
     #[must_use]
     pub fn with_motions(mut self, motions: Vec<BuiltMotion>) -> Self {
-        self.motions = motions;
+        self.runner = self.runner.with_motions(motions);
         self
     }
 
@@ -219,57 +182,22 @@ impl Replay {
 
     /// One row of the trace: the device is at `device_pose` at `time`, s; times never run back.
     pub fn row(&mut self, time: f64, device_pose: &Pose) -> ReplayRow {
-        let mut update_time = Duration::ZERO;
-        let elapsed = time - *self.began.get_or_insert(time);
         if let Some((before, pose)) = self.last_row.replace((time, *device_pose))
             && time > before
         {
             let way = pose_difference(device_pose, &pose, &Vector3::zeros());
             self.rates = [linear(&way).norm(), angular(&way).norm()].map(|w| w / (time - before));
         }
-        while self.clock.is_due(time) {
-            for motion in &self.motions {
-                self.god_object
-                    .move_obstacle(motion.obstacle, &motion.pose_at(elapsed));
-            }
-            let before = thread_cpu_time();
-            let report = self.god_object.step(device_pose, self.shaded.as_ref());
-            let took = thread_cpu_time().saturating_sub(before);
-            update_time += took;
-            self.measured.update(&report, took);
-            if let Some((_, watch)) = &self.fidelity {
-                watch.look(took, self.rates[0], self.rates[1]);
-            }
-            self.clock.updated(time);
-        }
-
-        for motion in &self.motions {
-            if let Some(pose) = self.god_object.obstacle_poses().nth(motion.obstacle) {
-                self.coupling.place_obstacle(motion.obstacle, pose);
-            }
-        }
-        let set = self.god_object.constraint_set();
-        let before = thread_cpu_time();
-        let output = self.coupling.step(time, device_pose, set);
-        let force_time = thread_cpu_time().saturating_sub(before);
-        self.shaded = output.shaded;
-
-        let answer = ReplayRow {
-            time,
-            device_pose: *device_pose,
-            god_object_pose: set.god_object_pose,
-            wrench: output.wrench,
-            contacts: set.constraints.len(),
-            active: output.active,
-            gap_min: set.gap_min,
-            kkt: output.kkt,
-            stale: time - self.clock.last,
-            timings_us: (microseconds(update_time), microseconds(force_time)),
+        let mut watch = Watch {
+            measured: &mut self.measured,
+            fidelity: self.fidelity.as_ref().map(|(_, watch)| watch),
+            rates: self.rates,
         };
+        let answer = self.runner.row(time, device_pose, &mut watch);
         let device = at_reference_point(device_pose, &self.reference_point);
-        self.energy.grant(self.coupling.obstacle_work());
+        self.energy.grant(self.runner.coupling().obstacle_work());
         self.energy.arrive(&device);
-        self.energy.hold(&device, &output.wrench);
+        self.energy.hold(&device, &answer.wrench);
         self.observe(&answer);
         answer
     }
@@ -302,7 +230,7 @@ impl Replay {
                 .is_finite()
                 .then_some(self.measured.gap_min),
             energy_injected_j: self.energy.highest(),
-            energy_from_obstacles_j: self.coupling.obstacle_work(),
+            energy_from_obstacles_j: self.runner.coupling().obstacle_work(),
             energy_generated_j: self.energy.generated(),
             fidelity: self
                 .fidelity
@@ -313,20 +241,23 @@ impl Replay {
     }
 }
 
-impl UpdateClock {
-    fn is_due(&mut self, time: f64) -> bool {
-        let Some(period) = self.period else {
-            // Once per row: `updated` notes the row's time; a second question about the same row is answered with no.
-            return self.start.is_none() || time > self.last;
-        };
-        let start = *self.start.get_or_insert(time);
-        time >= start + (self.updates as f64 - EARLY_SHARE) * period
+/// The clock of the steps, and where their reports go.
+struct Watch<'a> {
+    measured: &'a mut Measured,
+    fidelity: Option<&'a FidelityWatch>,
+    rates: [f64; 2],
+}
+
+impl Onlooker for Watch<'_> {
+    fn now(&self) -> Duration {
+        thread_cpu_time()
     }
 
-    fn updated(&mut self, time: f64) {
-        self.start.get_or_insert(time);
-        self.last = time;
-        self.updates += 1;
+    fn updated(&mut self, report: &StepReport, took: Duration) {
+        self.measured.update(report, took);
+        if let Some(watch) = self.fidelity {
+            watch.look(took, self.rates[0], self.rates[1]);
+        }
     }
 }
 
@@ -348,41 +279,4 @@ impl Measured {
 
 fn microseconds(time: Duration) -> f64 {
     time.as_secs_f64() * 1e6
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn updates(rate: Option<f64>, rows: u32, row_period: f64) -> Vec<u64> {
-        let mut clock = UpdateClock {
-            period: rate.map(f64::recip),
-            start: None,
-            updates: 0,
-            last: 0.0,
-        };
-        let mut counts = Vec::new();
-        for row in 0..rows {
-            let time = 3.0 + f64::from(row) * row_period;
-            let before = clock.updates;
-            while clock.is_due(time) {
-                clock.updated(time);
-            }
-            counts.push(clock.updates - before);
-        }
-        counts
-    }
-
-    #[test]
-    fn without_a_rate_there_is_one_update_per_row() {
-        assert_eq!(updates(None, 5, 0.001), [1; 5]);
-    }
-
-    #[test]
-    fn a_slow_loop_skips_rows_and_a_fast_one_updates_several_times() {
-        assert_eq!(updates(Some(250.0), 9, 0.001), [1, 0, 0, 0, 1, 0, 0, 0, 1]);
-        assert_eq!(updates(Some(3000.0), 3, 0.001), [1, 3, 3]);
-        assert_eq!(updates(Some(1000.0), 1000, 0.001).iter().sum::<u64>(), 1000);
-        assert_eq!(updates(Some(70.0), 1001, 0.001).iter().sum::<u64>(), 71);
-    }
 }

@@ -1,0 +1,106 @@
+//! Files: what is wrong with them, traces, and the replay of a trace.
+
+use std::path::{Path, PathBuf};
+
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use taut_scene::{DeviceTrace, REPLAY_COLUMNS, ReplayWriter, Runner, Scene, numbers_of_pose};
+
+use crate::convert::{bad, bad_file, table};
+
+/// What was found about one file.
+#[pyclass(frozen, get_all, module = "taut")]
+pub(crate) struct FileReport {
+    file: String,
+    good: bool,
+    summary: String,
+    problems: Vec<String>,
+    notes: Vec<String>,
+    /// Cubic metres; `None` if it is no mesh.
+    volume: Option<f64>,
+    /// Metres; `None` if it is no mesh.
+    size: Option<[f64; 3]>,
+    triangles: Option<usize>,
+    watertight: Option<bool>,
+    text: String,
+}
+
+#[pymethods]
+impl FileReport {
+    fn __str__(&self) -> &str {
+        &self.text
+    }
+}
+
+#[pyfunction]
+pub(crate) fn check(py: Python<'_>, path: PathBuf) -> PyResult<FileReport> {
+    let report = py
+        .detach(|| taut_scene::check(&[path]))
+        .pop()
+        .ok_or_else(|| bad("no report"))?;
+    let mesh = report.mesh.as_ref();
+    Ok(FileReport {
+        text: report.to_string(),
+        good: report.is_good(),
+        problems: report.problems.iter().map(ToString::to_string).collect(),
+        volume: mesh.map(|mesh| mesh.volume_m3),
+        size: mesh.map(|mesh| mesh.size_m),
+        triangles: mesh.map(|mesh| mesh.triangles),
+        watertight: mesh.map(|mesh| mesh.watertight),
+        file: report.file,
+        summary: report.summary,
+        notes: report.notes,
+    })
+}
+
+#[pyfunction]
+pub(crate) fn read_trace(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let trace = py.detach(|| DeviceTrace::load(&path)).map_err(bad_file)?;
+    let numbers = trace
+        .samples()
+        .iter()
+        .flat_map(|sample| {
+            [sample.time]
+                .into_iter()
+                .chain(numbers_of_pose(&sample.pose))
+        })
+        .collect();
+    table(py, numbers, 8)
+}
+
+#[pyfunction]
+#[pyo3(signature = (scene, trace, out = None))]
+pub(crate) fn replay<'py>(
+    py: Python<'py>,
+    scene: &str,
+    trace: PathBuf,
+    out: Option<PathBuf>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let numbers = py.detach(|| rows(scene, &trace, out.as_deref()))?;
+    table(py, numbers, REPLAY_COLUMNS.split(',').count())
+}
+
+/// All columns of all rows; the file, if one is named, gets the bytes that `taut replay` writes.
+fn rows(scene: &str, trace: &Path, out: Option<&Path>) -> PyResult<Vec<f64>> {
+    let built = Scene::named_or_file(scene)
+        .and_then(|scene| scene.build())
+        .map_err(bad_file)?;
+    let trace = DeviceTrace::load(trace).map_err(bad_file)?;
+    let mut runner = Runner::of_scene(built).map_err(|error| bad(error.to_string()))?;
+    let mut writer = ReplayWriter::new(Vec::new(), false)?;
+    let mut numbers = Vec::new();
+    for sample in trace.samples() {
+        let row = runner.row(sample.time, &sample.pose, &mut ());
+        writer.write(&row)?;
+        numbers.push(row.time);
+        numbers.extend(numbers_of_pose(&row.device_pose));
+        numbers.extend(numbers_of_pose(&row.god_object_pose));
+        numbers.extend(row.wrench.iter());
+        numbers.extend([row.contacts as f64, row.active as f64]);
+        numbers.extend([row.gap_min, row.kkt, row.stale]);
+    }
+    if let Some(out) = out {
+        std::fs::write(out, writer.finish()?)?;
+    }
+    Ok(numbers)
+}

@@ -1,0 +1,112 @@
+"""The god-object method for Python. Poses: x y z (m) qw qx qy qz, world from body; SI units, world axes."""
+
+from os import PathLike
+from typing import final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+COLUMNS: list[str]
+"""Names of the columns of `replay`."""
+SHIPPED_SCENES: list[str]
+"""Names that `Simulation` and `replay` take; every other name is the path of a scene file."""
+
+class TautError(ValueError):
+    """Input that cannot be used; the text says what, where and what to do."""
+
+@final
+class Update:
+    """What one update of the god-object did."""
+
+    contacts: int
+    """Rows in the constraint set."""
+    active: int
+    """Rows in the last active set."""
+    gap_min: float
+    """Smallest distance between the bodies, m; infinite when none is near."""
+    kkt: float
+    """Worst relative KKT residual of the update's projections."""
+    substeps: int
+    solver_failures: int
+    """Projections without an answer: the body stayed where it was."""
+    obstacles_blocked: int
+    """Obstacles that did not get to their targets."""
+    unfinished: bool
+    """The budget ran out before the body was as close as it gets: safe, only not yet closest."""
+
+@final
+class Force:
+    """The force on the hand."""
+
+    wrench: NDArray[np.float64]
+    """Force (N), then torque (N m) about the reference point; world axes, within the scene's limits."""
+    active: int
+    kkt: float
+    solved: bool
+    """The answer is certified. Where it is not, the wrench is zero, but between obstacles that move."""
+    saturated: bool
+    """A limit of force or torque was at work."""
+
+@final
+class Simulation:
+    """A scene and the two loops of the method on it. Threads may share it: they take turns, without the interpreter's lock."""
+
+    name: str
+    stiffness: float
+    """Of the coupling at the reference point, N/m."""
+    size: float
+    """Longest side of the box around the god-object, m."""
+    mass: float
+    """Of the god-object, kg."""
+    obstacles: list[str]
+    """Their names, in the order of the scene file."""
+    reference_point: NDArray[np.float64]
+    """Point at which wrenches act, in the god-object's own frame, m."""
+    start: NDArray[np.float64]
+    """Pose at which the god-object starts."""
+    god_object: NDArray[np.float64]
+    """Pose at which the god-object is."""
+
+    def __new__(cls, scene: str, overrides: list[str] = ...) -> Simulation:
+        """A shipped scene by its name or a scene file by its path; overrides as `taut --set`: "coupling.k_s=1.0"."""
+    def update(self, device: ArrayLike) -> Update:
+        """Loop 1: the god-object follows the device's pose as far as the obstacles let it, and never further."""
+    def force(self, time: float, device: ArrayLike) -> Force:
+        """Loop 2: the force for a device's pose at `time`, s, which never runs back; once per reading of the device."""
+    def constraints(self) -> NDArray[np.float64]:
+        """One row per constraint: point (m), unit normal from obstacle to god-object, gap (m); seven columns."""
+    def move_obstacle(self, index: int, target: ArrayLike) -> None:
+        """Sends an obstacle to a pose: it goes there at the next update."""
+    def obstacle_pose(self, index: int) -> NDArray[np.float64]:
+        """Where an obstacle is."""
+    def reset(self) -> None:
+        """Back to the start, as if nothing had been stepped."""
+
+@final
+class FileReport:
+    """What was found about one file; `str` of it is the text of `taut check`."""
+
+    file: str
+    good: bool
+    summary: str
+    problems: list[str]
+    notes: list[str]
+    triangles: int | None
+    watertight: bool | None
+    volume: float | None
+    """m^3; negative if the surface is inside out."""
+    size: tuple[float, float, float] | None
+    """Sides of the box around it, m."""
+    text: str
+
+def check(path: str | PathLike[str]) -> FileReport:
+    """Looks at a mesh, scene, trace or workbench file as `taut check` does. A file that is bad, or missing, is an answer."""
+
+def read_trace(path: str | PathLike[str]) -> NDArray[np.float64]:
+    """A trace of the device: one row per sample, time (s) and pose; eight columns."""
+
+def replay(
+    scene: str, trace: str | PathLike[str], out: str | PathLike[str] | None = None
+) -> NDArray[np.float64]:
+    """A trace through a scene: one row per sample, columns as in COLUMNS. `out` gets the bytes that `taut replay` writes."""
