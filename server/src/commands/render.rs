@@ -32,8 +32,15 @@ pub(crate) fn run(_args: RenderArgs) -> Result<(), crate::shared::failure::Failu
 pub(crate) fn adapter() -> Option<Result<String, String>> {
     let gpu = taut_render::renderer::Gpu::open();
     Some(
-        gpu.map(|gpu| gpu.chosen())
-            .map_err(|error| error.to_string()),
+        gpu.map(|gpu| {
+            let slow = if gpu.is_software() {
+                "; that is software, slow and good for tests: the screens of a workbench need a graphics card"
+            } else {
+                ""
+            };
+            format!("{}{slow}", gpu.chosen())
+        })
+        .map_err(|error| error.to_string()),
     )
 }
 

@@ -78,7 +78,7 @@ impl Felt {
     /// Share of the time above one just-noticeable difference; NaN where there is no right answer.
     #[must_use]
     pub fn share_above_one(&self) -> f64 {
-        let above = self.each.iter().filter(|j| !(**j <= 1.0)).count(); // NaN is above
+        let above = self.each.iter().filter(|j| **j > 1.0 || j.is_nan()).count();
         above as f64 / self.each.len() as f64
     }
 }
@@ -123,14 +123,14 @@ fn steps(forces: &[Vector3<f64>], right: &[Vector3<f64>]) -> (Vec<f64>, f64) {
     };
     // What is left of each change after the right answer's own smooth one then, or a millisecond beside.
     let mut left = vec![0.0; count];
-    for i in 1..count {
+    for (i, rest) in left.iter_mut().enumerate().skip(1) {
         let beside = i.saturating_sub(1).max(1)..(i + 2).min(count);
         let smooth = beside.filter(|j| felt_step(*j).is_none());
         let own = smooth.map(|j| change(right, j)).fold(0.0, f64::max);
-        left[i] = change(forces, i) - own;
+        *rest = change(forces, i) - own;
         // Not clamped by max: NaN stays.
-        if left[i] < 0.0 {
-            left[i] = 0.0;
+        if *rest < 0.0 {
+            *rest = 0.0;
         }
     }
     // The nearest pairs first: a steady ramp matches itself.
@@ -151,8 +151,8 @@ fn steps(forces: &[Vector3<f64>], right: &[Vector3<f64>]) -> (Vec<f64>, f64) {
             }
         }
     }
-    for i in 1..count {
-        left[i] /= just_felt(forces[i].norm().max(forces[i - 1].norm()));
+    for (i, step) in left.iter_mut().enumerate().skip(1) {
+        *step /= just_felt(forces[i].norm().max(forces[i - 1].norm()));
     }
     (left, delay as f64 * TICK)
 }

@@ -14,8 +14,8 @@ use crate::scene::{GOD_OBJECT_NAME, Scene, shipped_scene_text};
 use crate::trace::DeviceTrace;
 use crate::workbench::Workbench;
 
-/// A body longer than this, m, is probably in millimetres.
-const SUSPICIOUS_SIZE: f64 = 5.0;
+/// A body longer than this, m, is probably in millimetres; a shorter one was probably scaled twice.
+const SUSPICIOUS_SIZES: [f64; 2] = [5e-4, 5.0];
 
 /// Reads each file and says everything that is wrong with it. The kind follows from the ending and, for .toml, from the
 /// tables. Names of shipped scenes are taken too.
@@ -43,7 +43,7 @@ fn check_one(path: &Path) -> FileReport {
         report(
             path,
             FileKind::Scene,
-            Scene::named_or_file(&name).and_then(|scene| summarise_scene(&scene)),
+            Scene::named_or_file(&name).and_then(|scene| summarise_scene(&scene, &mut Vec::new())),
         )
     } else {
         let text = "is no file that taut knows; use .toml (scene, workbench), .csv (trace), .ply, .obj, .stl, .glb or .gltf";
@@ -93,9 +93,7 @@ fn check_mesh(path: &Path) -> FileReport {
         .collect();
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
     let mut notes = Vec::new();
-    if longest > SUSPICIOUS_SIZE {
-        notes.push(format!("the longest side is {longest} m; if the file is in millimetres, write scale = 0.001 in the scene"));
-    }
+    notes.extend(doubt_about_size("the mesh", longest));
     let summary = figures.to_string();
     FileReport {
         file: path.display().to_string(),
@@ -122,11 +120,12 @@ fn check_toml(path: &Path) -> FileReport {
         _ => false,
     };
     if has(&["god_object", "obstacle", "coupling", "limits", "hand"]) {
-        report(
-            path,
-            FileKind::Scene,
-            Scene::load(path).and_then(|scene| summarise_scene(&scene)),
-        )
+        let mut notes = Vec::new();
+        let scene = Scene::load(path).and_then(|scene| summarise_scene(&scene, &mut notes));
+        FileReport {
+            notes,
+            ..report(path, FileKind::Scene, scene)
+        }
     } else if has(&[
         "screen",
         "node",
@@ -139,7 +138,7 @@ fn check_toml(path: &Path) -> FileReport {
         let workbench = Workbench::load(path).and_then(|workbench| {
             notes = workbench.notes();
             let scene = workbench.load_scene()?;
-            let (inner, fidelity) = summarise_scene(&scene)?;
+            let (inner, fidelity) = summarise_scene(&scene, &mut notes)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
             let summary = format!(
                 "workbench \"{}\", {screens} screens, {nodes} nodes, {inner}",
@@ -161,8 +160,37 @@ fn check_toml(path: &Path) -> FileReport {
     }
 }
 
-fn summarise_scene(scene: &Scene) -> Result<(String, Option<FidelityPlan>), FileError> {
+/// What to ask about the longest side of a body, m, where it is none that a hand can hold.
+fn doubt_about_size(body: &str, longest: f64) -> Option<String> {
+    let [least, most] = SUSPICIOUS_SIZES;
+    let advice = if longest > most {
+        "if the file is in millimetres, write unit = \"mm\" beside mesh in the scene"
+    } else if longest < least {
+        "if the file is in metres, write no unit and no scale beside mesh in the scene"
+    } else {
+        return None;
+    };
+    Some(format!(
+        "the longest side of {body} is {longest:.3e} m; {advice}"
+    ))
+}
+
+fn summarise_scene(
+    scene: &Scene,
+    notes: &mut Vec<String>,
+) -> Result<(String, Option<FidelityPlan>), FileError> {
     let built = scene.build()?;
+    let mut sizes = Vec::new();
+    for body in &built.bodies {
+        let Some((low, high)) = body.mesh.bounds() else {
+            continue;
+        };
+        let longest = (high - low).max();
+        if scene.is_from_file(&body.name) {
+            sizes.push(format!("{} {longest:.4} m", body.name));
+            notes.extend(doubt_about_size(&body.name, longest));
+        }
+    }
     let triangles: Vec<String> = built
         .bodies
         .iter()
@@ -183,6 +211,9 @@ fn summarise_scene(scene: &Scene) -> Result<(String, Option<FidelityPlan>), File
         built.name,
         triangles.join(", ")
     );
+    if !sizes.is_empty() {
+        summary += &format!(", longest side: {}", sizes.join(", "));
+    }
     let settings = &built.settings;
     summary += &format!(
         ", rest distance {:.3} um (fits down to {:.3} um a side; for tighter ones give clearance in [method])",

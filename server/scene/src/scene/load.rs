@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
 
+use super::build::GOD_OBJECT_NAME;
 use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
@@ -54,6 +55,17 @@ impl Scene {
         let text = read_text(path, MAX_TOML_BYTES)?;
         let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
         Self::parse(&path.display().to_string(), &text, &directory)
+    }
+
+    /// Whether the body of this name among the bodies has its form from a mesh file.
+    pub(crate) fn is_from_file(&self, body: &str) -> bool {
+        let shape = if body == GOD_OBJECT_NAME {
+            Some(&self.spec.god_object.shape)
+        } else {
+            let mut obstacles = self.spec.obstacles.iter();
+            obstacles.find(|o| o.name == body).map(|o| &o.shape)
+        };
+        matches!(shape, Some(Shape::Mesh { .. }))
     }
 
     /// One of [`SHIPPED_SCENES`] by its name, or else the file of this path.

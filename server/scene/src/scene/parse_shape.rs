@@ -21,6 +21,16 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 
 const AXES: [(&str, Axis); 3] = [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)];
 
+/// Units that a mesh file may be in, and what they are in metres.
+const UNITS: [(&str, f64); 6] = [
+    ("m", 1.0),
+    ("dm", 0.1),
+    ("cm", 0.01),
+    ("mm", 1e-3),
+    ("um", 1e-6),
+    ("inch", 0.0254),
+];
+
 /// Reads one primitive's table.
 type ReadPrimitive = fn(&Section<'_>) -> Option<Shape>;
 
@@ -37,7 +47,8 @@ pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     };
     let mut found = Vec::new();
     if let Some(path) = shape.text("mesh") {
-        let scale = shape.number_or("scale", Range::Positive, 1.0);
+        let unit = shape.choice("unit", &UNITS).unwrap_or(1.0);
+        let scale = unit * shape.number_or("scale", Range::Positive, 1.0);
         found.push(Some(Shape::Mesh {
             path: path.to_owned(),
             scale,

@@ -16,7 +16,7 @@ pub enum Shape {
     Mesh {
         /// As written.
         path: String,
-        /// Factor on all coordinates.
+        /// Factor on all coordinates: that of the unit, m, times the scale.
         scale: f64,
         /// Most distance to the mesh in the file, either way, m; the mesh gets as few triangles as that allows.
         simplify: Option<f64>,
