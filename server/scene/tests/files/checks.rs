@@ -109,7 +109,7 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
              shape = {{ plane = {{}} }}\nposition = [0.0, 0.0, -1.0]\n"
         )
     };
-    let metres = folder.check("metres.toml", &scene(""));
+    let metres = folder.check("metres.toml", scene(""));
     assert_eq!(metres.notes.len(), 1, "{metres}");
     assert!(
         metres.notes[0].contains("6.000e1 m") && metres.notes[0].contains("unit = \"mm\""),
@@ -120,16 +120,16 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
         (", unit = \"mm\", scale = 2.0", "god-object 0.1200 m"),
         (", scale = 0.001", "god-object 0.0600 m"),
     ] {
-        let report = folder.check("part.toml", &scene(more));
+        let report = folder.check("part.toml", scene(more));
         assert!(
             report.problems.is_empty() && report.notes.is_empty(),
             "{report}"
         );
         assert!(report.summary.contains(longest), "{report}");
     }
-    let twice = folder.check("twice.toml", &scene(", unit = \"um\""));
+    let twice = folder.check("twice.toml", scene(", unit = \"um\""));
     assert!(twice.notes[0].contains("write no unit"), "{twice}");
-    let unknown = folder.check("ell.toml", &scene(", unit = \"ell\""));
+    let unknown = folder.check("ell.toml", scene(", unit = \"ell\""));
     assert!(
         unknown.problems[0].text.contains("\"ell\", but must be"),
         "{unknown}"
