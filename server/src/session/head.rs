@@ -1,5 +1,5 @@
 //! The viewer's head: still, swaying as people do who stand and look, or where a tracker sees it: a VRPN tracker that the server listens to,
-//! or `taut track` on another PC ([`crate::session::remote_head`]).
+//! or `taut track` on another PC (`session::remote_head`).
 //!
 //! | symbol | name in code | unit | meaning                                              |
 //! |--------|--------------|------|------------------------------------------------------|

@@ -22,7 +22,6 @@ impl Session {
         if let Some(fidelity) = &mut self.fidelity {
             for line in fidelity.watch.notices(&mut fidelity.reported) {
                 terminal.say(&line);
-                tracing::info!("{line}");
             }
         }
         let Some(link) = &self.link else {
@@ -42,8 +41,9 @@ impl Session {
                 terminal.say(&format!("taut: {line}"));
             } else if concerns_presence {
                 terminal.say(&line);
+            } else {
+                tracing::info!("{line}"); // what was said above is not said twice
             }
-            tracing::info!("{line}");
             if let Some(recorder) = &self.recorder {
                 recorder.events().send(EventRecord {
                     time: self.clock.now(),

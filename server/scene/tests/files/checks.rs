@@ -105,8 +105,8 @@ fn a_part_in_millimetres_is_doubted_in_its_scene_and_taken_with_its_unit() {
     folder.file("part.ply", write_ply(&cuboid([30.0, 20.0, 10.0])));
     let scene = |more: &str| {
         format!(
-            "name = \"part\"\n[god_object]\nshape = {{ mesh = \"part.ply\"{more} }}\n[[obstacle]]\nname = \"table\"\n\
-             shape = {{ plane = {{}} }}\nposition = [0.0, 0.0, -1.0]\n"
+            "name = \"part\"\n[god_object]\nmass = 1.0\nshape = {{ mesh = \"part.ply\"{more} }}\n[[obstacle]]\nname = \"table\"\n\
+             shape = {{ plane = {{}} }}\npose = {{ position = [0.0, 0.0, -100.0] }}\n"
         )
     };
     let metres = folder.check("metres.toml", scene(""));
