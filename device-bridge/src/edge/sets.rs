@@ -78,6 +78,7 @@ pub fn read_set(wire: &proto::ConstraintSet, set: &mut ConstraintSet) -> Result<
     let origin = pose.translation.vector;
     set.sequence = wire.head.sequence;
     set.god_object_pose = pose;
+    set.published = None; // on another clock, and the way here is not even
     set.truncated = wire.head.flags & SET_TRUNCATED != 0;
     set.gap_min = f64::INFINITY;
     set.reduction_error = 0.0;

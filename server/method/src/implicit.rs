@@ -14,7 +14,8 @@
 //! the force is the one that is felt there. It is Gauss-Newton's scheme on poses, so that no derivative of the rotation vector
 //! appears: each round starts from zero.
 //!
-//! A motion without rotation is exact in one projection, so it costs none of this.
+//! A row that holds the body was projected to the distance `g + b / s`: where its true distance there is that, and nothing turned, the linear rows
+//! were true, and there are no rounds. So a body that slides on flat faces costs none, and one that slides round a cylinder gets them without turning.
 //! Source: beyond Ortega et al. 2007, Section 7.3.2, which names linear constraints as a limitation.
 
 use nalgebra::{Point3, Vector3};
@@ -35,6 +36,8 @@ pub(crate) struct ImplicitRounds {
     radius: f64,
     /// Bending of a path below which a straight row is true, m.
     tolerance: f64,
+    /// Whether rows bend for a body that does not turn, too.
+    slides: bool,
     /// Its own: the rows of the first projection stay prepared elsewhere.
     projector: Projector,
     rows: Vec<HalfSpace>,
@@ -98,10 +101,17 @@ impl ImplicitRounds {
             rounds: settings.implicit_rounds,
             radius,
             tolerance,
+            slides: false,
             projector,
             rows: Vec::with_capacity(capacity),
             warm_start: Vec::with_capacity(capacity.min(6)),
         }
+    }
+
+    /// Rounds for round features, too, about which a body slides without turning. Not for a body that is to move: its way there would be a chord.
+    pub(crate) fn about_round_features(mut self) -> Self {
+        self.slides = true;
+        self
     }
 
     /// See [`Projector::limit_iterations`].
@@ -132,9 +142,9 @@ impl ImplicitRounds {
         let mut answer: Option<ImplicitAnswer> = None;
         self.remember_active(given.projection);
         for round in 1..=self.rounds {
-            // A point of the body leaves its tangent by at most r theta^2 / 2.
+            // A point of the body leaves its tangent by at most r theta^2 / 2; round features bend without that.
             let bends = 0.5 * self.radius * turned * turned > self.tolerance; // false for NaN
-            if !bends {
+            if !bends && (!self.slides || self.holds_true(given, &bound_at, &candidate)) {
                 break;
             }
             let difference = pose_difference(given.goal, &candidate, &branch);
@@ -169,6 +179,23 @@ impl ImplicitRounds {
             candidate = reached;
         }
         answer
+    }
+
+    /// Whether the rows that hold the body do so at the distance that they were projected to.
+    fn holds_true(
+        &self,
+        given: &LinearAnswer,
+        bound_at: impl Fn(usize) -> f64,
+        candidate: &Pose,
+    ) -> bool {
+        self.warm_start.iter().all(|row| {
+            let row = *row as usize;
+            given.constraints.get(row).is_none_or(|constraint| {
+                let moved = constraint.moved(given.start, candidate, given.shaded);
+                let projected_to = constraint.gap + bound_at(row) / given.scale;
+                (moved.gap - projected_to).abs() <= self.tolerance
+            })
+        })
     }
 
     /// Every row as it is at `candidate`.

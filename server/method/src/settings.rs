@@ -32,6 +32,8 @@ const REST_DISTANCE_PER_CLEARANCE: f64 = 0.1;
 const MOTION_TOLERANCE_PER_REST_DISTANCE: f64 = 5e-3;
 /// Most rounds of implicit constraints: what three do not mend, the next update does.
 const MAX_IMPLICIT_ROUNDS: u32 = 3;
+/// Rounds of implicit constraints where no mesh meets a mesh.
+const ROUNDS_OF_EXACT_SHAPES: u32 = 2;
 
 /// What stands in the metric for the inertia tensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,7 +98,7 @@ pub struct Settings {
     /// Most repetitions of project, move, collect within one update.
     pub max_substeps: u32,
     /// How often a projection is repeated with its rows re-linearised where it led to, in both loops; 0 leaves them linear.
-    /// A motion that does not turn the body needs none.
+    /// A motion that does not turn the body needs none; in the coupling, one round a cylinder or a sphere does.
     pub implicit_rounds: u32,
     /// Most evaluations of one feature pair's gap in one collision search.
     pub max_advancement_steps: u32,
@@ -154,6 +156,16 @@ impl Settings {
             minimum_gap: self.minimum_gap * share,
             gap_tolerance: self.gap_tolerance * share,
             motion_tolerance: self.motion_tolerance * share,
+            ..self
+        }
+    }
+
+    /// The same for a world in which no mesh meets a mesh: rows are few there, and those of round features bend as the body slides, so they are
+    /// re-linearised. With linear rows the force round a cylinder turns once an update.
+    #[must_use]
+    pub fn for_exact_shapes(self) -> Self {
+        Self {
+            implicit_rounds: self.implicit_rounds.max(ROUNDS_OF_EXACT_SHAPES),
             ..self
         }
     }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::Mesh;
 use crate::quasi_statics::Metric;
-use crate::settings::RotationMetric;
+use crate::settings::{RotationMetric, Settings};
 use crate::shape::Primitive;
 use crate::spatial::Pose;
 use crate::surface::{HeightMapTexture, UvHeightMapTexture};
@@ -117,4 +117,18 @@ pub struct World {
     pub body: Body,
     /// Everything else.
     pub obstacles: Vec<Obstacle>,
+}
+
+impl World {
+    /// Defaults for these shapes from defaults for their size, see [`Settings::for_exact_shapes`].
+    #[must_use]
+    pub fn settings_for(&self, defaults: Settings) -> Settings {
+        let meshes_meet =
+            self.body.primitive.is_none() && self.obstacles.iter().any(|o| o.primitive.is_none());
+        if meshes_meet {
+            defaults
+        } else {
+            defaults.for_exact_shapes()
+        }
+    }
 }

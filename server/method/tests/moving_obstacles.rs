@@ -114,6 +114,43 @@ fn the_force_of_a_rising_plate_grows_evenly_between_slow_updates() {
     assert!(largest <= 0.15, "a step of {largest} N");
 }
 
+/// Updates every 3.33 ms and 7.7 ms, that begin between the ticks of the force: 0.1 N each millisecond all the same.
+#[test]
+fn the_force_of_a_rising_plate_grows_evenly_whatever_the_ticks() {
+    for period in [1.0 / 300.0, 1.0 / 130.0, 1.0 / 70.0] {
+        let world = world(5e-3, 0.5);
+        let (mut god_object, mut coupling, settings) = loops(&world);
+        let device = Pose::translation(0.0, 0.0, 0.03);
+        let (speed, mut next, mut last) = (0.1, 0.0, 0.0);
+        let mut steps = Vec::new();
+        for millisecond in 0..320 {
+            let time = f64::from(millisecond) * 1e-3;
+            while next <= time {
+                god_object.move_obstacle(0, &Pose::translation(0.0, 0.0, speed * next - 2.5e-3));
+                god_object.step(&device, None);
+                god_object.note_published(next);
+                next += period;
+            }
+            let force = coupling
+                .step(time, &device, god_object.constraint_set())
+                .wrench[2];
+            if last > 0.5 && force < settings.force_limit {
+                steps.push(force - last);
+            }
+            last = force;
+        }
+        let (least, most) = steps
+            .iter()
+            .fold((f64::INFINITY, 0.0_f64), |(low, high), step| {
+                (low.min(*step), high.max(*step))
+            });
+        assert!(
+            least > 0.095 && most < 0.105,
+            "updates of {period} s: steps of {least} to {most} N"
+        );
+    }
+}
+
 #[test]
 fn passivity_lets_a_plate_push_the_hand_with_the_plates_own_energy() {
     let world = world(5e-3, 0.5);

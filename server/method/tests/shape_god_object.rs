@@ -172,6 +172,70 @@ impl Loops {
     }
 }
 
+/// The set is that of angle 0; the device has gone on round by up to a sixth of a right angle, 2 mm below the surface.
+#[test]
+fn the_force_round_a_cylinder_on_an_old_set_is_that_of_a_new_one() {
+    let round = [
+        Form::Cylinder(0.03, 0.05),
+        Form::Sphere(0.03),
+        Form::Capsule(0.03, 0.05),
+    ];
+    let bodies = [
+        Form::Sphere(0.01),
+        Form::Sphere(0.002),
+        Form::Capsule(0.004, 0.01),
+    ];
+    for (obstacle, form) in round
+        .iter()
+        .flat_map(|o| bodies.iter().map(move |f| (*o, *f)))
+    {
+        let (Form::Sphere(radius) | Form::Capsule(radius, _)) = form else {
+            unreachable!("round bodies");
+        };
+        let world = Arc::new(one(form, obstacle, Pose::identity()));
+        let settings = world.settings_for(Settings {
+            adaptation: None,
+            ..Settings::for_size(0.02)
+        });
+        let rest = settings.rest_distance;
+        let place = |depth: f64, angle: f64| {
+            let reach = 0.03 + radius - depth;
+            let (x, z) = (reach * angle.cos(), reach * angle.sin());
+            at(x, 0.0, z, UnitQuaternion::identity())
+        };
+        let start = place(-2.0 * rest, 0.0);
+        let god_object = GodObject::new(world.clone(), settings, start).expect("a free start");
+        let force = |settings: &Settings, angle: f64| {
+            let mut coupling = Coupling::new(&world, settings);
+            let device = place(2e-3, angle);
+            linear(
+                &coupling
+                    .step(0.0, &device, god_object.constraint_set())
+                    .wrench,
+            )
+        };
+        let linear_rows = Settings {
+            implicit_rounds: 0,
+            ..settings
+        };
+        for tenth in 1..=5 {
+            let angle = 0.05 * f64::from(tenth);
+            let expected = Vector3::new(angle.cos(), 0.0, angle.sin()) * STIFFNESS * (2e-3 + rest);
+            let off =
+                |settings: &Settings| (force(settings, angle) - expected).norm() / expected.norm();
+            let (implicit, without) = (off(&settings), off(&linear_rows));
+            assert!(
+                implicit < 0.02,
+                "{form:?} round {obstacle:?} at {angle}: off by {implicit}"
+            );
+            assert!(
+                without > 0.8 * angle,
+                "linear rows would do: off by {without} at {angle}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_cylinder_goes_into_a_faceted_hole_without_force_along_it() {
     let hole = Form::Hole(0.0105, 72);

@@ -146,10 +146,12 @@ impl GodObjectLoop {
             &self.statistics.blocked_updates,
             u64::from(report.obstacles_blocked > 0),
         );
+        self.snapshot.published = clock();
+        self.god_object
+            .note_published(self.snapshot.published.as_secs_f64());
         self.snapshot
             .set
             .clone_from(self.god_object.constraint_set());
-        self.snapshot.published = clock();
         self.snapshot.device_time = device.time;
         self.snapshot.report = report;
         note_obstacles(&self.motions, &self.god_object, &mut self.snapshot.moving);

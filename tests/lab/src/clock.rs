@@ -95,7 +95,7 @@ pub(crate) fn run_within(
         loop {
             match done {
                 Some(end) if end <= time => {
-                    method.publish();
+                    method.publish(end);
                     done = None;
                 }
                 None if begin <= time => {
@@ -152,7 +152,7 @@ mod tests {
         fn update(&mut self, time: f64, _device: &Pose) {
             self.now = time;
         }
-        fn publish(&mut self) {
+        fn publish(&mut self, _time: f64) {
             self.published = self.now;
         }
         fn force(&mut self, _time: f64, _device: &Pose) -> Vector6 {

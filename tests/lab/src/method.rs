@@ -35,8 +35,8 @@ pub trait HapticMethod {
     /// One update of the simulation, begun at `time` with the device where it is then.
     fn update(&mut self, time: f64, device: &Pose);
 
-    /// The last update is done: poses and forces are its from now on.
-    fn publish(&mut self);
+    /// The last update was done at `time`: poses and forces are its from now on.
+    fn publish(&mut self, time: f64);
 
     /// Force and torque on the hand at the body's reference point, N and N m, world axes.
     fn force(&mut self, time: f64, device: &Pose) -> Vector6;
@@ -65,10 +65,11 @@ impl Scene {
     /// With the default settings for a body of this size, m, and a device of this speed, m/s.
     #[must_use]
     pub fn new(world: World, size: f64, speed: f64, start: Pose) -> Self {
+        let settings = world.settings_for(Settings::for_size(size));
         Self {
             world: Arc::new(world),
             start,
-            settings: Settings::for_size(size),
+            settings,
             speed,
         }
     }

@@ -42,6 +42,9 @@ pub struct ConstraintSet {
     pub sequence: u64,
     /// Pose of the body's own frame at which the constraints hold.
     pub god_object_pose: Pose,
+    /// When it was published, s, on the clock of the times that the coupling is given; `None` where that is not known. Rows of obstacles that move go
+    /// on with them from then; without it, from when the coupling first sees the set.
+    pub published: Option<f64>,
     /// Rows in ascending order of their features.
     pub constraints: Vec<NonPenetrationConstraint>,
     /// Smallest distance between the bodies, m; infinite when none is within the activation distance.
@@ -94,6 +97,7 @@ impl Clone for ConstraintSet {
     fn clone_from(&mut self, source: &Self) {
         self.sequence = source.sequence;
         self.god_object_pose = source.god_object_pose;
+        self.published = source.published;
         self.constraints.clone_from(&source.constraints);
         self.gap_min = source.gap_min;
         self.truncated = source.truncated;

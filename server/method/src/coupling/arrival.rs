@@ -3,14 +3,14 @@
 /// The time of the present set, and between it and the one before.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Arrival {
-    /// When the present set was first seen, s.
+    /// When the present set was published or, where that is not known, first seen, s.
     time: f64,
     /// Time between the present set and the one before, s.
     period: f64,
 }
 
 impl Arrival {
-    /// Takes note of a new set, s.
+    /// Takes note of a new set and of its time, s.
     pub(super) fn observe(&mut self, time: f64) {
         *self = Self {
             time,

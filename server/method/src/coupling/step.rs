@@ -130,7 +130,8 @@ impl Coupling {
                 settings.motion_tolerance,
                 Projector::new(settings.solver, capacity),
                 capacity,
-            ),
+            )
+            .about_round_features(),
             known: KnownRows::new(capacity),
             targets: Vec::with_capacity(capacity),
             bounds: Vec::with_capacity(capacity),
@@ -179,7 +180,7 @@ impl Coupling {
         let arrived = !self.present.is(set);
         if arrived {
             self.take(set);
-            self.arrival.observe(time);
+            self.arrival.observe(set.published.unwrap_or(time));
         }
         if self.present.moving {
             self.carry_rows(time, set);

@@ -176,6 +176,7 @@ impl GodObject {
     /// The rows given are all that there are.
     fn write_given(&mut self) {
         self.set.sequence += 1;
+        self.set.published = None;
         self.set.god_object_pose = self.pose;
         self.set.gap_min = self.given.gap_min;
         self.set.truncated = self.given.truncated;

@@ -316,6 +316,7 @@ impl GodObject {
             return;
         };
         self.set.sequence += 1;
+        self.set.published = None;
         self.set.god_object_pose = self.pose;
         self.set.truncated = reduction.truncated() || self.given.truncated;
         self.set.reduction_error = reduction.error();

@@ -194,6 +194,7 @@ impl GodObject {
     /// The obstacles stand: no row comes nearer by itself any more.
     fn forget_arrivals(&mut self) {
         self.set.sequence += 1;
+        self.set.published = None;
         for row in &mut self.set.constraints {
             row.came = 0.0;
         }

@@ -139,6 +139,11 @@ impl GodObject {
         &self.set
     }
 
+    /// Writes into the set when it is published, s, on the clock of the coupling's times. Whose obstacles move calls it after each update.
+    pub fn note_published(&mut self, time: f64) {
+        self.set.published = Some(time);
+    }
+
     /// The settings in force.
     pub fn settings(&self) -> &Settings {
         &self.settings

@@ -345,6 +345,13 @@ impl Scene {
         if let Some(clearance) = method.clearance {
             defaults = defaults.with_clearance(clearance);
         }
+        let is_mesh = |shape: &Shape| shape.primitive().is_none();
+        let obstacles = &self.spec.obstacles;
+        let meshes_meet = is_mesh(&self.spec.god_object.shape)
+            && obstacles.iter().any(|obstacle| is_mesh(&obstacle.shape));
+        if !meshes_meet {
+            defaults = defaults.for_exact_shapes();
+        }
         if let Some(auto) = auto {
             defaults.gap_tolerance = auto.gap_tolerance;
             defaults.implicit_rounds = auto.rounds;

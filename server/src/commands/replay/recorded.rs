@@ -203,6 +203,7 @@ impl RecordedSession {
             .step(&update.device_pose, update.shaded.as_ref());
         let took = thread_cpu_time().saturating_sub(before).as_secs_f64() * 1e6;
         self.published = update.published.as_secs_f64();
+        self.god_object.note_published(self.published);
         self.measured.updates += 1;
         self.measured.update_us.push(took);
         let set = self.god_object.constraint_set();

@@ -50,7 +50,7 @@ impl HapticMethod for Counted {
         self.work += self.simulation.step(device, self.shaded.as_ref()).work;
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, _time: f64) {
         self.published.clone_from(self.simulation.constraint_set());
         if self.moves
             && let Some(pose) = self.simulation.obstacle_poses().next()

@@ -229,7 +229,7 @@ impl Conditions {
                 f64::from(update) * period,
                 &Pose::from_parts(place.into(), at_rest.rotation),
             );
-            method.publish();
+            method.publish(f64::from(update) * period);
             let _ = method.force(f64::from(update) * period, &at_rest);
         }
         let before = updates * period;
@@ -243,7 +243,7 @@ impl Conditions {
             let measured = plant.measured_pose();
             // Half a tick late: no update begins at the instant of a force.
             while (updates + 0.5) * period <= time {
-                method.publish();
+                method.publish(time);
                 method.update(time, &measured);
                 updates += 1.0;
             }

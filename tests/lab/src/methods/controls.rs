@@ -41,7 +41,7 @@ impl Control {
 impl HapticMethod for Control {
     fn update(&mut self, _time: f64, _device: &Pose) {}
 
-    fn publish(&mut self) {}
+    fn publish(&mut self, _time: f64) {}
 
     fn force(&mut self, _time: f64, _device: &Pose) -> Vector6 {
         let Some(state) = &mut self.random else {

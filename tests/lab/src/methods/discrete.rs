@@ -56,7 +56,7 @@ impl Discrete {
             published: ConstraintSet::with_capacity(capacity),
         };
         method.collect(0);
-        method.publish();
+        method.publish(0.0);
         method
     }
 
@@ -117,7 +117,7 @@ impl HapticMethod for Discrete {
         self.collect(self.set.sequence + 1);
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, _time: f64) {
         self.published.clone_from(&self.set);
     }
 

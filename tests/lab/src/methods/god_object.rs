@@ -44,7 +44,8 @@ impl HapticMethod for GodObjectMethod {
         let _ = self.simulation.step(device, self.shaded.as_ref());
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, time: f64) {
+        self.simulation.note_published(time);
         self.published.clone_from(self.simulation.constraint_set());
     }
 

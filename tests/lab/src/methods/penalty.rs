@@ -99,7 +99,7 @@ impl HapticMethod for Penalty {
         self.now = (*device, limited(&self.wrench(device), &self.settings));
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, _time: f64) {
         self.published = self.now;
     }
 

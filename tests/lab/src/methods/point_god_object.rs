@@ -162,7 +162,7 @@ impl HapticMethod for PointGodObject {
         }
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, _time: f64) {
         self.published.clone_from(&self.now);
     }
 
@@ -209,7 +209,7 @@ mod tests {
         let device = Pose::translation(0.004, 0.003, 0.002);
         for _ in 0..10 {
             method.update(0.0, &device);
-            method.publish();
+            method.publish(0.0);
         }
         let force = linear(&method.force(0.0, &device));
         let expected = Vector3::new(1.0, 2.0, 3.0);

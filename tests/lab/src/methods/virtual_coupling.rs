@@ -137,7 +137,7 @@ impl HapticMethod for VirtualCoupling {
         self.proxy.pose = from_reference_point(&pose, &body.reference_point);
     }
 
-    fn publish(&mut self) {
+    fn publish(&mut self, _time: f64) {
         self.published = self.proxy;
     }
 

@@ -39,7 +39,7 @@ pub(super) fn run(_extent: Extent) -> Vec<Row> {
                 let tuning = method.tunings()[0];
                 let mut penalty = method.start(&scene, TICK, tuning);
                 penalty.update(0.0, &inside);
-                penalty.publish();
+                penalty.publish(0.0);
                 let force = linear(&penalty.force(TICK, &inside)).norm();
                 let row = Row {
                     settings: tuning.to_string(),
