@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use taut_link::RejoinPolicy;
+use taut_scene::{LengthUnit, MAX_HOLE_EDGES};
 
 /// Version and commit.
 const VERSION: &str = concat!(
@@ -102,6 +103,8 @@ pub enum Command {
     Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
+    /// Makes a scene of parts from CAD programs, and mends their meshes within stated bounds
+    Import(ImportArgs),
     /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Says where the viewer's head is, from a tracker on this PC
@@ -339,6 +342,41 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
+/// `taut import`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "The first part is in the hand, the others stand, each where its file puts it; a first part that touches the others begins above them.\n\nExamples:\n  taut import peg.stl hole.stl --unit mm --out peg-and-hole\n  taut import housing.obj --unit mm --obstacle --out housing && taut demo --scene housing/scene.toml"
+)]
+pub struct ImportArgs {
+    /// Mesh files: .stl, .obj, .ply, .glb, .gltf
+    #[arg(required = true, value_name = "PART")]
+    pub parts: Vec<PathBuf>,
+    /// The new folder for meshes and scene.toml; one that exists is refused
+    #[arg(long, value_name = "FOLDER")]
+    pub out: PathBuf,
+    /// Unit of parts whose format names none, STL, OBJ and PLY: m, dm, cm, mm, um, inch (default: m, for parts of a size to be held); glTF is in metres
+    #[arg(long, value_name = "UNIT")]
+    pub unit: Option<LengthUnit>,
+    /// Use as few triangles as keep within this distance of the part
+    #[arg(long, value_name = "METRES", value_parser = positive_length)]
+    pub simplify: Option<f64>,
+    /// Close holes of at most this many edges (default: 16, if a hole is below 1 % of its surface)
+    #[arg(long, value_name = "EDGES", value_parser = hole_edges)]
+    pub close_holes: Option<usize>,
+    /// Make open sheets solids of this thickness (default: sheets are refused)
+    #[arg(long, value_name = "METRES", value_parser = positive_length)]
+    pub thicken: Option<f64>,
+    /// Name of the scene (default: the folder's)
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Let all parts stand, with a small sphere in the hand
+    #[arg(long)]
+    pub obstacle: bool,
+    /// Print the report as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
 #[command(
@@ -495,6 +533,8 @@ pub enum MethodChoice {
 const DEMO_PORTS: u16 = 4;
 /// A day is longer than any session; NaN and infinity are no durations.
 const MAX_SECONDS: f64 = 86_400.0;
+/// No part for a hand needs more.
+const MAX_LENGTH: f64 = 1.0;
 /// No loop turns faster.
 const MAX_RATE_HZ: f64 = 1e6;
 /// No tracker is faster, and the server would take it for a flood.
@@ -523,6 +563,17 @@ fn positive_seconds(text: &str) -> Result<f64, String> {
 
 fn positive_rate(text: &str) -> Result<f64, String> {
     positive(text, MAX_RATE_HZ, "Hz")
+}
+
+fn positive_length(text: &str) -> Result<f64, String> {
+    positive(text, MAX_LENGTH, "metres")
+}
+
+fn hole_edges(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(edges) if edges <= MAX_HOLE_EDGES => Ok(edges),
+        _ => Err(format!("give a number of edges up to {MAX_HOLE_EDGES}")),
+    }
 }
 
 fn tracking_rate(text: &str) -> Result<f64, String> {

@@ -9,6 +9,7 @@ mod document;
 pub mod fidelity;
 mod files;
 mod height_map_file;
+mod import;
 mod mesh_file;
 mod problem;
 mod runner;
@@ -18,10 +19,13 @@ mod simplify;
 mod trace;
 mod workbench;
 
-pub use check::{FileKind, FileReport, MeshFigures, check};
+pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
 pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
+pub use import::{
+    Finding, ImportReport, ImportRequest, LengthUnit, MAX_HOLE_EDGES, PartReport, import,
+};
 pub use mesh_file::{RawMesh, is_mesh_path, read_mesh, read_mesh_bytes, write_ply};
 pub use problem::{FileError, Problem};
 pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};

@@ -7,6 +7,7 @@ pub mod arm;
 mod demo;
 mod doctor;
 mod finished_file;
+mod import;
 mod key;
 mod keys;
 mod manual;
@@ -26,8 +27,8 @@ use serde::Serialize;
 use taut_bridge::console;
 
 use crate::cli::{
-    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, KeysArgs, RecordArgs, ReplayArgs,
-    TrackArgs,
+    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, ImportArgs, KeysArgs, RecordArgs,
+    ReplayArgs, TrackArgs,
 };
 use crate::report::terminal::Terminal;
 use crate::report::{ReplayReport, SessionReport};
@@ -75,6 +76,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Record(args) => record_command(&args),
         Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
+        Command::Import(args) => import_command(&args),
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),
@@ -166,6 +168,16 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
     } else {
         ExitCode::from(EXIT_BAD_INPUT)
     })
+}
+
+fn import_command(args: &ImportArgs) -> Result<ExitCode> {
+    let report = import::run(args)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        print(report.to_string())?;
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {

@@ -236,7 +236,7 @@ fn check_outward(
 /// Outward unit normal, or `None` where the triangle has no area to rounding.
 ///
 /// The two shortest sides make the cross product: the least cancellation in a sliver.
-pub(crate) fn face_normal(corners: &[Point3<f64>; 3]) -> Option<Vector3<f64>> {
+pub fn face_normal(corners: &[Point3<f64>; 3]) -> Option<Vector3<f64>> {
     let sides = [
         corners[1] - corners[0],
         corners[2] - corners[1],

@@ -21,13 +21,13 @@ pub(crate) mod volume;
 pub(crate) mod wide_tree;
 
 pub use mass::{MassProperties, mass_properties};
-pub use mesh::Mesh;
+pub use mesh::{Mesh, face_normal};
 pub use mesh_error::MeshError;
 pub use nearest::{NearestOnMesh, nearest_on_mesh};
 pub use normals::corner_normals;
 pub use one_sided_distance::{OneSidedDistance, one_sided_distance};
-pub use parts::InvertedPart;
-pub use report::MeshReport;
+pub use parts::{ClosedPart, InvertedPart, closed_parts, connected};
+pub use report::{MeshPlaces, MeshReport};
 pub use self_intersection::self_intersection;
 pub use topology::Edge;
 pub use tree::{Node, Tree};

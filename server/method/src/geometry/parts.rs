@@ -25,11 +25,59 @@ pub struct InvertedPart {
     pub volume: f64,
 }
 
+/// A part of a closed surface, and how deep it lies in the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClosedPart {
+    /// Its triangles, ascending.
+    pub triangles: Vec<u32>,
+    /// Middle of the box around it, m.
+    pub center: Point3<f64>,
+    /// Signed volume, m^3.
+    pub volume: f64,
+    /// How many other parts surround it: a part at an odd depth is the wall of a cavity.
+    pub depth: usize,
+}
+
 struct Part {
     triangles: Vec<u32>,
     low: Point3<f64>,
     high: Point3<f64>,
     volume: f64,
+}
+
+/// The parts of a closed surface whose triangles agree about outside within each part, in the order of their first triangles.
+/// `adjacent` names the two triangles of each edge. Which way a part looks has no influence on the depths.
+pub fn closed_parts(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    adjacent: impl Iterator<Item = [u32; 2]>,
+) -> Vec<ClosedPart> {
+    let parts: Vec<Part> = connected(triangles.len(), adjacent)
+        .into_iter()
+        .map(|inside| measure(vertices, triangles, inside))
+        .collect();
+    let depth = |own: &Part| {
+        let around = |other: &&Part| {
+            let encloses =
+                (0..3).all(|k| other.low[k] <= own.low[k] && own.high[k] <= other.high[k]);
+            encloses
+                && !std::ptr::eq(*other, own)
+                && sample_points(vertices, triangles, own)
+                    .all(|point| windings(vertices, triangles, other, &point).abs() > SURROUNDED)
+        };
+        parts.iter().filter(around).count()
+    };
+    let depths: Vec<usize> = parts.iter().map(depth).collect();
+    parts
+        .into_iter()
+        .zip(depths)
+        .map(|(part, depth)| ClosedPart {
+            center: nalgebra::center(&part.low, &part.high),
+            triangles: part.triangles,
+            volume: part.volume,
+            depth,
+        })
+        .collect()
 }
 
 /// The parts that are inside out, in the order of their first triangles. `adjacent` names the two triangles of each edge of a closed, consistently
@@ -45,12 +93,9 @@ pub(super) fn inverted_parts(
         .collect();
     let inverted = |index: usize| {
         let part = &parts[index];
-        let step = part.triangles.len().div_ceil(SAMPLES);
         let outward = part.volume > 0.0; // false for NaN
         !outward
-            && part.triangles.iter().step_by(step).any(|t| {
-                let [a, b, c] = triangles[*t as usize].map(|v| vertices[v as usize].coords);
-                let middle = Point3::from((a + b + c) / 3.0);
+            && sample_points(vertices, triangles, part).any(|middle| {
                 winding_number(vertices, triangles, &parts, index, &middle) < SURROUNDED
             })
     };
@@ -65,8 +110,21 @@ pub(super) fn inverted_parts(
         .collect()
 }
 
-/// Sets of triangles that are connected by edges.
-fn connected(count: usize, adjacent: impl Iterator<Item = [u32; 2]>) -> Vec<Vec<u32>> {
+/// Middles of some triangles of a part, spread evenly.
+fn sample_points<'a>(
+    vertices: &'a [Point3<f64>],
+    triangles: &'a [[u32; 3]],
+    part: &'a Part,
+) -> impl Iterator<Item = Point3<f64>> + 'a {
+    let step = part.triangles.len().div_ceil(SAMPLES);
+    part.triangles.iter().step_by(step).map(|t| {
+        let [a, b, c] = triangles[*t as usize].map(|v| vertices[v as usize].coords);
+        Point3::from((a + b + c) / 3.0)
+    })
+}
+
+/// Sets of triangles that are connected through pairs of neighbours, each ascending, in the order of their first triangles.
+pub fn connected(count: usize, adjacent: impl Iterator<Item = [u32; 2]>) -> Vec<Vec<u32>> {
     let mut parent: Vec<u32> = (0..count as u32).collect();
     for [a, b] in adjacent {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
@@ -122,12 +180,22 @@ fn winding_number(
     point: &Point3<f64>,
 ) -> f64 {
     let holds = |part: &Part| (0..3).all(|k| part.low[k] <= point[k] && point[k] <= part.high[k]);
-    let around = parts
+    parts
         .iter()
         .enumerate()
         .filter(|(index, part)| *index != own && holds(part))
-        .flat_map(|(_, part)| &part.triangles);
-    let angles = around.map(|t| {
+        .map(|(_, part)| windings(vertices, triangles, part, point))
+        .sum()
+}
+
+/// How often one part winds around `point`.
+fn windings(
+    vertices: &[Point3<f64>],
+    triangles: &[[u32; 3]],
+    part: &Part,
+    point: &Point3<f64>,
+) -> f64 {
+    let angles = part.triangles.iter().map(|t| {
         let corners = triangles[*t as usize].map(|v| vertices[v as usize] - point);
         solid_angle(&corners)
     });

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::mesh::{face_normal, signed_volume};
 use super::parts::{InvertedPart, inverted_parts};
@@ -34,6 +34,23 @@ pub struct MeshReport {
     pub volume: f64,
     /// Least height of a triangle with area, m; infinite when there is none.
     pub smallest_feature: f64,
+    /// Where the first of each fault is.
+    pub places: MeshPlaces,
+}
+
+/// Where the first fault of each kind is, m, in the mesh's frame: the middle of an edge or of a triangle. `None` where there is no such fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeshPlaces {
+    /// A triangle without area; `None` as well where its corners are no points.
+    pub degenerate: Option<Point3<f64>>,
+    /// A triangle with the corners of an earlier one.
+    pub duplicate: Option<Point3<f64>>,
+    /// An edge with one triangle.
+    pub border: Option<Point3<f64>>,
+    /// An edge with more than two triangles.
+    pub non_manifold: Option<Point3<f64>>,
+    /// An edge along which two triangles run the same way.
+    pub misoriented: Option<Point3<f64>>,
 }
 
 impl MeshReport {
@@ -56,8 +73,19 @@ impl MeshReport {
             corners.sort_unstable();
             !seen.insert(corners)
         };
-        let duplicate_faces = sound.iter().filter(duplicate).count();
+        let duplicates: Vec<&[u32; 3]> = sound.iter().filter(duplicate).collect();
         let (sides, adjacent) = count_sides(&sound);
+        let middle = |corners: &[u32]| {
+            let sum: Vector3<f64> = corners.iter().map(|v| vertices[*v as usize].coords).sum();
+            Point3::from(sum / corners.len() as f64)
+        };
+        let places = MeshPlaces {
+            degenerate: named.iter().find(|t| !with_area(t)).map(|t| middle(t)),
+            duplicate: duplicates.first().map(|t| middle(&t[..])),
+            border: sides.first_border.map(|edge| middle(&edge)),
+            non_manifold: sides.first_crowded.map(|edge| middle(&edge)),
+            misoriented: sides.first_misoriented.map(|edge| middle(&edge)),
+        };
         let closed = sides.border == 0 && sides.crowded == 0 && sides.misoriented == 0;
         let inverted_parts = if closed {
             inverted_parts(vertices, &sound, adjacent.into_iter())
@@ -79,12 +107,13 @@ impl MeshReport {
             oriented: sides.misoriented == 0 && volume > 0.0 && inverted_parts.is_empty(),
             inverted_parts,
             degenerate_faces: triangles.len() - sound.len(),
-            duplicate_faces,
+            duplicate_faces: duplicates.len(),
             border_edges: sides.border,
             non_manifold_edges: sides.crowded,
             misoriented_edges: sides.misoriented,
             volume,
             smallest_feature: heights.fold(f64::INFINITY, f64::min),
+            places,
         }
     }
 
@@ -103,6 +132,9 @@ struct SideCounts {
     border: usize,
     crowded: usize,
     misoriented: usize,
+    first_border: Option<[u32; 2]>,
+    first_crowded: Option<[u32; 2]>,
+    first_misoriented: Option<[u32; 2]>,
 }
 
 /// What the edges are like, and the two triangles at each that has two.
@@ -116,13 +148,23 @@ fn count_sides(triangles: &[[u32; 3]]) -> (SideCounts, Vec<[u32; 2]>) {
     sides.sort_unstable();
     let (mut counts, mut adjacent) = (SideCounts::default(), Vec::new());
     for edge in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let ends = [edge[0].0, edge[0].1];
         match *edge {
-            [_] => counts.border += 1,
+            [_] => {
+                counts.border += 1;
+                counts.first_border.get_or_insert(ends);
+            }
             [a, b] => {
-                counts.misoriented += usize::from(a.2 == b.2);
+                if a.2 == b.2 {
+                    counts.misoriented += 1;
+                    counts.first_misoriented.get_or_insert(ends);
+                }
                 adjacent.push([a.3, b.3]);
             }
-            _ => counts.crowded += 1,
+            _ => {
+                counts.crowded += 1;
+                counts.first_crowded.get_or_insert(ends);
+            }
         }
     }
     (counts, adjacent)

@@ -15,7 +15,7 @@ use crate::trace::DeviceTrace;
 use crate::workbench::Workbench;
 
 /// A body longer than this, m, is probably in millimetres; a shorter one was probably scaled twice.
-const SUSPICIOUS_SIZES: [f64; 2] = [5e-4, 5.0];
+pub(crate) const SUSPICIOUS_SIZES: [f64; 2] = [5e-4, 5.0];
 
 /// Reads each file and says everything that is wrong with it. The kind follows from the ending and, for .toml, from the
 /// tables. Names of shipped scenes are taken too.
@@ -81,7 +81,7 @@ fn check_mesh(path: &Path) -> FileReport {
         Err(error) => return report(path, FileKind::Mesh, Err(error)),
     };
     let figures = MeshFigures::of(&mesh);
-    let mut faults = figures.faults();
+    let mut faults: Vec<String> = figures.faults().iter().map(ToString::to_string).collect();
     if let Err(error) = Mesh::new(mesh.vertices, mesh.triangles)
         && faults.is_empty()
     {

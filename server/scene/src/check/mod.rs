@@ -3,5 +3,7 @@
 mod inspect;
 mod report;
 
+pub(crate) use inspect::SUSPICIOUS_SIZES;
 pub use inspect::check;
-pub use report::{FileKind, FileReport, MeshFigures};
+pub(crate) use report::place_text;
+pub use report::{FaultPlaces, FileKind, FileReport, MeshFigures};

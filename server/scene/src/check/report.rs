@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use god_object::geometry::{InvertedPart, MeshReport};
+use god_object::geometry::{InvertedPart, MeshPlaces, MeshReport};
+use nalgebra::Point3;
 use serde::Serialize;
 
 use crate::fidelity::FidelityPlan;
@@ -80,6 +81,36 @@ pub struct MeshFigures {
     pub smallest_feature_m: Option<f64>,
     /// Sides of the box around it, m.
     pub size_m: [f64; 3],
+    /// Where the first fault of each kind is.
+    pub places_m: FaultPlaces,
+}
+
+/// Where the first fault of each kind is, m, in the mesh's frame: the middle of a triangle or of an edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FaultPlaces {
+    /// A triangle without area.
+    pub degenerate: Option<[f64; 3]>,
+    /// A triangle with the corners of another.
+    pub duplicate: Option<[f64; 3]>,
+    /// An edge with one triangle.
+    pub border: Option<[f64; 3]>,
+    /// An edge with more than two triangles.
+    pub non_manifold: Option<[f64; 3]>,
+    /// An edge whose triangles disagree about outside.
+    pub misoriented: Option<[f64; 3]>,
+}
+
+impl FaultPlaces {
+    fn of(places: &MeshPlaces) -> Self {
+        let plain = |place: Option<Point3<f64>>| place.map(Into::into);
+        Self {
+            degenerate: plain(places.degenerate),
+            duplicate: plain(places.duplicate),
+            border: plain(places.border),
+            non_manifold: plain(places.non_manifold),
+            misoriented: plain(places.misoriented),
+        }
+    }
 }
 
 /// A closed part of a mesh that is inside out.
@@ -104,7 +135,7 @@ impl InvertedPartFigures {
 }
 
 impl MeshFigures {
-    pub(super) fn of(mesh: &RawMesh) -> Self {
+    pub(crate) fn of(mesh: &RawMesh) -> Self {
         let report = MeshReport::of(&mesh.vertices, &mesh.triangles);
         let size = mesh
             .bounds()
@@ -127,54 +158,93 @@ impl MeshFigures {
             volume_m3: report.volume,
             smallest_feature_m: Some(report.smallest_feature).filter(|height| height.is_finite()),
             size_m: size,
+            places_m: FaultPlaces::of(&report.places),
         }
     }
 
-    /// A sentence for each figure that a closed surface must not have.
-    pub(super) fn faults(&self) -> Vec<String> {
+    /// Each figure that a closed surface must not have.
+    pub(crate) fn faults(&self) -> Vec<MeshFault> {
+        let places = &self.places_m;
         let counted = [
             (
                 self.degenerate_faces,
-                "triangles have no area; remove them or merge their vertices",
+                "triangles have no area",
+                places.degenerate,
+                "remove them or merge their vertices, as `taut import` does",
             ),
             (
                 self.duplicate_faces,
-                "triangles have the same corners as another; remove them",
+                "triangles have the same corners as another",
+                places.duplicate,
+                "remove them, as `taut import` does",
             ),
             (
                 self.border_edges,
-                "edges have one triangle only; close the holes or merge duplicate vertices",
+                "edges have one triangle only",
+                places.border,
+                "close the holes or merge duplicate vertices, as `taut import` does; it makes a solid of a sheet, too",
             ),
             (
                 self.non_manifold_edges,
-                "edges have more than two triangles; split the surfaces apart",
+                "edges have more than two triangles",
+                places.non_manifold,
+                "split the surfaces apart, as `taut import` does where they are solids that touch",
             ),
             (
                 self.misoriented_edges,
-                "edges have triangles that disagree about outside; turn triangles around",
+                "edges have triangles that disagree about outside",
+                places.misoriented,
+                "turn triangles around, as `taut import` does",
             ),
         ];
-        let mut faults: Vec<String> = counted
-            .iter()
-            .filter(|(n, _)| *n > 0)
-            .map(|(n, text)| format!("{n} {text}"))
+        let mut faults: Vec<MeshFault> = counted
+            .into_iter()
+            .filter(|(n, ..)| *n > 0)
+            .map(|(n, text, place, remedy)| MeshFault {
+                what: match place {
+                    Some(place) => {
+                        format!("{n} {text}, the first about {}", place_text(&place.into()))
+                    }
+                    None => format!("{n} {text}"),
+                },
+                remedy,
+            })
             .collect();
-        let whole = |part: &&InvertedPartFigures| part.triangles == self.triangles;
-        if self.inverted_parts.iter().any(|part| whole(&part)) {
-            faults.push(format!(
-                "the surface is inside out (volume {} m^3); turn all triangles around",
-                self.volume_m3
-            ));
-        }
-        for part in self.inverted_parts.iter().filter(|part| !whole(part)) {
-            let [x, y, z] = part.center_m;
-            faults.push(format!(
-                "the closed part of {} triangles about ({x:.4}, {y:.4}, {z:.4}) m is inside out (volume {} m^3); turn its triangles around",
-                part.triangles, part.volume_m3
-            ));
+        const TURN: &str = "turn its triangles around, as `taut import` does";
+        for part in &self.inverted_parts {
+            let volume = part.volume_m3;
+            let what = if part.triangles == self.triangles {
+                format!("the surface is inside out (volume {volume} m^3)")
+            } else {
+                format!(
+                    "the closed part of {} triangles about {} is inside out (volume {volume} m^3)",
+                    part.triangles,
+                    place_text(&part.center_m.into())
+                )
+            };
+            faults.push(MeshFault { what, remedy: TURN });
         }
         faults
     }
+}
+
+/// Something that a closed surface must not have.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MeshFault {
+    /// What and where.
+    pub(crate) what: String,
+    remedy: &'static str,
+}
+
+impl fmt::Display for MeshFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}; {}", self.what, self.remedy)
+    }
+}
+
+/// A place as messages show it.
+pub(crate) fn place_text(place: &Point3<f64>) -> String {
+    format!("({:.5}, {:.5}, {:.5}) m", place.x, place.y, place.z)
 }
 
 impl fmt::Display for FileReport {

@@ -11,5 +11,6 @@ mod texture_coordinates;
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
+pub(crate) use read::is_gltf_path;
 pub use read::{is_mesh_path, read_mesh, read_mesh_bytes};
 pub(crate) use texture_coordinates::read_texture_coordinates;

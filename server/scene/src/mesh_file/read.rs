@@ -49,6 +49,11 @@ pub fn is_mesh_path(path: &Path) -> bool {
     )
 }
 
+/// Whether the file is glTF, whose unit is the metre.
+pub(crate) fn is_gltf_path(path: &Path) -> bool {
+    matches!(extension(path).as_str(), "glb" | "gltf")
+}
+
 pub(super) fn extension(path: &Path) -> String {
     path.extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase())

@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::auto_fidelity::AutoFidelity;
 use super::load::Scene;
 use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
+use crate::check::MeshFigures;
 use crate::document::At;
 use crate::fidelity::FidelityPlan;
 use crate::mesh_file::RawMesh;
@@ -258,7 +259,17 @@ impl Scene {
             _ => "the shape".to_owned(),
         };
         Mesh::new(raw.vertices, raw.triangles)
-            .map_err(|error| problems.push(at.problem(format!("{name} cannot be used: {error}"))))
+            .map_err(|error| {
+                let mut add =
+                    |text| problems.push(at.problem(format!("{name} cannot be used: {text}")));
+                // Read again, since a mesh that is sound is not read twice: all faults, with their places.
+                let raw = self.raw_mesh(shape, at).unwrap_or_default();
+                let faults = MeshFigures::of(&raw).faults();
+                faults.iter().for_each(|fault| add(fault.to_string()));
+                if faults.is_empty() {
+                    add(error.to_string());
+                }
+            })
             .ok()
     }
 

@@ -10,7 +10,7 @@ mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
 pub use load::{Scene, SceneSource};
-pub(crate) use parse_shape::pose_of;
+pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,

@@ -22,7 +22,7 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 const AXES: [(&str, Axis); 3] = [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)];
 
 /// Units that a mesh file may be in, and what they are in metres.
-const UNITS: [(&str, f64); 6] = [
+pub(crate) const LENGTH_UNITS: [(&str, f64); 6] = [
     ("m", 1.0),
     ("dm", 0.1),
     ("cm", 0.01),
@@ -47,7 +47,7 @@ pub(super) fn shape(body: &Section<'_>) -> Option<Shape> {
     };
     let mut found = Vec::new();
     if let Some(path) = shape.text("mesh") {
-        let unit = shape.choice("unit", &UNITS).unwrap_or(1.0);
+        let unit = shape.choice("unit", &LENGTH_UNITS).unwrap_or(1.0);
         let scale = unit * shape.number_or("scale", Range::Positive, 1.0);
         found.push(Some(Shape::Mesh {
             path: path.to_owned(),

@@ -1,0 +1,292 @@
+//! `taut import`: parts as CAD programs and scanners export them, made into meshes and a scene that the method can use.
+//!
+//! Every repair moves a point by at most a stated distance, or is refused. What cannot be repaired is said with its place; nothing is written then.
+
+mod crossing;
+mod edges;
+mod faces;
+mod folder;
+mod holes;
+mod manifold;
+mod orientation;
+mod repair;
+mod report;
+mod scene_text;
+mod shell;
+mod stitch;
+mod unit;
+mod weld;
+
+use std::path::{Path, PathBuf};
+
+use god_object::Mesh;
+use nalgebra::{Point3, Vector3};
+
+pub use holes::MAX_HOLE_EDGES;
+pub use report::{Finding, ImportReport, PartReport};
+pub use unit::LengthUnit;
+
+use crate::check::{MeshFigures, place_text};
+use crate::mesh_file::{RawMesh, read_mesh, write_ply};
+use crate::problem::{FileError, Problem};
+use crate::scene::{GOD_OBJECT_NAME, Scene};
+use crate::simplify::simplify;
+use folder::NewFolder;
+use repair::{Repaired, Wishes, is_single, repair};
+use report::Places;
+use scene_text::{Placed, around, clear_above, scene_text, sphere_radius};
+
+/// Parts whose middle is farther from the origin than so many of their diagonals are moved there together.
+const FAR_AWAY: f64 = 2.0;
+/// Name of the scene file in the folder.
+const SCENE_FILE: &str = "scene.toml";
+
+/// What to import, and how.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImportRequest {
+    /// Mesh files; the first one is the god-object.
+    pub parts: Vec<PathBuf>,
+    /// The folder to write; there must be nothing of that name.
+    pub folder: PathBuf,
+    /// Unit of files that name none of their own: STL, OBJ, PLY.
+    pub unit: Option<LengthUnit>,
+    /// Most distance by which a simplified mesh may differ, m.
+    pub simplify: Option<f64>,
+    /// Most edges of a hole that is closed; `None` closes small ones.
+    pub close_holes: Option<usize>,
+    /// Thickness of the solid that an open sheet becomes, m; `None` refuses sheets.
+    pub thicken: Option<f64>,
+    /// Name of the scene; `None` takes the folder's.
+    pub name: Option<String>,
+    /// All parts stand, and a sphere is in the hand.
+    pub obstacles_only: bool,
+}
+
+/// Reads, repairs and writes. All faults of all parts are reported; with any, nothing is written.
+pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
+    let folder = NewFolder::create(&request.folder)?;
+    let mut problems = Vec::new();
+    let mut names = vec![GOD_OBJECT_NAME.to_owned()];
+    let mut parts = Vec::new();
+    for (index, path) in request.parts.iter().enumerate() {
+        let own = new_name(path, &mut names);
+        let held = index == 0 && !request.obstacles_only;
+        let body = if held { GOD_OBJECT_NAME } else { &own };
+        match part(path, body, &format!("{own}.ply"), request) {
+            Ok(part) => parts.push(part),
+            Err(error) => problems.extend(error.into_problems()),
+        }
+    }
+    FileError::unless_empty(problems)?;
+    let mut notes = Vec::new();
+    move_to_origin(&mut parts, &mut notes);
+    let placed: Vec<Placed> = parts
+        .iter()
+        .map(|(report, mesh)| {
+            let (low, high) = mesh
+                .bounds()
+                .unwrap_or((Point3::origin(), Point3::origin()));
+            Placed {
+                body: report.body.clone(),
+                mesh_file: report.mesh_file.clone(),
+                low,
+                high,
+            }
+        })
+        .collect();
+    let mut reports = Vec::with_capacity(parts.len());
+    for (report, mesh) in parts {
+        folder.write(&report.mesh_file, &write_ply(&mesh))?;
+        reports.push(report);
+    }
+    write_scene(request, &folder, &placed, &mut notes)?;
+    let report = ImportReport {
+        folder: request.folder.display().to_string(),
+        scene: request.folder.join(SCENE_FILE).display().to_string(),
+        parts: reports,
+        notes,
+    };
+    folder.write("import.txt", format!("{report}\n").as_bytes())?;
+    folder.finish()?;
+    Ok(report)
+}
+
+/// A name for the body and its file, from the name of the part's: unique, and of characters that are the same everywhere.
+fn new_name(path: &Path, taken: &mut Vec<String>) -> String {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let plain: String = stem
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || c == '_' {
+                c
+            } else {
+                '-'
+            }
+        })
+        .take(64)
+        .collect();
+    let plain = match plain.trim_matches('-') {
+        "" => "part".to_owned(),
+        name => name.to_owned(),
+    };
+    let mut name = plain.clone();
+    let mut number = 2;
+    // Names that differ in case only are one file on some systems.
+    while taken.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
+        name = format!("{plain}-{number}");
+        number += 1;
+    }
+    taken.push(name.clone());
+    name
+}
+
+/// One part, read, repaired and simplified.
+fn part(
+    path: &Path,
+    body: &str,
+    mesh_file: &str,
+    request: &ImportRequest,
+) -> Result<(PartReport, RawMesh), FileError> {
+    let raw = read_mesh(path)?;
+    let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
+    let (unit, unit_assumed) = unit::unit_of(path, &raw, request.unit).map_err(fail)?;
+    let single = is_single(&raw.vertices);
+    let wishes = Wishes {
+        close_holes: request.close_holes,
+        thicken: request.thicken,
+    };
+    let Repaired {
+        mesh,
+        findings,
+        moved,
+        thickened,
+    } = repair(raw.scaled(unit.metres), single, wishes).map_err(|faults| {
+        let of_file = |text| Problem::of_file(path.display(), text);
+        FileError::of_all(faults.into_iter().map(of_file).collect())
+    })?;
+    let (mesh, simplified) = match request.simplify {
+        Some(max_error) => {
+            let (mesh, outcome) = simplify(mesh, max_error, body);
+            (mesh, Some(outcome))
+        }
+        None => (mesh, None),
+    };
+    let crossing = crossing::crossing(&mesh);
+    let raw = raw_of(&mesh);
+    let mut report = PartReport {
+        file: path.display().to_string(),
+        body: body.to_owned(),
+        mesh_file: mesh_file.to_owned(),
+        unit: unit.name,
+        unit_assumed,
+        findings,
+        moved_m: moved,
+        thickened_m: thickened,
+        simplified_m: None,
+        mesh: MeshFigures::of(&raw),
+    };
+    if let Some(outcome) = &simplified {
+        report.simplified(outcome);
+    }
+    if let Some(place) = crossing {
+        report.findings.push(Finding::new(
+            "meets-itself",
+            &Places::of(1, Some(place)),
+            "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
+        ));
+    }
+    Ok((report, raw))
+}
+
+fn raw_of(mesh: &Mesh) -> RawMesh {
+    RawMesh {
+        vertices: mesh.vertices().to_vec(),
+        triangles: mesh.triangles().to_vec(),
+    }
+}
+
+/// Parts keep their places to each other; only when all are far away, all are moved by the same way.
+fn move_to_origin(parts: &mut [(PartReport, RawMesh)], notes: &mut Vec<String>) {
+    let boxes = parts.iter().filter_map(|(_, mesh)| mesh.bounds());
+    let Some((low, high)) = boxes.reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1))) else {
+        return;
+    };
+    let way: Vector3<f64> = -nalgebra::center(&low, &high).coords;
+    if way.norm() <= FAR_AWAY * (high - low).norm() {
+        return;
+    }
+    for vertex in parts.iter_mut().flat_map(|(_, mesh)| &mut mesh.vertices) {
+        *vertex += way;
+    }
+    notes.push(format!(
+        "the parts lie far from the origin of their files; all were moved by the same {}, and places above are those before",
+        place_text(&Point3::from(way))
+    ));
+}
+
+/// Writes the scene with the held body where its file puts it or, where it would touch the others, above them.
+fn write_scene(
+    request: &ImportRequest,
+    folder: &NewFolder,
+    placed: &[Placed],
+    notes: &mut Vec<String>,
+) -> Result<(), FileError> {
+    let named = request.folder.file_name().unwrap_or_default();
+    let name = match &request.name {
+        Some(name) => name.clone(),
+        None => named.to_string_lossy().into_owned(),
+    };
+    let (held, obstacles) = match placed.split_first() {
+        Some((first, rest)) if !request.obstacles_only => (Some(first), rest),
+        _ => (None, placed),
+    };
+    let low = held.map_or_else(|| -sphere_radius(placed), |part| part.low.z);
+    let middle = around(obstacles).map_or(Point3::origin(), |(a, b)| nalgebra::center(&a, &b));
+    let mut above = Point3::new(0.0, 0.0, clear_above(low, obstacles));
+    if held.is_none() {
+        (above.x, above.y) = (middle.x, middle.y);
+    }
+    let as_in_files = held.map(|_| Point3::origin());
+    let mut first_error = None;
+    for start in as_in_files.into_iter().chain([above]) {
+        let text = scene_text(&name, held, obstacles, start);
+        folder.write(SCENE_FILE, text.as_bytes())?;
+        let path = folder.partial().join(SCENE_FILE);
+        match Scene::load(&path).and_then(|scene| scene.build()) {
+            Ok(_) => {
+                notes.extend(scene_note(held, obstacles, first_error.is_some(), start));
+                return Ok(());
+            }
+            Err(error) => {
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    let mut problems = first_error.map_or_else(Vec::new, FileError::into_problems);
+    for problem in &mut problems {
+        problem.file = request.folder.join(SCENE_FILE).display().to_string();
+    }
+    FileError::unless_empty(problems)
+}
+
+fn scene_note(
+    held: Option<&Placed>,
+    obstacles: &[Placed],
+    touched: bool,
+    start: Point3<f64>,
+) -> Option<String> {
+    match held {
+        None => Some(format!(
+            "a sphere is in the hand, and begins at {}",
+            place_text(&start)
+        )),
+        Some(_) if touched => Some(format!(
+            "the parts touch or overlap where their files put them; the god-object begins {:.4} m above its place, clear of the others",
+            start.z
+        )),
+        Some(_) if obstacles.is_empty() => Some(
+            "one part is in the hand and there is nothing to touch; name more parts, or write --obstacle to touch this one with a sphere".to_owned(),
+        ),
+        Some(_) => None,
+    }
+}

@@ -1,0 +1,184 @@
+//! What an import found and did.
+
+use std::fmt;
+
+use nalgebra::Point3;
+use serde::Serialize;
+
+use crate::check::{MeshFigures, place_text};
+use crate::simplify::Simplified;
+
+/// Most places that are kept of one finding.
+const MAX_PLACES: usize = 3;
+
+/// How often something was found, and where the first are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Places {
+    pub(super) count: usize,
+    pub(super) first: Vec<Point3<f64>>,
+}
+
+impl Places {
+    pub(super) fn add(&mut self, place: Point3<f64>) {
+        self.count += 1;
+        if self.first.len() < MAX_PLACES {
+            self.first.push(place);
+        }
+    }
+
+    pub(super) fn join(&mut self, other: Self) {
+        self.count += other.count;
+        let room = MAX_PLACES - self.first.len();
+        self.first.extend(other.first.into_iter().take(room));
+    }
+
+    pub(super) fn of(count: usize, place: Option<Point3<f64>>) -> Self {
+        Self {
+            count,
+            first: place.into_iter().collect(),
+        }
+    }
+}
+
+/// One thing that was found in a part, or done to it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// Which, as a word: `vertices-merged`, `holes-closed` and so on.
+    pub kind: &'static str,
+    /// How many.
+    pub count: usize,
+    /// A sentence.
+    pub text: String,
+    /// Where the first are, m, in the part's own frame.
+    pub places_m: Vec<[f64; 3]>,
+}
+
+impl Finding {
+    pub(super) fn new(kind: &'static str, places: &Places, text: impl Into<String>) -> Self {
+        Self {
+            kind,
+            count: places.count,
+            text: text.into(),
+            places_m: places.first.iter().map(|p| (*p).into()).collect(),
+        }
+    }
+}
+
+/// What became of one part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartReport {
+    /// The file, as the user named it.
+    pub file: String,
+    /// The body in the scene: `god-object`, or the obstacle's name.
+    pub body: String,
+    /// The mesh file, in the folder.
+    pub mesh_file: String,
+    /// The unit in which the file was read.
+    pub unit: &'static str,
+    /// Whether nobody named that unit: not the user, not the format.
+    pub unit_assumed: bool,
+    /// What was found and done, in order.
+    pub findings: Vec<Finding>,
+    /// No point of the surface in the file was moved farther, m; without what simplification and thickening say of themselves.
+    pub moved_m: f64,
+    /// No point of a sheet is farther from the solid that it became, m; absent where nothing was thickened.
+    pub thickened_m: Option<f64>,
+    /// No point of the simplified surface is farther from the other one, either way, m; absent where nothing was simplified.
+    pub simplified_m: Option<f64>,
+    /// Figures of the mesh that was written.
+    pub mesh: MeshFigures,
+}
+
+/// What an import found and did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ImportReport {
+    /// The folder that was written.
+    pub folder: String,
+    /// The scene file in it.
+    pub scene: String,
+    /// Of each part, in order.
+    pub parts: Vec<PartReport>,
+    /// What the user should know of the scene.
+    pub notes: Vec<String>,
+}
+
+impl PartReport {
+    pub(super) fn simplified(&mut self, outcome: &Simplified) {
+        let text = match &outcome.unchanged {
+            None => {
+                self.simplified_m = Some(outcome.to_original.max(outcome.from_original));
+                format!(
+                    "simplified from {} to {} triangles, at most {:.3e} m from the surface and that at most {:.3e} m from it (limit {:.3e} m)",
+                    outcome.triangles_before,
+                    outcome.triangles_after,
+                    outcome.to_original,
+                    outcome.from_original,
+                    outcome.max_error
+                )
+            }
+            Some(why) => format!("not simplified within {:.3e} m: {why}", outcome.max_error),
+        };
+        self.findings
+            .push(Finding::new("simplified", &Places::default(), text));
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.text)?;
+        let places: Vec<String> = self
+            .places_m
+            .iter()
+            .map(|p| place_text(&Point3::from(*p)))
+            .collect();
+        if places.is_empty() {
+            return Ok(());
+        }
+        write!(f, "; at {}", places.join(", "))?;
+        if self.count > places.len() {
+            write!(f, " and {} more", self.count - places.len())?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for PartReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let assumed = if self.unit_assumed { ", assumed" } else { "" };
+        let [x, y, z] = self.mesh.size_m;
+        write!(
+            f,
+            "{} (in {}{assumed}): {} in {}, {} triangles, {x:.4} x {y:.4} x {z:.4} m, {:.3e} m^3",
+            self.file,
+            self.unit,
+            self.body,
+            self.mesh_file,
+            self.mesh.triangles,
+            self.mesh.volume_m3
+        )?;
+        for finding in &self.findings {
+            write!(f, "\n  {finding}")?;
+        }
+        write!(
+            f,
+            "\n  no point of the surface moved farther than {:.3e} m",
+            self.moved_m
+        )
+    }
+}
+
+impl fmt::Display for ImportReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for part in &self.parts {
+            writeln!(f, "{part}")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
+        }
+        write!(
+            f,
+            "written: {}; try it: taut demo --scene {}",
+            self.folder, self.scene
+        )
+    }
+}

@@ -1,0 +1,99 @@
+//! The scene file of an import.
+
+use std::fmt::Write as _;
+
+use nalgebra::Point3;
+
+/// What is drawn is about this wide, m.
+const DRAWN_WIDTH: f64 = 0.3;
+/// A body that begins above the others begins this share of all their size above them.
+const START_GAP: f64 = 0.1;
+/// Radius of the sphere in the hand, as a share of the longest side of all parts.
+const SPHERE_SHARE: f64 = 0.05;
+
+/// A part in the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Placed {
+    /// `god-object`, or the obstacle's name.
+    pub(super) body: String,
+    pub(super) mesh_file: String,
+    pub(super) low: Point3<f64>,
+    pub(super) high: Point3<f64>,
+}
+
+/// Smallest and largest corner of the box around some parts; `None` of none.
+pub(super) fn around<'p>(
+    parts: impl IntoIterator<Item = &'p Placed>,
+) -> Option<(Point3<f64>, Point3<f64>)> {
+    parts
+        .into_iter()
+        .map(|part| (part.low, part.high))
+        .reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+}
+
+/// Radius of the sphere in the hand where all parts stand, m.
+pub(super) fn sphere_radius(parts: &[Placed]) -> f64 {
+    around(parts).map_or(0.0, |(low, high)| SPHERE_SHARE * (high - low).max())
+}
+
+/// How far up a body that reaches from `low` has to begin to be clear above the obstacles, m.
+pub(super) fn clear_above(low: f64, obstacles: &[Placed]) -> f64 {
+    around(obstacles).map_or(0.0, |(from, to)| to.z + START_GAP * (to - from).max() - low)
+}
+
+/// The scene: `held` is the part in the hand, or else a sphere above the obstacles. `start` is where it begins.
+pub(super) fn scene_text(
+    name: &str,
+    held: Option<&Placed>,
+    obstacles: &[Placed],
+    start: Point3<f64>,
+) -> String {
+    let mut text = String::from(
+        "# Made by taut import; import.txt beside it says what was done to the parts. Lengths in metres.\n",
+    );
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "name = {}\n\n[god_object]", quoted(name));
+    let (shape, longest) = match held {
+        Some(part) => (
+            format!("mesh = {}", quoted(&part.mesh_file)),
+            (part.high - part.low).max(),
+        ),
+        None => {
+            let radius = sphere_radius(obstacles);
+            (format!("sphere = {{ radius = {radius:?} }}"), 2.0 * radius)
+        }
+    };
+    let _ = writeln!(text, "shape = {{ {shape} }}");
+    text.push_str(
+        "mass = 1.0    # kg; or density = 1000.0, kg/m^3. The stiffness grows with the mass.\n",
+    );
+    let [x, y, z] = start.into();
+    let _ = writeln!(
+        text,
+        "pose = {{ position = [{x:?}, {y:?}, {z:?}], rotation = [1.0, 0.0, 0.0, 0.0] }}    # m; w x y z"
+    );
+    for part in obstacles {
+        let _ = writeln!(
+            text,
+            "\n[[obstacle]]\nname = {}\nshape = {{ mesh = {} }}",
+            quoted(&part.body),
+            quoted(&part.mesh_file)
+        );
+    }
+    let longest = around(obstacles).map_or(longest, |(low, high)| longest.max((high - low).max()));
+    let scale = two_digits(DRAWN_WIDTH / longest);
+    let _ = writeln!(
+        text,
+        "\n[view]\ndisplay_scale = {scale:?}    # drawn about {DRAWN_WIDTH} m wide"
+    );
+    text
+}
+
+/// Two significant digits, for people who read the file.
+fn two_digits(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}

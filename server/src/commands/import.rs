@@ -1,0 +1,24 @@
+//! `taut import`: parts into a folder with meshes and a scene. The work is `taut_scene::import`.
+
+use taut_scene::{ImportReport, ImportRequest};
+
+use crate::cli::ImportArgs;
+use crate::shared::failure::Failure;
+
+/// Imports, or says every fault of every part.
+pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
+    let request = ImportRequest {
+        parts: args.parts.clone(),
+        folder: args.out.clone(),
+        unit: args.unit,
+        simplify: args.simplify,
+        close_holes: args.close_holes,
+        thicken: args.thicken,
+        name: args.name.clone(),
+        obstacles_only: args.obstacle,
+    };
+    taut_scene::import(&request).map_err(|error| {
+        let all: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
+        Failure::bad_input(all.join("\n"))
+    })
+}
