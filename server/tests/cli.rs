@@ -34,7 +34,7 @@ fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
 #[test]
 fn every_command_has_help_with_an_example() {
     for command in [
-        "demo", "serve", "render", "bridge", "replay", "record", "check", "doctor", "keys",
+        "demo", "serve", "render", "bridge", "replay", "record", "check", "import", "doctor", "keys",
     ] {
         let output = taut(&[command, "--help"]);
         assert!(output.status.success(), "{command}");
@@ -120,7 +120,7 @@ fn without_a_command_it_says_how_to_begin_and_starts_nothing() {
 fn completions_and_manual_pages_name_every_command() {
     let place = Workplace::new();
     let commands = [
-        "demo", "serve", "bridge", "replay", "record", "check", "doctor", "keys",
+        "demo", "serve", "bridge", "replay", "record", "check", "import", "doctor", "keys",
     ];
     for shell in ["bash", "zsh", "fish"] {
         let output = taut(&["completions", shell]);

@@ -10,7 +10,7 @@ use crate::fidelity::FidelityPlan;
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::mesh_file::{is_mesh_path, read_mesh};
 use crate::problem::{FileError, Problem};
-use crate::scene::{GOD_OBJECT_NAME, Scene, shipped_scene_text};
+use crate::scene::{GOD_OBJECT_NAME, Scene, mesh_faults, shipped_scene_text};
 use crate::trace::DeviceTrace;
 use crate::workbench::Workbench;
 
@@ -121,7 +121,16 @@ fn check_toml(path: &Path) -> FileReport {
     };
     if has(&["god_object", "obstacle", "coupling", "limits", "hand"]) {
         let mut notes = Vec::new();
-        let scene = Scene::load(path).and_then(|scene| summarise_scene(&scene, &mut notes));
+        let scene = match Scene::load(path) {
+            Ok(scene) => summarise_scene(&scene, &mut notes),
+            Err(error) => {
+                // The meshes are judged all the same: one run tells everything.
+                let directory = path.parent().map(Path::to_path_buf).unwrap_or_default();
+                let mut problems = error.into_problems();
+                problems.extend(mesh_faults(&document, &directory));
+                Err(FileError::of_all(problems))
+            }
+        };
         FileReport {
             notes,
             ..report(path, FileKind::Scene, scene)

@@ -130,6 +130,25 @@ impl Document {
 }
 
 impl Node {
+    /// The value of a key, if this is a table that has it.
+    pub(crate) fn child(&self, key: &str) -> Option<&Self> {
+        let Value::Table(entries) = &self.value else {
+            return None;
+        };
+        entries
+            .iter()
+            .find(|(name, _)| name == key)
+            .map(|(_, node)| node)
+    }
+
+    /// The values of an array; of anything else none.
+    pub(crate) fn items(&self) -> &[Self] {
+        match &self.value {
+            Value::Array(items) => items,
+            _ => &[],
+        }
+    }
+
     /// Puts the node and all below it at `at`.
     fn relocate(&mut self, at: &At) {
         self.at = at.clone();

@@ -147,7 +147,8 @@ fn part(
     mesh_file: &str,
     request: &ImportRequest,
 ) -> Result<(PartReport, RawMesh), FileError> {
-    let raw = read_mesh(path)?;
+    // A vertex of no triangle is no part of the surface, however far away it is.
+    let raw = read_mesh(path)?.without_unused();
     let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
     let (unit, unit_assumed) = unit::unit_of(path, &raw, request.unit).map_err(fail)?;
     let single = is_single(&raw.vertices);

@@ -42,6 +42,28 @@ impl RawMesh {
         }
     }
 
+    /// Without the vertices that no triangle names, the others in their order.
+    #[must_use]
+    pub(crate) fn without_unused(self) -> Self {
+        let mut used = vec![false; self.vertices.len()];
+        for v in self.triangles.iter().flatten() {
+            used[*v as usize] = true;
+        }
+        let mut vertices = Vec::with_capacity(self.vertices.len());
+        let mut new_place = vec![u32::MAX; self.vertices.len()];
+        for (v, point) in self.vertices.iter().enumerate().filter(|(v, _)| used[*v]) {
+            new_place[v] = vertices.len() as u32; // at most the old count, which was a u32
+            vertices.push(*point);
+        }
+        let triangles = self.triangles.iter();
+        Self {
+            triangles: triangles
+                .map(|t| t.map(|v| new_place[v as usize]))
+                .collect(),
+            vertices,
+        }
+    }
+
     /// Merges vertices whose coordinates are exactly equal (+0 and -0 are equal), in order of first appearance.
     ///
     /// No tolerance: formats without indices repeat a corner's digits exactly, and a tolerance would close holes that

@@ -6,7 +6,7 @@ use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Tex
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::auto_fidelity::AutoFidelity;
-use super::load::Scene;
+use super::load::{Scene, unusable};
 use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
 use crate::check::MeshFigures;
 use crate::document::At;
@@ -254,20 +254,18 @@ impl Scene {
                 return None;
             }
         };
-        let name = match shape {
-            Shape::Mesh { path, .. } => format!("the mesh \"{path}\""),
-            _ => "the shape".to_owned(),
-        };
         Mesh::new(raw.vertices, raw.triangles)
             .map_err(|error| {
-                let mut add =
-                    |text| problems.push(at.problem(format!("{name} cannot be used: {text}")));
-                // Read again, since a mesh that is sound is not read twice: all faults, with their places.
+                let Shape::Mesh { path, .. } = shape else {
+                    problems.push(at.problem(format!("the shape cannot be used: {error}")));
+                    return;
+                };
+                // Made again, since no copy is kept of a mesh that is sound: all its faults, with their places.
                 let raw = self.raw_mesh(shape, at).unwrap_or_default();
                 let faults = MeshFigures::of(&raw).faults();
-                faults.iter().for_each(|fault| add(fault.to_string()));
+                problems.extend(faults.iter().map(|fault| unusable(at, path, fault)));
                 if faults.is_empty() {
-                    add(error.to_string());
+                    problems.push(unusable(at, path, error));
                 }
             })
             .ok()

@@ -12,12 +12,16 @@ use super::spec::{
     BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
     ObstacleSpec, Shape, View,
 };
-use crate::document::{At, Document};
+use crate::check::MeshFigures;
+use crate::document::{At, Document, Node, Value};
 use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
 use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
+
+/// Most mesh files of a faulty document that are read.
+const MAX_FAULTY_MESHES: usize = 100;
 
 /// Where a scene's own files are looked for first.
 #[derive(Clone, Debug, PartialEq)]
@@ -263,10 +267,52 @@ impl Scene {
         })
     }
 
+    fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
+        self.origin.locate(name, at)
+    }
+}
+
+/// Everything that is wrong with the mesh files of a document that is no scene for other reasons. Nothing else of it is looked at.
+pub(crate) fn mesh_faults(document: &Document, directory: &Path) -> Vec<Problem> {
+    let origin = Origin::Directory(directory.to_path_buf());
+    let root = &document.root;
+    let obstacles = root.child("obstacle").map_or(&[][..], Node::items);
+    let bodies = root.child("god_object").into_iter().chain(obstacles);
+    let mut seen: Vec<&str> = Vec::new();
+    let mut problems = Vec::new();
+    for node in bodies.filter_map(|body| body.child("shape")?.child("mesh")) {
+        let Value::Text(name) = &node.value else {
+            continue; // said where the document was read
+        };
+        if seen.contains(&name.as_str()) || seen.len() >= MAX_FAULTY_MESHES {
+            continue;
+        }
+        seen.push(name);
+        let mesh = origin
+            .locate(name, &node.at)
+            .map_err(FileError::from)
+            .and_then(|path| read_mesh(&path));
+        match mesh {
+            Ok(mesh) => {
+                let faults = MeshFigures::of(&mesh).faults();
+                problems.extend(faults.iter().map(|fault| unusable(&node.at, name, fault)));
+            }
+            Err(error) => problems.extend(error.into_problems()),
+        }
+    }
+    problems
+}
+
+/// A complaint about a mesh that a scene names.
+pub(super) fn unusable(at: &At, mesh: &str, why: impl std::fmt::Display) -> Problem {
+    at.problem(format!("the mesh \"{mesh}\" cannot be used: {why}"))
+}
+
+impl Origin {
     /// Beside the scene, else in a data directory.
     fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
         let mut places = Vec::new();
-        if let Origin::Directory(directory) = &self.origin {
+        if let Self::Directory(directory) = self {
             places.push(directory.join(name));
         }
         places.extend(

@@ -9,6 +9,7 @@ mod shipped;
 mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
+pub(crate) use load::mesh_faults;
 pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};

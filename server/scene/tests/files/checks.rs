@@ -55,7 +55,7 @@ fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
     };
     let report = Folder::new().check("inverted.ply", with_part(0.02, 0.3));
     let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
-    let expected = "the closed part of 12 triangles about (0.3000, 0.0000, 0.0000) m is inside out";
+    let expected = "the closed part of 12 triangles about (0.30000, 0.00000, 0.00000) m is inside out";
     assert!(
         texts.len() == 1 && texts[0].starts_with(expected),
         "{texts:?}"
@@ -75,13 +75,16 @@ fn a_broken_mesh_is_told_everything_that_is_wrong() {
     let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
     // The copy closes one of the three edges of the hole, the wrong way round, and crowds its other two.
     let expected = [
-        "1 triangles have no area; remove them or merge their vertices",
-        "1 triangles have the same corners as another; remove them",
-        "2 edges have one triangle only; close the holes or merge duplicate vertices",
-        "2 edges have more than two triangles; split the surfaces apart",
-        "1 edges have triangles that disagree about outside; turn triangles around",
+        "1 triangles have no area, the first about (-0.03333, -0.10000, -0.10000) m; remove them or merge their vertices, as `taut import` does",
+        "1 triangles have the same corners as another, the first about (-0.10000, -0.03333, 0.03333) m; remove them, as `taut import` does",
+        "2 edges have one triangle only, the first about (0.00000, 0.00000, 0.10000) m; close the holes",
+        "2 edges have more than two triangles, the first about (-0.10000, -0.10000, 0.00000) m; split the surfaces apart",
+        "1 edges have triangles that disagree about outside, the first about (-0.10000, 0.00000, 0.10000) m; turn triangles around",
     ];
-    assert_eq!(texts, expected);
+    assert_eq!(texts.len(), expected.len());
+    for (text, start) in texts.iter().zip(expected) {
+        assert!(text.starts_with(start) && text.contains("`taut import`"), "{text}");
+    }
     assert!(report.to_string().contains("watertight NO"), "{report}");
 }
 
@@ -263,4 +266,28 @@ fn a_least_rate_above_the_rate_is_a_fault() {
         "{text}"
     );
     assert!(!workbench_with(0, &[("rate = 60 ", "rate = 0.5 ")]).is_good());
+}
+
+#[test]
+fn faults_of_meshes_are_told_with_those_of_the_scene_that_names_them() {
+    let folder = Folder::new();
+    let mut mesh = cuboid([0.1; 3]);
+    mesh.triangles.pop();
+    folder.file("open.ply", write_ply(&mesh));
+    let report = folder.check(
+        "faulty.toml",
+        "name = \"x\"\nspeed = 3\n[god_object]\nmass = 1.0\nshape = { mesh = \"open.ply\" }\n\
+         [[obstacle]]\nname = \"a\"\nshape = { mesh = \"missing.ply\" }\n[[obstacle]]\nname = \"b\"\nshape = { mesh = \"open.ply\" }\n",
+    );
+    let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
+    let expected = [
+        "unknown key `speed`",
+        "the mesh \"open.ply\" cannot be used: 3 edges have one triangle only, the first about",
+        "the file \"missing.ply\" does not exist",
+    ];
+    assert_eq!(texts.len(), expected.len(), "{texts:?}");
+    for (text, start) in texts.iter().zip(expected) {
+        assert!(text.starts_with(start), "{text}");
+    }
+    assert_eq!(report.problems[1].line, Some(5));
 }

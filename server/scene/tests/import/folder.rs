@@ -1,0 +1,145 @@
+//! What an import writes: a folder that can be used at once, or nothing.
+
+use std::path::{Path, PathBuf};
+
+use taut_scene::{ImportRequest, Scene, check, import};
+
+use super::solids::{Soup, moved, part, scaled};
+use super::write::{ply, stl};
+
+struct Parts(tempfile::TempDir);
+
+impl Parts {
+    fn new(files: &[(&str, &Soup)]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, soup) in files {
+            std::fs::write(folder.path().join(name), ply(soup)).unwrap();
+        }
+        Self(folder)
+    }
+
+    fn request(&self, names: &[&str]) -> ImportRequest {
+        ImportRequest {
+            parts: names.iter().map(|name| self.path(name)).collect(),
+            folder: self.path("out"),
+            ..ImportRequest::default()
+        }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn entries(&self) -> usize {
+        std::fs::read_dir(self.0.path()).unwrap().count()
+    }
+}
+
+fn start_of(scene: &Path) -> [f64; 3] {
+    let built = Scene::load(scene).and_then(|scene| scene.build()).unwrap();
+    built.start.translation.vector.into()
+}
+
+#[test]
+fn the_scene_passes_the_check_and_keeps_the_places_of_the_parts() {
+    let parts = Parts::new(&[
+        ("peg.ply", &part()),
+        ("hole.ply", &moved(part(), [0.1, 0.0, 0.0])),
+    ]);
+    let report = import(&parts.request(&["peg.ply", "hole.ply"])).unwrap();
+    let scene = PathBuf::from(&report.scene);
+    assert!(check(&[&scene])[0].is_good(), "{}", check(&[&scene])[0]);
+    assert_eq!(start_of(&scene), [0.0; 3]);
+    let built = Scene::load(&scene).and_then(|scene| scene.build()).unwrap();
+    assert_eq!(built.name, "out");
+    let obstacle = &built.bodies[1];
+    assert_eq!(obstacle.name, "hole");
+    assert_eq!(obstacle.mesh.bounds().unwrap().0.x, 0.07);
+    let text = std::fs::read_to_string(parts.path("out/import.txt")).unwrap();
+    assert_eq!(text, format!("{report}\n"));
+}
+
+#[test]
+fn a_part_that_touches_the_others_begins_above_them() {
+    let parts = Parts::new(&[
+        ("a.ply", &part()),
+        ("b.ply", &moved(part(), [0.02, 0.0, 0.0])),
+    ]);
+    let report = import(&parts.request(&["a.ply", "b.ply"])).unwrap();
+    let start = start_of(Path::new(&report.scene));
+    assert!(start[2] > 0.02, "{start:?}");
+    assert!(report.notes[0].contains("touch or overlap"), "{report}");
+}
+
+#[test]
+fn all_parts_stand_below_a_sphere_where_that_is_asked() {
+    let parts = Parts::new(&[("a.ply", &part())]);
+    let request = ImportRequest {
+        obstacles_only: true,
+        ..parts.request(&["a.ply"])
+    };
+    let report = import(&request).unwrap();
+    let built = Scene::load(Path::new(&report.scene))
+        .and_then(|scene| scene.build())
+        .unwrap();
+    assert!(built.world.body.primitive.is_some());
+    assert_eq!(built.bodies[1].name, "a");
+}
+
+#[test]
+fn a_folder_that_exists_is_refused_by_name_and_left_as_it_is() {
+    let parts = Parts::new(&[("a.ply", &part())]);
+    std::fs::create_dir(parts.path("out")).unwrap();
+    let error = import(&parts.request(&["a.ply"])).unwrap_err().to_string();
+    assert!(error.contains("out: exists already"), "{error}");
+    assert_eq!(std::fs::read_dir(parts.path("out")).unwrap().count(), 0);
+    let nowhere = ImportRequest {
+        folder: parts.path("no/such/out"),
+        ..parts.request(&["a.ply"])
+    };
+    let error = import(&nowhere).unwrap_err().to_string();
+    assert!(error.contains("cannot be made"), "{error}");
+}
+
+#[test]
+fn faults_of_all_parts_are_told_at_once_and_nothing_is_left() {
+    let parts = Parts::new(&[("mm.ply", &scaled(part(), 1e3)), ("good.ply", &part())]);
+    let request = parts.request(&["mm.ply", "good.ply", "missing.ply"]);
+    let before = parts.entries();
+    let error = import(&request).unwrap_err();
+    assert_eq!(error.problems().len(), 2, "{:?}", error.problems());
+    assert!(error.problems()[0].file.ends_with("mm.ply"));
+    assert_eq!(parts.entries(), before);
+}
+
+#[test]
+fn names_that_would_be_the_same_are_told_apart() {
+    let parts = Parts::new(&[
+        ("a b.ply", &part()),
+        ("god-object.ply", &moved(part(), [0.1, 0.0, 0.0])),
+    ]);
+    std::fs::write(parts.path("A-B.stl"), stl(&moved(part(), [0.2, 0.0, 0.0]))).unwrap();
+    let report = import(&parts.request(&["a b.ply", "god-object.ply", "A-B.stl"])).unwrap();
+    let files: Vec<&str> = report.parts.iter().map(|p| p.mesh_file.as_str()).collect();
+    assert_eq!(files, ["a-b.ply", "god-object-2.ply", "A-B-2.ply"]);
+}
+
+#[test]
+fn a_place_is_told_in_metres_of_the_part() {
+    let overlapping: Soup = [part(), moved(part(), [0.03, 0.02, 0.01])].concat();
+    let parts = Parts::new(&[("a.ply", &overlapping)]);
+    let report = import(&parts.request(&["a.ply"])).unwrap();
+    let finding = report.parts[0]
+        .findings
+        .iter()
+        .find(|f| f.kind == "meets-itself")
+        .unwrap();
+    // The boxes meet along the outline of [0, 0.03] x [0, 0.02] x [0, 0.01].
+    let [x, y, z] = finding.places_m[0];
+    let on_both = |c: f64, half: f64| (-1e-9..=half + 1e-9).contains(&c);
+    assert!(
+        on_both(x, 0.03) && on_both(y, 0.02) && on_both(z, 0.01),
+        "{finding}"
+    );
+    assert!(report.to_string().contains("NOT MENDED"), "{report}");
+}

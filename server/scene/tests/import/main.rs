@@ -1,0 +1,8 @@
+//! `taut import` on awkward parts, judged by a few lines of its own.
+
+mod awkward;
+mod folder;
+mod judge;
+mod page;
+mod solids;
+mod write;
