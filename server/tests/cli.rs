@@ -34,7 +34,8 @@ fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
 #[test]
 fn every_command_has_help_with_an_example() {
     for command in [
-        "demo", "serve", "render", "bridge", "replay", "record", "check", "import", "doctor", "keys",
+        "demo", "serve", "render", "bridge", "replay", "record", "check", "import", "doctor",
+        "keys",
     ] {
         let output = taut(&[command, "--help"]);
         assert!(output.status.success(), "{command}");

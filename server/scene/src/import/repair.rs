@@ -184,7 +184,17 @@ fn close(
         return Ok(None);
     }
     let Some(thickness) = wishes.thicken else {
-        return Err(vec![open_text(&open)]);
+        let pieces = components(&mesh.triangles).len();
+        let is_rubble = 2 * pieces > mesh.triangles.len();
+        return Err(vec![if is_rubble {
+            let reach = WIDEST_SHARE * weld::diagonal(mesh);
+            format!(
+                "falls into {pieces} pieces of a triangle or two, farther apart than the {reach:.3e} m within which vertices are merged, as at {}; export it as one connected mesh",
+                place_text(&open[0].place)
+            )
+        } else {
+            open_text(&open, wishes.close_holes)
+        }]);
     };
     let thickened = shell::thicken(mesh, thickness);
     note(findings, "thickened", &thickened.sheets, |n| {
@@ -196,7 +206,7 @@ fn close(
     Ok(Some(thickened.farthest))
 }
 
-fn open_text(open: &[holes::Loop]) -> String {
+fn open_text(open: &[holes::Loop], tried: Option<usize>) -> String {
     let edges: usize = open.iter().map(|l| l.vertices.len()).sum();
     let listed: Vec<String> = open
         .iter()
@@ -216,7 +226,9 @@ fn open_text(open: &[holes::Loop]) -> String {
         String::new()
     };
     let largest = open.iter().map(|l| l.vertices.len()).max().unwrap_or(0);
-    let advice = if largest <= MAX_HOLE_EDGES {
+    let advice = if tried.is_some_and(|most| largest <= most) {
+        "closed there it would hold nothing or cut through itself; if it is a sheet, write --thicken with its thickness in metres".to_owned()
+    } else if largest <= MAX_HOLE_EDGES {
         format!(
             "if they are holes, write --close-holes {largest}; if it is a sheet, write --thicken with its thickness in metres"
         )

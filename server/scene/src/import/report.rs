@@ -159,11 +159,15 @@ impl fmt::Display for PartReport {
         for finding in &self.findings {
             write!(f, "\n  {finding}")?;
         }
-        write!(
-            f,
-            "\n  no point of the surface moved farther than {:.3e} m",
-            self.moved_m
-        )
+        if self.moved_m > 0.0 {
+            write!(
+                f,
+                "\n  no point of the surface was moved farther than {:.3e} m",
+                self.moved_m
+            )
+        } else {
+            write!(f, "\n  no point of the surface was moved")
+        }
     }
 }
 

@@ -58,7 +58,8 @@ pub(super) fn unit_of(
     };
     if assumed && is_doubtful(longest) {
         return Err(format!(
-            "names no unit, and its longest side is {longest}: nothing for a hand if that is in metres; {}",
+            "names no unit, and its longest side is {}: nothing for a hand if that is in metres; {}",
+            short(longest),
             advice(longest)
         ));
     }
@@ -80,13 +81,18 @@ pub(super) fn is_doubtful(longest: f64) -> bool {
     !usual
 }
 
+/// At most seven digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}
+
 fn advice(longest: f64) -> String {
     let likely: Vec<String> = LengthUnit::all()
         .filter(|unit| !is_doubtful(longest * unit.metres))
         .map(|unit| format!("--unit {} ({:.4} m)", unit.name, longest * unit.metres))
         .collect();
     if likely.is_empty() {
-        "say with --unit what it is in".to_owned()
+        "write --unit with what it is in, --unit m if it is so small or large".to_owned()
     } else {
         format!("write {}", likely.join(" or "))
     }

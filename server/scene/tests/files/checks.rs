@@ -55,7 +55,8 @@ fn a_closed_part_inside_out_is_named_with_its_place_and_a_cavity_is_not() {
     };
     let report = Folder::new().check("inverted.ply", with_part(0.02, 0.3));
     let texts: Vec<&str> = report.problems.iter().map(|p| p.text.as_str()).collect();
-    let expected = "the closed part of 12 triangles about (0.30000, 0.00000, 0.00000) m is inside out";
+    let expected =
+        "the closed part of 12 triangles about (0.30000, 0.00000, 0.00000) m is inside out";
     assert!(
         texts.len() == 1 && texts[0].starts_with(expected),
         "{texts:?}"
@@ -83,7 +84,10 @@ fn a_broken_mesh_is_told_everything_that_is_wrong() {
     ];
     assert_eq!(texts.len(), expected.len());
     for (text, start) in texts.iter().zip(expected) {
-        assert!(text.starts_with(start) && text.contains("`taut import`"), "{text}");
+        assert!(
+            text.starts_with(start) && text.contains("`taut import`"),
+            "{text}"
+        );
     }
     assert!(report.to_string().contains("watertight NO"), "{report}");
 }

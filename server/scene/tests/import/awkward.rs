@@ -255,7 +255,7 @@ fn shared_vertices() -> Vec<Case> {
             "cracks.ply",
             "cracks of 0.1 mm",
             ply_soup(&Noise::new().on(ball(0.03), 1e-4)),
-            "is open along",
+            "pieces of a triangle or two",
         ),
         good(
             "t-vertices.ply",
@@ -619,7 +619,7 @@ fn openings() -> Vec<Case> {
             "sheet-closed.stl",
             "an open sheet, to be closed as a hole",
             stl(&flat()),
-            "if it is a sheet, write --thicken",
+            "closed there it would hold nothing",
         )
         .options("--close-holes 64"),
         good(

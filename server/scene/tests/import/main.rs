@@ -4,5 +4,6 @@ mod awkward;
 mod folder;
 mod judge;
 mod page;
+mod rubble;
 mod solids;
 mod write;

@@ -35,10 +35,7 @@ fn table() -> String {
                 } else {
                     findings.join("; ")
                 };
-                format!(
-                    "{findings}; moved at most {:.1e} m",
-                    report.parts[0].moved_m
-                )
+                findings
             }
             (_, Err(error)) => format!("**refused**: {}", error.problems()[0].text),
             (_, Ok(_)) => "was imported".to_owned(),
