@@ -5,6 +5,7 @@ mod exact_shapes;
 mod fidelity;
 mod generated_shapes;
 mod scene_faults;
+mod scene_page;
 mod shipped;
 mod simplification;
 mod workbench_faults;
