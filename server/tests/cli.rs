@@ -395,6 +395,39 @@ fn a_session_is_served_recorded_and_ended_by_a_signal() {
 }
 
 #[test]
+fn import_makes_a_scene_or_says_what_to_write() {
+    let place = Workplace::new();
+    // A tetrahedron of 30 mm, one of its faces turned.
+    place.write(
+        "part.obj",
+        "v 0 0 0\nv 30 0 0\nv 0 30 0\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 1 3 4\nf 2 3 4\n",
+    );
+    let (part, out) = (place.text("part.obj"), place.text("out"));
+    refused(
+        &["import", &part, "--out", &out],
+        &["part.obj", "--unit mm (0.0300 m)"],
+    );
+    assert!(!place.path("out").exists());
+    refused(
+        &["import", &part, "--out", &out, "--unit", "feet"],
+        &["write one of m, dm, cm, mm, um, inch"],
+    );
+    let output = taut(&["import", &part, "--out", &out, "--unit", "mm", "--json"]);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+    assert_eq!(
+        report["parts"][0]["findings"][0]["kind"],
+        "triangles-turned"
+    );
+    assert_eq!(report["parts"][0]["moved_m"], 0.0);
+    let scene = report["scene"].as_str().unwrap_or_default();
+    assert!(taut(&["check", scene]).status.success());
+    refused(
+        &["import", &part, "--out", &out, "--unit", "mm"],
+        &["exists already"],
+    );
+}
+
+#[test]
 fn check_lists_every_fault_and_tells_good_from_bad() {
     let place = Workplace::new();
     place.write(

@@ -5,10 +5,13 @@ use nalgebra::Point3;
 use super::distance::triangles_intersect;
 use super::mesh::Mesh;
 
-/// Faces at an edge whose normals are opposite to this cosine lie on each other.
-const FOLDED: f64 = -1.0 + 1e-12;
+/// Faces on the same side of their common edge lie on each other if the cosine between them is above this.
+const FOLDED: f64 = 1.0 - 1e-12;
+/// Rounding of a triple product of differences, relative to the coordinates times the square of the longest difference: some units in the last
+/// place, for corners are known to the rounding of their coordinates only.
+const VOLUME_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Two triangles of the mesh that meet elsewhere than at corners and edges that they share; `None` when there are none.
+/// Two triangles of the mesh that meet elsewhere than at corners and edges where both have vertices; `None` when there are none.
 pub fn self_intersection(mesh: &Mesh) -> Option<[u32; 2]> {
     let count = mesh.triangles().len() as u32;
     let mut stack = Vec::new();
@@ -42,7 +45,12 @@ fn partner(mesh: &Mesh, a: u32, stack: &mut Vec<u32>) -> Option<u32> {
 
 fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {
     let (on_a, on_b) = (mesh.triangles()[a as usize], mesh.triangles()[b as usize]);
-    let own = |t: [u32; 3], other: [u32; 3]| t.into_iter().filter(move |v| !other.contains(v));
+    // By place, not by number: surfaces that touch at a vertex or an edge may each have their own there.
+    let place = |v: u32| mesh.vertices()[v as usize];
+    let own = |t: [u32; 3], other: [u32; 3]| {
+        t.into_iter()
+            .filter(move |v| !other.iter().any(|w| v == w || place(*v) == place(*w)))
+    };
     match own(on_a, on_b).count() {
         3 => triangles_intersect(&mesh.corners(a), &mesh.corners(b)),
         // One corner in common: the opposite side of either may run through the other.
@@ -57,7 +65,23 @@ fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {
             hits(side(on_a, on_b), b) || hits(side(on_b, on_a), a)
         }
         // An edge in common: one on the other.
-        1 => mesh.face_normal(a).dot(mesh.face_normal(b)) < FOLDED,
+        1 => {
+            let apex = |t, other| own(t, other).next().map(place);
+            let mut edge = on_a
+                .into_iter()
+                .map(place)
+                .filter(|p| Some(*p) != apex(on_a, on_b));
+            let (Some(from), Some(to)) = (edge.next(), edge.next()) else {
+                return true;
+            };
+            let along = to - from;
+            let arm = |p: Point3<f64>| {
+                let arm = p - from;
+                (arm - along * (arm.dot(&along) / along.norm_squared())).normalize()
+            };
+            let arms = [apex(on_a, on_b), apex(on_b, on_a)].map(|p| p.map(arm));
+            matches!(arms, [Some(a), Some(b)] if a.dot(&b) > FOLDED)
+        }
         _ => true, // the same three corners
     }
 }
@@ -65,7 +89,20 @@ fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {
 /// Whether a segment meets a triangle, by the signs of volumes; one in its plane does not.
 fn segment_meets(p: &Point3<f64>, q: &Point3<f64>, t: &[Point3<f64>; 3]) -> bool {
     let volume = |a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>, d: &Point3<f64>| {
-        (b - a).cross(&(c - a)).dot(&(d - a))
+        let arms = [b - a, c - a, d - a];
+        let volume = arms[0].cross(&arms[1]).dot(&arms[2]);
+        let longest = arms.iter().map(|arm| arm.norm()).fold(0.0, f64::max);
+        let reach = [a, b, c, d]
+            .map(|p| p.coords.amax())
+            .into_iter()
+            .fold(0.0, f64::max);
+        let rounding = VOLUME_ROUNDING * reach * longest * longest;
+        // In one plane, to rounding.
+        if volume.abs() <= rounding {
+            0.0
+        } else {
+            volume
+        }
     };
     let sides = [p, q].map(|x| volume(&t[0], &t[1], &t[2], x));
     if sides[0] * sides[1] > 0.0 || sides == [0.0, 0.0] {

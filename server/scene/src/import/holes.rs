@@ -100,8 +100,11 @@ pub(super) fn close(mesh: &mut RawMesh, asked: Option<usize>) -> Closed {
     let parts = components(&mesh.triangles);
     let most = asked.unwrap_or(SMALL_HOLE_EDGES).min(MAX_HOLE_EDGES);
     let mut edges: HashSet<[u32; 2]> = sides(&mesh.triangles).iter().map(|s| s.ends).collect();
-    for (component, triangles) in parts.iter().enumerate() {
-        let own: Vec<&Loop> = all.iter().filter(|l| l.component == component).collect();
+    let mut loops_of: Vec<Vec<&Loop>> = vec![Vec::new(); parts.len()];
+    for hole in &all {
+        loops_of[hole.component].push(hole);
+    }
+    for (triangles, own) in parts.iter().zip(&loops_of) {
         if own.is_empty() {
             continue;
         }

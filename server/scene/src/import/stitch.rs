@@ -21,7 +21,7 @@ const MAX_PASSES: usize = 4;
 pub(super) struct Stitched {
     /// Sides that were cut.
     pub(super) sides: usize,
-    /// Farthest that a corner was from the side, m.
+    /// Farthest that a point was moved, m: in each pass, as far as a corner was from the side.
     pub(super) moved: f64,
     /// The first of these corners.
     pub(super) place: Option<Point3<f64>>,
@@ -35,14 +35,25 @@ pub(super) fn stitch(mesh: &mut RawMesh, tolerance: f64) -> Stitched {
         if open.is_empty() || open.len() > MAX_OPEN_EDGES {
             break;
         }
-        if !pass(mesh, &open, tolerance, &mut done) {
+        let mut now = Stitched {
+            place: done.place,
+            ..Stitched::default()
+        };
+        pass(mesh, &open, tolerance, &mut now);
+        if now.sides == 0 {
             break;
         }
+        // A point may be moved in each pass.
+        done = Stitched {
+            sides: done.sides + now.sides,
+            moved: done.moved + now.moved,
+            place: now.place,
+        };
     }
     done
 }
 
-fn pass(mesh: &mut RawMesh, open: &[Side], tolerance: f64, done: &mut Stitched) -> bool {
+fn pass(mesh: &mut RawMesh, open: &[Side], tolerance: f64, done: &mut Stitched) {
     let mut points: Vec<u32> = open.iter().flat_map(|side| side.ends).collect();
     points.sort_unstable();
     points.dedup();
@@ -72,7 +83,6 @@ fn pass(mesh: &mut RawMesh, open: &[Side], tolerance: f64, done: &mut Stitched) 
             done.place.get_or_insert(mesh.vertices[v as usize]);
         }
     }
-    !cut.is_empty()
 }
 
 fn x(mesh: &RawMesh, v: u32) -> f64 {

@@ -218,3 +218,52 @@ fn the_bunny_keeps_its_form_with_fewer_triangles() {
         "{report}"
     );
 }
+
+/// Each triangle cut into four, so often.
+fn cut(mut raw: RawMesh, times: u32) -> RawMesh {
+    for _ in 0..times {
+        let mut middles = std::collections::HashMap::new();
+        let (mut vertices, mut triangles) = (raw.vertices.clone(), Vec::new());
+        for [a, b, c] in raw.triangles {
+            let mut middle = |i: u32, j: u32| {
+                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
+                    let (p, q) = (vertices[i as usize], vertices[j as usize]);
+                    vertices.push(nalgebra::center(&p, &q));
+                    vertices.len() as u32 - 1
+                })
+            };
+            let (d, e, f) = (middle(a, b), middle(b, c), middle(c, a));
+            triangles.extend([[a, d, f], [d, b, e], [f, e, c], [d, e, f]]);
+        }
+        raw = RawMesh {
+            vertices,
+            triangles,
+        };
+    }
+    raw
+}
+
+#[test]
+fn faces_in_one_plane_to_rounding_do_not_run_through_themselves() {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.7, 0.3, 0.2);
+    let mut raw = cut(cuboid([0.03, 0.02, 0.01]), 4);
+    raw.vertices.iter_mut().for_each(|v| *v = turn * *v);
+    assert_eq!(self_intersection(&mesh(&raw)), None);
+}
+
+#[test]
+fn solids_that_touch_at_an_edge_or_a_vertex_do_not_run_through_each_other() {
+    let pair = |way: Vector3<f64>| {
+        let (mut two, other) = (cuboid([0.01; 3]), cuboid([0.01; 3]));
+        let first = two.vertices.len() as u32;
+        two.vertices.extend(other.vertices.iter().map(|p| p + way));
+        two.triangles
+            .extend(other.triangles.iter().map(|t| t.map(|v| v + first)));
+        self_intersection(&mesh(&two))
+    };
+    assert_eq!(pair(Vector3::new(0.02, 0.02, 0.0)), None);
+    assert_eq!(pair(Vector3::new(0.02, 0.02, 0.02)), None);
+    // With an edge in common, but one in the other.
+    assert!(pair(Vector3::new(0.01, 0.01, 0.0)).is_some());
+    assert!(pair(Vector3::new(0.02, 0.01, 0.0)).is_some());
+}
