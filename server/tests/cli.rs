@@ -408,9 +408,12 @@ fn import_makes_a_scene_or_says_what_to_write() {
         &["part.obj", "--unit mm (0.0300 m)"],
     );
     assert!(!place.path("out").exists());
-    refused(
-        &["import", &part, "--out", &out, "--unit", "feet"],
-        &["write one of m, dm, cm, mm, um, inch"],
+    let unknown = taut(&["import", &part, "--out", &out, "--unit", "feet"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    let error = String::from_utf8_lossy(&unknown.stderr).into_owned();
+    assert!(
+        error.contains("write one of m, dm, cm, mm, um, inch"),
+        "{error}"
     );
     let output = taut(&["import", &part, "--out", &out, "--unit", "mm", "--json"]);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();

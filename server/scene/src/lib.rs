@@ -12,6 +12,7 @@ mod height_map_file;
 mod import;
 mod mesh_file;
 mod problem;
+mod progress;
 mod runner;
 mod scene;
 pub mod shapes;

@@ -3,22 +3,17 @@
 //! The simplifier's own error is an estimate. What is stated here is measured afterwards, as a rigorous upper bound, both ways; a candidate beyond the
 //! limit, open, inside out or running through itself is not taken, and the next finer one is tried.
 
-use std::io::IsTerminal;
-use std::time::{Duration, Instant};
-
 use god_object::Mesh;
 use god_object::geometry::{one_sided_distance, self_intersection};
-use indicatif::ProgressBar;
 use meshopt::SimplifyOptions;
 
 use crate::mesh_file::RawMesh;
+use crate::progress::Progress;
 
 /// Errors that the simplifier is asked for, as shares of the limit: coarsest first.
 const LEVELS: [f32; 8] = [2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.15, 0.05];
 /// Most passes of the simplifier over its own answer.
 const MAX_PASSES: u32 = 8;
-/// Work that takes longer shows a bar.
-const SILENT_TIME: Duration = Duration::from_secs(2);
 
 /// How a mesh was simplified.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,14 +55,17 @@ impl std::fmt::Display for Simplified {
 /// The coarsest candidate within `max_error` (m) of `original`, both ways, that is closed, outward and does not run through itself; else the original.
 pub fn simplify(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
     let before = original.triangles().len();
-    let mut bar = Bar::new(body);
+    let progress = Progress::on_triangles(
+        before,
+        format_args!("{body}: simplifying {before} triangles"),
+    );
     let mut reason = "no candidate has fewer triangles".to_owned();
     for level in LEVELS {
         let raw = candidate(&original, max_error as f32 * level);
         if raw.triangles.len() >= before {
             break; // finer levels have no fewer
         }
-        match measured(raw, &original, max_error, &mut bar) {
+        match measured(raw, &original, max_error, &progress) {
             Ok((mesh, [to_original, from_original])) => {
                 let report = Simplified {
                     body: body.to_owned(),
@@ -137,7 +135,7 @@ fn measured(
     raw: RawMesh,
     original: &Mesh,
     max_error: f64,
-    bar: &mut Bar,
+    progress: &Progress,
 ) -> Result<(Mesh, [f64; 2]), String> {
     let mesh = Mesh::new(raw.vertices, raw.triangles)
         .map_err(|error| format!("the candidates are not closed surfaces: {error}"))?;
@@ -147,8 +145,10 @@ fn measured(
         ));
     }
     let total = mesh.triangles().len() + original.triangles().len();
-    let mut bound = |from: &Mesh, to: &Mesh, offset: usize| {
-        let found = one_sided_distance(from, to, max_error, |done| bar.show(offset + done, total));
+    let bound = |from: &Mesh, to: &Mesh, offset: usize| {
+        let found = one_sided_distance(from, to, max_error, |done| {
+            progress.show(offset + done, total)
+        });
         if found.at_most <= max_error {
             Ok(found.at_most)
         } else {
@@ -161,44 +161,4 @@ fn measured(
     let to_original = bound(&mesh, original, 0)?;
     let from_original = bound(original, &mesh, mesh.triangles().len())?;
     Ok((mesh, [to_original, from_original]))
-}
-
-/// A progress bar that appears on a terminal when the work takes long.
-struct Bar {
-    started: Instant,
-    body: String,
-    shown: Option<ProgressBar>,
-}
-
-impl Bar {
-    fn new(body: &str) -> Self {
-        Self {
-            started: Instant::now(),
-            body: body.to_owned(),
-            shown: None,
-        }
-    }
-
-    fn show(&mut self, done: usize, total: usize) {
-        if self.shown.is_none()
-            && self.started.elapsed() > SILENT_TIME
-            && std::io::stderr().is_terminal()
-        {
-            let bar = ProgressBar::new(total as u64);
-            bar.println(format!("{}: measuring the simplified mesh", self.body));
-            self.shown = Some(bar);
-        }
-        if let Some(bar) = &self.shown {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-        }
-    }
-}
-
-impl Drop for Bar {
-    fn drop(&mut self) {
-        if let Some(bar) = self.shown.take() {
-            bar.finish_and_clear();
-        }
-    }
 }

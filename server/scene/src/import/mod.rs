@@ -29,6 +29,7 @@ pub use unit::LengthUnit;
 use crate::check::{MeshFigures, place_text};
 use crate::mesh_file::{RawMesh, read_mesh, write_ply};
 use crate::problem::{FileError, Problem};
+use crate::progress::Progress;
 use crate::scene::{GOD_OBJECT_NAME, Scene};
 use crate::simplify::simplify;
 use folder::NewFolder;
@@ -152,6 +153,8 @@ fn part(
     let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
     let (unit, unit_assumed) = unit::unit_of(path, &raw, request.unit).map_err(fail)?;
     let single = is_single(&raw.vertices);
+    let (file, count) = (path.display(), raw.triangles.len());
+    let progress = Progress::on_triangles(count, format_args!("{file}: mending {count} triangles"));
     let wishes = Wishes {
         close_holes: request.close_holes,
         thicken: request.thicken,
@@ -165,6 +168,7 @@ fn part(
         let of_file = |text| Problem::of_file(path.display(), text);
         FileError::of_all(faults.into_iter().map(of_file).collect())
     })?;
+    drop(progress);
     let (mesh, simplified) = match request.simplify {
         Some(max_error) => {
             let (mesh, outcome) = simplify(mesh, max_error, body);
@@ -172,7 +176,13 @@ fn part(
         }
         None => (mesh, None),
     };
+    let count = mesh.triangles().len();
+    let progress = Progress::on_triangles(
+        count,
+        format_args!("{file}: looking where {count} triangles run through each other"),
+    );
     let crossing = crossing::crossing(&mesh);
+    drop(progress);
     let raw = raw_of(&mesh);
     let mut report = PartReport {
         file: path.display().to_string(),

@@ -13,6 +13,7 @@ use crate::document::At;
 use crate::fidelity::FidelityPlan;
 use crate::mesh_file::RawMesh;
 use crate::problem::{FileError, Problem};
+use crate::progress::Progress;
 use crate::shapes;
 use crate::simplify::{Simplified, simplify};
 use crate::trace::DeviceTrace;
@@ -254,6 +255,9 @@ impl Scene {
                 return None;
             }
         };
+        let (count, name) = (raw.triangles.len(), shape.file().unwrap_or("a shape"));
+        let _progress =
+            Progress::on_triangles(count, format_args!("{name}: preparing {count} triangles"));
         Mesh::new(raw.vertices, raw.triangles)
             .map_err(|error| {
                 let Shape::Mesh { path, .. } = shape else {

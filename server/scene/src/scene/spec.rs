@@ -76,6 +76,14 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// The mesh file that it names, as written.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Mesh { path, .. } => Some(path),
+            _ => None,
+        }
+    }
+
     /// The exact form, if the shape is one: a primitive that does not name its tessellation.
     pub fn primitive(&self) -> Option<Primitive> {
         match *self {
