@@ -16,6 +16,7 @@ mod progress;
 mod runner;
 mod scene;
 pub mod shapes;
+mod simplified_cache;
 mod simplify;
 mod trace;
 mod workbench;

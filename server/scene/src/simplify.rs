@@ -3,15 +3,20 @@
 //! The simplifier's own error is an estimate. What is stated here is measured afterwards, as a rigorous upper bound, both ways; a candidate beyond the
 //! limit, open, inside out or running through itself is not taken, and the next finer one is tried.
 
+use std::time::Instant;
+
 use god_object::Mesh;
 use god_object::geometry::{one_sided_distance, self_intersection};
 use meshopt::SimplifyOptions;
 
 use crate::mesh_file::RawMesh;
 use crate::progress::Progress;
+use crate::simplified_cache::{Key, SimplifiedCache};
 
 /// Errors that the simplifier is asked for, as shares of the limit: coarsest first.
 const LEVELS: [f32; 8] = [2.0, 1.4, 1.0, 0.7, 0.5, 0.3, 0.15, 0.05];
+/// Simplifying fewer triangles takes no second.
+const KEPT_TRIANGLES: usize = 10_000;
 /// Most passes of the simplifier over its own answer.
 const MAX_PASSES: u32 = 8;
 
@@ -53,7 +58,35 @@ impl std::fmt::Display for Simplified {
 }
 
 /// The coarsest candidate within `max_error` (m) of `original`, both ways, that is closed, outward and does not run through itself; else the original.
+///
+/// Meshes of 10,000 triangles and more are looked for in the user's cache first, and kept there if it took longer than a second.
 pub fn simplify(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
+    let is_large = original.triangles().len() >= KEPT_TRIANGLES;
+    let cache = is_large.then(SimplifiedCache::of_user).flatten();
+    simplify_with(original, max_error, body, cache.as_ref())
+}
+
+/// The same with this cache, or none.
+pub(crate) fn simplify_with(
+    original: Mesh,
+    max_error: f64,
+    body: &str,
+    cache: Option<&SimplifiedCache>,
+) -> (Mesh, Simplified) {
+    let Some(cache) = cache else {
+        return compute(original, max_error, body);
+    };
+    let key = Key::of(&original, max_error);
+    if let Some((mesh, report)) = cache.read(key, &original, max_error, body) {
+        return (mesh.unwrap_or(original), report);
+    }
+    let begun = Instant::now();
+    let (mesh, report) = compute(original, max_error, body);
+    cache.keep(key, &mesh, &report, begun.elapsed());
+    (mesh, report)
+}
+
+fn compute(original: Mesh, max_error: f64, body: &str) -> (Mesh, Simplified) {
     let before = original.triangles().len();
     let progress = Progress::on_triangles(
         before,

@@ -1,7 +1,7 @@
 //! Meshes by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
 //! for the next who asks, in this session or in a later one.
 
-use super::mesh_cache::{Cached, MeshCache};
+use super::mesh_cache::MeshCache;
 use crate::{
     LinkError, MeshCounters,
     counters::MeshCounterCells,
@@ -12,6 +12,7 @@ use std::{
     collections::HashMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
+use taut_cache::Cached;
 use taut_proto::{
     MeshBlob, MeshHash, SceneDescription, VersionRange,
     control::{ControlMessage, MeshHeader, MeshRequest},
