@@ -7,9 +7,10 @@ use super::mesh::Mesh;
 
 /// Faces on the same side of their common edge lie on each other if the cosine between them is above this.
 const FOLDED: f64 = 1.0 - 1e-12;
-/// Rounding of a triple product of differences, relative to the coordinates times the square of the longest difference: some units in the last
-/// place, for corners are known to the rounding of their coordinates only.
-const VOLUME_ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Heights over a triangle below this share of the longest side are none: faces of one plane, cut up and rounded.
+const FLAT: f64 = 1e-9;
+/// Heights below this share of the coordinates are their rounding: some units in the last place.
+const COORDINATE_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// Two triangles of the mesh that meet elsewhere than at corners and edges where both have vertices; `None` when there are none.
 pub fn self_intersection(mesh: &Mesh) -> Option<[u32; 2]> {
@@ -86,25 +87,20 @@ fn meet_elsewhere(mesh: &Mesh, a: u32, b: u32) -> bool {
     }
 }
 
-/// Whether a segment meets a triangle, by the signs of volumes; one in its plane does not.
+/// Whether a segment meets a triangle, by the signs of volumes. One in its plane, or off it by less than [`FLAT`] and rounding, does not.
 fn segment_meets(p: &Point3<f64>, q: &Point3<f64>, t: &[Point3<f64>; 3]) -> bool {
     let volume = |a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>, d: &Point3<f64>| {
-        let arms = [b - a, c - a, d - a];
-        let volume = arms[0].cross(&arms[1]).dot(&arms[2]);
-        let longest = arms.iter().map(|arm| arm.norm()).fold(0.0, f64::max);
-        let reach = [a, b, c, d]
-            .map(|p| p.coords.amax())
-            .into_iter()
-            .fold(0.0, f64::max);
-        let rounding = VOLUME_ROUNDING * reach * longest * longest;
-        // In one plane, to rounding.
-        if volume.abs() <= rounding {
-            0.0
-        } else {
-            volume
-        }
+        (b - a).cross(&(c - a)).dot(&(d - a))
     };
-    let sides = [p, q].map(|x| volume(&t[0], &t[1], &t[2], x));
+    let side = |x: &Point3<f64>| {
+        let arms = [t[1] - t[0], t[2] - t[0], x - t[0]];
+        let longest = arms.iter().map(|arm| arm.norm()).fold(0.0, f64::max);
+        let reach = t.iter().map(|p| p.coords.amax()).fold(0.0, f64::max);
+        let least = (FLAT * longest + COORDINATE_ROUNDING * reach) * longest * longest;
+        let volume = volume(&t[0], &t[1], &t[2], x);
+        if volume.abs() <= least { 0.0 } else { volume }
+    };
+    let sides = [p, q].map(side);
     if sides[0] * sides[1] > 0.0 || sides == [0.0, 0.0] {
         return false;
     }
