@@ -315,3 +315,34 @@ fn cavities_and_what_floats_in_them_are_told_by_nesting() {
     let refused = Mesh::new(crossing.0, crossing.1).unwrap_err();
     assert!(matches!(refused, MeshError::PartInsideOut(_)));
 }
+
+#[test]
+fn parts_know_how_many_others_surround_them_whichever_way_they_look() {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    // Three in each other, the middle one inside out, and one beside them.
+    for (size, away, turned) in [
+        (4.0, 0.0, false),
+        (1.5, 0.0, true),
+        (0.4, 0.0, false),
+        (0.4, 9.0, true),
+    ] {
+        let (v, t) = tetrahedron(size);
+        let first = vertices.len() as u32;
+        // About its own middle.
+        let middle = v.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 4.0;
+        vertices.extend(v.iter().map(|p| p - middle + Vector3::x() * away));
+        triangles.extend(t.iter().map(|t| {
+            let [a, b, c] = t.map(|v| v + first);
+            if turned { [a, c, b] } else { [a, b, c] }
+        }));
+    }
+    let adjacent = (0..triangles.len() as u32 / 4).flat_map(|part| {
+        let first = 4 * part;
+        (0..3).map(move |k| [first, first + k + 1])
+    });
+    let parts = god_object::geometry::closed_parts(&vertices, &triangles, adjacent);
+    let depths: Vec<usize> = parts.iter().map(|part| part.depth).collect();
+    assert_eq!(depths, [0, 1, 2, 0]);
+    let outward: Vec<bool> = parts.iter().map(|part| part.volume > 0.0).collect();
+    assert_eq!(outward, [true, false, true, false]);
+}
