@@ -56,7 +56,7 @@ pub(super) fn loops(mesh: &RawMesh) -> Vec<Loop> {
         component_at[to as usize] = component_of[side.triangle as usize];
     }
     let mut found = Vec::new();
-    for start in 0..mesh.vertices.len() {
+    for (start, component) in component_at.into_iter().enumerate() {
         let (mut vertices, mut at) = (Vec::new(), start as u32);
         while next[at as usize] != u32::MAX {
             vertices.push(at);
@@ -74,7 +74,7 @@ pub(super) fn loops(mesh: &RawMesh) -> Vec<Loop> {
         found.push(Loop {
             place: Point3::from(sum / points.len() as f64),
             length: around.map(|(a, b)| (b - a).norm()).sum(),
-            component: component_at[start],
+            component,
             vertices,
         });
     }

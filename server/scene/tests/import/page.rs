@@ -30,12 +30,11 @@ fn table() -> String {
                     .iter()
                     .map(|f| f.text.clone())
                     .collect();
-                let findings = if findings.is_empty() {
+                if findings.is_empty() {
                     "nothing to mend".to_owned()
                 } else {
                     findings.join("; ")
-                };
-                findings
+                }
             }
             (_, Err(error)) => format!("**refused**: {}", error.problems()[0].text),
             (_, Ok(_)) => "was imported".to_owned(),
