@@ -1,6 +1,7 @@
 //! `taut import` on awkward parts, judged by a few lines of its own.
 
 mod awkward;
+mod cases;
 mod folder;
 mod judge;
 mod page;

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use super::awkward::{Expected, cases, run};
+use super::awkward::run;
+use super::cases::{Expected, cases};
 
 const BEGIN: &str = "<!-- the table is written by: cargo test -p taut-scene --test import write_the_table -- --ignored -->\n";
 const END: &str = "<!-- end of the table -->\n";

@@ -50,7 +50,15 @@ pub(crate) fn joined<const N: usize>(soups: [Soup; N]) -> Soup {
     soups.into_iter().flatten().collect()
 }
 
-/// A triangle without area, or of the soup, appended.
+/// Six times the signed volume of a triangle and the origin.
+pub(crate) fn six_volumes([a, b, c]: &Triangle) -> f64 {
+    let [x, y, z] = *a;
+    x * (b[1] * c[2] - b[2] * c[1])
+        + y * (b[2] * c[0] - b[0] * c[2])
+        + z * (b[0] * c[1] - b[1] * c[0])
+}
+
+/// With these triangles at the end.
 pub(crate) fn with(mut soup: Soup, more: &[Triangle]) -> Soup {
     soup.extend_from_slice(more);
     soup

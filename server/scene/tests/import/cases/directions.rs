@@ -1,0 +1,120 @@
+//! Triangles and parts that look the wrong way, and cavities.
+
+use super::{Case, ONE, bad, good};
+use crate::solids::{Soup, Triangle, VOLUME, cuboid, flipped, joined, moved, part};
+use crate::write::{ply, stl};
+
+pub(super) fn directions() -> Vec<Case> {
+    let inner = || cuboid([0.01, 0.008, 0.005]);
+    const INNER: f64 = 8.0 * 0.01 * 0.008 * 0.005;
+    let beside = || moved(part(), [0.1, 0.0, 0.0]);
+    let mixed = || {
+        let mut k = 0;
+        let turn = |t: Triangle| {
+            k += 1;
+            if k % 3 == 0 { [t[0], t[2], t[1]] } else { t }
+        };
+        part().into_iter().map(turn).collect::<Soup>()
+    };
+    let core = || moved(cuboid([0.002; 3]), [0.002, 0.0, 0.0]);
+    const CORE: f64 = 8.0 * 8e-9;
+    vec![
+        good(
+            "inside-out.stl",
+            "all triangles turned",
+            stl(&flipped(part())),
+            part(),
+            &["parts-turned"],
+            ONE,
+        ),
+        good(
+            "one-turned.stl",
+            "one triangle turned",
+            stl(&joined([
+                flipped(part()[..1].to_vec()),
+                part()[1..].to_vec(),
+            ])),
+            part(),
+            &["triangles-turned"],
+            ONE,
+        ),
+        good(
+            "mixed.stl",
+            "every third triangle turned",
+            stl(&mixed()),
+            part(),
+            &["triangles-turned"],
+            ONE,
+        ),
+        good(
+            "one-part-turned.stl",
+            "two parts, one of them inside out",
+            stl(&joined([part(), flipped(beside())])),
+            joined([part(), beside()]),
+            &["parts-turned"],
+            (2, 2.0 * VOLUME),
+        ),
+        good(
+            "cavity.ply",
+            "a closed cavity",
+            ply(&joined([part(), flipped(inner())])),
+            joined([part(), inner()]),
+            &["cavities"],
+            (2, VOLUME - INNER),
+        ),
+        good(
+            "cavity-inside-out.ply",
+            "a closed cavity, all turned",
+            ply(&joined([flipped(part()), inner()])),
+            joined([part(), inner()]),
+            &["parts-turned", "cavities"],
+            (2, VOLUME - INNER),
+        ),
+        good(
+            "cavity-outward.ply",
+            "a closed cavity whose wall is turned",
+            ply(&joined([part(), inner()])),
+            joined([part(), inner()]),
+            &["parts-turned", "cavities"],
+            (2, VOLUME - INNER),
+        ),
+        good(
+            "core.ply",
+            "a body in the cavity, turned",
+            ply(&joined([part(), flipped(inner()), flipped(core())])),
+            joined([part(), inner(), core()]),
+            &["parts-turned", "cavities"],
+            (3, VOLUME - INNER + CORE),
+        ),
+        bad(
+            "moebius.ply",
+            "a surface with one side only",
+            ply(&moebius()),
+            "one side only",
+        ),
+    ]
+}
+
+fn moebius() -> Soup {
+    const CELLS: usize = 24;
+    let at = |i: usize, side: f64| {
+        let turn = i as f64 / CELLS as f64 * std::f64::consts::TAU;
+        let (s, c) = (turn / 2.0).sin_cos();
+        let r = 0.03 + 0.01 * side * c;
+        // The last ring is the first one, the other way round, to the digit.
+        [r * turn.cos(), r * turn.sin(), 0.01 * side * s]
+    };
+    let ring = |i: usize| {
+        if i == CELLS {
+            [at(0, 1.0), at(0, -1.0)]
+        } else {
+            [at(i, -1.0), at(i, 1.0)]
+        }
+    };
+    (0..CELLS)
+        .flat_map(|i| {
+            let ([a, b], [c, d]) = (ring(i), ring(i + 1));
+            [[a, c, b], [b, c, d]]
+        })
+        .collect()
+}

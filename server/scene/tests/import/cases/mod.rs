@@ -1,0 +1,103 @@
+//! Awkward part files: what is in them, what is meant, and what `taut import` is expected to do.
+
+mod directions;
+mod files;
+mod openings;
+mod surfaces;
+
+use crate::solids::{Soup, VOLUME};
+
+/// One file.
+pub(crate) struct Case {
+    /// File name, unique.
+    pub file: &'static str,
+    /// What is awkward.
+    pub what: &'static str,
+    pub bytes: Vec<u8>,
+    /// Options beside `--out`, as on the command line.
+    pub options: &'static str,
+    /// The solid that is meant, m; empty where the file is refused.
+    pub truth: Soup,
+    /// How far the file itself is from that, m.
+    pub error: f64,
+    pub expected: Expected,
+}
+
+pub(crate) enum Expected {
+    Imported {
+        /// Of the findings, in order.
+        kinds: &'static [&'static str],
+        /// Connected parts.
+        parts: usize,
+        /// m^3.
+        volume: f64,
+    },
+    /// What the refusal contains.
+    Refused(&'static str),
+}
+
+/// Error of single precision for coordinates below 0.25 m: half a unit in the last place along each axis.
+const SINGLE: f64 = 1.3e-8;
+
+fn good(
+    file: &'static str,
+    what: &'static str,
+    bytes: Vec<u8>,
+    truth: Soup,
+    kinds: &'static [&'static str],
+    (parts, volume): (usize, f64),
+) -> Case {
+    Case {
+        file,
+        what,
+        bytes,
+        options: "",
+        truth,
+        error: SINGLE,
+        expected: Expected::Imported {
+            kinds,
+            parts,
+            volume,
+        },
+    }
+}
+
+fn bad(file: &'static str, what: &'static str, bytes: Vec<u8>, text: &'static str) -> Case {
+    Case {
+        file,
+        what,
+        bytes,
+        options: "",
+        truth: Vec::new(),
+        error: 0.0,
+        expected: Expected::Refused(text),
+    }
+}
+
+impl Case {
+    fn options(self, options: &'static str) -> Self {
+        Self { options, ..self }
+    }
+
+    fn error(self, error: f64) -> Self {
+        Self { error, ..self }
+    }
+}
+
+pub(crate) fn cases() -> Vec<Case> {
+    [
+        files::formats_and_units(),
+        surfaces::shared_vertices(),
+        surfaces::faces(),
+        directions::directions(),
+        openings::openings(),
+        openings::contacts(),
+        files::broken(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+const ONE: (usize, f64) = (1, VOLUME);
+const MM: f64 = 1e3;

@@ -1,0 +1,196 @@
+//! Holes, sheets, and bodies that touch.
+
+use taut_scene::shapes::Axis;
+
+use super::{Case, ONE, bad, good};
+use crate::solids::{
+    HALF, Soup, VOLUME, ball, flipped, joined, mapped, moved, part, sheet, six_volumes, soup_of,
+    without,
+};
+use crate::write::{obj_soup, ply, stl};
+
+pub(super) fn openings() -> Vec<Case> {
+    let holed = |count: usize| {
+        let whole = ball(0.03);
+        let mut soup = whole.clone();
+        // Far apart in the order of the file, and so in space.
+        (0..count).for_each(|k| {
+            soup.remove(100 + 300 * k);
+        });
+        (soup, whole)
+    };
+    let volume = |soup: &Soup| soup.iter().map(six_volumes).sum::<f64>() / 6.0;
+    let ((one, whole), (three, _)) = (holed(1), holed(3));
+    let cup = || without(part(), |p| p[2] == HALF[2]);
+    let flat = || sheet([0.06, 0.04], [6, 4]);
+    let bent = || {
+        mapped(flat(), |[x, y, _]| {
+            if x > 0.03 {
+                [0.03, y, x - 0.03]
+            } else {
+                [x, y, 0.0]
+            }
+        })
+    };
+    let tin = || soup_of(&taut_scene::shapes::cylinder(0.02, 0.01, 24, Axis::Z));
+    let opened = || without(tin(), |p| p[2] == 0.01);
+    vec![
+        good(
+            "hole.ply",
+            "a triangle is missing",
+            ply(&one),
+            whole.clone(),
+            &["holes-closed"],
+            (1, volume(&whole)),
+        ),
+        good(
+            "holes.ply",
+            "three triangles are missing",
+            ply(&three),
+            whole.clone(),
+            &["holes-closed"],
+            (1, volume(&whole)),
+        ),
+        bad(
+            "cup.ply",
+            "a box without its upper face, unasked",
+            ply(&cup()),
+            "write --close-holes 4; if it is a sheet, write --thicken",
+        ),
+        good(
+            "cup-closed.ply",
+            "the same, to be closed",
+            ply(&cup()),
+            part(),
+            &["holes-closed"],
+            ONE,
+        )
+        .options("--close-holes 4"),
+        good(
+            "cup-thick.ply",
+            "the same, to be a cup of sheet metal",
+            ply(&cup()),
+            cup(),
+            &["thickened"],
+            (1, 1.2808e-5),
+        )
+        .options("--thicken 0.002")
+        .error(1e-12),
+        good(
+            "tin.ply",
+            "a cylinder of 24 sides without its lid, to be closed",
+            ply(&opened()),
+            tin(),
+            &["holes-closed"],
+            (1, volume(&tin())),
+        )
+        .options("--close-holes 24"),
+        bad(
+            "sheet.stl",
+            "an open sheet",
+            stl(&flat()),
+            "if it is a sheet, write --thicken",
+        ),
+        bad(
+            "sheet-closed.stl",
+            "an open sheet, to be closed as a hole",
+            stl(&flat()),
+            "closed there it would hold nothing",
+        )
+        .options("--close-holes 64"),
+        good(
+            "sheet-thick.stl",
+            "an open sheet, to be 1 mm thick",
+            stl(&flat()),
+            flat(),
+            &["thickened"],
+            (1, 2.4e-6),
+        )
+        .options("--thicken 0.001"),
+        good(
+            "bent.stl",
+            "a bent sheet, to be 1 mm thick",
+            stl(&bent()),
+            bent(),
+            &["thickened"],
+            (1, 2.4e-6),
+        )
+        .options("--thicken 0.001"),
+        good(
+            "two-sided.ply",
+            "a sheet of two sides with nothing between, to be 1 mm thick",
+            ply(&joined([flat(), flipped(flat())])),
+            flat(),
+            &["backs", "thickened"],
+            (1, 2.4e-6),
+        )
+        .options("--thicken 0.001"),
+    ]
+}
+
+pub(super) fn contacts() -> Vec<Case> {
+    let [x, y, z] = HALF;
+    let beside = |way| moved(part(), way);
+    let pair = |way| joined([part(), beside(way)]);
+    // The inner wall: a rectangle across the box between its edges at y = +-0.02.
+    let wall = vec![
+        [[-x, -y, -z], [-x, -y, z], [x, y, z]],
+        [[-x, -y, -z], [x, y, z], [x, y, -z]],
+    ];
+    vec![
+        good(
+            "at-an-edge.stl",
+            "two boxes that touch at an edge",
+            stl(&pair([2.0 * x, 2.0 * y, 0.0])),
+            pair([2.0 * x, 2.0 * y, 0.0]),
+            &["taken-apart"],
+            (2, 2.0 * VOLUME),
+        ),
+        good(
+            "at-a-vertex.stl",
+            "two boxes that touch at a vertex",
+            stl(&pair([2.0 * x, 2.0 * y, 2.0 * z])),
+            pair([2.0 * x, 2.0 * y, 2.0 * z]),
+            &["taken-apart"],
+            (2, 2.0 * VOLUME),
+        ),
+        good(
+            "at-a-face.stl",
+            "two boxes that touch with a whole face each",
+            stl(&joined([part(), mirrored(x)])),
+            joined([
+                without(part(), |p| p[0] == x),
+                without(mirrored(x), |p| p[0] == x),
+            ]),
+            &["inner-walls"],
+            (1, 2.0 * VOLUME),
+        ),
+        good(
+            "overlap.stl",
+            "two boxes that overlap",
+            stl(&pair([x, y, z])),
+            pair([x, y, z]),
+            &["meets-itself"],
+            (2, 2.0 * VOLUME),
+        ),
+        bad(
+            "inner-wall.ply",
+            "a wall across the inside",
+            ply(&joined([part(), wall])),
+            "it cannot be told which belong together",
+        ),
+        good(
+            "two.obj",
+            "two boxes apart, triangles with vertices of their own",
+            obj_soup(&pair([0.1, 0.0, 0.0])),
+            pair([0.1, 0.0, 0.0]),
+            &["vertices-equal"],
+            (2, 2.0 * VOLUME),
+        ),
+    ]
+}
+
+/// The box mirrored at the plane of its face at `x`: the triangles of that face are the same.
+fn mirrored(x: f64) -> Soup {
+    flipped(mapped(part(), |p| [2.0 * x - p[0], p[1], p[2]]))
+}
