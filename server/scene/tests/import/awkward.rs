@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use taut_scene::{FileError, ImportReport, ImportRequest, import};
+use taut_scene::{FileError, ImportReport, ImportRequest, LengthUnit, import};
 
 use super::cases::{Case, Expected, cases};
 use super::judge::{judge, one_sided};
@@ -103,7 +103,23 @@ fn misjudged(
     };
     let soup = verdict.soup;
     let apart = one_sided(&soup, &truth).max(one_sided(&truth, &soup));
-    (apart > bound).then(|| format!("{apart:e} m from what is meant, {bound:e} m were stated"))
+    if apart > bound {
+        return Some(format!(
+            "{apart:e} m from what is meant, {bound:e} m were stated"
+        ));
+    }
+    // What the file itself holds is no farther away than was said, unless it was taken out or all was moved.
+    let unit: LengthUnit = part.unit.parse().unwrap();
+    let file = soup_of(
+        &taut_scene::read_mesh(Path::new(&part.file))
+            .unwrap()
+            .scaled(unit.metres),
+    );
+    let lost = one_sided(&file, &soup);
+    let stated = bound - case.error + 1e-15;
+    let comparable = !far && !found.contains(&"inner-walls");
+    (comparable && lost > stated)
+        .then(|| format!("{lost:e} m from the file, {stated:e} m were stated"))
 }
 
 fn centred(soup: &Soup) -> Soup {

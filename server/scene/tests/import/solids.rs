@@ -25,9 +25,9 @@ pub(crate) fn part() -> Soup {
     cuboid(HALF)
 }
 
-/// 1,280 triangles.
+/// 320 triangles.
 pub(crate) fn ball(radius: f64) -> Soup {
-    soup_of(&shapes::sphere(radius, 3))
+    soup_of(&shapes::sphere(radius, 2))
 }
 
 pub(crate) fn moved(soup: Soup, way: Point) -> Soup {
