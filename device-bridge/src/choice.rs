@@ -1,6 +1,6 @@
 //! Which device: one word on the command line, with options after commas.
 //!
-//! `simulated,strings=wb`, `trace:FILE`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
+//! `simulated,strings=wb`, `trace:FILE`, `haply=HOST:PORT`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -10,8 +10,10 @@ use taut_vrpn::{Address, AddressError, SensorMapping};
 
 use crate::device::Device;
 use crate::devices::{
-    Anchor, CapMode, CapSettings, HidPort, SourceError, SpaceMouse, VrpnDevice, VrpnSettings,
+    Anchor, CapMode, CapSettings, HaplyDevice, HaplySettings, HidPort, SourceError, SpaceMouse,
+    VrpnDevice, VrpnSettings,
 };
+use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
 use crate::vrpn::{VrpnMode, VrpnSource};
 
@@ -30,7 +32,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 5] = [
+pub const DRIVERS: [Driver; 6] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -40,6 +42,11 @@ pub const DRIVERS: [Driver; 5] = [
         name: "trace",
         form: "trace:FILE",
         what: "a recorded trace of poses: no force",
+    },
+    Driver {
+        name: "haply",
+        form: "haply[=HOST:PORT][,arm=ID,grip=yes|no,axes=x y z,scale=S,anchor=start|workbench]",
+        what: "a Haply Inverse arm behind its service, with or without a VerseGrip: force without torque",
     },
     Driver {
         name: "space-mouse",
@@ -68,22 +75,24 @@ pub enum DeviceChoice {
     },
     /// [`crate::RecordedDevice`] of a trace file.
     Trace(PathBuf),
-    /// An input device of this machine or network.
+    /// A device of this machine or network, found when it is opened.
     Input(InputChoice),
     /// The mouse of a render window, which joins as a bridge of its own.
     Mouse,
 }
 
-/// An input device without force.
+/// A device that is opened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InputChoice {
     /// [`SpaceMouse`].
     SpaceMouse(CapSettings),
     /// [`VrpnDevice`].
     Vrpn(Box<VrpnSettings>),
+    /// [`HaplyDevice`], with force.
+    Haply(Box<HaplySettings>),
 }
 
-/// Why an input device cannot be read.
+/// Why a device cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// The SpaceMouse.
@@ -97,18 +106,26 @@ pub enum InputError {
         /// What the system says.
         cause: std::io::Error,
     },
+    /// The Inverse service.
+    #[error(transparent)]
+    Haply(#[from] HaplyError),
 }
 
 impl InputChoice {
-    /// Starts to read it.
+    /// Starts to read it. A driver with a thread that a force depends on asks for real-time priority `priority` for it; 0 asks for none.
     ///
     /// # Errors
     /// [`InputError`]. A tracker that does not answer yet is no error: it is waited for.
-    pub fn open(&self, placement: Placement) -> Result<Box<dyn Device>, InputError> {
+    pub fn open(
+        &self,
+        placement: Placement,
+        priority: u8,
+    ) -> Result<Box<dyn Device>, InputError> {
         Ok(match self {
             Self::SpaceMouse(settings) => {
                 Box::new(SpaceMouse::open(Box::new(HidPort), *settings, placement)?)
             }
+            Self::Haply(settings) => Box::new(HaplyDevice::open(settings, placement, priority)?),
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);
                 Box::new(device.map_err(|cause| InputError::Vrpn {
@@ -142,6 +159,9 @@ pub enum UnknownDevice {
     /// The tracker's address.
     #[error(transparent)]
     Address(#[from] AddressError),
+    /// The Inverse service's address.
+    #[error(transparent)]
+    Service(#[from] HaplyAddressError),
     /// No such option.
     #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
     Option {
@@ -172,7 +192,7 @@ impl FromStr for DeviceChoice {
     type Err = UnknownDevice;
 
     fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        let end = text.find([':', ',']).unwrap_or(text.len());
+        let end = text.find([':', ',', '=']).unwrap_or(text.len());
         let (name, rest) = text.split_at(end);
         let Some(driver) = DRIVERS.iter().find(|driver| driver.name == name) else {
             return Err(UnknownDevice::Name {
@@ -190,6 +210,9 @@ impl FromStr for DeviceChoice {
             }),
             ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
             ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
+            ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
+                rest,
+            )?)))),
             ("space-mouse", None) => {
                 let settings = cap_settings(rest.trim_start_matches(','))?;
                 Ok(Self::Input(InputChoice::SpaceMouse(settings)))
@@ -260,6 +283,34 @@ fn vrpn_settings(text: &str) -> Result<VrpnSettings, UnknownDevice> {
             "max-age" => settings.max_age = Duration::from_secs_f64(max_age.unwrap_or(0.1)),
             _ => {}
         }
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+fn haply_settings(text: &str) -> Result<HaplySettings, UnknownDevice> {
+    let mut settings = HaplySettings::default();
+    let (address, options) = match text.strip_prefix('=') {
+        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
+        None => ("", text.trim_start_matches(',')),
+    };
+    if text.starts_with('=') {
+        settings.address = address.parse()?;
+    }
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("haply", option);
+        let exchange = &mut settings.exchange;
+        if let Some(arm) = option.asked("arm") {
+            if arm.is_empty() {
+                return Err(option.wrong("arm", "the service's name of the arm, such as 04C3"));
+            }
+            exchange.arm = Some(arm.to_owned());
+        }
+        let yes_or_no = [("yes", true), ("no", false)];
+        option.choice("grip", &yes_or_no, &mut exchange.with_grip)?;
+        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
         option.finish()?;
     }
     Ok(settings)
@@ -447,6 +498,17 @@ mod tests {
             (0.001, Anchor::Workbench)
         );
         assert_eq!(vrpn.max_age, Duration::from_millis(200));
+        let DeviceChoice::Input(InputChoice::Haply(haply)) =
+            choice("haply=lab:10001,arm=04C3,grip=no,axes=x -z y,scale=2,anchor=workbench")
+        else {
+            panic!();
+        };
+        assert_eq!(haply.address.to_string(), "lab:10001");
+        assert_eq!(haply.exchange.arm.as_deref(), Some("04C3"));
+        assert!(!haply.exchange.with_grip);
+        assert_eq!((haply.mapping.scale, haply.anchor), (2.0, Anchor::Workbench));
+        let plain = DeviceChoice::Input(InputChoice::Haply(Box::default()));
+        assert_eq!(choice("haply"), plain);
     }
 
     #[test]
@@ -454,7 +516,12 @@ mod tests {
         for (text, part) in [
             ("spacemouse", "did you mean `space-mouse`?"),
             ("simulatd", "did you mean `simulated`?"),
-            ("phantom", "use simulated, trace:FILE, space-mouse"),
+            ("phantom", "use simulated, trace:FILE, haply, space-mouse"),
+            ("haply=", "write HOST or HOST:PORT"),
+            ("haply:10001", "write haply[=HOST:PORT]"),
+            ("haply=pc:1,grip=maybe", "must be yes or no"),
+            ("haply,scale=0", "a number from 0.01 to 100"),
+            ("haply,arms=1", "did you mean `arm`?"),
             ("trace:", "write trace:FILE"),
             ("trace", "write trace:FILE"),
             ("simulated,hand=firm", "it has strings"),

@@ -4,6 +4,7 @@
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
+//! - [`HaplyDevice`]: a force device that people own, with its service simulated in [`haply`].
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -22,6 +23,7 @@ mod device;
 mod device_loop;
 mod devices;
 pub mod edge;
+pub mod haply;
 mod own_stamps;
 mod placement;
 mod port;
@@ -29,6 +31,7 @@ pub mod realtime;
 mod report;
 pub mod service_manager;
 pub mod signals;
+mod simulate;
 mod simulated_strings;
 mod trace_file;
 mod vrpn;
@@ -47,10 +50,11 @@ pub use devices::{
     VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HeldStrings, MAX_EDGE_DELAY,
+    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HaplyDevice, HaplyPort, HaplySettings,
+    HeldStrings, MAX_EDGE_DELAY,
     MinJerkPath, Motors, PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
     SpidarDevice, SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand,
-    ViaPoint, min_jerk, string_grip,
+    ViaPoint, haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
 pub use port::{
@@ -59,6 +63,7 @@ pub use port::{
     SafetySettings, TickReport, UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
 };
 pub use report::{BridgeReport, Quantiles};
+pub use simulate::{SimulateArgs, execute_simulation};
 pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};
 pub use trace_file::{TraceFileError, read_trace, via_points};
 pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

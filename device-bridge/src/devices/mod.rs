@@ -1,6 +1,7 @@
 //! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
 pub(crate) mod glide;
+pub(crate) mod haply;
 pub(crate) mod held_strings;
 pub(crate) mod led;
 pub(crate) mod rate_control;
@@ -12,6 +13,8 @@ pub(crate) mod spidar;
 pub(crate) mod vrpn;
 
 pub use glide::Glide;
+pub(crate) use haply::haply_grip;
+pub use haply::{HaplyDevice, HaplyPort, HaplySettings, haply_limits};
 pub use held_strings::{HeldStrings, string_grip};
 pub use led::{LedDevice, Target};
 pub use rate_control::{CapMode, CapSettings, RateControl};
