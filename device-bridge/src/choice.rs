@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use taut_plant::Grip;
 use taut_vrpn::{Address, AddressError, SensorMapping};
 
 use crate::device::Device;
@@ -111,7 +112,29 @@ pub enum InputError {
     Haply(#[from] HaplyError),
 }
 
+/// What a device with motors is declared to be, before it is opened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceDevice {
+    /// Its mechanics, in its own metres.
+    pub grip: Grip,
+    /// From a reading to the force that answers it, beyond the loop's own period, s.
+    pub delay_s: f64,
+    /// Metres on the workbench of one of its own.
+    pub scale: f64,
+    /// Whether it can turn a hand, not only push it.
+    pub renders_torque: bool,
+}
+
 impl InputChoice {
+    /// What its motors are declared to bear; `None` without motors.
+    #[must_use]
+    pub fn force_device(&self) -> Option<ForceDevice> {
+        match self {
+            Self::SpaceMouse(_) | Self::Vrpn(_) => None,
+            Self::Haply(settings) => Some(settings.force_device()),
+        }
+    }
+
     /// Starts to read it. A driver with a thread that a force depends on asks for real-time priority `priority` for it; 0 asks for none.
     ///
     /// # Errors

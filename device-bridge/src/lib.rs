@@ -40,7 +40,7 @@ pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
 pub use bridge_loop::{BridgeLoop, TickOutput};
 pub use choice::{
-    DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
+    DRIVERS, DeviceChoice, Driver, ForceDevice, InputChoice, InputError, UnknownDevice, drivers_help,
 };
 pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};

@@ -5,9 +5,11 @@ use std::time::Duration;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
+use taut_bridge::haply::HaplyState;
 use taut_bridge::{
     AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
-    MinJerkPath, Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
+    HaplyDevice, HaplyPort, HaplySettings, MinJerkPath, Passivity, PassivitySettings, Placement,
+    Pose, RecordedDevice, RemoteDevice, SafetySettings,
     SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
@@ -71,6 +73,36 @@ fn a_recorded_device_does_not_allocate() {
     let trace = (0..100).map(row).collect();
     let device = RecordedDevice::new(trace, AtEnd::Loop, Point3::origin());
     drive(device.expect("a valid trace"), &mut |_| {});
+}
+
+/// What the thread of the Inverse service's client hands over.
+struct Told(triple_buffer::Output<HaplyState>, [f64; 3]);
+
+impl HaplyPort for Told {
+    fn newest(&mut self) -> HaplyState {
+        *self.0.read()
+    }
+
+    fn push(&mut self, force: [f64; 3]) {
+        self.1 = force;
+    }
+}
+
+#[test]
+fn a_haply_arm_does_not_allocate() {
+    let (mut states, newest) = triple_buffer::TripleBuffer::new(&HaplyState::default()).split();
+    let placement = Placement::plain(Pose::identity(), Point3::origin());
+    let told = Box::new(Told(newest, [0.0; 3]));
+    let device = HaplyDevice::new(told, &HaplySettings::default(), placement);
+    drive(device, &mut |tick| {
+        let height = 1e-3 * (tick as f64 * 0.01).sin();
+        states.write(HaplyState {
+            reports: tick + 1,
+            position: [0.0, -0.1, 0.16 + height],
+            orientation: Some([1.0, 0.0, 0.0, 0.0]),
+            ..HaplyState::default()
+        });
+    });
 }
 
 #[test]

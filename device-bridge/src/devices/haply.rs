@@ -17,6 +17,7 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use taut_plant::Grip;
 use taut_vrpn::{PoseReport, SensorMapping};
 
+use crate::choice::ForceDevice;
 use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
 use crate::devices::Anchor;
 use crate::haply::{
@@ -72,6 +73,19 @@ pub struct HaplySettings {
     pub mapping: SensorMapping,
     /// How the body follows.
     pub anchor: Anchor,
+}
+
+impl HaplySettings {
+    /// What the arm is assumed to bear.
+    #[must_use]
+    pub fn force_device(&self) -> ForceDevice {
+        ForceDevice {
+            grip: haply_grip(),
+            delay_s: DELAY_S - 1.0 / RATE_HZ,
+            scale: self.mapping.scale,
+            renders_torque: false,
+        }
+    }
 }
 
 impl Default for HaplySettings {
