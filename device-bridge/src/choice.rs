@@ -7,15 +7,16 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use taut_plant::Grip;
-use taut_vrpn::{Address, AddressError, SensorMapping};
+use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
 
 use crate::device::Device;
 use crate::devices::{
     Anchor, CapMode, CapSettings, HaplyDevice, HaplySettings, HidPort, SourceError, SpaceMouse,
-    VrpnDevice, VrpnSettings,
+    SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
 use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
+use crate::simulated_strings::string_geometry;
 use crate::vrpn::{VrpnMode, VrpnSource};
 
 /// Similarity (Jaro-Winkler, 0 to 1) from which a name is offered for an unknown one.
@@ -33,7 +34,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 6] = [
+pub const DRIVERS: [Driver; 7] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -48,6 +49,11 @@ pub const DRIVERS: [Driver; 6] = [
         name: "haply",
         form: "haply[=HOST:PORT][,arm=ID,grip=yes|no,axes=x y z,scale=S,anchor=start|workbench]",
         what: "a Haply Inverse arm behind its service, with or without a VerseGrip: force without torque",
+    },
+    Driver {
+        name: "spidar",
+        form: "spidar:PORT[,geometry=g6x4r|NAME|FILE,axes=x -z y]",
+        what: "a SPIDAR-G on its UART motor boards: six degrees of freedom, force and torque",
     },
     Driver {
         name: "space-mouse",
@@ -91,6 +97,8 @@ pub enum InputChoice {
     Vrpn(Box<VrpnSettings>),
     /// [`HaplyDevice`], with force.
     Haply(Box<HaplySettings>),
+    /// [`crate::SpidarDevice`] on motor boards.
+    Spidar(Box<SpidarUartSettings>),
 }
 
 /// Why a device cannot be opened.
@@ -110,6 +118,9 @@ pub enum InputError {
     /// The Inverse service.
     #[error(transparent)]
     Haply(#[from] HaplyError),
+    /// The motor boards.
+    #[error(transparent)]
+    Spidar(#[from] SpidarUartError),
 }
 
 /// What a device with motors is declared to be, before it is opened.
@@ -132,6 +143,7 @@ impl InputChoice {
         match self {
             Self::SpaceMouse(_) | Self::Vrpn(_) => None,
             Self::Haply(settings) => Some(settings.force_device()),
+            Self::Spidar(settings) => Some(settings.force_device()),
         }
     }
 
@@ -139,16 +151,13 @@ impl InputChoice {
     ///
     /// # Errors
     /// [`InputError`]. A tracker that does not answer yet is no error: it is waited for.
-    pub fn open(
-        &self,
-        placement: Placement,
-        priority: u8,
-    ) -> Result<Box<dyn Device>, InputError> {
+    pub fn open(&self, placement: Placement, priority: u8) -> Result<Box<dyn Device>, InputError> {
         Ok(match self {
             Self::SpaceMouse(settings) => {
                 Box::new(SpaceMouse::open(Box::new(HidPort), *settings, placement)?)
             }
             Self::Haply(settings) => Box::new(HaplyDevice::open(settings, placement, priority)?),
+            Self::Spidar(settings) => settings.open(&placement, priority)?,
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);
                 Box::new(device.map_err(|cause| InputError::Vrpn {
@@ -185,6 +194,9 @@ pub enum UnknownDevice {
     /// The Inverse service's address.
     #[error(transparent)]
     Service(#[from] HaplyAddressError),
+    /// The geometry of a string-driven device.
+    #[error("{0}")]
+    Geometry(String),
     /// No such option.
     #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
     Option {
@@ -233,6 +245,9 @@ impl FromStr for DeviceChoice {
             }),
             ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
             ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
+            ("spidar", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Spidar(
+                Box::new(spidar_settings(rest)?),
+            ))),
             ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
                 rest,
             )?)))),
@@ -309,6 +324,36 @@ fn vrpn_settings(text: &str) -> Result<VrpnSettings, UnknownDevice> {
         option.finish()?;
     }
     Ok(settings)
+}
+
+fn spidar_settings(text: &str) -> Result<SpidarUartSettings, UnknownDevice> {
+    let (path, options) = text.split_once(',').unwrap_or((text, ""));
+    let (mut named, mut axes) = ("g6x4r", SpidarUartSettings::AXES);
+    let mut right = true;
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("spidar", option);
+        named = option.asked("geometry").unwrap_or(named);
+        let mut wanted = Axes::SAME;
+        option.parsed("axes", "such as `x -z y`", &mut wanted)?;
+        if option.name == "axes" {
+            right = wanted.matrix().determinant() > 0.0;
+            axes = wanted;
+        }
+        if !right {
+            return Err(option.wrong(
+                "axes",
+                "right-handed, such as `x -z y`: a frame has no mirror image",
+            ));
+        }
+        option.finish()?;
+    }
+    let geometry =
+        string_geometry(named).map_err(|error| UnknownDevice::Geometry(error.to_string()))?;
+    Ok(SpidarUartSettings {
+        path: path.to_owned(),
+        geometry,
+        axes,
+    })
 }
 
 fn haply_settings(text: &str) -> Result<HaplySettings, UnknownDevice> {
@@ -485,6 +530,7 @@ mod tests {
         for driver in DRIVERS {
             let text = short(driver.form)
                 .replace("TRACKER@HOST", "Tracker0@host")
+                .replace("PORT", "/dev/ttyUSB0")
                 .replace("FILE", "a,b.csv");
             choice(&text);
         }
@@ -529,7 +575,10 @@ mod tests {
         assert_eq!(haply.address.to_string(), "lab:10001");
         assert_eq!(haply.exchange.arm.as_deref(), Some("04C3"));
         assert!(!haply.exchange.with_grip);
-        assert_eq!((haply.mapping.scale, haply.anchor), (2.0, Anchor::Workbench));
+        assert_eq!(
+            (haply.mapping.scale, haply.anchor),
+            (2.0, Anchor::Workbench)
+        );
         let plain = DeviceChoice::Input(InputChoice::Haply(Box::default()));
         assert_eq!(choice("haply"), plain);
     }
@@ -539,7 +588,14 @@ mod tests {
         for (text, part) in [
             ("spacemouse", "did you mean `space-mouse`?"),
             ("simulatd", "did you mean `simulated`?"),
-            ("phantom", "use simulated, trace:FILE, haply, space-mouse"),
+            (
+                "phantom",
+                "use simulated, trace:FILE, haply, spidar:PORT, space-mouse",
+            ),
+            ("spidar", "write spidar:PORT"),
+            ("spidar:", "write spidar:PORT"),
+            ("spidar:/dev/x,geometry=nothing", "g6x4r"),
+            ("spidar:/dev/x,axes=y x z", "right-handed"),
             ("haply=", "write HOST or HOST:PORT"),
             ("haply:10001", "write haply[=HOST:PORT]"),
             ("haply=pc:1,grip=maybe", "must be yes or no"),

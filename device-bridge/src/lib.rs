@@ -33,6 +33,8 @@ pub mod service_manager;
 pub mod signals;
 mod simulate;
 mod simulated_strings;
+#[cfg(unix)]
+pub mod spidar_uart;
 mod trace_file;
 mod vrpn;
 
@@ -40,7 +42,8 @@ pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
 pub use bridge_loop::{BridgeLoop, TickOutput};
 pub use choice::{
-    DRIVERS, DeviceChoice, Driver, ForceDevice, InputChoice, InputError, UnknownDevice, drivers_help,
+    DRIVERS, DeviceChoice, Driver, ForceDevice, InputChoice, InputError, UnknownDevice,
+    drivers_help,
 };
 pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
@@ -51,10 +54,10 @@ pub use devices::{
 };
 pub use devices::{
     AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HaplyDevice, HaplyPort, HaplySettings,
-    HeldStrings, MAX_EDGE_DELAY,
-    MinJerkPath, Motors, PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
-    SpidarDevice, SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand,
-    ViaPoint, haply_limits, min_jerk, string_grip,
+    HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError, Progress, RecordedDevice,
+    RemoteDevice, SimulatedDevice, SpidarDevice, SpidarPlacement, SpidarUartError,
+    SpidarUartSettings, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
+    haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
 pub use port::{

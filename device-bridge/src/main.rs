@@ -6,7 +6,11 @@ use clap::Parser;
 
 /// The device side of taut: reads a device, sends its poses, renders the forces that come back.
 #[derive(Parser)]
-#[command(name = "taut-bridge", version, after_help = "taut-bridge simulate-device plays a device; see its --help.")]
+#[command(
+    name = "taut-bridge",
+    version,
+    after_help = "taut-bridge simulate-device plays a device; see its --help."
+)]
 struct Cli {
     #[command(flatten)]
     bridge: taut_bridge::BridgeArgs,

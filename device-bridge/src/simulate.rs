@@ -37,6 +37,9 @@ pub struct SimulateArgs {
 enum Played {
     /// Haply's Inverse service with one arm and a wireless VerseGrip
     Haply(PlayedHaply),
+    /// SPIDAR's UART motor boards with strings and grip, on a pseudo-terminal
+    #[cfg(unix)]
+    Spidar(PlayedSpidar),
 }
 
 #[derive(Clone, Debug, clap::Args)]
@@ -53,6 +56,25 @@ struct PlayedHaply {
     hand: PlayedHand,
 }
 
+#[cfg(unix)]
+#[derive(Clone, Debug, clap::Args)]
+struct PlayedSpidar {
+    /// A name for the pseudo-terminal; without it the system's own, which is printed.
+    #[arg(long, value_name = "FILE")]
+    link: Option<PathBuf>,
+
+    /// Geometry of the strings: a shipped one or a file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "g6x4r")]
+    geometry: String,
+
+    /// One board of eight motors instead of two of four.
+    #[arg(long)]
+    one_board: bool,
+
+    #[command(flatten)]
+    hand: PlayedHand,
+}
+
 /// Who holds it.
 #[derive(Clone, Debug, clap::Args)]
 struct PlayedHand {
@@ -60,7 +82,7 @@ struct PlayedHand {
     #[arg(long, value_name = "HAND", default_value_t)]
     hand: HandPreset,
 
-    /// Intention of the hand: via points in the format of a trace, in the device's axes. Without it, 60 mm down and up again.
+    /// Intention of the hand: via points in the format of a trace, in the device's axes. Without it, its own way of touching.
     #[arg(long, value_name = "FILE")]
     path: Option<PathBuf>,
 
@@ -85,7 +107,9 @@ impl PlayedHand {
 /// Why no device is played.
 #[derive(Debug, thiserror::Error)]
 enum SimulateError {
-    #[error("cannot listen at {address}: {cause}; give another by --bind, or end what listens there")]
+    #[error(
+        "cannot listen at {address}: {cause}; give another by --bind, or end what listens there"
+    )]
     Bind {
         address: SocketAddr,
         cause: std::io::Error,
@@ -94,6 +118,15 @@ enum SimulateError {
     File(#[from] TraceFileError),
     #[error("{}: {cause}", path.display())]
     Path { path: PathBuf, cause: PathError },
+    #[cfg(unix)]
+    #[error(transparent)]
+    Geometry(#[from] crate::simulated_strings::StringsError),
+    #[cfg(unix)]
+    #[error(transparent)]
+    Boards(#[from] crate::spidar_uart::BoardsError),
+    #[cfg(unix)]
+    #[error("no pseudo-terminal can be had: {0}; name a file that can be made by --link")]
+    Terminal(std::io::Error),
     #[error("--duration is {0}, which is out of range; use 0 to 1e9 s")]
     Duration(f64),
     #[error("signals cannot be listened to ({0}); end other programs or raise the limits")]
@@ -104,11 +137,15 @@ enum SimulateError {
 
 /// What a played device tells at its end.
 #[derive(Clone, Debug, Serialize)]
-struct PlayedReport {
-    device: &'static str,
-    sessions: u64,
-    messages: u64,
-    largest_force_n: f64,
+#[serde(untagged)]
+enum PlayedReport {
+    Haply {
+        sessions: u64,
+        messages: u64,
+        largest_force_n: f64,
+    },
+    #[cfg(unix)]
+    Spidar { cycles: u64, digits: [i16; 8] },
 }
 
 /// Plays a device as a process: where it can be found as the first line on standard output, a report in JSON as the last. Returns the exit
@@ -141,6 +178,8 @@ fn play(args: &SimulateArgs) -> Result<PlayedReport, SimulateError> {
     let over = || end.is_asked() || deadline.is_some_and(|deadline| monotonic_now() >= deadline);
     match &args.device {
         Played::Haply(haply) => play_haply(haply, over),
+        #[cfg(unix)]
+        Played::Spidar(spidar) => play_spidar(spidar, over),
     }
 }
 
@@ -166,10 +205,45 @@ fn play_haply(args: &PlayedHaply, over: impl Fn() -> bool) -> Result<PlayedRepor
         thread::sleep(LOOK);
     }
     let totals = service.totals();
-    Ok(PlayedReport {
-        device: "haply",
+    Ok(PlayedReport::Haply {
         sessions: totals.sessions,
         messages: totals.messages,
         largest_force_n: totals.largest_force,
+    })
+}
+
+#[cfg(unix)]
+fn play_spidar(
+    args: &PlayedSpidar,
+    over: impl Fn() -> bool,
+) -> Result<PlayedReport, SimulateError> {
+    use crate::spidar_uart::{BoardsTerminal, SimulatedBoards};
+
+    let geometry = crate::simulated_strings::string_geometry(&args.geometry)?;
+    let boards = SimulatedBoards::new(
+        &geometry,
+        args.hand.hand.into(),
+        args.hand.path()?,
+        Some(Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed)),
+        args.one_board,
+        [0; 8],
+    )?;
+    let terminal = BoardsTerminal::start(boards, args.link.as_deref());
+    let terminal = terminal.map_err(SimulateError::Terminal)?;
+    let path = args.link.as_ref().map_or_else(
+        || terminal.path().to_owned(),
+        |link| link.display().to_string(),
+    );
+    let told = console::print(format!(
+        "simulated motor boards are at {path}; read them by: taut bridge --device spidar:{path}"
+    ));
+    told.map_err(SimulateError::Output)?;
+    while !over() {
+        thread::sleep(LOOK);
+    }
+    let boards = terminal.boards();
+    Ok(PlayedReport::Spidar {
+        cycles: boards.cycles(),
+        digits: *boards.digits(),
     })
 }

@@ -30,7 +30,10 @@ fn ms(time: u64) -> Duration {
 }
 
 fn placement() -> Placement {
-    Placement::plain(Pose::translation(0.0, 0.0, 0.1), Point3::new(0.0, 0.0, 0.01))
+    Placement::plain(
+        Pose::translation(0.0, 0.0, 0.1),
+        Point3::new(0.0, 0.0, 0.01),
+    )
 }
 
 fn simulated(with_grip: bool) -> SimulatedInverse {
@@ -67,10 +70,16 @@ fn port(device: impl Device + 'static) -> DevicePort {
 
 fn tick(port: &mut DevicePort, now: Duration) -> (Option<DeviceFault>, f64) {
     let report = port.tick(now, |reading| {
-        Some(Command::fresh(now, wall(reading.sample.pose.translation.vector.z)))
+        Some(Command::fresh(
+            now,
+            wall(reading.sample.pose.translation.vector.z),
+        ))
     });
     assert_eq!(report.wrench.fixed_rows::<3>(3).norm(), 0.0, "a torque");
-    (report.reading.fault, report.wrench.fixed_rows::<3>(0).norm())
+    (
+        report.reading.fault,
+        report.wrench.fixed_rows::<3>(0).norm(),
+    )
 }
 
 /// Ticks in real time until `done` of fault and force.
@@ -90,22 +99,29 @@ fn tick_until(port: &mut DevicePort, what: &str, done: impl Fn(Option<DeviceFaul
 fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
     let any = "127.0.0.1:0".parse().expect("an address");
     let service = HaplyService::start(any, simulated(true)).expect("a free port");
-    let device = HaplyDevice::open(&settings(service.address()), placement(), 0).expect("it is there");
+    let device =
+        HaplyDevice::open(&settings(service.address()), placement(), 0).expect("it is there");
     assert_eq!(device.info().actuated_degrees_of_freedom, 3);
     let mut port = port(device);
     let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
     tick_until(&mut port, "the wall", felt);
-    tick_until(&mut port, "the wall at the arm", |_, _| service.totals().force > 0.3);
+    tick_until(&mut port, "the wall at the arm", |_, _| {
+        service.totals().force > 0.3
+    });
 
     service.set_plugged(false);
-    tick_until(&mut port, "the cable is out", |fault, force| fault.is_some() && force == 0.0);
+    tick_until(&mut port, "the cable is out", |fault, force| {
+        fault.is_some() && force == 0.0
+    });
     assert_eq!(service.totals().force, 0.0);
     service.set_plugged(true);
     tick_until(&mut port, "the cable is in", felt);
 
     // A service that hangs: its connection is given up.
     service.set_mute(true);
-    tick_until(&mut port, "it hangs", |fault, force| fault.is_some() && force == 0.0);
+    tick_until(&mut port, "it hangs", |fault, force| {
+        fault.is_some() && force == 0.0
+    });
     let before = service.totals().sessions;
     service.set_mute(false);
     tick_until(&mut port, "it goes on", felt);
@@ -114,7 +130,9 @@ fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
     // Another service at the same place.
     let address = service.address();
     drop(service);
-    tick_until(&mut port, "it is gone", |fault, force| fault.is_some() && force == 0.0);
+    tick_until(&mut port, "it is gone", |fault, force| {
+        fault.is_some() && force == 0.0
+    });
     let service = HaplyService::start(address, simulated(true)).expect("the port again");
     tick_until(&mut port, "another one", felt);
 
@@ -138,7 +156,14 @@ impl Drop for Played {
 
 fn play(bind: &str) -> (Played, SocketAddr) {
     let mut child = Program::new(env!("CARGO_BIN_EXE_taut-bridge"))
-        .args(["simulate-device", "haply", "--hand", "light", "--bind", bind])
+        .args([
+            "simulate-device",
+            "haply",
+            "--hand",
+            "light",
+            "--bind",
+            bind,
+        ])
         .stdout(Stdio::piped())
         .spawn()
         .expect("it starts");
@@ -158,7 +183,9 @@ fn a_service_in_a_process_of_its_own_is_killed_and_comes_back() {
     let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
     tick_until(&mut port, "the wall", felt);
     drop(played);
-    tick_until(&mut port, "it is killed", |fault, force| fault.is_some() && force == 0.0);
+    tick_until(&mut port, "it is killed", |fault, force| {
+        fault.is_some() && force == 0.0
+    });
     let _played = play(&address.to_string());
     tick_until(&mut port, "it is back", felt);
 }
@@ -170,11 +197,17 @@ fn an_old_service_and_none_are_each_a_sentence() {
     let service = HaplyService::start_as(any, simulated(true), old).expect("a free port");
     let open = |address| HaplyDevice::open(&settings(address), placement(), 0);
     let error = open(service.address()).err().expect("too old").to_string();
-    assert!(error.contains("has version 3.4") && error.contains("install a newer one"), "{error}");
+    assert!(
+        error.contains("has version 3.4") && error.contains("install a newer one"),
+        "{error}"
+    );
     let address = service.address();
     drop(service);
     let error = open(address).err().expect("gone").to_string();
-    assert!(error.contains("no Inverse service answers at") && error.contains("start it"), "{error}");
+    assert!(
+        error.contains("no Inverse service answers at") && error.contains("start it"),
+        "{error}"
+    );
 }
 
 /// The wire without sockets: an exchange and a simulated service, a message per newest state that is asked for.
@@ -195,7 +228,9 @@ impl Wire {
     fn new(with_grip: bool) -> Self {
         let mut service = simulated(with_grip);
         let mut exchange = Exchange::new(ExchangeSettings::default(), HaplyState::default());
-        exchange.hear(&service.inventory(Duration::ZERO, 1)).expect("an inventory");
+        exchange
+            .hear(&service.inventory(Duration::ZERO, 1))
+            .expect("an inventory");
         Self(Arc::new(Mutex::new(Ends {
             exchange,
             service,
@@ -236,7 +271,11 @@ impl HaplyPort for Wire {
 
 fn wired(with_grip: bool) -> (Wire, DevicePort) {
     let wire = Wire::new(with_grip);
-    let device = HaplyDevice::new(Box::new(wire.clone()), &HaplySettings::default(), placement());
+    let device = HaplyDevice::new(
+        Box::new(wire.clone()),
+        &HaplySettings::default(),
+        placement(),
+    );
     (wire, port(device))
 }
 
@@ -253,7 +292,11 @@ fn the_force_is_gone_120_ms_after_the_last_answer_and_back_within_a_second() {
                     wire.turn(ms(time));
                 }
                 let (_, force) = tick(port, ms(time));
-                zero_since = if force == 0.0 { zero_since.or(Some(time)) } else { None };
+                zero_since = if force == 0.0 {
+                    zero_since.or(Some(time))
+                } else {
+                    None
+                };
             }
             zero_since
         };
@@ -310,7 +353,13 @@ fn the_body_follows_the_cursor_and_the_grip_in_every_frame() {
         let turned = placement.workbench_from_world.isometry.rotation * Vector3::new(1.0, 0.0, 0.5);
         let pushed = wire.with(|ends| ends.force);
         let wanted = [turned.x, -turned.z, turned.y];
-        assert!(pushed.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-12), "{pushed:?}");
+        assert!(
+            pushed
+                .iter()
+                .zip(wanted)
+                .all(|(a, b)| (a - b).abs() < 1e-12),
+            "{pushed:?}"
+        );
         // What moves along a force does work of one sign in both frames.
         let work = turned.dot(&on_workbench);
         assert!((Vector3::from(pushed).dot(&moved) - work).abs() < 1e-9);
@@ -332,7 +381,11 @@ fn a_prop_stands_where_the_arm_is_and_forces_of_two_programs_add_up() {
     let sample = device.read(ms(1)).expect("a sample");
     assert!((sample.pose * placement().reference_point).coords.norm() < 1e-6);
 
-    let push = |z: f64| format!(r#"{{"session":{{}},"inverse3":[{{"device_id":"51A3","commands":{{"set_cursor_force":{{"vector":{{"x":0,"y":0,"z":{z}}}}}}}}}]}}"#);
+    let push = |z: f64| {
+        format!(
+            r#"{{"session":{{}},"inverse3":[{{"device_id":"51A3","commands":{{"set_cursor_force":{{"vector":{{"x":0,"y":0,"z":{z}}}}}}}}}]}}"#
+        )
+    };
     wire.with(|ends| {
         let service = &mut ends.service;
         let _ = service.answer(ms(2), 1, &push(0.5));
@@ -351,7 +404,10 @@ struct Dice(u64);
 
 impl Dice {
     fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % sides
     }
 }
@@ -394,7 +450,10 @@ fn damaged_frames(frames: u64) -> u64 {
         let now = ms(frame);
         wire.turn(now);
         let report = port.tick(now, |reading| {
-            Some(Command::fresh(now, wall(reading.sample.pose.translation.vector.z)))
+            Some(Command::fresh(
+                now,
+                wall(reading.sample.pose.translation.vector.z),
+            ))
         });
         if report.reading.fault.is_some() || report.reading.sample.time != now {
             continue;
@@ -406,9 +465,18 @@ fn damaged_frames(frames: u64) -> u64 {
         let wrong = (sample.pose * g - start * g - moved).norm();
         // A message has no checksum of its own (TCP has one): what may pass is what a hand could have done since the last state that was believed, and back.
         let passed = now.saturating_sub(trusted).as_secs_f64() + step;
-        assert!(wrong <= 2.0 * limits.max_speed * passed, "{wrong} m at {now:?}");
-        let turned = sample.pose.rotation.angle_to(&(truth.rotation * origin.rotation.inverse() * start.rotation));
-        assert!(turned <= 2.0 * limits.max_turn_rate * passed, "{turned} rad at {now:?}");
+        assert!(
+            wrong <= 2.0 * limits.max_speed * passed,
+            "{wrong} m at {now:?}"
+        );
+        let turned = sample
+            .pose
+            .rotation
+            .angle_to(&(truth.rotation * origin.rotation.inverse() * start.rotation));
+        assert!(
+            turned <= 2.0 * limits.max_turn_rate * passed,
+            "{turned} rad at {now:?}"
+        );
         trusted = now;
     }
     assert!(good > frames / 2, "{good} of {frames}");

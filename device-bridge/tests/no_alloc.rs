@@ -9,8 +9,7 @@ use taut_bridge::haply::HaplyState;
 use taut_bridge::{
     AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
     HaplyDevice, HaplyPort, HaplySettings, MinJerkPath, Passivity, PassivitySettings, Placement,
-    Pose, RecordedDevice, RemoteDevice, SafetySettings,
-    SimulatedDevice, TraceRow, Tremor,
+    Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;

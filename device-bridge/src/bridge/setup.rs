@@ -169,12 +169,10 @@ pub(super) fn build_loop(
                 }
             }
         }
-        Motion::Input(input) => {
-            input.open(
-                Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?,
-                args.priority,
-            )?
-        }
+        Motion::Input(input) => input.open(
+            Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?,
+            args.priority,
+        )?,
         Motion::Trace(path, trace) => {
             let at_end = if args.looping {
                 AtEnd::Loop

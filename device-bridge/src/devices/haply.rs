@@ -38,14 +38,14 @@ const TURN_LAG_S: f64 = 0.01;
 #[must_use]
 pub(crate) fn haply_grip() -> Grip {
     Grip {
-        mass: 0.1,                                    // kg
-        damping: Vector3::repeat(1.0),                // N s/m
-        rotational_inertia: 2e-5,                     // kg m^2
-        rotational_damping: Vector3::repeat(1e-4),    // N m s/rad
+        mass: 0.1,                                 // kg
+        damping: Vector3::repeat(1.0),             // N s/m
+        rotational_inertia: 2e-5,                  // kg m^2
+        rotational_damping: Vector3::repeat(1e-4), // N m s/rad
         coulomb_force: Vector3::zeros(),
         coulomb_torque: Vector3::zeros(),
         string_inertia: Matrix6::zeros(),
-        max_force: 5.0,                               // N
+        max_force: 5.0, // N
         max_torque: 0.0,
     }
 }
@@ -139,8 +139,16 @@ impl HaplyDevice {
     ///
     /// # Errors
     /// [`HaplyError`]: it is not there, or too old. An arm that is not there yet is waited for.
-    pub fn open(settings: &HaplySettings, placement: Placement, priority: u8) -> Result<Self, HaplyError> {
-        let client = HaplyClient::start(settings.address.clone(), settings.exchange.clone(), priority)?;
+    pub fn open(
+        settings: &HaplySettings,
+        placement: Placement,
+        priority: u8,
+    ) -> Result<Self, HaplyError> {
+        let client = HaplyClient::start(
+            settings.address.clone(),
+            settings.exchange.clone(),
+            priority,
+        )?;
         Ok(Self::new(Box::new(client), settings, placement))
     }
 
@@ -188,7 +196,11 @@ impl HaplyDevice {
         if self.anchor == Anchor::Workbench {
             let pose = self.placement.pose_in_world(cursor);
             // Without a grip nothing turns the body.
-            let rotation = if has_grip { pose.rotation } else { self.placement.start.rotation };
+            let rotation = if has_grip {
+                pose.rotation
+            } else {
+                self.placement.start.rotation
+            };
             return Isometry3::from_parts(pose.translation, rotation);
         }
         let start = self.placement.at_reference_point(&self.placement.start);
@@ -214,7 +226,8 @@ impl HaplyDevice {
         } else {
             before + (turned / passed - before) * (passed / (passed + TURN_LAG_S))
         };
-        let moving = self.mapping.axes.matrix() * Vector3::from(state.velocity) * self.mapping.scale;
+        let moving =
+            self.mapping.axes.matrix() * Vector3::from(state.velocity) * self.mapping.scale;
         let moving = self.mapping.origin.rotation * moving;
         self.velocity = stacked(&self.placement.vector_in_world(&moving), &turning);
         self.at_g = next;
@@ -239,7 +252,11 @@ impl Device for HaplyDevice {
             return Err(DeviceFault::NotStarted);
         }
         let is_new = state.reports != self.seen.0;
-        let age = if is_new { Duration::ZERO } else { now.saturating_sub(self.seen.1) };
+        let age = if is_new {
+            Duration::ZERO
+        } else {
+            now.saturating_sub(self.seen.1)
+        };
         if state.unusable.is_some() || age > MAX_AGE {
             return Err(self.lose(DeviceFault::Lost { age }));
         }
@@ -264,6 +281,7 @@ impl Device for HaplyDevice {
         // A force has a direction in the world, and no scale.
         let on_workbench = self.placement.workbench_from_world.isometry.rotation * force;
         let unturned = self.mapping.origin.rotation.inverse() * on_workbench;
-        self.port.push((self.mapping.axes.matrix().transpose() * unturned).into());
+        self.port
+            .push((self.mapping.axes.matrix().transpose() * unturned).into());
     }
 }

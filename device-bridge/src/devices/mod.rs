@@ -10,6 +10,7 @@ pub(crate) mod remote;
 pub(crate) mod simulated;
 pub(crate) mod space_mouse;
 pub(crate) mod spidar;
+pub(crate) mod spidar_uart;
 pub(crate) mod vrpn;
 
 pub use glide::Glide;
@@ -26,6 +27,7 @@ pub use space_mouse::{
     SpaceMouse,
 };
 pub use spidar::{SpidarDevice, SpidarPlacement};
+pub use spidar_uart::{SpidarUartError, SpidarUartSettings};
 pub use taut_plant::{
     Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError, Progress, Tremor,
     TremorMotion, UnknownHand, ViaPoint, min_jerk,

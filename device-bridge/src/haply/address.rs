@@ -29,7 +29,9 @@ impl Default for ServiceAddress {
 
 /// A text that is no address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no address of an Inverse service; write HOST or HOST:PORT, such as localhost:10001")]
+#[error(
+    "`{0}` is no address of an Inverse service; write HOST or HOST:PORT, such as localhost:10001"
+)]
 pub struct AddressError(String);
 
 impl FromStr for ServiceAddress {

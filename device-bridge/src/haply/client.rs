@@ -69,7 +69,9 @@ pub enum HaplyError {
     #[error(transparent)]
     Version(#[from] VersionError),
     /// No thread.
-    #[error("cannot start a thread for the Inverse service: {0}; end other programs or raise the limit")]
+    #[error(
+        "cannot start a thread for the Inverse service: {0}; end other programs or raise the limit"
+    )]
     Thread(std::io::Error),
 }
 
@@ -98,7 +100,9 @@ impl From<tungstenite::Error> for Lost {
     fn from(error: tungstenite::Error) -> Self {
         match error {
             tungstenite::Error::Io(error) => Self::Socket(error),
-            tungstenite::Error::ConnectionClosed | tungstenite::Error::AlreadyClosed => Self::Closed,
+            tungstenite::Error::ConnectionClosed | tungstenite::Error::AlreadyClosed => {
+                Self::Closed
+            }
             other => Self::WebSocket(Box::new(other)),
         }
     }

@@ -59,7 +59,9 @@ pub enum Unusable {
     #[error("the device's motors have no power; connect its power supply")]
     NoPower,
     /// Its axes are in another order than was asked for.
-    #[error("the service gives the device's axes in another order than {PERMUTATION}, which was asked for; set its basis to {PERMUTATION}")]
+    #[error(
+        "the service gives the device's axes in another order than {PERMUTATION}, which was asked for; set its basis to {PERMUTATION}"
+    )]
     OtherBasis,
     /// It says no position.
     #[error("the service tells no position of the device")]
@@ -131,7 +133,10 @@ impl Exchange {
 
     fn choose(&mut self, said: &Said) {
         let wanted = self.settings.arm.as_deref();
-        let found = said.arms.iter().find(|arm| wanted.is_none_or(|id| arm.id == id));
+        let found = said
+            .arms
+            .iter()
+            .find(|arm| wanted.is_none_or(|id| arm.id == id));
         let Some(arm) = found else { return };
         self.arm = Some(arm.id.clone());
         if self.settings.with_grip {
@@ -144,14 +149,22 @@ impl Exchange {
             arm.model.clone().unwrap_or_else(|| "arm".to_owned()),
             arm.id,
             arm.handedness.clone().unwrap_or_else(unknown),
-            self.grip.as_ref().map_or("stays as it is: no grip".to_owned(), |(_, id)| format!("by grip {id}")),
+            self.grip
+                .as_ref()
+                .map_or("stays as it is: no grip".to_owned(), |(_, id)| format!(
+                    "by grip {id}"
+                )),
         );
     }
 
     /// The state after `said`.
     fn judge(&mut self, said: &Said) -> Result<HaplyState, Unusable> {
         let id = self.arm.as_deref().ok_or(Unusable::NotPlugged)?;
-        let arm = said.arms.iter().find(|arm| arm.id == id).ok_or(Unusable::NotPlugged)?;
+        let arm = said
+            .arms
+            .iter()
+            .find(|arm| arm.id == id)
+            .ok_or(Unusable::NotPlugged)?;
         if let Some(permutation) = arm.permutation.as_deref()
             && self.said >= CONFIGURED
         {
@@ -192,7 +205,9 @@ impl Exchange {
         let say = Say {
             profile: first.then_some(self.settings.profile.as_str()),
             // With the arm unknown until it is there; and once the configuration should hold, to see whether it does.
-            full: arm.is_none() || self.said == CONFIGURED || self.state.unusable == Some(Unusable::NotPlugged),
+            full: arm.is_none()
+                || self.said == CONFIGURED
+                || self.state.unusable == Some(Unusable::NotPlugged),
             arm,
             set_basis: first,
             force: force.filter(|_| self.state.unusable.is_none()),

@@ -27,7 +27,9 @@ pub enum MessageError {
     #[error("the Inverse service sent what is no state message: {0}")]
     NotUnderstood(#[from] serde_json::Error),
     /// A number that cannot be.
-    #[error("the Inverse service says that {what} of the device {device} is {value}, which cannot be")]
+    #[error(
+        "the Inverse service says that {what} of the device {device} is {value}, which cannot be"
+    )]
     OutOfRange {
         /// Whose.
         device: String,
@@ -37,7 +39,9 @@ pub enum MessageError {
         value: f64,
     },
     /// More than can be plugged in, or names that are none.
-    #[error("the Inverse service names more than {MAX_DEVICES} devices of a kind, or one by no sensible name")]
+    #[error(
+        "the Inverse service names more than {MAX_DEVICES} devices of a kind, or one by no sensible name"
+    )]
     Names,
 }
 
@@ -211,7 +215,10 @@ impl Said {
             (GripKind::Custom, &message.custom_verse_grip),
             (GripKind::Wired, &message.verse_grip),
         ];
-        let count = message.inverse3.len().max(grips.iter().map(|(_, of)| of.len()).max().unwrap_or(0));
+        let count = message
+            .inverse3
+            .len()
+            .max(grips.iter().map(|(_, of)| of.len()).max().unwrap_or(0));
         if count > MAX_DEVICES {
             return Err(MessageError::Names);
         }
@@ -277,7 +284,10 @@ impl ArmMessage {
 impl GripMessage {
     fn checked(&self, kind: GripKind) -> Result<GripSaid, MessageError> {
         let id = name(self.device_id.clone())?;
-        let orientation = self.state.as_ref().and_then(|state| state.orientation.as_ref());
+        let orientation = self
+            .state
+            .as_ref()
+            .and_then(|state| state.orientation.as_ref());
         let orientation = orientation.map(|q| [q.w, q.x, q.y, q.z]);
         if let Some(q) = orientation {
             let norm = q.iter().map(|part| part * part).sum::<f64>().sqrt();
@@ -296,9 +306,10 @@ impl GripMessage {
         let buttons = of.map_or(u16::from(single), |of| {
             u16::from(of.a) | u16::from(of.b) << 1 | u16::from(of.c) << 2
         });
-        let ready = self.status.as_ref().is_none_or(|status| {
-            status.ready.unwrap_or(true) && status.connected.unwrap_or(true)
-        });
+        let ready = self
+            .status
+            .as_ref()
+            .is_none_or(|status| status.ready.unwrap_or(true) && status.connected.unwrap_or(true));
         Ok(GripSaid {
             kind,
             id,
@@ -346,12 +357,21 @@ impl Say<'_> {
         if let Some(profile) = self.profile {
             let comma = if self.full { "," } else { "" };
             // A profile's name is this program's own: no letters to escape.
-            let _ = write!(out, "{comma}\"configure\":{{\"profile\":{{\"name\":\"{profile}\"}}}}");
+            let _ = write!(
+                out,
+                "{comma}\"configure\":{{\"profile\":{{\"name\":\"{profile}\"}}}}"
+            );
         }
         out.push('}');
         if let Some(arm) = self.arm {
-            let _ = write!(out, ",\"inverse3\":[{{\"device_id\":\"{arm}\",\"commands\":{{");
-            match self.force.filter(|force| force.iter().all(|part| part.is_finite())) {
+            let _ = write!(
+                out,
+                ",\"inverse3\":[{{\"device_id\":\"{arm}\",\"commands\":{{"
+            );
+            match self
+                .force
+                .filter(|force| force.iter().all(|part| part.is_finite()))
+            {
                 Some([x, y, z]) => {
                     let _ = write!(
                         out,
@@ -409,15 +429,25 @@ mod tests {
     fn a_documented_message_is_read() {
         let said = Said::parse(FULL).expect("the service's own");
         assert_eq!(said.session, Some(176));
-        let [arm] = &said.arms[..] else { panic!("one arm") };
-        assert_eq!((arm.id.as_str(), arm.model.as_deref()), ("04C3", Some("inverse3")));
+        let [arm] = &said.arms[..] else {
+            panic!("one arm")
+        };
+        assert_eq!(
+            (arm.id.as_str(), arm.model.as_deref()),
+            ("04C3", Some("inverse3"))
+        );
         assert_eq!(arm.position, Some([0.12794551, 0.038903017, -0.05089721]));
         assert_eq!(arm.force, Some([0.0, 0.5, 0.0]));
         assert_eq!(arm.permutation.as_deref(), Some("XYZ"));
         assert!(arm.calibrated && arm.ready && arm.powered);
-        let [grip] = &said.grips[..] else { panic!("one grip") };
+        let [grip] = &said.grips[..] else {
+            panic!("one grip")
+        };
         assert_eq!((grip.buttons, grip.ready), (0b101, true));
-        assert_eq!(grip.orientation, Some([0.5644226, 0.34646606, 0.6608887, -0.34802246]));
+        assert_eq!(
+            grip.orientation,
+            Some([0.5644226, 0.34646606, 0.6608887, -0.34802246])
+        );
     }
 
     #[test]
@@ -431,14 +461,23 @@ mod tests {
             ("0.6608887", "0.8608887", "orientation"),
             ("\"04C3\"", "\"04\\\"C3\"", "sensible name"),
             ("\"z\":-0.05089721", "\"q\":0", "missing field `z`"),
-            ("\"cursor_velocity\"", "\"cursor_position\"", "duplicate field"),
+            (
+                "\"cursor_velocity\"",
+                "\"cursor_position\"",
+                "duplicate field",
+            ),
         ] {
             assert!(FULL.contains(from), "{from}");
-            let text = FULL.replacen(from, to, 1).replacen("\"id\":\"04\\\"C3\"", "\"id\":\"x\"", 1);
+            let text =
+                FULL.replacen(from, to, 1)
+                    .replacen("\"id\":\"04\\\"C3\"", "\"id\":\"x\"", 1);
             let error = Said::parse(&text).expect_err(to).to_string();
             assert!(error.contains(part), "{from} -> {to}: {error}");
         }
-        let many = format!("{{\"inverse3\":[{}]}}", vec!["{\"device_id\":\"a\"}"; 65].join(","));
+        let many = format!(
+            "{{\"inverse3\":[{}]}}",
+            vec!["{\"device_id\":\"a\"}"; 65].join(",")
+        );
         assert!(Said::parse(&many).is_err());
     }
 

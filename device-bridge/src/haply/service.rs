@@ -179,8 +179,8 @@ fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<tungstenite::Erro
     if !head.to_ascii_lowercase().contains("upgrade: websocket") {
         return answer_http(stream, &head, &shared.version).map_err(io);
     }
-    let mut socket = tungstenite::accept(stream)
-        .map_err(|_| Box::new(tungstenite::Error::ConnectionClosed))?;
+    let mut socket =
+        tungstenite::accept(stream).map_err(|_| Box::new(tungstenite::Error::ConnectionClosed))?;
     socket.get_ref().set_read_timeout(Some(LOOK)).map_err(io)?;
     let session = shared.sessions.fetch_add(1, Ordering::Relaxed) + 1;
     let greeting = shared.inverse().inventory(monotonic_now(), session);

@@ -63,7 +63,13 @@ impl SimulatedSettings {
                 WORKSPACE_CENTRE[2] - down,
             ),
         };
-        let points = vec![at(0.0, 0.0), at(2.0, 0.06), at(4.0, 0.06), at(6.0, 0.0), at(8.0, 0.0)];
+        let points = vec![
+            at(0.0, 0.0),
+            at(2.0, 0.06),
+            at(4.0, 0.06),
+            at(6.0, 0.0),
+            at(8.0, 0.0),
+        ];
         // Growing times: it cannot be refused.
         MinJerkPath::new(points, true).unwrap_or_else(|_| MinJerkPath::hold(Isometry3::identity()))
     }
@@ -175,15 +181,22 @@ impl SimulatedInverse {
         let due = passed.saturating_sub(self.elapsed);
         self.elapsed = self.elapsed.max(passed);
         // A force that has grown too old ended where it did.
-        let oldest = self.pushes.values().map(|push| push.said + IDLE_AFTER).min();
+        let oldest = self
+            .pushes
+            .values()
+            .map(|push| push.said + IDLE_AFTER)
+            .min();
         if let Some(end) = oldest.filter(|end| *end <= now) {
             let until = end.saturating_sub(epoch).saturating_sub(self.elapsed - due);
-            self.plant.advance(self.plant.time() + until.min(due).min(LONGEST_SILENCE));
+            self.plant
+                .advance(self.plant.time() + until.min(due).min(LONGEST_SILENCE));
             self.command(now);
             let rest = due.saturating_sub(until);
-            self.plant.advance(self.plant.time() + rest.min(LONGEST_SILENCE));
+            self.plant
+                .advance(self.plant.time() + rest.min(LONGEST_SILENCE));
         } else {
-            self.plant.advance(self.plant.time() + due.min(LONGEST_SILENCE));
+            self.plant
+                .advance(self.plant.time() + due.min(LONGEST_SILENCE));
         }
         self.largest_force = self.largest_force.max(self.rendered().norm());
     }
@@ -192,7 +205,8 @@ impl SimulatedInverse {
         self.pushes.retain(|_, push| now < push.said + IDLE_AFTER);
         let sum: Vector3<f64> = self.pushes.values().map(|push| push.force).sum();
         let sum = if self.plugged { sum } else { Vector3::zeros() };
-        self.plant.command(&Vector6::new(sum.x, sum.y, sum.z, 0.0, 0.0, 0.0));
+        self.plant
+            .command(&Vector6::new(sum.x, sum.y, sum.z, 0.0, 0.0, 0.0));
         self.largest_force = self.largest_force.max(self.rendered().norm());
     }
 
@@ -275,7 +289,11 @@ fn commanded(message: &Value) -> Option<Vector3<f64>> {
         return None;
     }
     let vector = &command["vector"];
-    let part = |name: &str| vector[name].as_f64().filter(|part| part.abs() <= LARGEST_COMMAND);
+    let part = |name: &str| {
+        vector[name]
+            .as_f64()
+            .filter(|part| part.abs() <= LARGEST_COMMAND)
+    };
     Some(Vector3::new(part("x")?, part("y")?, part("z")?))
 }
 

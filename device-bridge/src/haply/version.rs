@@ -79,7 +79,11 @@ pub fn service_version(address: &ServiceAddress) -> Result<ServiceVersion, Versi
         .into();
     let asked = agent.get(format!("http://{address}/version")).call();
     let mut answer = asked.map_err(|error| unknown(error.to_string()))?;
-    let body = answer.body_mut().with_config().limit(MAX_ANSWER).read_to_string();
+    let body = answer
+        .body_mut()
+        .with_config()
+        .limit(MAX_ANSWER)
+        .read_to_string();
     let body = body.map_err(|error| unknown(error.to_string()))?;
     let told: Answer = serde_json::from_str(&body).map_err(|error| unknown(error.to_string()))?;
     let found = ServiceVersion::parse(&told.project_version)

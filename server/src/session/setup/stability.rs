@@ -255,7 +255,8 @@ mod tests {
         let body = &scene.world.body;
         let warned = judge(&light(), true, &asked(2000.0), body, false).expect("the hand holds it");
         assert!(warned.iter().any(|w| w.contains("lets go")), "{warned:?}");
-        let refused = judge(&light(), true, &asked(50_000.0), body, false).expect_err("far too stiff");
+        let refused =
+            judge(&light(), true, &asked(50_000.0), body, false).expect_err("far too stiff");
         assert!(refused.to_string().contains("--allow-unstable"));
         assert!(judge(&light(), true, &asked(50_000.0), body, true).is_ok_and(|w| !w.is_empty()));
     }
@@ -291,7 +292,8 @@ mod tests {
             resolution: 3e-5,
             ..light()
         };
-        let warned = judge(&counted, true, &scene.settings, &scene.world.body, false).expect("stable");
+        let warned =
+            judge(&counted, true, &scene.settings, &scene.world.body, false).expect("stable");
         assert!(warned.iter().any(|w| w.contains("encoder")), "{warned:?}");
     }
 }

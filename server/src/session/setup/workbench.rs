@@ -83,7 +83,8 @@ pub fn session_setup(
     let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
     let declared = match &overrides.input {
         Some(choice) => of_input(choice, built.view.display_scale, scene_hand),
-        None => declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?.map(|dynamics| (dynamics, true)),
+        None => declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?
+            .map(|dynamics| (dynamics, true)),
     };
     if let Some((dynamics, renders_torque)) = declared {
         let body = &built.world.body;
