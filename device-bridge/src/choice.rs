@@ -269,7 +269,7 @@ fn strings_option(options: &str) -> Result<Option<String>, UnknownDevice> {
         let mut option = OptionText::new("simulated", option);
         if let Some(named) = option.asked("strings") {
             if named.is_empty() {
-                return Err(option.wrong("strings", "g6x3r, g6x5r, wb or a geometry file"));
+                return Err(option.wrong("strings", "g6x3r, g6x4r, g6x5r, wb or a geometry file"));
             }
             strings = Some(named.to_owned());
         }
@@ -604,7 +604,7 @@ mod tests {
             ("trace:", "write trace:FILE"),
             ("trace", "write trace:FILE"),
             ("simulated,hand=firm", "it has strings"),
-            ("simulated,strings", "must be g6x3r, g6x5r, wb or"),
+            ("simulated,strings", "must be g6x3r, g6x4r, g6x5r, wb or"),
             ("simulated:wb", "write simulated"),
             ("vrpn", "write vrpn:TRACKER@HOST"),
             ("vrpn:Tracker0", "DEVICE@HOST:PORT"),

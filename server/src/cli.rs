@@ -385,7 +385,7 @@ pub struct ImportArgs {
     after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
 )]
 pub struct DoctorArgs {
-    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x4r, g6x5r, wb), or a geometry file
     #[arg(long, value_name = "NAME|FILE")]
     pub device: Option<String>,
     /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)
