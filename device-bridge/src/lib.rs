@@ -26,6 +26,7 @@ pub mod edge;
 pub mod haply;
 mod own_stamps;
 mod placement;
+mod plugged;
 mod port;
 pub mod realtime;
 mod report;
@@ -60,6 +61,7 @@ pub use devices::{
     haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
+pub use plugged::{PluggedPort, plugged_ports};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
     Events, MAX_EVENTS_PER_TICK, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,

@@ -20,7 +20,7 @@ use tungstenite::{Message, WebSocket};
 
 use super::address::ServiceAddress;
 use super::exchange::{Exchange, ExchangeSettings, HaplyState, Unusable};
-use super::message::MessageError;
+use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
 use crate::realtime::{self, Ticker, monotonic_now};
 
@@ -42,6 +42,9 @@ const RETRY: Duration = Duration::from_millis(200);
 const MAX_MESSAGE: usize = 1 << 20;
 /// Messages that say nothing sensible, one after the other, that end a connection.
 const MAX_NONSENSE: u32 = 20;
+
+/// Messages by which a service is looked at.
+const LOOKS: usize = 200;
 
 /// What the device's loop wants rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -320,6 +323,50 @@ impl Talker {
         }
         Err(Lost::NoAnswer)
     }
+}
+
+/// What a service has, and how fast it answers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HaplyFound {
+    /// Its arms and grips, as it greets.
+    pub said: Said,
+    /// From a message without force to its answer, in growing order.
+    pub answers: Vec<Duration>,
+}
+
+/// Looks at a service: reads its inventory, and asks for the state of its arms [`LOOKS`] times, without force.
+///
+/// # Errors
+/// [`HaplyError`]: nobody answers, or too old a service.
+pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
+    let gone = |lost: Lost| HaplyError::NoService {
+        address: address.clone(),
+        cause: lost.to_string(),
+    };
+    let mut socket = connect(address).map_err(gone)?;
+    if let Err(error @ VersionError::TooOld { .. }) = service_version(address) {
+        return Err(error.into());
+    }
+    let measured = || {
+        let greeting = next_text(&mut socket)?.ok_or(Lost::NoInventory)?;
+        let said = Said::parse(&greeting).map_err(Lost::Nonsense)?;
+        let mut exchange = Exchange::new(ExchangeSettings::default(), HaplyState::default());
+        exchange.hear(&greeting).map_err(Lost::Nonsense)?;
+        let mut answers = Vec::with_capacity(LOOKS);
+        for _ in 0..LOOKS {
+            let begun = monotonic_now();
+            send(&mut socket, exchange.say(None))?;
+            let answer = next_text(&mut socket)?.ok_or(Lost::NoAnswer)?;
+            answers.push(monotonic_now().saturating_sub(begun));
+            exchange.hear(&answer).map_err(Lost::Nonsense)?;
+            thread::sleep(PERIOD);
+        }
+        answers.sort_unstable();
+        let _ = socket.close(None); // it is dropped either way
+        Ok(HaplyFound { said, answers })
+    };
+    let mut measured = measured;
+    measured().map_err(gone)
 }
 
 /// Zero is the last word of a connection, if it still takes one.

@@ -25,9 +25,9 @@ mod simulated;
 mod version;
 
 pub use address::{AddressError as HaplyAddressError, ServiceAddress};
-pub use client::{HaplyClient, HaplyError, PushedForce};
+pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
 pub use exchange::{Exchange, ExchangeSettings, HaplyState, Unusable};
-pub use message::{MessageError, Said};
+pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::workspace_centre;
 pub use simulated::{SimulatedInverse, SimulatedSettings};

@@ -12,6 +12,8 @@ use taut_spidar::STRINGS;
 const FASTEST: f64 = 5.0;
 /// Fastest change of that, m/s^2, of one reading alone.
 const HARDEST: f64 = 300.0;
+/// Longest time over which a hand's motion foretells a count, s: what it may do meanwhile grows with the square.
+const LONGEST_STEP: f64 = 2.5e-3;
 /// Counts that rounding and jitter of the readings' times may add.
 const SLACK: f64 = 2.0;
 /// After a silence of this length the boards may have been without power.
@@ -129,8 +131,12 @@ impl Counters {
         change.iter().all(|change| f64::from(change.abs()) <= most)
     }
 
+    /// As a hand goes on, over a time so short that this says much.
     fn is_smooth(&self, change: &[i32; STRINGS], rates: &[f64; STRINGS], span: f64) -> bool {
         let most = HARDEST / self.metres_per_count * span * span + SLACK;
+        if span > LONGEST_STEP {
+            return false;
+        }
         let off = |i: usize| (f64::from(change[i]) - rates[i] * span).abs();
         (0..STRINGS).all(|i| off(i) <= most)
     }
