@@ -11,7 +11,7 @@ use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
 
 use crate::device::Device;
 use crate::devices::{
-    Anchor, CapMode, CapSettings, HaplyDevice, HaplySettings, HidPort, SourceError, SpaceMouse,
+    Anchor, CapMode, CapSettings, HaplySettings, HidPort, SourceError, SpaceMouse,
     SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
 use crate::haply::{HaplyAddressError, HaplyError};
@@ -95,7 +95,7 @@ pub enum InputChoice {
     SpaceMouse(CapSettings),
     /// [`VrpnDevice`].
     Vrpn(Box<VrpnSettings>),
-    /// [`HaplyDevice`], with force.
+    /// [`crate::ArmDevice`] behind a service.
     Haply(Box<HaplySettings>),
     /// [`crate::SpidarDevice`] on motor boards.
     Spidar(Box<SpidarUartSettings>),
@@ -156,7 +156,7 @@ impl InputChoice {
             Self::SpaceMouse(settings) => {
                 Box::new(SpaceMouse::open(Box::new(HidPort), *settings, placement)?)
             }
-            Self::Haply(settings) => Box::new(HaplyDevice::open(settings, placement, priority)?),
+            Self::Haply(settings) => Box::new(settings.open(placement, priority)?),
             Self::Spidar(settings) => settings.open(&placement, priority)?,
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);

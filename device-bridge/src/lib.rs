@@ -4,7 +4,7 @@
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
-//! - [`HaplyDevice`]: a force device that people own, with its service simulated in [`haply`].
+//! - [`ArmDevice`]: a force device that people own, with its service simulated in [`haply`].
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -54,7 +54,7 @@ pub use devices::{
     VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HaplyDevice, HaplyPort, HaplySettings,
+    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HaplySettings,
     HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError, Progress, RecordedDevice,
     RemoteDevice, SimulatedDevice, SpidarDevice, SpidarPlacement, SpidarUartError,
     SpidarUartSettings, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,

@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
-    Exchange, ExchangeSettings, HaplyService, HaplyState, ServiceAddress, SimulatedInverse,
+    Exchange, ExchangeSettings, HaplyService, ServiceAddress, SimulatedInverse,
     SimulatedSettings,
 };
 use taut_bridge::realtime::monotonic_now;
 use taut_bridge::{
-    Anchor, Command, CommandSource, Device, DeviceFault, DevicePort, Hand, HaplyDevice, HaplyPort,
+    ArmState, Anchor, Command, CommandSource, Device, DeviceFault, DevicePort, Hand, ArmDevice, ArmPort,
     HaplySettings, Placement, Pose, SafetySettings,
 };
 
@@ -100,7 +100,7 @@ fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
     let any = "127.0.0.1:0".parse().expect("an address");
     let service = HaplyService::start(any, simulated(true)).expect("a free port");
     let device =
-        HaplyDevice::open(&settings(service.address()), placement(), 0).expect("it is there");
+        settings(service.address()).open(placement(), 0).expect("it is there");
     assert_eq!(device.info().actuated_degrees_of_freedom, 3);
     let mut port = port(device);
     let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
@@ -178,7 +178,7 @@ fn play(bind: &str) -> (Played, SocketAddr) {
 #[test]
 fn a_service_in_a_process_of_its_own_is_killed_and_comes_back() {
     let (played, address) = play("127.0.0.1:0");
-    let device = HaplyDevice::open(&settings(address), placement(), 0).expect("it is there");
+    let device = settings(address).open(placement(), 0).expect("it is there");
     let mut port = port(device);
     let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
     tick_until(&mut port, "the wall", felt);
@@ -195,7 +195,7 @@ fn an_old_service_and_none_are_each_a_sentence() {
     let any = "127.0.0.1:0".parse().expect("an address");
     let old = r#"{"project_version":"3.4.2.0"}"#;
     let service = HaplyService::start_as(any, simulated(true), old).expect("a free port");
-    let open = |address| HaplyDevice::open(&settings(address), placement(), 0);
+    let open = |address| settings(address).open(placement(), 0);
     let error = open(service.address()).err().expect("too old").to_string();
     assert!(
         error.contains("has version 3.4") && error.contains("install a newer one"),
@@ -227,7 +227,7 @@ struct Ends {
 impl Wire {
     fn new(with_grip: bool) -> Self {
         let mut service = simulated(with_grip);
-        let mut exchange = Exchange::new(ExchangeSettings::default(), HaplyState::default());
+        let mut exchange = Exchange::new(ExchangeSettings::default(), ArmState::default());
         exchange
             .hear(&service.inventory(Duration::ZERO, 1))
             .expect("an inventory");
@@ -259,8 +259,8 @@ impl Wire {
     }
 }
 
-impl HaplyPort for Wire {
-    fn newest(&mut self) -> HaplyState {
+impl ArmPort for Wire {
+    fn newest(&mut self) -> ArmState {
         self.with(|ends| *ends.exchange.state())
     }
 
@@ -271,9 +271,9 @@ impl HaplyPort for Wire {
 
 fn wired(with_grip: bool) -> (Wire, DevicePort) {
     let wire = Wire::new(with_grip);
-    let device = HaplyDevice::new(
+    let device = ArmDevice::new(
         Box::new(wire.clone()),
-        &HaplySettings::default(),
+        HaplySettings::default().arm(),
         placement(),
     );
     (wire, port(device))
@@ -327,7 +327,7 @@ fn the_body_follows_the_cursor_and_the_grip_in_every_frame() {
         let wire = Wire::new(with_grip);
         let mut settings = HaplySettings::default();
         settings.mapping.axes = "x z -y".parse().expect("axes");
-        let mut device = HaplyDevice::new(Box::new(wire.clone()), &settings, placement);
+        let mut device = ArmDevice::new(Box::new(wire.clone()), settings.arm(), placement);
         wire.turn(ms(1));
         let first = device.read(ms(1)).expect("a sample");
         let start = placement.start;
@@ -375,7 +375,7 @@ fn a_prop_stands_where_the_arm_is_and_forces_of_two_programs_add_up() {
         anchor: Anchor::Workbench,
         ..HaplySettings::default()
     };
-    let mut device = HaplyDevice::new(Box::new(wire.clone()), &settings, placement());
+    let mut device = ArmDevice::new(Box::new(wire.clone()), settings.arm(), placement());
     wire.turn(ms(1));
     // The middle of the arm's workspace is the workbench's origin, and there is G.
     let sample = device.read(ms(1)).expect("a sample");

@@ -5,10 +5,9 @@ use std::time::Duration;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
-use taut_bridge::haply::HaplyState;
 use taut_bridge::{
     AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
-    HaplyDevice, HaplyPort, HaplySettings, MinJerkPath, Passivity, PassivitySettings, Placement,
+    ArmDevice, ArmPort, ArmState, HaplySettings, MinJerkPath, Passivity, PassivitySettings, Placement,
     Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow, Tremor,
 };
 use taut_link::DeviceInput;
@@ -75,10 +74,10 @@ fn a_recorded_device_does_not_allocate() {
 }
 
 /// What the thread of the Inverse service's client hands over.
-struct Told(triple_buffer::Output<HaplyState>, [f64; 3]);
+struct Told(triple_buffer::Output<ArmState>, [f64; 3]);
 
-impl HaplyPort for Told {
-    fn newest(&mut self) -> HaplyState {
+impl ArmPort for Told {
+    fn newest(&mut self) -> ArmState {
         *self.0.read()
     }
 
@@ -89,17 +88,18 @@ impl HaplyPort for Told {
 
 #[test]
 fn a_haply_arm_does_not_allocate() {
-    let (mut states, newest) = triple_buffer::TripleBuffer::new(&HaplyState::default()).split();
+    let (mut states, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
     let placement = Placement::plain(Pose::identity(), Point3::origin());
     let told = Box::new(Told(newest, [0.0; 3]));
-    let device = HaplyDevice::new(told, &HaplySettings::default(), placement);
+    let device = ArmDevice::new(told, HaplySettings::default().arm(), placement);
     drive(device, &mut |tick| {
         let height = 1e-3 * (tick as f64 * 0.01).sin();
-        states.write(HaplyState {
+        states.write(ArmState {
             reports: tick + 1,
+            is_usable: true,
             position: [0.0, -0.1, 0.16 + height],
             orientation: Some([1.0, 0.0, 0.0, 0.0]),
-            ..HaplyState::default()
+            ..ArmState::default()
         });
     });
 }

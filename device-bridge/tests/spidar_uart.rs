@@ -310,7 +310,7 @@ fn damaged_cycles(cycles: u64) -> (u64, u64) {
             .map(|i| (counts[i] - truth[i] - begun[i]).abs())
             .max()
             .expect("eight");
-        // What may pass is what a hand could have done since the last believed cycle: 300 m/s^2 over a few milliseconds, and the cycle before.
+        // What may pass is what a hand could have done since the last believed cycle: 150 m/s^2 over a few milliseconds, and the cycle before.
         assert!(
             off <= 40,
             "{off} counts, {:.2} mm at {time} ms",

@@ -1,5 +1,6 @@
 //! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
+pub(crate) mod arm;
 pub(crate) mod glide;
 pub(crate) mod haply;
 pub(crate) mod held_strings;
@@ -15,7 +16,8 @@ pub(crate) mod vrpn;
 
 pub use glide::Glide;
 pub(crate) use haply::haply_grip;
-pub use haply::{HaplyDevice, HaplyPort, HaplySettings, haply_limits};
+pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
+pub use haply::{HaplySettings, haply_limits};
 pub use held_strings::{HeldStrings, string_grip};
 pub use led::{LedDevice, Target};
 pub use rate_control::{CapMode, CapSettings, RateControl};

@@ -19,9 +19,10 @@ use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
 use super::address::ServiceAddress;
-use super::exchange::{Exchange, ExchangeSettings, HaplyState, Unusable};
+use super::exchange::{Exchange, ExchangeSettings};
 use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
+use crate::devices::ArmState;
 use crate::realtime::{self, Ticker, monotonic_now};
 
 /// From message to message.
@@ -113,7 +114,7 @@ impl From<tungstenite::Error> for Lost {
 
 /// A service under a thread of its own. Dropping it leaves no force.
 pub struct HaplyClient {
-    newest: triple_buffer::Output<HaplyState>,
+    newest: triple_buffer::Output<ArmState>,
     force: triple_buffer::Input<PushedForce>,
     pushed: PushedForce,
     end: Arc<AtomicBool>,
@@ -139,7 +140,7 @@ impl HaplyClient {
             Err(error @ VersionError::TooOld { .. }) => return Err(error.into()),
             Err(unknown) => tracing::warn!("{unknown}; one before 3.5 would render no force"),
         }
-        let (state, newest) = triple_buffer::TripleBuffer::new(&HaplyState::default()).split();
+        let (state, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
         let (force, taken) = triple_buffer::TripleBuffer::new(&PushedForce::default()).split();
         let end = Arc::new(AtomicBool::new(false));
         let mut talker = Talker {
@@ -172,7 +173,7 @@ impl HaplyClient {
     }
 
     /// What the device said last.
-    pub fn newest(&mut self) -> &HaplyState {
+    pub fn newest(&mut self) -> &ArmState {
         self.newest.read()
     }
 
@@ -218,7 +219,7 @@ type Socket = WebSocket<TcpStream>;
 struct Talker {
     address: ServiceAddress,
     settings: ExchangeSettings,
-    out: triple_buffer::Input<HaplyState>,
+    out: triple_buffer::Input<ArmState>,
     force: triple_buffer::Output<PushedForce>,
     held: ForceHold,
     end: Arc<AtomicBool>,
@@ -227,7 +228,7 @@ struct Talker {
 impl Talker {
     /// Speaks, and calls again, until the end.
     fn run(&mut self, first: Socket) {
-        let mut state = HaplyState::default();
+        let mut state = ArmState::default();
         let mut next = Some(first);
         let mut told = String::new();
         while !self.is_over() {
@@ -247,7 +248,7 @@ impl Talker {
                 }
                 Err(lost) => lost,
             };
-            state.unusable = Some(Unusable::NoService);
+            state.is_usable = false;
             self.out.write(state);
             // A service that stays away is told of once.
             let text = lost.to_string();
@@ -297,8 +298,8 @@ impl Talker {
             }
             let state = *exchange.state();
             self.out.write(state);
-            if why != state.unusable {
-                why = state.unusable;
+            if why != exchange.unusable() {
+                why = exchange.unusable();
                 match why {
                     Some(why) => tracing::warn!("no pose and no force: {why}"),
                     None => tracing::info!("the device can be used again"),
@@ -350,7 +351,7 @@ pub fn look(address: &ServiceAddress) -> Result<HaplyFound, HaplyError> {
     let measured = || {
         let greeting = next_text(&mut socket)?.ok_or(Lost::NoInventory)?;
         let said = Said::parse(&greeting).map_err(Lost::Nonsense)?;
-        let mut exchange = Exchange::new(ExchangeSettings::default(), HaplyState::default());
+        let mut exchange = Exchange::new(ExchangeSettings::default(), ArmState::default());
         exchange.hear(&greeting).map_err(Lost::Nonsense)?;
         let mut answers = Vec::with_capacity(LOOKS);
         for _ in 0..LOOKS {

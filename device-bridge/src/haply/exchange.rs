@@ -1,5 +1,7 @@
 //! One connection to a service, without sockets: which arm and which grip are used, what they said last, and what is said next.
 
+use crate::devices::ArmState;
+
 use super::message::{GripKind, MessageError, PERMUTATION, Said, Say};
 
 /// What is wanted of a service.
@@ -21,23 +23,6 @@ impl Default for ExchangeSettings {
             with_grip: true,
         }
     }
-}
-
-/// What the device said last: m, m/s, w x y z.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct HaplyState {
-    /// Counts states that may be used.
-    pub reports: u64,
-    /// Why there is none to be used now.
-    pub unusable: Option<Unusable>,
-    /// Of the cursor, the device's axes.
-    pub position: [f64; 3],
-    /// Of the cursor.
-    pub velocity: [f64; 3],
-    /// Of the grip; `None` without a grip.
-    pub orientation: Option<[f64; 4]>,
-    /// Of the grip.
-    pub buttons: u16,
 }
 
 /// Why a device that the service knows, or should know, gives no pose.
@@ -80,7 +65,8 @@ pub struct Exchange {
     /// Messages said with an arm known.
     said: u32,
     other_basis: bool,
-    state: HaplyState,
+    state: ArmState,
+    unusable: Option<Unusable>,
     text: String,
 }
 
@@ -90,7 +76,7 @@ const CONFIGURED: u32 = 2;
 impl Exchange {
     /// Nothing said or heard yet; `state` counts on from the connection before.
     #[must_use]
-    pub fn new(settings: ExchangeSettings, state: HaplyState) -> Self {
+    pub fn new(settings: ExchangeSettings, state: ArmState) -> Self {
         Self {
             settings,
             arm: None,
@@ -98,14 +84,21 @@ impl Exchange {
             said: 0,
             other_basis: false,
             state,
+            unusable: None,
             text: String::with_capacity(512),
         }
     }
 
     /// What the device said last.
     #[must_use]
-    pub fn state(&self) -> &HaplyState {
+    pub fn state(&self) -> &ArmState {
         &self.state
+    }
+
+    /// Why there is none to be used now.
+    #[must_use]
+    pub fn unusable(&self) -> Option<Unusable> {
+        self.unusable
     }
 
     /// The arm that is used, once the service has named it.
@@ -125,8 +118,11 @@ impl Exchange {
         }
         let next = self.judge(&said);
         match next {
-            Ok(state) => self.state = state,
-            Err(unusable) => self.state.unusable = Some(unusable),
+            Ok(state) => (self.state, self.unusable) = (state, None),
+            Err(unusable) => {
+                self.state.is_usable = false;
+                self.unusable = Some(unusable);
+            }
         }
         Ok(())
     }
@@ -158,7 +154,7 @@ impl Exchange {
     }
 
     /// The state after `said`.
-    fn judge(&mut self, said: &Said) -> Result<HaplyState, Unusable> {
+    fn judge(&mut self, said: &Said) -> Result<ArmState, Unusable> {
         let id = self.arm.as_deref().ok_or(Unusable::NotPlugged)?;
         let arm = said
             .arms
@@ -180,9 +176,9 @@ impl Exchange {
                 return Err(unusable);
             }
         }
-        let mut state = HaplyState {
+        let mut state = ArmState {
             reports: self.state.reports + 1,
-            unusable: None,
+            is_usable: true,
             position: arm.position.ok_or(Unusable::NoPosition)?,
             velocity: arm.velocity.unwrap_or_default(),
             orientation: None,
@@ -207,10 +203,10 @@ impl Exchange {
             // With the arm unknown until it is there; and once the configuration should hold, to see whether it does.
             full: arm.is_none()
                 || self.said == CONFIGURED
-                || self.state.unusable == Some(Unusable::NotPlugged),
+                || self.unusable == Some(Unusable::NotPlugged),
             arm,
             set_basis: first,
-            force: force.filter(|_| self.state.unusable.is_none()),
+            force: force.filter(|_| self.unusable.is_none()),
             grip: self.grip.as_ref().map(|(kind, id)| (*kind, id.as_str())),
         };
         say.write(&mut self.text);

@@ -13,7 +13,7 @@
 //! | `simulated.rs` | the service's side without sockets: device, hand and grip simulated    |
 //! | `service.rs`   | the same on a socket                                                  |
 //!
-//! The driver on top is [`HaplyDevice`](crate::HaplyDevice). Sources: the service's documentation of 3.5 and the vendor's client `haply` 1.3.1, read
+//! The driver on top is [`ArmDevice`](crate::ArmDevice). Sources: the service's documentation of 3.5 and the vendor's client `haply` 1.3.1, read
 //! for facts. No device was at hand.
 
 mod address;
@@ -26,7 +26,7 @@ mod version;
 
 pub use address::{AddressError as HaplyAddressError, ServiceAddress};
 pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
-pub use exchange::{Exchange, ExchangeSettings, HaplyState, Unusable};
+pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::workspace_centre;

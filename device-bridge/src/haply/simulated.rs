@@ -1,6 +1,6 @@
 //! The service's side of the wire, without sockets: an arm in a simulated hand, a grip, and one answer to each message.
 //!
-//! The arm's mechanics are those that the driver assumes ([`crate::HaplyDevice`]). Forces of all sessions add up; each holds for its message, and
+//! The arm's mechanics are those that the driver assumes ([`crate::HaplySettings`]). Forces of all sessions add up; each holds for its message, and
 //! ends after [`IDLE_AFTER`] without another.
 
 use std::collections::HashMap;

@@ -11,7 +11,7 @@ use taut_spidar::STRINGS;
 /// Fastest change of a length, m/s: faster than the port lets a hand move.
 const FASTEST: f64 = 5.0;
 /// Fastest change of that, m/s^2, of one reading alone.
-const HARDEST: f64 = 300.0;
+const HARDEST: f64 = 150.0;
 /// Longest time over which a hand's motion foretells a count, s: what it may do meanwhile grows with the square.
 const LONGEST_STEP: f64 = 2.5e-3;
 /// Counts that rounding and jitter of the readings' times may add.
