@@ -11,8 +11,8 @@ use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
 
 use crate::device::Device;
 use crate::devices::{
-    Anchor, CapMode, CapSettings, HaplySettings, HidPort, SourceError, SpaceMouse,
-    SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
+    Anchor, ArmDevice, CapMode, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError,
+    SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
 use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
@@ -34,7 +34,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 7] = [
+pub const DRIVERS: [Driver; 8] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -54,6 +54,11 @@ pub const DRIVERS: [Driver; 7] = [
         name: "spidar",
         form: "spidar:PORT[,geometry=g6x4r|NAME|FILE,axes=x -z y]",
         what: "a SPIDAR-G on its UART motor boards: six degrees of freedom, force and torque",
+    },
+    Driver {
+        name: "polhem",
+        form: "polhem:PORT[,axes=y -x z,scale=S,anchor=start|workbench]",
+        what: "a Polhem arm on its text board: six degrees of freedom, force without torque",
     },
     Driver {
         name: "space-mouse",
@@ -99,6 +104,8 @@ pub enum InputChoice {
     Haply(Box<HaplySettings>),
     /// [`crate::SpidarDevice`] on motor boards.
     Spidar(Box<SpidarUartSettings>),
+    /// [`crate::ArmDevice`] on a serial port.
+    Polhem(Box<PolhemSettings>),
 }
 
 /// Why a device cannot be opened.
@@ -121,6 +128,13 @@ pub enum InputError {
     /// The motor boards.
     #[error(transparent)]
     Spidar(#[from] SpidarUartError),
+    /// The Polhem board.
+    #[cfg(unix)]
+    #[error(transparent)]
+    Polhem(#[from] crate::polhem::PolhemError),
+    /// A driver that is not here.
+    #[error("devices on serial ports can be used on Unix only")]
+    NotHere,
 }
 
 /// What a device with motors is declared to be, before it is opened.
@@ -144,6 +158,7 @@ impl InputChoice {
             Self::SpaceMouse(_) | Self::Vrpn(_) => None,
             Self::Haply(settings) => Some(settings.force_device()),
             Self::Spidar(settings) => Some(settings.force_device()),
+            Self::Polhem(settings) => Some(settings.force_device()),
         }
     }
 
@@ -158,6 +173,13 @@ impl InputChoice {
             }
             Self::Haply(settings) => Box::new(settings.open(placement, priority)?),
             Self::Spidar(settings) => settings.open(&placement, priority)?,
+            #[cfg(unix)]
+            Self::Polhem(settings) => {
+                let board = crate::polhem::PolhemBoard::open(&settings.path, priority)?;
+                Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
+            }
+            #[cfg(not(unix))]
+            Self::Polhem(_) => return Err(InputError::NotHere),
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);
                 Box::new(device.map_err(|cause| InputError::Vrpn {
@@ -247,6 +269,9 @@ impl FromStr for DeviceChoice {
             ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
             ("spidar", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Spidar(
                 Box::new(spidar_settings(rest)?),
+            ))),
+            ("polhem", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Polhem(
+                Box::new(polhem_settings(rest)?),
             ))),
             ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
                 rest,
@@ -354,6 +379,19 @@ fn spidar_settings(text: &str) -> Result<SpidarUartSettings, UnknownDevice> {
         geometry,
         axes,
     })
+}
+
+fn polhem_settings(text: &str) -> Result<PolhemSettings, UnknownDevice> {
+    let (path, options) = text.split_once(',').unwrap_or((text, ""));
+    let mut settings = PolhemSettings::at(path);
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("polhem", option);
+        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        option.finish()?;
+    }
+    Ok(settings)
 }
 
 fn haply_settings(text: &str) -> Result<HaplySettings, UnknownDevice> {
@@ -590,10 +628,12 @@ mod tests {
             ("simulatd", "did you mean `simulated`?"),
             (
                 "phantom",
-                "use simulated, trace:FILE, haply, spidar:PORT, space-mouse",
+                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, space-mouse",
             ),
             ("spidar", "write spidar:PORT"),
             ("spidar:", "write spidar:PORT"),
+            ("polhem", "write polhem:PORT"),
+            ("polhem:/dev/x,scal=1", "did you mean `scale`?"),
             ("spidar:/dev/x,geometry=nothing", "g6x4r"),
             ("spidar:/dev/x,axes=y x z", "right-handed"),
             ("haply=", "write HOST or HOST:PORT"),

@@ -27,7 +27,11 @@ pub mod haply;
 mod own_stamps;
 mod placement;
 mod plugged;
+#[cfg(unix)]
+pub mod polhem;
 mod port;
+#[cfg(unix)]
+pub mod pseudo_terminal;
 pub mod realtime;
 mod report;
 pub mod service_manager;
@@ -54,11 +58,11 @@ pub use devices::{
     VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HaplySettings,
-    HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError, Progress, RecordedDevice,
-    RemoteDevice, SimulatedDevice, SpidarDevice, SpidarPlacement, SpidarUartError,
-    SpidarUartSettings, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint,
-    haply_limits, min_jerk, string_grip,
+    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand,
+    HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
+    PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
+    SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, TraceRow, Tremor,
+    TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
 pub use plugged::{PluggedPort, plugged_ports};

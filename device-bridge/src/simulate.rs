@@ -40,6 +40,9 @@ enum Played {
     /// SPIDAR's UART motor boards with strings and grip, on a pseudo-terminal
     #[cfg(unix)]
     Spidar(PlayedSpidar),
+    /// A Polhem arm's text board, on a pseudo-terminal
+    #[cfg(unix)]
+    Polhem(PlayedPolhem),
 }
 
 #[derive(Clone, Debug, clap::Args)]
@@ -70,6 +73,17 @@ struct PlayedSpidar {
     /// One board of eight motors instead of two of four.
     #[arg(long)]
     one_board: bool,
+
+    #[command(flatten)]
+    hand: PlayedHand,
+}
+
+#[cfg(unix)]
+#[derive(Clone, Debug, clap::Args)]
+struct PlayedPolhem {
+    /// A name for the pseudo-terminal; without it the system's own, which is printed.
+    #[arg(long, value_name = "FILE")]
+    link: Option<PathBuf>,
 
     #[command(flatten)]
     hand: PlayedHand,
@@ -146,6 +160,8 @@ enum PlayedReport {
     },
     #[cfg(unix)]
     Spidar { cycles: u64, digits: [i16; 8] },
+    #[cfg(unix)]
+    Polhem { lines: u64, largest_force_n: f64 },
 }
 
 /// Plays a device as a process: where it can be found as the first line on standard output, a report in JSON as the last. Returns the exit
@@ -180,6 +196,8 @@ fn play(args: &SimulateArgs) -> Result<PlayedReport, SimulateError> {
         Played::Haply(haply) => play_haply(haply, over),
         #[cfg(unix)]
         Played::Spidar(spidar) => play_spidar(spidar, over),
+        #[cfg(unix)]
+        Played::Polhem(polhem) => play_polhem(polhem, over),
     }
 }
 
@@ -217,7 +235,8 @@ fn play_spidar(
     args: &PlayedSpidar,
     over: impl Fn() -> bool,
 ) -> Result<PlayedReport, SimulateError> {
-    use crate::spidar_uart::{BoardsTerminal, SimulatedBoards};
+    use crate::pseudo_terminal::PseudoTerminal;
+    use crate::spidar_uart::SimulatedBoards;
 
     let geometry = crate::simulated_strings::string_geometry(&args.geometry)?;
     let boards = SimulatedBoards::new(
@@ -228,7 +247,7 @@ fn play_spidar(
         args.one_board,
         [0; 8],
     )?;
-    let terminal = BoardsTerminal::start(boards, args.link.as_deref());
+    let terminal = PseudoTerminal::start(boards, args.link.as_deref());
     let terminal = terminal.map_err(SimulateError::Terminal)?;
     let path = args.link.as_ref().map_or_else(
         || terminal.path().to_owned(),
@@ -241,9 +260,39 @@ fn play_spidar(
     while !over() {
         thread::sleep(LOOK);
     }
-    let boards = terminal.boards();
+    let boards = terminal.device();
     Ok(PlayedReport::Spidar {
         cycles: boards.cycles(),
         digits: *boards.digits(),
+    })
+}
+
+#[cfg(unix)]
+fn play_polhem(
+    args: &PlayedPolhem,
+    over: impl Fn() -> bool,
+) -> Result<PlayedReport, SimulateError> {
+    use crate::polhem::SimulatedPolhem;
+    use crate::pseudo_terminal::PseudoTerminal;
+
+    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed);
+    let arm = SimulatedPolhem::new(args.hand.hand.into(), args.hand.path()?, Some(tremor));
+    let terminal = PseudoTerminal::start(arm, args.link.as_deref());
+    let terminal = terminal.map_err(SimulateError::Terminal)?;
+    let path = args.link.as_ref().map_or_else(
+        || terminal.path().to_owned(),
+        |link| link.display().to_string(),
+    );
+    let told = console::print(format!(
+        "a simulated Polhem board is at {path}; read it by: taut bridge --device polhem:{path}"
+    ));
+    told.map_err(SimulateError::Output)?;
+    while !over() {
+        thread::sleep(LOOK);
+    }
+    let arm = terminal.device();
+    Ok(PlayedReport::Polhem {
+        lines: arm.lines(),
+        largest_force_n: arm.largest_force(),
     })
 }

@@ -6,9 +6,10 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
-    AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
-    ArmDevice, ArmPort, ArmState, HaplySettings, MinJerkPath, Passivity, PassivitySettings, Placement,
-    Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow, Tremor,
+    ArmDevice, ArmPort, ArmState, AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits,
+    DevicePort, DeviceSample, Grip, Hand, HaplySettings, MinJerkPath, Passivity, PassivitySettings,
+    Placement, Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow,
+    Tremor,
 };
 use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;

@@ -6,8 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Point3, Vector6};
+use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
 use taut_bridge::realtime::monotonic_now;
-use taut_bridge::spidar_uart::{BoardInfo, BoardsTerminal, Counters, Cycle, SimulatedBoards};
+use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
 use taut_bridge::{
     Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Hand, InputChoice,
     MinJerkPath, Placement, Pose, SafetySettings, SpidarDevice, SpidarPlacement, ViaPoint,
@@ -91,7 +92,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         let link = folder.path().join("boards");
         let boards = Arc::new(Mutex::new(boards(one_board, [20_000; STRINGS])));
         let plug =
-            || BoardsTerminal::start_shared(Arc::clone(&boards), Some(&link)).expect("a terminal");
+            || PseudoTerminal::start_shared(Arc::clone(&boards), Some(&link)).expect("a terminal");
         let terminal = plug();
         let choice = format!("spidar:{}", link.display())
             .parse()
@@ -112,7 +113,7 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         });
         let terminal = plug();
         tick_until(&mut port, "the cable is in", felt);
-        let currents = || *terminal.boards().digits();
+        let currents = || *terminal.device().digits();
         assert!(currents().iter().any(|digit| *digit != 0));
 
         drop(port);

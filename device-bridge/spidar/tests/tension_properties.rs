@@ -202,7 +202,11 @@ fn ten_thousand_random_wrenches_agree_with_an_interior_point() {
                     let off = scaled(&(answer.wrench - answer.scale * wrench), arm).norm();
                     // The tall frame of G6X4R keeps the direction less well: its four long strings are nearer to parallel.
                     let share = if geometry.name == "G6X4R" { 3e-3 } else { 1e-3 };
-                    assert!(off <= share * kept + 1e-3, "{}: {off} of {kept}", geometry.name);
+                    assert!(
+                        off <= share * kept + 1e-3,
+                        "{}: {off} of {kept}",
+                        geometry.name
+                    );
                 }
                 TensionStatus::Nearest => {
                     nearest += 1;

@@ -117,4 +117,3 @@ impl ArmPort for HaplyClient {
         Self::push(self, force);
     }
 }
-

@@ -25,6 +25,7 @@ mod simulated;
 mod version;
 
 pub use address::{AddressError as HaplyAddressError, ServiceAddress};
+pub(crate) use client::ForceHold;
 pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};

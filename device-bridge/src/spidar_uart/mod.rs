@@ -7,7 +7,6 @@
 //! | `counters.rs`  | from counters of 16 bits that wrap to counts that may be believed             |
 //! | `boards.rs`    | the thread on the serial port: [`SpidarBoards`], a `StringHardware`           |
 //! | `simulated.rs` | the boards' side, with strings and hand, byte by byte                         |
-//! | `terminal.rs`  | the same behind a pseudo-terminal                                             |
 //!
 //! Facts: the published host side of Springhead (Boost, MIT or BSD licence), read for facts. The boards' firmware is not public, and no board was at hand:
 //! how fast they answer, what they do with a broken packet, and whether they let go of a current by themselves are not known.
@@ -17,11 +16,9 @@ mod counters;
 mod cycle;
 mod packet;
 mod simulated;
-mod terminal;
 
 pub use boards::{BoardsError, SpidarBoards};
 pub use counters::Counters;
 pub use cycle::{BrokenCycle, Cycle};
 pub use packet::BoardInfo;
 pub use simulated::SimulatedBoards;
-pub use terminal::BoardsTerminal;

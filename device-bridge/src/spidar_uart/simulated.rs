@@ -12,6 +12,7 @@ use taut_spidar::{Geometry, STRINGS, StringHardware, StringLosses};
 use super::boards::{BoardsError, digits_per_newton};
 use super::packet::{BoardInfo, COMMANDS, CURRENT, INFO, SET_LENGTHS, header};
 use crate::devices::{HeldStrings, SpidarPlacement};
+use crate::pseudo_terminal::FarEnd;
 
 /// What the hand does without a path: 15 mm to either side, a cycle in 4 s.
 const SWAY: (f64, f64) = (0.015, 4.0);
@@ -84,22 +85,6 @@ impl SimulatedBoards {
         self.cycles
     }
 
-    /// Takes bytes of the host at `now`; what they clock out is appended to `out`.
-    pub fn take(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) {
-        for byte in bytes {
-            out.extend(self.answers.pop_front());
-            let is_padding = self.packet.is_empty() && byte >> 3 == 0;
-            if is_padding {
-                continue;
-            }
-            self.packet.push(*byte);
-            if self.packet.len() >= self.length() {
-                self.obey(now);
-                self.packet.clear();
-            }
-        }
-    }
-
     /// Length of the packet that has begun: the addressed board's, or that of a command without more.
     fn length(&self) -> usize {
         let (board, command) = (self.packet[0] & 0b111, usize::from(self.packet[0] >> 3));
@@ -150,5 +135,22 @@ impl SimulatedBoards {
         // Velocities, in a unit that is not published, and forces.
         let rest = 2 * motors.len() + 2 * usize::from(info.forces);
         self.answers.extend(std::iter::repeat_n(0, rest));
+    }
+}
+
+impl FarEnd for SimulatedBoards {
+    fn take(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>) {
+        for byte in bytes {
+            out.extend(self.answers.pop_front());
+            let is_padding = self.packet.is_empty() && byte >> 3 == 0;
+            if is_padding {
+                continue;
+            }
+            self.packet.push(*byte);
+            if self.packet.len() >= self.length() {
+                self.obey(now);
+                self.packet.clear();
+            }
+        }
     }
 }

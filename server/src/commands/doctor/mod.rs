@@ -7,11 +7,11 @@ use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
+use taut_bridge::haply::ServiceAddress;
 use taut_bridge::realtime::{
     AWAKE, RealtimeGrant, keep_cores_awake, may_lock_memory, monotonic_now, request_fifo,
     sharpen_timers, sleep_until,
 };
-use taut_bridge::haply::ServiceAddress;
 use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
 
 use crate::shared::timing::{Distribution, Histogram};

@@ -16,7 +16,10 @@ pub(super) fn force_devices(service: &ServiceAddress) -> Vec<Finding> {
     let mut findings = vec![inverse_service(service)];
     match plugged_ports() {
         Ok(ports) if ports.is_empty() => {
-            findings.push(Finding::good("serial and HID ports", "no force device's port is there"));
+            findings.push(Finding::good(
+                "serial and HID ports",
+                "no force device's port is there",
+            ));
         }
         Ok(ports) => findings.extend(ports.iter().map(port)),
         Err(cause) => findings.push(Finding::good("serial and HID ports", cause)),
@@ -92,8 +95,15 @@ fn of_input(input: &InputChoice) -> String {
     let Some(device) = input.force_device() else {
         return "no force".to_owned();
     };
-    let (force, torque) = input.strongest().unwrap_or((device.grip.max_force, device.grip.max_torque));
-    bears(&device.grip, device.delay_s, force, device.renders_torque.then_some(torque))
+    let (force, torque) = input
+        .strongest()
+        .unwrap_or((device.grip.max_force, device.grip.max_torque));
+    bears(
+        &device.grip,
+        device.delay_s,
+        force,
+        device.renders_torque.then_some(torque),
+    )
 }
 
 #[cfg(test)]
@@ -109,13 +119,23 @@ mod tests {
         let service = HaplyService::start(any, inverse).expect("a free port");
         let address: ServiceAddress = service.address().to_string().parse().expect("an address");
         let finding = inverse_service(&address);
-        for part in ["inverse3 51A3", "1 grip(s)", "no torque", "renders 5 N", "N/m", "p99"] {
+        for part in [
+            "inverse3 51A3",
+            "1 grip(s)",
+            "no torque",
+            "renders 5 N",
+            "N/m",
+            "p99",
+        ] {
             assert!(finding.found.contains(part), "{part}: {finding:?}");
         }
         assert!(finding.good);
         drop(service);
         let finding = inverse_service(&address);
-        assert!(finding.good && finding.found.contains("none answers"), "{finding:?}");
+        assert!(
+            finding.good && finding.found.contains("none answers"),
+            "{finding:?}"
+        );
     }
 
     #[test]
@@ -129,7 +149,10 @@ mod tests {
             .found
         };
         let spidar = of(Some("spidar:/dev/ttyUSB0"));
-        assert!(spidar.contains("--device spidar:/dev/ttyUSB0") && spidar.contains("N m/rad"), "{spidar}");
+        assert!(
+            spidar.contains("--device spidar:/dev/ttyUSB0") && spidar.contains("N m/rad"),
+            "{spidar}"
+        );
         assert!(of(None).contains("no device that is known"));
     }
 }

@@ -1,4 +1,4 @@
-//! Simulated boards behind a pseudo-terminal, in place of `/dev/ttyUSB0`.
+//! A simulated device behind a pseudo-terminal, in place of `/dev/ttyUSB0`.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -9,38 +9,40 @@ use std::time::Duration;
 
 use serialport::{SerialPort, TTYPort};
 
-use super::simulated::SimulatedBoards;
 use crate::realtime::monotonic_now;
 
 /// How often a thread that waits looks for the end.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Running boards. Dropping it is pulling the cable.
-pub struct BoardsTerminal {
-    boards: Arc<Mutex<SimulatedBoards>>,
+/// What answers at the far end of a serial line.
+pub trait FarEnd: Send + 'static {
+    /// Takes bytes of the host at `now` (growing); what is answered is appended to `out`.
+    fn take(&mut self, now: Duration, bytes: &[u8], out: &mut Vec<u8>);
+}
+
+/// A running device. Dropping it is pulling the cable.
+pub struct PseudoTerminal<T> {
+    device: Arc<Mutex<T>>,
     path: String,
     link: Option<PathBuf>,
     end: Arc<AtomicBool>,
     thread: Option<thread::JoinHandle<()>>,
 }
 
-impl BoardsTerminal {
+impl<T: FarEnd> PseudoTerminal<T> {
     /// Opens a pseudo-terminal; `link` is a name for its path, replaced where there is one.
     ///
     /// # Errors
     /// No pseudo-terminal, no thread, or the link cannot be made.
-    pub fn start(boards: SimulatedBoards, link: Option<&Path>) -> std::io::Result<Self> {
-        Self::start_shared(Arc::new(Mutex::new(boards)), link)
+    pub fn start(device: T, link: Option<&Path>) -> std::io::Result<Self> {
+        Self::start_shared(Arc::new(Mutex::new(device)), link)
     }
 
-    /// The same with boards that outlive their cable.
+    /// The same with a device that outlives its cable.
     ///
     /// # Errors
     /// As [`Self::start`].
-    pub fn start_shared(
-        boards: Arc<Mutex<SimulatedBoards>>,
-        link: Option<&Path>,
-    ) -> std::io::Result<Self> {
+    pub fn start_shared(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
         let (mut master, slave) = TTYPort::pair().map_err(std::io::Error::from)?;
         let path = slave.name().unwrap_or_default();
         drop(slave); // it is locked: the driver opens the path itself
@@ -50,12 +52,12 @@ impl BoardsTerminal {
         }
         master.set_timeout(LOOK).map_err(std::io::Error::from)?;
         let end = Arc::new(AtomicBool::new(false));
-        let (ended, answering) = (Arc::clone(&end), Arc::clone(&boards));
+        let (ended, answering) = (Arc::clone(&end), Arc::clone(&device));
         let thread = thread::Builder::new()
-            .name("spidar-boards".to_owned())
+            .name("far-end".to_owned())
             .spawn(move || answer(master, &answering, &ended))?;
         Ok(Self {
-            boards,
+            device,
             path,
             link: link.map(Path::to_owned),
             end,
@@ -69,13 +71,13 @@ impl BoardsTerminal {
         &self.path
     }
 
-    /// The boards.
-    pub fn boards(&self) -> MutexGuard<'_, SimulatedBoards> {
-        self.boards.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The device.
+    pub fn device(&self) -> MutexGuard<'_, T> {
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Drop for BoardsTerminal {
+impl<T> Drop for PseudoTerminal<T> {
     fn drop(&mut self) {
         self.end.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -87,7 +89,7 @@ impl Drop for BoardsTerminal {
     }
 }
 
-fn answer(mut master: TTYPort, boards: &Mutex<SimulatedBoards>, end: &AtomicBool) {
+fn answer<T: FarEnd>(mut master: TTYPort, device: &Mutex<T>, end: &AtomicBool) {
     let mut bytes = [0; 512];
     let mut out = Vec::with_capacity(512);
     while !end.load(Ordering::Relaxed) {
@@ -100,9 +102,9 @@ fn answer(mut master: TTYPort, boards: &Mutex<SimulatedBoards>, end: &AtomicBool
             }
         };
         out.clear();
-        let mut boards = boards.lock().unwrap_or_else(PoisonError::into_inner);
-        boards.take(monotonic_now(), &bytes[..count], &mut out);
-        drop(boards);
+        let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
+        device.take(monotonic_now(), &bytes[..count], &mut out);
+        drop(device);
         if master.write_all(&out).is_err() {
             thread::sleep(LOOK);
         }
