@@ -10,6 +10,8 @@ use taut_plant::Grip;
 use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
 
 use crate::device::Device;
+#[cfg(unix)]
+use crate::devices::WoodenSettings;
 use crate::devices::{
     Anchor, ArmDevice, CapMode, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError,
     SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
@@ -34,7 +36,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 8] = [
+pub const DRIVERS: [Driver; 9] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -59,6 +61,11 @@ pub const DRIVERS: [Driver; 8] = [
         name: "polhem",
         form: "polhem:PORT[,axes=y -x z,scale=S,anchor=start|workbench]",
         what: "a Polhem arm on its text board: six degrees of freedom, force without torque",
+    },
+    Driver {
+        name: "wooden",
+        form: "wooden[=PATH][,model=NAME,axes=y -x z,scale=S,anchor=start|workbench]",
+        what: "a WoodenHaptics arm, or a kin of it, on its HID board: force without torque",
     },
     Driver {
         name: "space-mouse",
@@ -106,6 +113,9 @@ pub enum InputChoice {
     Spidar(Box<SpidarUartSettings>),
     /// [`crate::ArmDevice`] on a serial port.
     Polhem(Box<PolhemSettings>),
+    /// [`crate::ArmDevice`] on a HID board.
+    #[cfg(unix)]
+    Wooden(Box<WoodenSettings>),
 }
 
 /// Why a device cannot be opened.
@@ -132,6 +142,10 @@ pub enum InputError {
     #[cfg(unix)]
     #[error(transparent)]
     Polhem(#[from] crate::polhem::PolhemError),
+    /// The WoodenHaptics board.
+    #[cfg(unix)]
+    #[error(transparent)]
+    Wooden(#[from] crate::wooden::WoodenError),
     /// A driver that is not here.
     #[error("devices on serial ports can be used on Unix only")]
     NotHere,
@@ -159,6 +173,8 @@ impl InputChoice {
             Self::Haply(settings) => Some(settings.force_device()),
             Self::Spidar(settings) => Some(settings.force_device()),
             Self::Polhem(settings) => Some(settings.force_device()),
+            #[cfg(unix)]
+            Self::Wooden(settings) => Some(settings.force_device()),
         }
     }
 
@@ -176,6 +192,12 @@ impl InputChoice {
             #[cfg(unix)]
             Self::Polhem(settings) => {
                 let board = crate::polhem::PolhemBoard::open(&settings.path, priority)?;
+                Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
+            }
+            #[cfg(unix)]
+            Self::Wooden(settings) => {
+                let path = settings.path.clone();
+                let board = crate::wooden::WoodenBoard::open(path, settings.model, priority)?;
                 Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
             }
             #[cfg(not(unix))]
@@ -273,6 +295,10 @@ impl FromStr for DeviceChoice {
             ("polhem", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Polhem(
                 Box::new(polhem_settings(rest)?),
             ))),
+            #[cfg(unix)]
+            ("wooden", None) => Ok(Self::Input(InputChoice::Wooden(Box::new(wooden_settings(
+                rest,
+            )?)))),
             ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
                 rest,
             )?)))),
@@ -386,6 +412,32 @@ fn polhem_settings(text: &str) -> Result<PolhemSettings, UnknownDevice> {
     let mut settings = PolhemSettings::at(path);
     for option in options.split(',').filter(|option| !option.is_empty()) {
         let mut option = OptionText::new("polhem", option);
+        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+#[cfg(unix)]
+fn wooden_settings(text: &str) -> Result<WoodenSettings, UnknownDevice> {
+    use crate::wooden::{WOODEN_MODELS, WoodenModel};
+
+    let mut settings = WoodenSettings::default();
+    let (path, options) = match text.strip_prefix('=') {
+        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
+        None => ("", text.trim_start_matches(',')),
+    };
+    settings.path = (!path.is_empty()).then(|| path.into());
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("wooden", option);
+        if let Some(model) = option.asked("model") {
+            settings.model = WoodenModel::named(model).ok_or_else(|| {
+                let names: Vec<_> = WOODEN_MODELS.iter().map(|model| model.name).collect();
+                option.wrong("model", names.join(" or "))
+            })?;
+        }
         option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
         option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
         option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
@@ -628,10 +680,11 @@ mod tests {
             ("simulatd", "did you mean `simulated`?"),
             (
                 "phantom",
-                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, space-mouse",
+                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, wooden, space-mouse",
             ),
             ("spidar", "write spidar:PORT"),
             ("spidar:", "write spidar:PORT"),
+            ("wooden,model=phantom", "must be woodenhaptics-2019 or"),
             ("polhem", "write polhem:PORT"),
             ("polhem:/dev/x,scal=1", "did you mean `scale`?"),
             ("spidar:/dev/x,geometry=nothing", "g6x4r"),

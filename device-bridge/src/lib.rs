@@ -5,6 +5,7 @@
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
 //! - [`ArmDevice`]: a force device that people own, with its service simulated in [`haply`].
+//! - [`spidar_uart`], [`polhem`], [`wooden`]: more of them, each with its simulation ([`execute_simulation`] plays one as a process).
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -42,6 +43,8 @@ mod simulated_strings;
 pub mod spidar_uart;
 mod trace_file;
 mod vrpn;
+#[cfg(unix)]
+pub mod wooden;
 
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
@@ -52,6 +55,8 @@ pub use choice::{
 };
 pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
+#[cfg(unix)]
+pub use devices::WoodenSettings;
 pub use devices::{
     Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
     Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,

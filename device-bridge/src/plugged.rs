@@ -14,7 +14,11 @@ pub struct PluggedPort {
     pub device: Option<String>,
 }
 
-/// The serial ports on USB, any of which may be a SPIDAR's.
+/// USB number of PJRC's boards.
+#[cfg(unix)]
+const TEENSY: u16 = 0x16c0;
+
+/// The serial ports on USB, any of which may be a SPIDAR's or a Polhem's, and WoodenHaptics' HID boards.
 ///
 /// # Errors
 /// The system does not say, in words for people.
@@ -26,13 +30,42 @@ pub fn plugged_ports() -> Result<Vec<PluggedPort>, String> {
             return None;
         };
         let maker = usb.product.or(usb.manufacturer).unwrap_or_default();
+        // Polhem's text board is a Teensy; any adapter may be a SPIDAR's.
+        let driver = if usb.vid == TEENSY {
+            "polhem"
+        } else {
+            "spidar"
+        };
         Some(PluggedPort {
             what: format!("{:04x}:{:04x}, {maker}", usb.vid, usb.pid),
-            device: Some(format!("spidar:{}", port.port_name)),
+            device: Some(format!("{driver}:{}", port.port_name)),
             path: port.port_name,
         })
     });
-    Ok(on_usb.collect())
+    Ok(on_usb.chain(hid_boards()).collect())
+}
+
+/// WoodenHaptics' boards, which are no serial ports.
+#[cfg(all(unix, feature = "hid"))]
+fn hid_boards() -> Vec<PluggedPort> {
+    let Ok(hid) = hidapi::HidApi::new() else {
+        return Vec::new(); // no HID on this machine
+    };
+    let board = |device: &hidapi::DeviceInfo| {
+        let ids = (device.vendor_id(), device.product_id());
+        let path = device.path().to_string_lossy().into_owned();
+        crate::wooden::IDS.contains(&ids).then(|| PluggedPort {
+            what: format!("{:04x}:{:04x}, HID", ids.0, ids.1),
+            device: Some(format!("wooden={path}")),
+            path,
+        })
+    };
+    hid.device_list().filter_map(board).collect()
+}
+
+#[cfg(all(unix, not(feature = "hid")))]
+fn hid_boards() -> Vec<PluggedPort> {
+    Vec::new()
 }
 
 /// None is looked for here.

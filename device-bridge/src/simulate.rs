@@ -43,6 +43,9 @@ enum Played {
     /// A Polhem arm's text board, on a pseudo-terminal
     #[cfg(unix)]
     Polhem(PlayedPolhem),
+    /// A WoodenHaptics arm's HID board, on a socket
+    #[cfg(unix)]
+    Wooden(PlayedWooden),
 }
 
 #[derive(Clone, Debug, clap::Args)]
@@ -84,6 +87,21 @@ struct PlayedPolhem {
     /// A name for the pseudo-terminal; without it the system's own, which is printed.
     #[arg(long, value_name = "FILE")]
     link: Option<PathBuf>,
+
+    #[command(flatten)]
+    hand: PlayedHand,
+}
+
+#[cfg(unix)]
+#[derive(Clone, Debug, clap::Args)]
+struct PlayedWooden {
+    /// Name of the socket.
+    #[arg(long, value_name = "FILE", default_value = "/tmp/taut-wooden")]
+    socket: PathBuf,
+
+    /// Which arm, as in `--device wooden,model=NAME`.
+    #[arg(long, value_name = "NAME", default_value = "woodenhaptics-2019")]
+    model: String,
 
     #[command(flatten)]
     hand: PlayedHand,
@@ -141,6 +159,15 @@ enum SimulateError {
     #[cfg(unix)]
     #[error("no pseudo-terminal can be had: {0}; name a file that can be made by --link")]
     Terminal(std::io::Error),
+    #[cfg(unix)]
+    #[error("{path}: {cause}; name a file that can be made by --socket", path = path.display())]
+    Socket {
+        path: PathBuf,
+        cause: std::io::Error,
+    },
+    #[cfg(unix)]
+    #[error("there is no model `{0}`; `taut bridge --device wooden,model=?` names them")]
+    Model(String),
     #[error("--duration is {0}, which is out of range; use 0 to 1e9 s")]
     Duration(f64),
     #[error("signals cannot be listened to ({0}); end other programs or raise the limits")]
@@ -160,6 +187,8 @@ enum PlayedReport {
     },
     #[cfg(unix)]
     Spidar { cycles: u64, digits: [i16; 8] },
+    #[cfg(unix)]
+    Wooden { reports: u64, largest_force_n: f64 },
     #[cfg(unix)]
     Polhem { lines: u64, largest_force_n: f64 },
 }
@@ -198,6 +227,8 @@ fn play(args: &SimulateArgs) -> Result<PlayedReport, SimulateError> {
         Played::Spidar(spidar) => play_spidar(spidar, over),
         #[cfg(unix)]
         Played::Polhem(polhem) => play_polhem(polhem, over),
+        #[cfg(unix)]
+        Played::Wooden(wooden) => play_wooden(wooden, over),
     }
 }
 
@@ -293,6 +324,44 @@ fn play_polhem(
     let arm = terminal.device();
     Ok(PlayedReport::Polhem {
         lines: arm.lines(),
+        largest_force_n: arm.largest_force(),
+    })
+}
+
+#[cfg(unix)]
+fn play_wooden(
+    args: &PlayedWooden,
+    over: impl Fn() -> bool,
+) -> Result<PlayedReport, SimulateError> {
+    use std::sync::{Arc, Mutex};
+
+    use crate::wooden::{SimulatedWooden, WoodenModel, WoodenService};
+
+    let model = WoodenModel::named(&args.model);
+    let model = model.ok_or_else(|| SimulateError::Model(args.model.clone()))?;
+    let tremor = Tremor::new(Tremor::TYPICAL_RMS, args.hand.seed);
+    let arm = SimulatedWooden::new(
+        model,
+        args.hand.hand.into(),
+        args.hand.path()?,
+        Some(tremor),
+    );
+    let service = WoodenService::start(Arc::new(Mutex::new(arm)), &args.socket);
+    let service = service.map_err(|cause| SimulateError::Socket {
+        path: args.socket.clone(),
+        cause,
+    })?;
+    let (path, name) = (args.socket.display(), model.name);
+    let told = console::print(format!(
+        "a simulated {name} is at {path}; read it by: taut bridge --device wooden={path},model={name}"
+    ));
+    told.map_err(SimulateError::Output)?;
+    while !over() {
+        thread::sleep(LOOK);
+    }
+    let arm = service.arm();
+    Ok(PlayedReport::Wooden {
+        reports: arm.reports(),
         largest_force_n: arm.largest_force(),
     })
 }

@@ -14,6 +14,8 @@ pub(crate) mod space_mouse;
 pub(crate) mod spidar;
 pub(crate) mod spidar_uart;
 pub(crate) mod vrpn;
+#[cfg(unix)]
+pub(crate) mod wooden;
 
 pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
 pub use glide::Glide;
@@ -38,3 +40,5 @@ pub use taut_plant::{
     TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use vrpn::{Anchor, TrackerReader, VrpnDevice, VrpnSettings};
+#[cfg(unix)]
+pub use wooden::WoodenSettings;

@@ -12,7 +12,7 @@ use taut_spidar::STRINGS;
 const FASTEST: f64 = 5.0;
 /// Fastest change of that, m/s^2, of one reading alone.
 const HARDEST: f64 = 150.0;
-/// Longest time over which a hand's motion foretells a count, s: what it may do meanwhile grows with the square.
+/// Time from which on a hand is allowed no more, s: what it may do grows with the square, and so does what damage may.
 const LONGEST_STEP: f64 = 2.5e-3;
 /// Counts that rounding and jitter of the readings' times may add.
 const SLACK: f64 = 2.0;
@@ -131,12 +131,10 @@ impl Counters {
         change.iter().all(|change| f64::from(change.abs()) <= most)
     }
 
-    /// As a hand goes on, over a time so short that this says much.
+    /// As a hand goes on. After a longer time no more is allowed than after a short one, so that little passes by chance.
     fn is_smooth(&self, change: &[i32; STRINGS], rates: &[f64; STRINGS], span: f64) -> bool {
-        let most = HARDEST / self.metres_per_count * span * span + SLACK;
-        if span > LONGEST_STEP {
-            return false;
-        }
+        let foretold = span.min(LONGEST_STEP);
+        let most = HARDEST / self.metres_per_count * foretold * foretold + SLACK;
         let off = |i: usize| (f64::from(change[i]) - rates[i] * span).abs();
         (0..STRINGS).all(|i| off(i) <= most)
     }
