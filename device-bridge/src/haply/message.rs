@@ -244,7 +244,8 @@ impl ArmMessage {
         let vector = |xyz: Option<Xyz>, what, limit: f64| {
             let Some(xyz) = xyz else { return Ok(None) };
             let vector = [xyz.x, xyz.y, xyz.z];
-            match vector.into_iter().find(|value| !(value.abs() <= limit)) {
+            let fits = |value: &f64| value.abs() <= limit; // false for NaN
+            match vector.into_iter().find(|value| !fits(value)) {
                 None => Ok(Some(vector)),
                 Some(value) => Err(MessageError::OutOfRange {
                     device: id.clone(),
