@@ -121,7 +121,10 @@ fn a_board_that_is_not_there_is_a_sentence() {
 
 /// The wire without a socket, under a virtual clock.
 #[derive(Clone)]
-struct Direct(Arc<Mutex<(SimulatedWooden, ArmState, [f64; 3], [i16; 6])>>);
+struct Direct(Arc<Mutex<Ends>>);
+
+/// Arm, newest state, force and encoders.
+type Ends = (SimulatedWooden, ArmState, [f64; 3], [i16; 6]);
 
 const MODEL: WoodenModel = WOODEN_MODELS[0];
 

@@ -161,7 +161,8 @@ mod tests {
     #[test]
     fn a_line_is_read_to_the_letter() {
         let frame = Frame::parse(&line("12.5 -3.25 0.125 0.1 -0.2 0.3 -0.4 1")).expect("a line");
-        assert_eq!(frame.position, [0.0125, -0.00325, 0.000125]);
+        let micrometres = frame.position.map(|part| (part * 1e6).round());
+        assert_eq!(micrometres, [12_500.0, -3250.0, 125.0]);
         assert_eq!((frame.angles, frame.info), ([0.1, -0.2, 0.3, -0.4], 1));
         assert_eq!(
             frame.line().map(|line| line.to_vec()),
