@@ -26,6 +26,8 @@ const PHASE: Duration = Duration::from_micros(350);
 const ANSWER_WITHIN: Duration = Duration::from_millis(3);
 /// Without a believed line for this long the port is opened anew.
 const GIVEN_UP: Duration = Duration::from_millis(300);
+/// Lines of zero force at an end, in case one is lost.
+const LAST_LINES: u32 = 3;
 /// Between two attempts.
 const RETRY: Duration = Duration::from_millis(200);
 /// What a line's lengths and angles are rounded to where they are judged: 10 um, 0.1 mrad.
@@ -160,7 +162,7 @@ impl Line {
             let lost = match next.take().map_or_else(|| open(&self.path), Ok) {
                 Ok(mut port) => {
                     let lost = self.turn(&mut port);
-                    let _ = port.write_all(&force_frame(&[0.0; 3])); // gone as well, if it is not taken
+                    self.let_go(&mut port);
                     match lost {
                         Ok(()) => return,
                         Err(error) => error.to_string(),
@@ -183,6 +185,18 @@ impl Line {
 
     fn is_over(&self) -> bool {
         self.end.load(Ordering::Relaxed)
+    }
+
+    /// Zero, as far as the line still takes it: said until it is answered, because a port that is closed may drop what it has not sent.
+    fn let_go(&mut self, port: &mut Port) {
+        for _ in 0..LAST_LINES {
+            let said = port
+                .write_all(&force_frame(&[0.0; 3]))
+                .and_then(|()| port.flush());
+            if said.is_err() || self.newest_frame(port).is_err() {
+                return;
+            }
+        }
     }
 
     fn turn(&mut self, port: &mut Port) -> std::io::Result<()> {
