@@ -1,18 +1,24 @@
 //! Which device: one word on the command line, with options after commas.
 //!
-//! `simulated,strings=wb`, `trace:FILE`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
+//! `simulated,strings=wb`, `trace:FILE`, `haply=HOST:PORT`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use taut_vrpn::{Address, AddressError, SensorMapping};
+use taut_plant::Grip;
+use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
 
 use crate::device::Device;
+#[cfg(unix)]
+use crate::devices::WoodenSettings;
 use crate::devices::{
-    Anchor, CapMode, CapSettings, HidPort, SourceError, SpaceMouse, VrpnDevice, VrpnSettings,
+    Anchor, ArmDevice, CapMode, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError,
+    SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
+use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
+use crate::simulated_strings::string_geometry;
 use crate::vrpn::{VrpnMode, VrpnSource};
 
 /// Similarity (Jaro-Winkler, 0 to 1) from which a name is offered for an unknown one.
@@ -30,7 +36,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 5] = [
+pub const DRIVERS: [Driver; 9] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -40,6 +46,26 @@ pub const DRIVERS: [Driver; 5] = [
         name: "trace",
         form: "trace:FILE",
         what: "a recorded trace of poses: no force",
+    },
+    Driver {
+        name: "haply",
+        form: "haply[=HOST:PORT][,arm=ID,grip=yes|no,axes=x y z,scale=S,anchor=start|workbench]",
+        what: "a Haply Inverse arm behind its service, with or without a VerseGrip: force without torque",
+    },
+    Driver {
+        name: "spidar",
+        form: "spidar:PORT[,geometry=g6x4r|NAME|FILE,axes=x -z y]",
+        what: "a SPIDAR-G on its UART motor boards: six degrees of freedom, force and torque",
+    },
+    Driver {
+        name: "polhem",
+        form: "polhem:PORT[,axes=y -x z,scale=S,anchor=start|workbench]",
+        what: "a Polhem arm on its text board: six degrees of freedom, force without torque",
+    },
+    Driver {
+        name: "wooden",
+        form: "wooden[=PATH][,model=NAME,axes=y -x z,scale=S,anchor=start|workbench]",
+        what: "a WoodenHaptics arm, or a kin of it, on its HID board: force without torque",
     },
     Driver {
         name: "space-mouse",
@@ -68,22 +94,31 @@ pub enum DeviceChoice {
     },
     /// [`crate::RecordedDevice`] of a trace file.
     Trace(PathBuf),
-    /// An input device of this machine or network.
+    /// A device of this machine or network, found when it is opened.
     Input(InputChoice),
     /// The mouse of a render window, which joins as a bridge of its own.
     Mouse,
 }
 
-/// An input device without force.
+/// A device that is opened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum InputChoice {
     /// [`SpaceMouse`].
     SpaceMouse(CapSettings),
     /// [`VrpnDevice`].
     Vrpn(Box<VrpnSettings>),
+    /// [`crate::ArmDevice`] behind a service.
+    Haply(Box<HaplySettings>),
+    /// [`crate::SpidarDevice`] on motor boards.
+    Spidar(Box<SpidarUartSettings>),
+    /// [`crate::ArmDevice`] on a serial port.
+    Polhem(Box<PolhemSettings>),
+    /// [`crate::ArmDevice`] on a HID board.
+    #[cfg(unix)]
+    Wooden(Box<WoodenSettings>),
 }
 
-/// Why an input device cannot be read.
+/// Why a device cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// The SpaceMouse.
@@ -97,18 +132,76 @@ pub enum InputError {
         /// What the system says.
         cause: std::io::Error,
     },
+    /// The Inverse service.
+    #[error(transparent)]
+    Haply(#[from] HaplyError),
+    /// The motor boards.
+    #[error(transparent)]
+    Spidar(#[from] SpidarUartError),
+    /// The Polhem board.
+    #[cfg(unix)]
+    #[error(transparent)]
+    Polhem(#[from] crate::polhem::PolhemError),
+    /// The WoodenHaptics board.
+    #[cfg(unix)]
+    #[error(transparent)]
+    Wooden(#[from] crate::wooden::WoodenError),
+    /// A driver that is not here.
+    #[error("devices on serial ports can be used on Unix only")]
+    NotHere,
+}
+
+/// What a device with motors is declared to be, before it is opened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceDevice {
+    /// Its mechanics, in its own metres.
+    pub grip: Grip,
+    /// From a reading to the force that answers it, beyond the loop's own period, s.
+    pub delay_s: f64,
+    /// Metres on the workbench of one of its own.
+    pub scale: f64,
+    /// Whether it can turn a hand, not only push it.
+    pub renders_torque: bool,
 }
 
 impl InputChoice {
-    /// Starts to read it.
+    /// What its motors are declared to bear; `None` without motors.
+    #[must_use]
+    pub fn force_device(&self) -> Option<ForceDevice> {
+        match self {
+            Self::SpaceMouse(_) | Self::Vrpn(_) => None,
+            Self::Haply(settings) => Some(settings.force_device()),
+            Self::Spidar(settings) => Some(settings.force_device()),
+            Self::Polhem(settings) => Some(settings.force_device()),
+            #[cfg(unix)]
+            Self::Wooden(settings) => Some(settings.force_device()),
+        }
+    }
+
+    /// Starts to read it. A driver with a thread that a force depends on asks for real-time priority `priority` for it; 0 asks for none.
     ///
     /// # Errors
     /// [`InputError`]. A tracker that does not answer yet is no error: it is waited for.
-    pub fn open(&self, placement: Placement) -> Result<Box<dyn Device>, InputError> {
+    pub fn open(&self, placement: Placement, priority: u8) -> Result<Box<dyn Device>, InputError> {
         Ok(match self {
             Self::SpaceMouse(settings) => {
                 Box::new(SpaceMouse::open(Box::new(HidPort), *settings, placement)?)
             }
+            Self::Haply(settings) => Box::new(settings.open(placement, priority)?),
+            Self::Spidar(settings) => settings.open(&placement, priority)?,
+            #[cfg(unix)]
+            Self::Polhem(settings) => {
+                let board = crate::polhem::PolhemBoard::open(&settings.path, priority)?;
+                Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
+            }
+            #[cfg(unix)]
+            Self::Wooden(settings) => {
+                let path = settings.path.clone();
+                let board = crate::wooden::WoodenBoard::open(path, settings.model, priority)?;
+                Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
+            }
+            #[cfg(not(unix))]
+            Self::Polhem(_) => return Err(InputError::NotHere),
             Self::Vrpn(settings) => {
                 let device = VrpnDevice::start(settings, placement);
                 Box::new(device.map_err(|cause| InputError::Vrpn {
@@ -142,6 +235,12 @@ pub enum UnknownDevice {
     /// The tracker's address.
     #[error(transparent)]
     Address(#[from] AddressError),
+    /// The Inverse service's address.
+    #[error(transparent)]
+    Service(#[from] HaplyAddressError),
+    /// The geometry of a string-driven device.
+    #[error("{0}")]
+    Geometry(String),
     /// No such option.
     #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
     Option {
@@ -172,7 +271,7 @@ impl FromStr for DeviceChoice {
     type Err = UnknownDevice;
 
     fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        let end = text.find([':', ',']).unwrap_or(text.len());
+        let end = text.find([':', ',', '=']).unwrap_or(text.len());
         let (name, rest) = text.split_at(end);
         let Some(driver) = DRIVERS.iter().find(|driver| driver.name == name) else {
             return Err(UnknownDevice::Name {
@@ -190,6 +289,19 @@ impl FromStr for DeviceChoice {
             }),
             ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
             ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
+            ("spidar", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Spidar(
+                Box::new(spidar_settings(rest)?),
+            ))),
+            ("polhem", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Polhem(
+                Box::new(polhem_settings(rest)?),
+            ))),
+            #[cfg(unix)]
+            ("wooden", None) => Ok(Self::Input(InputChoice::Wooden(Box::new(wooden_settings(
+                rest,
+            )?)))),
+            ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
+                rest,
+            )?)))),
             ("space-mouse", None) => {
                 let settings = cap_settings(rest.trim_start_matches(','))?;
                 Ok(Self::Input(InputChoice::SpaceMouse(settings)))
@@ -208,7 +320,7 @@ fn strings_option(options: &str) -> Result<Option<String>, UnknownDevice> {
         let mut option = OptionText::new("simulated", option);
         if let Some(named) = option.asked("strings") {
             if named.is_empty() {
-                return Err(option.wrong("strings", "g6x3r, g6x5r, wb or a geometry file"));
+                return Err(option.wrong("strings", "g6x3r, g6x4r, g6x5r, wb or a geometry file"));
             }
             strings = Some(named.to_owned());
         }
@@ -260,6 +372,103 @@ fn vrpn_settings(text: &str) -> Result<VrpnSettings, UnknownDevice> {
             "max-age" => settings.max_age = Duration::from_secs_f64(max_age.unwrap_or(0.1)),
             _ => {}
         }
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+fn spidar_settings(text: &str) -> Result<SpidarUartSettings, UnknownDevice> {
+    let (path, options) = text.split_once(',').unwrap_or((text, ""));
+    let (mut named, mut axes) = ("g6x4r", SpidarUartSettings::AXES);
+    let mut right = true;
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("spidar", option);
+        named = option.asked("geometry").unwrap_or(named);
+        let mut wanted = Axes::SAME;
+        option.parsed("axes", "such as `x -z y`", &mut wanted)?;
+        if option.name == "axes" {
+            right = wanted.matrix().determinant() > 0.0;
+            axes = wanted;
+        }
+        if !right {
+            return Err(option.wrong(
+                "axes",
+                "right-handed, such as `x -z y`: a frame has no mirror image",
+            ));
+        }
+        option.finish()?;
+    }
+    let geometry =
+        string_geometry(named).map_err(|error| UnknownDevice::Geometry(error.to_string()))?;
+    Ok(SpidarUartSettings {
+        path: path.to_owned(),
+        geometry,
+        axes,
+    })
+}
+
+fn polhem_settings(text: &str) -> Result<PolhemSettings, UnknownDevice> {
+    let (path, options) = text.split_once(',').unwrap_or((text, ""));
+    let mut settings = PolhemSettings::at(path);
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("polhem", option);
+        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+#[cfg(unix)]
+fn wooden_settings(text: &str) -> Result<WoodenSettings, UnknownDevice> {
+    use crate::wooden::{WOODEN_MODELS, WoodenModel};
+
+    let mut settings = WoodenSettings::default();
+    let (path, options) = match text.strip_prefix('=') {
+        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
+        None => ("", text.trim_start_matches(',')),
+    };
+    settings.path = (!path.is_empty()).then(|| path.into());
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("wooden", option);
+        if let Some(model) = option.asked("model") {
+            settings.model = WoodenModel::named(model).ok_or_else(|| {
+                let names: Vec<_> = WOODEN_MODELS.iter().map(|model| model.name).collect();
+                option.wrong("model", names.join(" or "))
+            })?;
+        }
+        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        option.finish()?;
+    }
+    Ok(settings)
+}
+
+fn haply_settings(text: &str) -> Result<HaplySettings, UnknownDevice> {
+    let mut settings = HaplySettings::default();
+    let (address, options) = match text.strip_prefix('=') {
+        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
+        None => ("", text.trim_start_matches(',')),
+    };
+    if text.starts_with('=') {
+        settings.address = address.parse()?;
+    }
+    for option in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("haply", option);
+        let exchange = &mut settings.exchange;
+        if let Some(arm) = option.asked("arm") {
+            if arm.is_empty() {
+                return Err(option.wrong("arm", "the service's name of the arm, such as 04C3"));
+            }
+            exchange.arm = Some(arm.to_owned());
+        }
+        let yes_or_no = [("yes", true), ("no", false)];
+        option.choice("grip", &yes_or_no, &mut exchange.with_grip)?;
+        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
         option.finish()?;
     }
     Ok(settings)
@@ -411,6 +620,7 @@ mod tests {
         for driver in DRIVERS {
             let text = short(driver.form)
                 .replace("TRACKER@HOST", "Tracker0@host")
+                .replace("PORT", "/dev/ttyUSB0")
                 .replace("FILE", "a,b.csv");
             choice(&text);
         }
@@ -447,6 +657,20 @@ mod tests {
             (0.001, Anchor::Workbench)
         );
         assert_eq!(vrpn.max_age, Duration::from_millis(200));
+        let DeviceChoice::Input(InputChoice::Haply(haply)) =
+            choice("haply=lab:10001,arm=04C3,grip=no,axes=x -z y,scale=2,anchor=workbench")
+        else {
+            panic!();
+        };
+        assert_eq!(haply.address.to_string(), "lab:10001");
+        assert_eq!(haply.exchange.arm.as_deref(), Some("04C3"));
+        assert!(!haply.exchange.with_grip);
+        assert_eq!(
+            (haply.mapping.scale, haply.anchor),
+            (2.0, Anchor::Workbench)
+        );
+        let plain = DeviceChoice::Input(InputChoice::Haply(Box::default()));
+        assert_eq!(choice("haply"), plain);
     }
 
     #[test]
@@ -454,11 +678,26 @@ mod tests {
         for (text, part) in [
             ("spacemouse", "did you mean `space-mouse`?"),
             ("simulatd", "did you mean `simulated`?"),
-            ("phantom", "use simulated, trace:FILE, space-mouse"),
+            (
+                "phantom",
+                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, wooden, space-mouse",
+            ),
+            ("spidar", "write spidar:PORT"),
+            ("spidar:", "write spidar:PORT"),
+            ("wooden,model=phantom", "must be woodenhaptics-2019 or"),
+            ("polhem", "write polhem:PORT"),
+            ("polhem:/dev/x,scal=1", "did you mean `scale`?"),
+            ("spidar:/dev/x,geometry=nothing", "g6x4r"),
+            ("spidar:/dev/x,axes=y x z", "right-handed"),
+            ("haply=", "write HOST or HOST:PORT"),
+            ("haply:10001", "write haply[=HOST:PORT]"),
+            ("haply=pc:1,grip=maybe", "must be yes or no"),
+            ("haply,scale=0", "a number from 0.01 to 100"),
+            ("haply,arms=1", "did you mean `arm`?"),
             ("trace:", "write trace:FILE"),
             ("trace", "write trace:FILE"),
             ("simulated,hand=firm", "it has strings"),
-            ("simulated,strings", "must be g6x3r, g6x5r, wb or"),
+            ("simulated,strings", "must be g6x3r, g6x4r, g6x5r, wb or"),
             ("simulated:wb", "write simulated"),
             ("vrpn", "write vrpn:TRACKER@HOST"),
             ("vrpn:Tracker0", "DEVICE@HOST:PORT"),

@@ -30,7 +30,7 @@ pub struct BridgeArgs {
     #[arg(long, value_name = "NAME", default_value = "bridge")]
     pub node: String,
 
-    /// Device: `simulated`, `trace:FILE`, `space-mouse`, `vrpn:TRACKER@HOST`; options below.
+    /// Device: `simulated`, `trace:FILE`, `haply`, `space-mouse`, `vrpn:TRACKER@HOST`; options below.
     #[arg(long, value_name = "D", default_value = "simulated")]
     pub device: DeviceChoice,
 

@@ -74,6 +74,19 @@ pub struct DeviceInfo {
     pub rate_hz: f64,
 }
 
+impl DeviceInfo {
+    /// What to tell a user once of a device that pushes and cannot turn; `None` for every other.
+    #[must_use]
+    pub fn renders_no_torque(&self) -> Option<String> {
+        (self.actuated_degrees_of_freedom == 3).then(|| {
+            format!(
+                "{} renders force and no torque ({} degrees of freedom sensed, 3 actuated): torques are dropped, not turned into force",
+                self.name, self.sensed_degrees_of_freedom
+            )
+        })
+    }
+}
+
 /// The largest commands that a device renders faithfully. Infinite where there is no limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceLimits {

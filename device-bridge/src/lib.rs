@@ -4,6 +4,8 @@
 //!
 //! - [`Device`]: pose in, wrench out. [`SimulatedDevice`], [`RecordedDevice`], [`RemoteDevice`].
 //! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
+//! - [`ArmDevice`]: a force device that people own, with its service simulated in [`haply`].
+//! - [`spidar_uart`], [`polhem`], [`wooden`]: more of them, each with its simulation ([`execute_simulation`] plays one as a process).
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -22,43 +24,60 @@ mod device;
 mod device_loop;
 mod devices;
 pub mod edge;
+pub mod haply;
 mod own_stamps;
 mod placement;
+mod plugged;
+#[cfg(unix)]
+pub mod polhem;
 mod port;
+#[cfg(unix)]
+pub mod pseudo_terminal;
 pub mod realtime;
 mod report;
 pub mod service_manager;
 pub mod signals;
+mod simulate;
 mod simulated_strings;
+#[cfg(unix)]
+pub mod spidar_uart;
 mod trace_file;
 mod vrpn;
+#[cfg(unix)]
+pub mod wooden;
 
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
 pub use bridge_loop::{BridgeLoop, TickOutput};
 pub use choice::{
-    DRIVERS, DeviceChoice, Driver, InputChoice, InputError, UnknownDevice, drivers_help,
+    DRIVERS, DeviceChoice, Driver, ForceDevice, InputChoice, InputError, UnknownDevice,
+    drivers_help,
 };
 pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
+#[cfg(unix)]
+pub use devices::WoodenSettings;
 pub use devices::{
     Anchor, CapMode, CapSettings, CapState, Glide, HidPort, LedDevice, MODELS, Model, RateControl,
     Report, ReportPort, ReportSource, ShortReport, SourceError, SpaceMouse, Target, TrackerReader,
     VrpnDevice, VrpnSettings,
 };
 pub use devices::{
-    AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand, HandPreset, HeldStrings, MAX_EDGE_DELAY,
-    MinJerkPath, Motors, PathError, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
-    SpidarDevice, SpidarPlacement, Trace, TraceError, TraceRow, Tremor, TremorMotion, UnknownHand,
-    ViaPoint, min_jerk, string_grip,
+    ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand,
+    HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
+    PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
+    SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, TraceRow, Tremor,
+    TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
+pub use plugged::{PluggedPort, plugged_ports};
 pub use port::{
     ArmingState, Command, CommandSource, ContactBound, DevicePort, EnergyObserver, EventKind,
     Events, MAX_EVENTS_PER_TICK, Passivity, PassivitySettings, Reading, Rearm, SafetyEvent,
     SafetySettings, TickReport, UNIT_TOLERANCE, ValidationSettings, kind_of_fault,
 };
 pub use report::{BridgeReport, Quantiles};
+pub use simulate::{SimulateArgs, execute_simulation};
 pub use simulated_strings::{SimulatedSpidar, StringsError, simulated_spidar, string_geometry};
 pub use trace_file::{TraceFileError, read_trace, via_points};
 pub use vrpn::{TrackerFeed, TrackerState, UnknownVrpnMode, VrpnMode, VrpnSource};

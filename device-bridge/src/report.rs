@@ -57,6 +57,10 @@ pub struct Quantiles {
 pub struct BridgeReport {
     /// Name of the device.
     pub device: String,
+    /// Degrees of freedom in which it measures a pose.
+    pub sensed_degrees_of_freedom: u8,
+    /// Degrees of freedom in which it renders: with 3, force alone; torques are dropped.
+    pub actuated_degrees_of_freedom: u8,
     /// Server as given.
     pub server: String,
     /// Why the bridge ended: one sentence.
@@ -127,6 +131,13 @@ impl fmt::Display for BridgeReport {
             self.packets_lost,
             self.sessions,
         )?;
+        if self.actuated_degrees_of_freedom == 3 {
+            writeln!(
+                out,
+                "force alone was rendered, torque was dropped: {} degrees of freedom sensed, 3 actuated",
+                self.sensed_degrees_of_freedom
+            )?;
+        }
         for (name, quantiles) in [
             ("period", &self.period_us),
             ("wrench age", &self.wrench_age_us),

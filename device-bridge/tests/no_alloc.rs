@@ -6,9 +6,10 @@ use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
-    AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits, DevicePort, DeviceSample, Grip, Hand,
-    MinJerkPath, Passivity, PassivitySettings, Pose, RecordedDevice, RemoteDevice, SafetySettings,
-    SimulatedDevice, TraceRow, Tremor,
+    ArmDevice, ArmPort, ArmState, AtEnd, Command, DEFAULT_MAX_AGE, Device, DeviceLimits,
+    DevicePort, DeviceSample, Grip, Hand, HaplySettings, MinJerkPath, Passivity, PassivitySettings,
+    Placement, Pose, RecordedDevice, RemoteDevice, SafetySettings, SimulatedDevice, TraceRow,
+    Tremor,
 };
 use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;
@@ -71,6 +72,37 @@ fn a_recorded_device_does_not_allocate() {
     let trace = (0..100).map(row).collect();
     let device = RecordedDevice::new(trace, AtEnd::Loop, Point3::origin());
     drive(device.expect("a valid trace"), &mut |_| {});
+}
+
+/// What the thread of the Inverse service's client hands over.
+struct Told(triple_buffer::Output<ArmState>, [f64; 3]);
+
+impl ArmPort for Told {
+    fn newest(&mut self) -> ArmState {
+        *self.0.read()
+    }
+
+    fn push(&mut self, force: [f64; 3]) {
+        self.1 = force;
+    }
+}
+
+#[test]
+fn a_haply_arm_does_not_allocate() {
+    let (mut states, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
+    let placement = Placement::plain(Pose::identity(), Point3::origin());
+    let told = Box::new(Told(newest, [0.0; 3]));
+    let device = ArmDevice::new(told, HaplySettings::default().arm(), placement);
+    drive(device, &mut |tick| {
+        let height = 1e-3 * (tick as f64 * 0.01).sin();
+        states.write(ArmState {
+            reports: tick + 1,
+            is_usable: true,
+            position: [0.0, -0.1, 0.16 + height],
+            orientation: Some([1.0, 0.0, 0.0, 0.0]),
+            ..ArmState::default()
+        });
+    });
 }
 
 #[test]

@@ -95,6 +95,8 @@ pub enum Command {
     Render(crate::commands::arguments::RenderArgs),
     /// The device side, on this or another PC
     Bridge(taut_bridge::BridgeArgs),
+    /// Plays a device that is not at hand: speaks its wire, with a simulated arm and hand
+    SimulateDevice(taut_bridge::SimulateArgs),
     /// Runs the method offline on a device trace; the same input gives the same bytes
     Replay(ReplayArgs),
     /// Takes a live session's device trace, to be replayed
@@ -137,7 +139,7 @@ pub struct DemoArgs {
     /// How poses reach the render clients
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
-    /// What moves the god-object: `simulated`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
+    /// What moves the god-object: `simulated`, `haply`, `mouse`, `space-mouse`, `vrpn:TRACKER@HOST`, `trace:FILE`; options below
     /// (default: the scene's simulated hand)
     #[arg(long, value_name = "D", value_parser = device_text)]
     pub device: Option<String>,
@@ -383,7 +385,7 @@ pub struct ImportArgs {
     after_help = "Examples:\n  taut doctor --json\n  taut doctor --device g6x3r --out workspace.svg"
 )]
 pub struct DoctorArgs {
-    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x5r, wb), or a geometry file
+    /// Instead of this machine, examine a string-driven device: a shipped one (g6x3r, g6x4r, g6x5r, wb), or a geometry file
     #[arg(long, value_name = "NAME|FILE")]
     pub device: Option<String>,
     /// Where the picture of the device's workspace goes, an SVG file (default: NAME-workspace.svg)

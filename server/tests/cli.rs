@@ -34,8 +34,17 @@ fn refused<S: AsRef<std::ffi::OsStr>>(arguments: &[S], parts: &[&str]) {
 #[test]
 fn every_command_has_help_with_an_example() {
     for command in [
-        "demo", "serve", "render", "bridge", "replay", "record", "check", "import", "doctor",
+        "demo",
+        "serve",
+        "render",
+        "bridge",
+        "replay",
+        "record",
+        "check",
+        "import",
+        "doctor",
         "keys",
+        "simulate-device",
     ] {
         let output = taut(&[command, "--help"]);
         assert!(output.status.success(), "{command}");

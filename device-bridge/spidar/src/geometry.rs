@@ -24,6 +24,8 @@ pub struct Geometry {
     pub tension_max: f64,
     /// Amplifier input per tension, V/N, where it is known.
     pub volts_per_newton: Option<f64>,
+    /// Sign of the amplifier input that winds up: -1 where a motor turns the other way, else 1.
+    pub winding: PerString,
     /// Rotor and drum, kg m^2.
     pub motor_inertia: f64,
     /// Radius at which the string is wound, m.
@@ -37,8 +39,9 @@ pub struct Geometry {
 }
 
 /// The shipped files, by name.
-const SHIPPED: [(&str, &str, &str); 3] = [
+const SHIPPED: [(&str, &str, &str); 4] = [
     ("g6x3r", "g6x3r.toml", include_str!("../devices/g6x3r.toml")),
+    ("g6x4r", "g6x4r.toml", include_str!("../devices/g6x4r.toml")),
     ("g6x5r", "g6x5r.toml", include_str!("../devices/g6x5r.toml")),
     ("wb", "wb.toml", include_str!("../devices/wb.toml")),
 ];
@@ -143,7 +146,9 @@ impl Geometry {
     #[must_use]
     pub fn volts(&self, tensions: &PerString) -> Option<PerString> {
         let volts_per_newton = self.volts_per_newton?;
-        Some(tensions.map(|tension| tension * volts_per_newton))
+        Some(std::array::from_fn(|i| {
+            tensions[i] * volts_per_newton * self.winding[i]
+        }))
     }
 }
 
@@ -180,6 +185,22 @@ mod tests {
         assert_eq!(
             geometry.volts(&[10.0; 8]).map(|volts| volts[0]),
             Some(3.653)
+        );
+    }
+
+    #[test]
+    fn the_mdf_frame_has_its_own_order_and_windings() {
+        let Some(geometry) = Geometry::shipped("g6x4r") else {
+            panic!("shipped");
+        };
+        let volts = geometry.volts(&[1.0; 8]);
+        let signs = volts.map(|volts| volts.map(|volt| (volt * 100.0).round()));
+        assert_eq!(signs, Some([8.0, 8.0, -8.0, -8.0, -8.0, -8.0, 8.0, 8.0]));
+        let counts = geometry.metres_per_count.map(f64::signum);
+        assert_eq!(counts, [-1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0]);
+        assert!(
+            (geometry.half_width() - 0.069).abs() < 1e-12
+                && (geometry.arm() - 0.0225).abs() < 1e-12
         );
     }
 

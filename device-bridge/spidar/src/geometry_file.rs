@@ -86,6 +86,9 @@ impl Reader<'_> {
             tension_min: motor.tension_min,
             tension_max: motor.tension_max,
             volts_per_newton: motor.volts_per_newton,
+            winding: strings
+                .each_ref()
+                .map(|string| if string.current_reversed { -1.0 } else { 1.0 }),
             motor_inertia: motor.inertia,
             drum_radius: motor.drum_radius,
             motor_time_constant: motor.time_constant,
@@ -192,21 +195,17 @@ impl Reader<'_> {
 
     fn string(&mut self, table: &DeTable<'_>, at: usize) -> Option<TiedString> {
         const NAME: &str = "[[string]]";
-        self.known(table, NAME, &["motor", "grip", "reversed"]);
+        self.known(
+            table,
+            NAME,
+            &["motor", "grip", "reversed", "current_reversed"],
+        );
         let range = Range::Within(LARGEST_COORDINATE);
         let motor = self.vector(table, NAME, "motor", range, at, true);
         let grip = self.vector(table, NAME, "grip", range, at, true);
-        let reversed = match table.get("reversed") {
-            None => false,
-            Some(entry) => match entry.get_ref() {
-                DeValue::Boolean(reversed) => *reversed,
-                _ => {
-                    let text = format!("`reversed` in {NAME} must be true or false");
-                    self.complain(entry.span().start, text);
-                    return None;
-                }
-            },
-        };
+        let reversed = self.flag(table, NAME, "reversed");
+        let current_reversed = self.flag(table, NAME, "current_reversed");
+        let (reversed, current_reversed) = (reversed?, current_reversed?);
         let (motor, grip) = (motor?, grip?);
         if (motor - grip).norm() == 0.0 {
             self.complain(
@@ -219,7 +218,21 @@ impl Reader<'_> {
             motor,
             grip,
             reversed,
+            current_reversed,
         })
+    }
+
+    /// A key that is true or false, false without it; `None` where it is neither.
+    fn flag(&mut self, table: &DeTable<'_>, name: &str, key: &str) -> Option<bool> {
+        let Some(entry) = table.get(key) else {
+            return Some(false);
+        };
+        if let DeValue::Boolean(flag) = entry.get_ref() {
+            return Some(*flag);
+        }
+        let text = format!("`{key}` in {name} must be true or false");
+        self.complain(entry.span().start, text);
+        None
     }
 }
 
@@ -237,6 +250,8 @@ struct TiedString {
     motor: Vector3<f64>,
     grip: Vector3<f64>,
     reversed: bool,
+    /// The amplifier winds up with a negative input.
+    current_reversed: bool,
 }
 
 #[cfg(test)]

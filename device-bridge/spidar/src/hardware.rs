@@ -18,8 +18,7 @@ pub struct Reading {
     pub buttons: u16,
 }
 
-/// Encoders and motors. One implementation per motor controller; [`crate::SimulatedStrings`] is the only one here, because
-/// no vendor's controller or protocol description was at hand.
+/// Encoders and motors. One implementation per motor controller; [`crate::SimulatedStrings`] is the one without any.
 ///
 /// `now` never goes back between calls; neither method allocates, locks or waits.
 pub trait StringHardware: Send {

@@ -252,6 +252,8 @@ impl Run<'_> {
         let start = totals.first_tick.unwrap_or(totals.last_tick);
         BridgeReport {
             device: bridge.port().info().name.clone(),
+            sensed_degrees_of_freedom: bridge.port().info().sensed_degrees_of_freedom,
+            actuated_degrees_of_freedom: bridge.port().info().actuated_degrees_of_freedom,
             server: self.args.server.clone(),
             ended: ended.to_owned(),
             duration_s: totals.last_tick.saturating_sub(start).as_secs_f64(),

@@ -169,9 +169,10 @@ pub(super) fn build_loop(
                 }
             }
         }
-        Motion::Input(input) => {
-            input.open(Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?)?
-        }
+        Motion::Input(input) => input.open(
+            Placement::of_scene(scene).ok_or(BridgeError::NoStartPose)?,
+            args.priority,
+        )?,
         Motion::Trace(path, trace) => {
             let at_end = if args.looping {
                 AtEnd::Loop
@@ -196,6 +197,9 @@ pub(super) fn behind_port(
     start: &Pose,
 ) -> BridgeLoop {
     let has_motors = device.info().actuated_degrees_of_freedom > 0;
+    if let Some(sentence) = device.info().renders_no_torque() {
+        tracing::warn!("{sentence}");
+    }
     let nobody_is_hurt = matches!(args.device, DeviceChoice::Simulated { .. }) || !has_motors;
     let mut safety = args.safety.settings(args.rate, nobody_is_hurt);
     if !has_motors {

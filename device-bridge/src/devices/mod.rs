@@ -1,19 +1,30 @@
 //! The devices: simulated, recorded, at the other end of the network, and inputs without force. One file per driver.
 
+pub(crate) mod arm;
 pub(crate) mod glide;
+pub(crate) mod haply;
 pub(crate) mod held_strings;
 pub(crate) mod led;
+pub(crate) mod polhem;
 pub(crate) mod rate_control;
 pub(crate) mod recorded;
 pub(crate) mod remote;
 pub(crate) mod simulated;
 pub(crate) mod space_mouse;
 pub(crate) mod spidar;
+pub(crate) mod spidar_uart;
 pub(crate) mod vrpn;
+#[cfg(unix)]
+pub(crate) mod wooden;
 
+pub use arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
 pub use glide::Glide;
+pub(crate) use haply::haply_grip;
+pub use haply::{HaplySettings, haply_limits};
 pub use held_strings::{HeldStrings, string_grip};
 pub use led::{LedDevice, Target};
+pub use polhem::PolhemSettings;
+pub(crate) use polhem::polhem_grip;
 pub use rate_control::{CapMode, CapSettings, RateControl};
 pub use recorded::{AtEnd, RecordedDevice, Trace, TraceError, TraceRow};
 pub use remote::{DEFAULT_MAX_AGE, MAX_EDGE_DELAY, RemoteDevice};
@@ -23,8 +34,11 @@ pub use space_mouse::{
     SpaceMouse,
 };
 pub use spidar::{SpidarDevice, SpidarPlacement};
+pub use spidar_uart::{SpidarUartError, SpidarUartSettings};
 pub use taut_plant::{
     Encoder, Grip, Hand, HandPreset, MinJerkPath, Motors, PathError, Progress, Tremor,
     TremorMotion, UnknownHand, ViaPoint, min_jerk,
 };
 pub use vrpn::{Anchor, TrackerReader, VrpnDevice, VrpnSettings};
+#[cfg(unix)]
+pub use wooden::WoodenSettings;

@@ -7,9 +7,8 @@
 //! | grip  | the grip's, at the middle of its holes; equal to frame at rest |
 //! | body  | the held body's own                                            |
 //!
-//! The model is `taut-spidar`; the electronics are a [`StringHardware`]. No vendor's motor controller or its protocol was at hand, so
-//! that the only implementations here are simulated ones ([`HeldStrings`] has a hand): a laboratory with a device writes two
-//! functions, counts in and tensions out.
+//! The model is `taut-spidar`; the electronics are a [`StringHardware`]: UART motor boards ([`crate::spidar_uart`]), or simulated ones
+//! ([`HeldStrings`] has a hand). A laboratory with other electronics writes two functions, counts in and tensions out.
 //!
 //! [`HeldStrings`]: crate::HeldStrings
 
@@ -99,6 +98,8 @@ pub struct SpidarDevice<H> {
     /// The last counts that gave a pose, and that pose: the same counts are the same pose to the bit, so that a device whose counters
     /// stopped can be told from one that moves.
     answered: Option<([i32; STRINGS], PoseAnswer)>,
+    /// The sample of the newest reading: electronics that are read more slowly give one twice.
+    newest: Option<DeviceSample>,
     consistency: Option<Consistency>,
     tensions: Option<TensionAnswer>,
     /// Samples in a row with a slack string or inconsistent lengths.
@@ -150,6 +151,7 @@ impl<H: StringHardware> SpidarDevice<H> {
             world_from_body: placement.world_from_frame * placement.grip_from_body,
             geometry,
             answered: None,
+            newest: None,
             consistency: None,
             tensions: None,
             suspicious: 0,
@@ -175,7 +177,7 @@ impl<H: StringHardware> SpidarDevice<H> {
     /// Takes another calibration, such as a corrected one of `taut_spidar::self_calibrate`. The pose may jump: only while disarmed.
     pub fn set_encoders(&mut self, encoders: Encoders) {
         self.encoders = encoders;
-        self.answered = None;
+        (self.answered, self.newest) = (None, None);
         self.monitor.reset();
         self.rates.reset();
         self.suspicious = 0;
@@ -183,7 +185,7 @@ impl<H: StringHardware> SpidarDevice<H> {
 
     /// Says what a motor does. The string of one that does not work is left out of the pose.
     pub fn set_motor(&mut self, string: usize, state: MotorState) {
-        self.answered = None;
+        (self.answered, self.newest) = (None, None);
         self.solver.set_motor(string, state);
         self.kinematics
             .use_string(string, state == MotorState::Working);
@@ -224,6 +226,9 @@ impl<H: StringHardware> SpidarDevice<H> {
     }
 
     fn sample(&mut self, reading: &Reading) -> Result<DeviceSample, StringFault> {
+        if let Some(newest) = self.newest.filter(|newest| newest.time == reading.time) {
+            return Ok(newest);
+        }
         let lengths = self.encoders.lengths(&reading.counts);
         let rates = self.rates.step(reading.time, &lengths);
         let answer = match self.answered {
@@ -240,12 +245,14 @@ impl<H: StringHardware> SpidarDevice<H> {
         let (v, omega) = halves(&answer.twist(&rates));
         let turn = self.placement.world_from_frame.rotation;
         let (v, omega) = (turn * v, turn * omega);
-        Ok(DeviceSample {
+        let sample = DeviceSample {
             time: reading.time,
             pose: self.world_from_body,
             velocity: stack(&(v + omega.cross(&lever)), &omega),
             buttons: reading.buttons,
-        })
+        };
+        self.newest = Some(sample);
+        Ok(sample)
     }
 
     /// Slack strings and lengths that disagree become a fault when they last.
@@ -297,6 +304,7 @@ impl<H: StringHardware> Device for SpidarDevice<H> {
         self.fault = sample.as_ref().err().copied();
         if self.fault.is_some() {
             self.rates.reset();
+            self.newest = None;
         }
         self.spent.0 = self.clocked().saturating_sub(before);
         sample.map_err(DeviceFault::Strings)

@@ -98,6 +98,9 @@ impl DevicePort {
     ) -> Self {
         let info = device.info();
         let mut settings = settings.within(&info.limits).that_can_fade();
+        if info.actuated_degrees_of_freedom == 3 {
+            settings.max_torque = 0.0; // it has no motors for one
+        }
         if info.actuated_degrees_of_freedom == 0 {
             // A trace may stop dead: nobody feels it.
             settings.validation.frozen_after = Duration::ZERO;
@@ -344,7 +347,10 @@ impl DevicePort {
             (
                 &mut spells.torque,
                 EventKind::TorqueLimited,
-                limited.torque_asked.filter(|_| felt),
+                // A device without torque is told of once, at its start.
+                limited
+                    .torque_asked
+                    .filter(|_| felt && self.settings.max_torque > 0.0),
             ),
             (
                 &mut spells.force_slew,

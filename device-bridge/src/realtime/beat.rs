@@ -38,9 +38,15 @@ impl Ticker {
     /// The first deadline is one `period` from now, or up to two, so that it lies [`CLEAR_OF_KERNEL_TICK`].
     #[must_use]
     pub fn new(period: Duration) -> Self {
+        Self::at_phase(period, CLEAR_OF_KERNEL_TICK)
+    }
+
+    /// The same with the deadlines at `phase` of the period.
+    #[must_use]
+    pub fn at_phase(period: Duration, phase: Duration) -> Self {
         Self {
             period,
-            next: first_on_beat(monotonic_now(), period, CLEAR_OF_KERNEL_TICK),
+            next: first_on_beat(monotonic_now(), period, phase),
         }
     }
 

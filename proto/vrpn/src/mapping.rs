@@ -35,6 +35,12 @@ impl Axes {
     /// The tracker's axes are those of the target frame.
     pub const SAME: Self = Self(Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0));
 
+    /// Of a signed permutation.
+    #[must_use]
+    pub const fn of(signed_permutation: Matrix3<f64>) -> Self {
+        Self(signed_permutation)
+    }
+
     /// M of the head of this file.
     #[must_use]
     pub fn matrix(&self) -> &Matrix3<f64> {

@@ -72,6 +72,7 @@ fn run(command: Command) -> Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Bridge(args) => Ok(taut_bridge::execute(&args)),
+        Command::SimulateDevice(args) => Ok(taut_bridge::execute_simulation(&args)),
         Command::Replay(args) => replay_command(&args),
         Command::Record(args) => record_command(&args),
         Command::Arm(args) => arm_command(&args),

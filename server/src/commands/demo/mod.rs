@@ -35,6 +35,9 @@ const LOG_VARIABLE: &str = "TAUT_LOG";
 const MOUSE_MAX_AGE: Duration = Duration::from_millis(200);
 /// How the mouse holds the body.
 const HELP_MOUSE: &str = "mouse in the first window: left button moves the body along the screen, right button or wheel to and fro, middle button (or Shift + left) turns it; P lets go or takes hold, R goes back to the start, arrow and page keys move in small steps; more in docs/devices.md";
+/// How force comes at a device that can push.
+const HELP_ARM: &str =
+    "no force yet: type arm and Enter for force, off and Enter for none (docs/safety.md)";
 /// What the bridge is called.
 const BRIDGE_NODE: &str = "bridge";
 
@@ -113,6 +116,12 @@ pub(super) fn run(
     let mut session = Session::start(setup)?;
     session.end_with(&end);
     announce(&session, terminal);
+    let pushes = |input: &taut_bridge::InputChoice| input.force_device().is_some();
+    if overrides.input.as_ref().is_some_and(pushes) {
+        // Somebody holds it: a person arms.
+        taut_bridge::listen_at_console(session.arm_switch());
+        terminal.say(HELP_ARM);
+    }
 
     let mut children = Vec::new();
     let launcher = Launcher::new(&session, &directory, args)?;

@@ -1,11 +1,13 @@
 //! `taut doctor`: what this machine lacks for real time and for rendering, with the command that mends each.
 
 pub(crate) mod device;
+mod plugged;
 
 use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
+use taut_bridge::haply::ServiceAddress;
 use taut_bridge::realtime::{
     AWAKE, RealtimeGrant, keep_cores_awake, may_lock_memory, monotonic_now, request_fifo,
     sharpen_timers, sleep_until,
@@ -131,6 +133,7 @@ pub(super) fn examine() -> std::io::Result<DoctorReport> {
     ];
     findings.extend(rendering());
     findings.extend(devices());
+    findings.extend(plugged::force_devices(&ServiceAddress::default()));
     Ok(DoctorReport {
         findings,
         timer_lateness_us: lateness,

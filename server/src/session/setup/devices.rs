@@ -38,6 +38,7 @@ pub fn device(
                 &InputChoice::Vrpn(Box::new(settings)),
                 scene,
                 workbench_from_scene,
+                0,
             )
         }
         taut_scene::Device::SpaceMouse { .. } => {
@@ -46,6 +47,7 @@ pub fn device(
                 &InputChoice::SpaceMouse(settings),
                 scene,
                 workbench_from_scene,
+                0,
             )
         }
         taut_scene::Device::Simulated {
@@ -80,11 +82,12 @@ pub fn device(
     }
 }
 
-/// Opens an input device without force.
+/// Opens a device; `priority` is for a thread of its driver that a force depends on.
 pub fn input(
     choice: &InputChoice,
     scene: &BuiltScene,
     workbench_from_scene: &Pose,
+    priority: u8,
 ) -> Result<DeviceSource, Failure> {
     let scale = scene.view.display_scale;
     let placement = Placement {
@@ -92,7 +95,12 @@ pub fn input(
         reference_point: scene.reference_point(),
         workbench_from_world: Similarity3::from_isometry(*workbench_from_scene, scale),
     };
-    let device = choice.open(placement).map_err(Failure::bad_input)?;
+    let device = choice
+        .open(placement, priority)
+        .map_err(Failure::bad_input)?;
+    if let Some(sentence) = device.info().renders_no_torque() {
+        tracing::warn!("{sentence}");
+    }
     Ok(DeviceSource::Local(device))
 }
 

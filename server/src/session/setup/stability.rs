@@ -11,7 +11,7 @@
 
 use god_object::{Body, RotationMetric, Settings};
 use nalgebra::SymmetricEigen;
-use taut_bridge::{Grip, Hand, SpidarPlacement, string_geometry, string_grip};
+use taut_bridge::{Grip, Hand, InputChoice, SpidarPlacement, string_geometry, string_grip};
 use taut_plant::stability::{DeclaredAxis, SampledLoop};
 use taut_scene::{Device, DeviceDynamics, HandPreset};
 use taut_spidar::Geometry;
@@ -65,6 +65,32 @@ pub(super) fn declared(
     }
 }
 
+/// What a device of the command line is declared to be in the scene's metres, and whether it renders torque; `None` without motors. A hand is
+/// taken as it is: its stiffness per metre of the scene is not known.
+pub(super) fn of_input(
+    choice: &InputChoice,
+    display_scale: f64,
+    scene_hand: Option<HandPreset>,
+) -> Option<(DeviceDynamics, bool)> {
+    let device = choice.force_device()?;
+    // The same force over another way.
+    let shorter = display_scale / device.scale;
+    let dynamics = DeviceDynamics {
+        mass: device.grip.mass * shorter,
+        damping: device.grip.damping.min() * shorter,
+        friction: device.grip.coulomb_force.min(),
+        resolution: 0.0,
+        inertia: device.grip.rotational_inertia,
+        rotational_damping: device.grip.rotational_damping.min(),
+        rotational_friction: device.grip.coulomb_torque.min(),
+        angular_resolution: 0.0,
+        delay: device.delay_s,
+        motor_lag: 0.0,
+        hand: scene_hand.unwrap_or_default(),
+    };
+    Some((dynamics, device.renders_torque))
+}
+
 /// What a string-driven device is along and about its weakest axis, with the grip at the centre.
 fn of_strings(geometry: &Geometry, hand: Option<HandPreset>) -> DeviceDynamics {
     let grip = string_grip(geometry, &SpidarPlacement::default());
@@ -92,12 +118,14 @@ fn of_strings(geometry: &Geometry, hand: Option<HandPreset>) -> DeviceDynamics {
     }
 }
 
-/// What to tell the user of the scene's stiffness: warnings, or the refusal where it cannot be stable.
+/// What to tell the user of the scene's stiffness: warnings, or the refusal where it cannot be stable. A rotational stiffness that is not rendered
+/// is not judged.
 ///
 /// # Errors
 /// A wall of the scene is beyond the largest stable stiffness with the declared hand, and `allow_unstable` is not set.
 pub(super) fn judge(
     device: &DeviceDynamics,
+    renders_torque: bool,
     settings: &Settings,
     body: &Body,
     allow_unstable: bool,
@@ -110,6 +138,9 @@ pub(super) fn judge(
         (about, "N m/rad", "rotational stiffness"),
     ] {
         let linear = what == "stiffness";
+        if !linear && !renders_torque {
+            continue; // it is not rendered
+        }
         let axis = |hand: &Hand| {
             let damped = SampledLoop {
                 delay: PERIOD_S + device.delay,
@@ -209,7 +240,7 @@ mod tests {
     fn the_shipped_scene_suits_the_simulated_device() {
         let scene = scene();
         assert_eq!(
-            judge(&light(), &scene.settings, &scene.world.body, false),
+            judge(&light(), true, &scene.settings, &scene.world.body, false),
             Ok(vec![])
         );
     }
@@ -222,11 +253,36 @@ mod tests {
             ..scene.settings
         };
         let body = &scene.world.body;
-        let warned = judge(&light(), &asked(2000.0), body, false).expect("the hand holds it");
+        let warned = judge(&light(), true, &asked(2000.0), body, false).expect("the hand holds it");
         assert!(warned.iter().any(|w| w.contains("lets go")), "{warned:?}");
-        let refused = judge(&light(), &asked(50_000.0), body, false).expect_err("far too stiff");
+        let refused =
+            judge(&light(), true, &asked(50_000.0), body, false).expect_err("far too stiff");
         assert!(refused.to_string().contains("--allow-unstable"));
-        assert!(judge(&light(), &asked(50_000.0), body, true).is_ok_and(|w| !w.is_empty()));
+        assert!(judge(&light(), true, &asked(50_000.0), body, true).is_ok_and(|w| !w.is_empty()));
+    }
+
+    #[test]
+    fn an_arm_without_torque_is_judged_by_its_force_in_the_scene_s_metres() {
+        let scene = scene();
+        let arm: taut_bridge::DeviceChoice = "haply".parse().expect("a driver");
+        let taut_bridge::DeviceChoice::Input(arm) = arm else {
+            panic!("it is opened");
+        };
+        let judged = |display_scale: f64, stiffness: f64| {
+            let (dynamics, torque) = of_input(&arm, display_scale, None).expect("motors");
+            assert!(!torque);
+            let settings = Settings {
+                k_h: stiffness / (scene.settings.k_s * scene.world.body.mass),
+                ..scene.settings
+            };
+            judge(&dynamics, torque, &settings, &scene.world.body, false)
+        };
+        let warned = judged(1.0, 1000.0).expect("a hand holds it");
+        assert_eq!(warned.len(), 1, "{warned:?}");
+        assert!(warned[0].contains("scene's stiffness") && warned[0].contains("lets go"));
+        // Drawn three times as large, a hand moves three times as far for the same force.
+        assert_eq!(judged(3.0, 1000.0).map(|w| w.len()), Ok(0));
+        assert!(judged(1.0, 50_000.0).is_err());
     }
 
     #[test]
@@ -236,7 +292,8 @@ mod tests {
             resolution: 3e-5,
             ..light()
         };
-        let warned = judge(&counted, &scene.settings, &scene.world.body, false).expect("stable");
+        let warned =
+            judge(&counted, true, &scene.settings, &scene.world.body, false).expect("stable");
         assert!(warned.iter().any(|w| w.contains("encoder")), "{warned:?}");
     }
 }

@@ -24,7 +24,7 @@ use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input, vrpn_source};
-use crate::session::setup::stability::{declared, judge, stiffnesses};
+use crate::session::setup::stability::{declared, judge, of_input, stiffnesses};
 use crate::session::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
 use crate::shared::contact_snapshot::MAX_MOVING;
 use crate::shared::failure::Failure;
@@ -81,9 +81,21 @@ pub fn session_setup(
         )));
     }
     let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
-    if let Some(dynamics) = declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)? {
+    let declared = match &overrides.input {
+        Some(choice) => of_input(choice, built.view.display_scale, scene_hand),
+        None => declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?
+            .map(|dynamics| (dynamics, true)),
+    };
+    if let Some((dynamics, renders_torque)) = declared {
         let body = &built.world.body;
-        for warning in judge(&dynamics, &built.settings, body, overrides.allow_unstable)? {
+        let judged = judge(
+            &dynamics,
+            renders_torque,
+            &built.settings,
+            body,
+            overrides.allow_unstable,
+        )?;
+        for warning in judged {
             tracing::warn!("{warning}");
         }
     }
@@ -110,7 +122,7 @@ pub fn session_setup(
         frames: frames::settings(&workbench.frames),
         node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
-    let safety = safety(workbench, &built.settings, &built.world.body);
+    let safety = safety(workbench, overrides, &built.settings, &built.world.body);
     let recording = overrides
         .recording
         .as_ref()
@@ -126,7 +138,12 @@ pub fn session_setup(
         fidelity,
         recording,
         device: match &overrides.input {
-            Some(choice) => input(choice, &built, &workbench_from_scene)?,
+            Some(choice) => input(
+                choice,
+                &built,
+                &workbench_from_scene,
+                realtime.haptics_priority,
+            )?,
             None => device(&workbench.device, &built, &workbench_from_scene)?,
         },
         motions: built.motions,
@@ -214,18 +231,22 @@ fn contact_bound(scene: &god_object::Settings, body: &god_object::Body) -> Conta
 /// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
 fn safety(
     workbench: &Workbench,
+    overrides: &Overrides,
     scene: &god_object::Settings,
     body: &god_object::Body,
 ) -> SafetySettings {
     let wanted = &workbench.safety;
-    let nobody_is_hurt = matches!(
-        workbench.device,
-        Device::Simulated { .. }
-            | Device::Trace { .. }
-            | Device::Vrpn { .. }
-            | Device::SpaceMouse { .. }
-            | Device::Remote
-    );
+    let nobody_is_hurt = match &overrides.input {
+        Some(choice) => choice.force_device().is_none(),
+        None => matches!(
+            workbench.device,
+            Device::Simulated { .. }
+                | Device::Trace { .. }
+                | Device::Vrpn { .. }
+                | Device::SpaceMouse { .. }
+                | Device::Remote
+        ),
+    };
     let rearm = match wanted.rearm {
         Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
         Some(taut_scene::Rearm::Manual) => Rearm::Manual,

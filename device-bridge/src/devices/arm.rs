@@ -1,0 +1,222 @@
+//! An arm that pushes and cannot turn: a cursor with three degrees of freedom of force, and an orientation that is measured or not.
+//!
+//! | frame     | meaning                                                                                       |
+//! |-----------|-----------------------------------------------------------------------------------------------|
+//! | device    | the arm's, as its driver names it                                                             |
+//! | workbench | what the user sees; `axes` and `scale` of [`SensorMapping`] lead to it, from the workspace's middle |
+//! | world     | the scene's ([`Placement`])                                                                   |
+//!
+//! The cursor, where the arm pushes, is at G, the body's reference point: so a force at G is a force at the cursor, and a torque about G is
+//! what such a device cannot render. It is dropped, never turned into force. The orientation turns the body about G.
+
+use std::time::Duration;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
+use taut_vrpn::{PoseReport, SensorMapping};
+
+use crate::device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Pose};
+use crate::devices::Anchor;
+use crate::placement::{Placement, stacked};
+
+/// Of the loop around it, Hz.
+const RATE_HZ: f64 = 1000.0;
+/// A state older than this is none.
+const MAX_AGE: Duration = Duration::from_millis(20);
+/// Time constant of the angular velocity, which is not measured, s.
+const TURN_LAG_S: f64 = 0.01;
+
+/// What an arm said last: m, m/s, w x y z, its own axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ArmState {
+    /// Counts states that may be used.
+    pub reports: u64,
+    /// Whether the newest may be used now.
+    pub is_usable: bool,
+    /// Of the cursor.
+    pub position: [f64; 3],
+    /// Of the cursor.
+    pub velocity: [f64; 3],
+    /// Of the grip; `None` without one.
+    pub orientation: Option<[f64; 4]>,
+    /// One bit per button, bit 0 the first.
+    pub buttons: u16,
+}
+
+/// An arm, and where it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmSettings {
+    /// For people.
+    pub name: String,
+    /// What it bears, in its own metres.
+    pub limits: DeviceLimits,
+    /// Whether it may measure an orientation.
+    pub with_orientation: bool,
+    /// Middle of its workspace, its own axes, m.
+    pub centre: Vector3<f64>,
+    /// From its axes to the workbench's.
+    pub mapping: SensorMapping,
+    /// How the body follows.
+    pub anchor: Anchor,
+}
+
+/// What speaks to an arm: a thread of its driver, or a test.
+pub trait ArmPort: Send {
+    /// What the device said last; neither waits nor allocates.
+    fn newest(&mut self) -> ArmState;
+
+    /// Wants a force, N, the device's axes; likewise.
+    fn push(&mut self, force: [f64; 3]);
+}
+
+/// The device.
+pub struct ArmDevice {
+    info: DeviceInfo,
+    port: Box<dyn ArmPort>,
+    centre: Vector3<f64>,
+    mapping: SensorMapping,
+    anchor: Anchor,
+    placement: Placement,
+    /// Pose of the cursor on the workbench when the first state came, and of the body's frame at G then.
+    anchored: Option<(Pose, Pose)>,
+    seen: (u64, Duration),
+    /// The sample of the newest state, frame at G.
+    at_g: Pose,
+    velocity: Vector6<f64>,
+    was_lost: bool,
+}
+
+impl ArmDevice {
+    /// A device behind `port`.
+    #[must_use]
+    pub fn new(port: Box<dyn ArmPort>, arm: ArmSettings, placement: Placement) -> Self {
+        let mut limits = arm.limits;
+        // A metre of the device is so many of the world: the same force over another way.
+        limits.max_stiffness *= placement.workbench_from_world.scaling() / arm.mapping.scale;
+        Self {
+            info: DeviceInfo {
+                name: arm.name,
+                sensed_degrees_of_freedom: if arm.with_orientation { 6 } else { 3 },
+                actuated_degrees_of_freedom: 3,
+                limits,
+                rate_hz: RATE_HZ,
+            },
+            port,
+            centre: arm.centre,
+            mapping: arm.mapping,
+            anchor: arm.anchor,
+            placement,
+            anchored: None,
+            seen: (0, Duration::ZERO),
+            at_g: placement.at_reference_point(&placement.start),
+            velocity: Vector6::zeros(),
+            was_lost: false,
+        }
+    }
+
+    /// Where the cursor is on the workbench; `None` where the state is no pose.
+    fn on_workbench(&self, state: &ArmState) -> Option<Pose> {
+        let [w, i, j, k] = state.orientation.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+        let norm = (w * w + i * i + j * j + k * k).sqrt();
+        let from_centre = Vector3::from(state.position) - self.centre;
+        self.mapping.pose(&PoseReport {
+            sensor: 0,
+            position: from_centre.into(),
+            // Unit within what the wire's steps allow, and exactly so from here on; NaN is refused there.
+            rotation: [i, j, k, w].map(|part| part / norm),
+        })
+    }
+
+    /// Where the body's frame at G is for a cursor at `cursor` on the workbench.
+    fn target(&mut self, cursor: &Pose, has_grip: bool) -> Pose {
+        if self.anchor == Anchor::Workbench {
+            let pose = self.placement.pose_in_world(cursor);
+            // Without a grip nothing turns the body.
+            let rotation = if has_grip {
+                pose.rotation
+            } else {
+                self.placement.start.rotation
+            };
+            return Isometry3::from_parts(pose.translation, rotation);
+        }
+        let start = self.placement.at_reference_point(&self.placement.start);
+        let (cursor_then, body_then) = *self.anchored.get_or_insert((*cursor, start));
+        let travel = cursor.translation.vector - cursor_then.translation.vector;
+        let turn = (cursor.rotation * cursor_then.rotation.inverse()).scaled_axis();
+        let turn = self.placement.rotation_in_world(&turn);
+        Isometry3::from_parts(
+            (body_then.translation.vector + self.placement.vector_in_world(&travel)).into(),
+            UnitQuaternion::from_scaled_axis(turn) * body_then.rotation,
+        )
+    }
+
+    fn take(&mut self, now: Duration, state: &ArmState) -> Result<(), DeviceFault> {
+        let cursor = self.on_workbench(state).ok_or(DeviceFault::NotFinite)?;
+        let next = self.target(&cursor, state.orientation.is_some());
+        let passed = now.saturating_sub(self.seen.1).as_secs_f64();
+        let is_first = self.seen.0 == 0 || self.was_lost || passed > MAX_AGE.as_secs_f64();
+        let turned = (next.rotation * self.at_g.rotation.inverse()).scaled_axis();
+        let before: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into();
+        let turning = if is_first || passed <= 0.0 {
+            Vector3::zeros()
+        } else {
+            before + (turned / passed - before) * (passed / (passed + TURN_LAG_S))
+        };
+        let moving =
+            self.mapping.axes.matrix() * Vector3::from(state.velocity) * self.mapping.scale;
+        let moving = self.mapping.origin.rotation * moving;
+        self.velocity = stacked(&self.placement.vector_in_world(&moving), &turning);
+        self.at_g = next;
+        self.seen = (state.reports, now);
+        Ok(())
+    }
+
+    fn lose(&mut self, fault: DeviceFault) -> DeviceFault {
+        self.was_lost = true;
+        fault
+    }
+}
+
+impl Device for ArmDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn read(&mut self, now: Duration) -> Result<DeviceSample, DeviceFault> {
+        let state = self.port.newest();
+        if state.reports == 0 {
+            return Err(DeviceFault::NotStarted);
+        }
+        let is_new = state.reports != self.seen.0;
+        let age = if is_new {
+            Duration::ZERO
+        } else {
+            now.saturating_sub(self.seen.1)
+        };
+        if !state.is_usable || age > MAX_AGE {
+            return Err(self.lose(DeviceFault::Lost { age }));
+        }
+        if is_new && let Err(fault) = self.take(now, &state) {
+            return Err(self.lose(fault));
+        }
+        if std::mem::replace(&mut self.was_lost, false) {
+            return Err(DeviceFault::Reconnected);
+        }
+        Ok(DeviceSample {
+            time: self.seen.1,
+            pose: self.placement.from_reference_point(&self.at_g),
+            velocity: self.velocity,
+            buttons: state.buttons,
+        })
+    }
+
+    fn write(&mut self, _now: Duration, wrench: &Vector6<f64>) {
+        let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into();
+        let is_finite = force.iter().all(|part| part.is_finite());
+        let force = if is_finite { force } else { Vector3::zeros() };
+        // A force has a direction in the world, and no scale.
+        let on_workbench = self.placement.workbench_from_world.isometry.rotation * force;
+        let unturned = self.mapping.origin.rotation.inverse() * on_workbench;
+        self.port
+            .push((self.mapping.axes.matrix().transpose() * unturned).into());
+    }
+}

@@ -1,0 +1,119 @@
+//! A Haply Inverse arm, with or without a VerseGrip: three degrees of freedom of force, six (or three) of motion.
+//!
+//! The cursor is the reference point of the body ([`ArmDevice`]). The arm's axes: x right, y away from the user, z up (the service's basis XYZ), origin at its
+//! base.
+//!
+//! Force limit, damping, mass and axes are assumed: no device was at hand, and the vendor publishes none of them with its protocol.
+
+use nalgebra::{Matrix6, Vector3};
+use taut_plant::Grip;
+use taut_vrpn::SensorMapping;
+
+use crate::choice::ForceDevice;
+use crate::device::DeviceLimits;
+use crate::devices::Anchor;
+use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
+use crate::haply::{ExchangeSettings, HaplyClient, HaplyError, ServiceAddress, workspace_centre};
+use crate::placement::Placement;
+
+/// The client's messages, and the loop around them, Hz.
+const RATE_HZ: f64 = 1000.0;
+/// From a reading to the force that answers it: a period in the loop, as much on the wire.
+const DELAY_S: f64 = 2.0 / RATE_HZ;
+
+/// The arm's mechanics as they are assumed: to be measured on a real one.
+#[must_use]
+pub(crate) fn haply_grip() -> Grip {
+    Grip {
+        mass: 0.1,                                 // kg
+        damping: Vector3::repeat(1.0),             // N s/m
+        rotational_inertia: 2e-5,                  // kg m^2
+        rotational_damping: Vector3::repeat(1e-4), // N m s/rad
+        coulomb_force: Vector3::zeros(),
+        coulomb_torque: Vector3::zeros(),
+        string_inertia: Matrix6::zeros(),
+        max_force: 5.0, // N
+        max_torque: 0.0,
+    }
+}
+
+/// What an arm of this kind bears, N and N/m in the device's own metres.
+#[must_use]
+pub fn haply_limits() -> DeviceLimits {
+    let (max_stiffness, _) = haply_grip().critical_stiffness(1.0 / RATE_HZ, DELAY_S);
+    DeviceLimits {
+        max_stiffness,
+        max_rotational_stiffness: 0.0,
+        max_force: haply_grip().max_force,
+        max_torque: 0.0,
+    }
+}
+
+/// An arm as a device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HaplySettings {
+    /// Of the service.
+    pub address: ServiceAddress,
+    /// Which arm, which grip.
+    pub exchange: ExchangeSettings,
+    /// From the arm's frame to the workbench's.
+    pub mapping: SensorMapping,
+    /// How the body follows.
+    pub anchor: Anchor,
+}
+
+impl HaplySettings {
+    /// The arm as a device.
+    #[must_use]
+    pub fn arm(&self) -> ArmSettings {
+        ArmSettings {
+            name: format!("Haply Inverse at {}", self.address),
+            limits: haply_limits(),
+            with_orientation: self.exchange.with_grip,
+            centre: workspace_centre().coords,
+            mapping: self.mapping,
+            anchor: self.anchor,
+        }
+    }
+
+    /// Connects to the service.
+    ///
+    /// # Errors
+    /// [`HaplyError`]: it is not there, or too old. An arm that is not there yet is waited for.
+    pub fn open(&self, placement: Placement, priority: u8) -> Result<ArmDevice, HaplyError> {
+        let client = HaplyClient::start(self.address.clone(), self.exchange.clone(), priority)?;
+        Ok(ArmDevice::new(Box::new(client), self.arm(), placement))
+    }
+
+    /// What the arm is assumed to bear.
+    #[must_use]
+    pub fn force_device(&self) -> ForceDevice {
+        ForceDevice {
+            grip: haply_grip(),
+            delay_s: DELAY_S - 1.0 / RATE_HZ,
+            scale: self.mapping.scale,
+            renders_torque: false,
+        }
+    }
+}
+
+impl Default for HaplySettings {
+    fn default() -> Self {
+        Self {
+            address: ServiceAddress::default(),
+            exchange: ExchangeSettings::default(),
+            mapping: SensorMapping::identity(),
+            anchor: Anchor::default(),
+        }
+    }
+}
+
+impl ArmPort for HaplyClient {
+    fn newest(&mut self) -> ArmState {
+        *Self::newest(self)
+    }
+
+    fn push(&mut self, force: [f64; 3]) {
+        Self::push(self, force);
+    }
+}

@@ -1,0 +1,87 @@
+//! A WoodenHaptics arm on its HID board, as it is chosen and opened.
+//!
+//! Its axes as they are read: x towards the user, y to the right, z up. Mass, damping and axes are assumed, kinematics, force and stiffness are those of the
+//! published configurations: no arm was at hand.
+
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+use taut_plant::Grip;
+use taut_vrpn::SensorMapping;
+
+use crate::choice::ForceDevice;
+use crate::device::DeviceLimits;
+use crate::devices::arm::ArmSettings;
+use crate::devices::{Anchor, PolhemSettings, polhem_grip};
+use crate::wooden::{WOODEN_MODELS, WoodenModel};
+
+/// Of the loop around it, Hz.
+const RATE_HZ: f64 = 1000.0;
+/// From a reading to the force that answers it: a period in the loop, as much on the wire.
+const DELAY_S: f64 = 2.0 / RATE_HZ;
+
+/// An arm on a HID board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WoodenSettings {
+    /// Of the hidraw device, or of a socket in its place; without one the first board on USB.
+    pub path: Option<PathBuf>,
+    /// Its numbers.
+    pub model: WoodenModel,
+    /// From the arm's frame to the workbench's.
+    pub mapping: SensorMapping,
+    /// How the body follows.
+    pub anchor: Anchor,
+}
+
+impl Default for WoodenSettings {
+    fn default() -> Self {
+        Self {
+            path: None,
+            model: WOODEN_MODELS[0],
+            mapping: SensorMapping {
+                axes: PolhemSettings::AXES,
+                ..SensorMapping::identity()
+            },
+            anchor: Anchor::default(),
+        }
+    }
+}
+
+impl WoodenSettings {
+    fn grip(&self) -> Grip {
+        Grip {
+            max_force: self.model.max_force,
+            ..polhem_grip()
+        }
+    }
+
+    /// What the arm is assumed to bear.
+    #[must_use]
+    pub fn force_device(&self) -> ForceDevice {
+        ForceDevice {
+            grip: self.grip(),
+            delay_s: DELAY_S - 1.0 / RATE_HZ,
+            scale: self.mapping.scale,
+            renders_torque: false,
+        }
+    }
+
+    /// The arm as a device.
+    #[must_use]
+    pub fn arm(&self) -> ArmSettings {
+        let (stable, _) = self.grip().critical_stiffness(1.0 / RATE_HZ, DELAY_S);
+        ArmSettings {
+            name: format!("{} on a HID board", self.model.name),
+            limits: DeviceLimits {
+                max_stiffness: stable.min(self.model.max_stiffness),
+                max_rotational_stiffness: 0.0,
+                max_force: self.model.max_force,
+                max_torque: 0.0,
+            },
+            with_orientation: self.model.wrist_counts > 0.0,
+            centre: Vector3::zeros(),
+            mapping: self.mapping,
+            anchor: self.anchor,
+        }
+    }
+}

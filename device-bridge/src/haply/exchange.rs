@@ -1,0 +1,218 @@
+//! One connection to a service, without sockets: which arm and which grip are used, what they said last, and what is said next.
+
+use crate::devices::ArmState;
+
+use super::message::{GripKind, MessageError, PERMUTATION, Said, Say};
+
+/// What is wanted of a service.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExchangeSettings {
+    /// Name under which the service lists this program.
+    pub profile: String,
+    /// The arm of this name; the first one without a name.
+    pub arm: Option<String>,
+    /// Whether a grip gives the orientation, where there is one.
+    pub with_grip: bool,
+}
+
+impl Default for ExchangeSettings {
+    fn default() -> Self {
+        Self {
+            profile: "taut".to_owned(),
+            arm: None,
+            with_grip: true,
+        }
+    }
+}
+
+/// Why a device that the service knows, or should know, gives no pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unusable {
+    /// No connection.
+    #[error("the Inverse service does not answer")]
+    NoService,
+    /// The service is there, the device is not.
+    #[error("the Inverse service has no such device; plug it in")]
+    NotPlugged,
+    /// It does not know where it is.
+    #[error("the device is not calibrated; move it to its calibration pose")]
+    NotCalibrated,
+    /// It has not started.
+    #[error("the device is not ready; wait, or plug it in anew")]
+    NotReady,
+    /// Its motors have no power.
+    #[error("the device's motors have no power; connect its power supply")]
+    NoPower,
+    /// Its axes are in another order than was asked for.
+    #[error(
+        "the service gives the device's axes in another order than {PERMUTATION}, which was asked for; set its basis to {PERMUTATION}"
+    )]
+    OtherBasis,
+    /// It says no position.
+    #[error("the service tells no position of the device")]
+    NoPosition,
+    /// The grip that gave the orientation is gone or asleep.
+    #[error("the grip is gone; switch it on, or do without by grip=no")]
+    NoGrip,
+}
+
+/// The client's half of one connection.
+#[derive(Debug)]
+pub struct Exchange {
+    settings: ExchangeSettings,
+    arm: Option<String>,
+    grip: Option<(GripKind, String)>,
+    /// Messages said with an arm known.
+    said: u32,
+    other_basis: bool,
+    state: ArmState,
+    unusable: Option<Unusable>,
+    text: String,
+}
+
+/// The message, counted with the arm known, from which the configuration counts that was asked for in the first.
+const CONFIGURED: u32 = 2;
+
+impl Exchange {
+    /// Nothing said or heard yet; `state` counts on from the connection before.
+    #[must_use]
+    pub fn new(settings: ExchangeSettings, state: ArmState) -> Self {
+        Self {
+            settings,
+            arm: None,
+            grip: None,
+            said: 0,
+            other_basis: false,
+            state,
+            unusable: None,
+            text: String::with_capacity(512),
+        }
+    }
+
+    /// What the device said last.
+    #[must_use]
+    pub fn state(&self) -> &ArmState {
+        &self.state
+    }
+
+    /// Why there is none to be used now.
+    #[must_use]
+    pub fn unusable(&self) -> Option<Unusable> {
+        self.unusable
+    }
+
+    /// The arm that is used, once the service has named it.
+    #[must_use]
+    pub fn arm(&self) -> Option<&str> {
+        self.arm.as_deref()
+    }
+
+    /// Takes a message of the service: the inventory, or the answer to what was said last.
+    ///
+    /// # Errors
+    /// [`MessageError`]: the state is what it was before.
+    pub fn hear(&mut self, text: &str) -> Result<(), MessageError> {
+        let said = Said::parse(text)?;
+        if self.arm.is_none() {
+            self.choose(&said);
+        }
+        let next = self.judge(&said);
+        match next {
+            Ok(state) => (self.state, self.unusable) = (state, None),
+            Err(unusable) => {
+                self.state.is_usable = false;
+                self.unusable = Some(unusable);
+            }
+        }
+        Ok(())
+    }
+
+    fn choose(&mut self, said: &Said) {
+        let wanted = self.settings.arm.as_deref();
+        let found = said
+            .arms
+            .iter()
+            .find(|arm| wanted.is_none_or(|id| arm.id == id));
+        let Some(arm) = found else { return };
+        self.arm = Some(arm.id.clone());
+        if self.settings.with_grip {
+            let grip = said.grips.iter().find(|grip| grip.orientation.is_some());
+            self.grip = grip.map(|grip| (grip.kind, grip.id.clone()));
+        }
+        let unknown = || "unknown".to_owned();
+        tracing::info!(
+            "{} {}, {}-handed; orientation {}",
+            arm.model.clone().unwrap_or_else(|| "arm".to_owned()),
+            arm.id,
+            arm.handedness.clone().unwrap_or_else(unknown),
+            self.grip
+                .as_ref()
+                .map_or("stays as it is: no grip".to_owned(), |(_, id)| format!(
+                    "by grip {id}"
+                )),
+        );
+    }
+
+    /// The state after `said`.
+    fn judge(&mut self, said: &Said) -> Result<ArmState, Unusable> {
+        let id = self.arm.as_deref().ok_or(Unusable::NotPlugged)?;
+        let arm = said
+            .arms
+            .iter()
+            .find(|arm| arm.id == id)
+            .ok_or(Unusable::NotPlugged)?;
+        if let Some(permutation) = arm.permutation.as_deref()
+            && self.said >= CONFIGURED
+        {
+            self.other_basis = !permutation.eq_ignore_ascii_case(PERMUTATION);
+        }
+        for (good, unusable) in [
+            (arm.calibrated, Unusable::NotCalibrated),
+            (arm.ready, Unusable::NotReady),
+            (arm.powered, Unusable::NoPower),
+            (!self.other_basis, Unusable::OtherBasis),
+        ] {
+            if !good {
+                return Err(unusable);
+            }
+        }
+        let mut state = ArmState {
+            reports: self.state.reports + 1,
+            is_usable: true,
+            position: arm.position.ok_or(Unusable::NoPosition)?,
+            velocity: arm.velocity.unwrap_or_default(),
+            orientation: None,
+            buttons: 0,
+        };
+        if let Some((kind, id)) = &self.grip {
+            let of = |grip: &&super::message::GripSaid| grip.kind == *kind && grip.id == *id;
+            let grip = said.grips.iter().find(of).filter(|grip| grip.ready);
+            let grip = grip.ok_or(Unusable::NoGrip)?;
+            state.orientation = Some(grip.orientation.ok_or(Unusable::NoGrip)?);
+            state.buttons = grip.buttons;
+        }
+        Ok(state)
+    }
+
+    /// The next message. `force` (N, the device's axes) goes out only while the device may be used; without one its motors go idle.
+    pub fn say(&mut self, force: Option<[f64; 3]>) -> &str {
+        let arm = self.arm.as_deref();
+        let first = arm.is_some() && self.said == 0;
+        let say = Say {
+            profile: first.then_some(self.settings.profile.as_str()),
+            // With the arm unknown until it is there; and once the configuration should hold, to see whether it does.
+            full: arm.is_none()
+                || self.said == CONFIGURED
+                || self.unusable == Some(Unusable::NotPlugged),
+            arm,
+            set_basis: first,
+            force: force.filter(|_| self.unusable.is_none()),
+            grip: self.grip.as_ref().map(|(kind, id)| (*kind, id.as_str())),
+        };
+        say.write(&mut self.text);
+        if arm.is_some() {
+            self.said = self.said.saturating_add(1);
+        }
+        &self.text
+    }
+}

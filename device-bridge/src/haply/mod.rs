@@ -1,0 +1,35 @@
+//! Haply Inverse: the service's wire, a client that keeps it in exchange, and a service that is simulated.
+//!
+//! The Inverse service is a program of the vendor's that owns the USB devices and speaks JSON over WebSocket (port 10001). It answers **each
+//! message with exactly one state message**, so whoever sends sets the rate. A force holds for its message alone.
+//!
+//! | file           | what                                                                  |
+//! |----------------|-----------------------------------------------------------------------|
+//! | `address.rs`   | HOST:PORT                                                             |
+//! | `message.rs`   | what the service says, checked; what is said to it                    |
+//! | `exchange.rs`  | one connection without sockets: which device, which grip, what is next |
+//! | `client.rs`    | the thread: sockets, the millisecond's beat, another connection        |
+//! | `version.rs`   | which service is there: 3.5 or later                                  |
+//! | `simulated.rs` | the service's side without sockets: device, hand and grip simulated    |
+//! | `service.rs`   | the same on a socket                                                  |
+//!
+//! The driver on top is [`ArmDevice`](crate::ArmDevice). Sources: the service's documentation of 3.5 and the vendor's client `haply` 1.3.1, read
+//! for facts. No device was at hand.
+
+mod address;
+mod client;
+mod exchange;
+mod message;
+mod service;
+mod simulated;
+mod version;
+
+pub use address::{AddressError as HaplyAddressError, ServiceAddress};
+pub(crate) use client::ForceHold;
+pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
+pub use exchange::{Exchange, ExchangeSettings, Unusable};
+pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
+pub use service::{HaplyService, ServiceTotals};
+pub(crate) use simulated::workspace_centre;
+pub use simulated::{SimulatedInverse, SimulatedSettings};
+pub use version::{ServiceVersion, VersionError, service_version};

@@ -1,0 +1,111 @@
+//! Which service is there. Before 3.5 the fields of a force had other names, so that an old service would take it for none.
+
+use std::time::Duration;
+
+use serde::Deserialize;
+
+use super::address::ServiceAddress;
+
+/// The first whose messages are understood.
+const FIRST: ServiceVersion = ServiceVersion { major: 3, minor: 5 };
+/// How long the answer may take.
+const PATIENCE: Duration = Duration::from_secs(2);
+/// Largest answer that is read, bytes.
+const MAX_ANSWER: u64 = 1 << 16;
+
+/// Version of an Inverse service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ServiceVersion {
+    /// Before the first point.
+    pub major: u32,
+    /// After it.
+    pub minor: u32,
+}
+
+/// Why no version is known, or which one is too old.
+#[derive(Debug, thiserror::Error)]
+pub enum VersionError {
+    /// Too old.
+    #[error(
+        "the Inverse service at {address} has version {}.{}, but its messages are understood from {}.{} on; install a newer one",
+        found.major, found.minor, FIRST.major, FIRST.minor
+    )]
+    TooOld {
+        /// Of the service.
+        address: ServiceAddress,
+        /// What it says.
+        found: ServiceVersion,
+    },
+    /// No answer, or one that says no version.
+    #[error("the Inverse service at {address} does not tell its version ({cause})")]
+    Unknown {
+        /// Of the service.
+        address: ServiceAddress,
+        /// What went wrong.
+        cause: String,
+    },
+}
+
+#[derive(Deserialize)]
+struct Answer {
+    project_version: String,
+}
+
+impl ServiceVersion {
+    /// The first two numbers of a text such as `3.5.1.0`.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut numbers = text.trim_start_matches('v').split(['.', '-', '+']);
+        Some(Self {
+            major: numbers.next()?.parse().ok()?,
+            minor: numbers.next()?.parse().ok()?,
+        })
+    }
+}
+
+/// Asks the service for its version, `GET /version`; waits at most two seconds.
+///
+/// # Errors
+/// [`VersionError`].
+pub fn service_version(address: &ServiceAddress) -> Result<ServiceVersion, VersionError> {
+    let unknown = |cause: String| VersionError::Unknown {
+        address: address.clone(),
+        cause,
+    };
+    let agent: ureq::Agent = ureq::Agent::config_builder()
+        .timeout_global(Some(PATIENCE))
+        .proxy(None)
+        .build()
+        .into();
+    let asked = agent.get(format!("http://{address}/version")).call();
+    let mut answer = asked.map_err(|error| unknown(error.to_string()))?;
+    let body = answer
+        .body_mut()
+        .with_config()
+        .limit(MAX_ANSWER)
+        .read_to_string();
+    let body = body.map_err(|error| unknown(error.to_string()))?;
+    let told: Answer = serde_json::from_str(&body).map_err(|error| unknown(error.to_string()))?;
+    let found = ServiceVersion::parse(&told.project_version)
+        .ok_or_else(|| unknown(format!("`{}` is none", told.project_version)))?;
+    if found < FIRST {
+        return Err(VersionError::TooOld {
+            address: address.clone(),
+            found,
+        });
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_compared_by_number() {
+        let of = |text| ServiceVersion::parse(text).unwrap_or_else(|| panic!("{text}"));
+        assert!(of("3.0.0.0") < FIRST && of("3.4.9") < FIRST && of("2.10") < FIRST);
+        assert!(of("3.5.0") == FIRST && of("v3.10.2-rc1") > FIRST && of("4.0") > FIRST);
+        assert_eq!(ServiceVersion::parse("main"), None);
+    }
+}

@@ -1,0 +1,219 @@
+//! Lines of 63 bytes, blank-padded, the last byte a line's end.
+//!
+//! ```text
+//!   from the board   x y z [mm]  tA lambda tD tE [rad]  info
+//!   to the board     fx fy fz [mN]  0 0 0 0
+//! ```
+//!
+//! The orientation is Rz(tA) Ry(-lambda) Rx(tD) Ry(tE). There is no checksum: a line counts only if it has 63 bytes and eight numbers in range.
+
+use std::fmt::Write;
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Of a line, its end included.
+pub(crate) const LINE: usize = 63;
+/// Farthest cursor that is believed, mm along an axis: the workspace has a radius of 150.
+const FARTHEST_MM: f64 = 500.0;
+/// Largest angle, rad.
+const LARGEST_ANGLE: f64 = 7.0;
+/// Largest force that a line can say, mN.
+const LARGEST_MN: f64 = 20_000.0;
+
+/// What the board said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Of the cursor, m.
+    pub position: [f64; 3],
+    /// tA, lambda, tD, tE, rad.
+    pub angles: [f64; 4],
+    /// The board's own flags; not published which.
+    pub info: i32,
+}
+
+/// Why a line is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BrokenFrame {
+    /// Not 63 bytes with the line's end last.
+    #[error("a line of the Polhem board has not {LINE} bytes")]
+    Length,
+    /// Not eight numbers.
+    #[error("a line of the Polhem board has not eight numbers")]
+    Numbers,
+    /// A number that cannot be.
+    #[error("a line of the Polhem board has a number that cannot be")]
+    OutOfRange,
+}
+
+impl Frame {
+    /// Reads a line, its end included.
+    ///
+    /// # Errors
+    /// [`BrokenFrame`].
+    pub fn parse(line: &[u8]) -> Result<Self, BrokenFrame> {
+        let [text @ .., b'\n'] = line else {
+            return Err(BrokenFrame::Length);
+        };
+        if line.len() != LINE || text.contains(&b'\n') {
+            return Err(BrokenFrame::Length);
+        }
+        let text = str::from_utf8(text).map_err(|_| BrokenFrame::Numbers)?;
+        let mut words = text.split(' ').filter(|word| !word.is_empty());
+        let mut numbers = [0.0; 7];
+        for number in &mut numbers {
+            let word = words.next().ok_or(BrokenFrame::Numbers)?;
+            // Digits alone: no `inf`, no exponent.
+            let is_plain = word
+                .bytes()
+                .all(|byte| byte.is_ascii_digit() || b"+-.".contains(&byte));
+            let read: Option<f64> = word.parse().ok();
+            *number = read.filter(|_| is_plain).ok_or(BrokenFrame::Numbers)?;
+        }
+        let info = words
+            .next()
+            .and_then(|word| word.parse().ok())
+            .ok_or(BrokenFrame::Numbers)?;
+        if words.next().is_some() {
+            return Err(BrokenFrame::Numbers);
+        }
+        let [x, y, z, angles @ ..] = numbers;
+        let fits = [x, y, z].iter().all(|mm| mm.abs() <= FARTHEST_MM)
+            && angles.iter().all(|angle| angle.abs() <= LARGEST_ANGLE);
+        if !fits {
+            return Err(BrokenFrame::OutOfRange);
+        }
+        Ok(Self {
+            position: [x, y, z].map(|mm| mm * 1e-3),
+            angles,
+            info,
+        })
+    }
+
+    /// The line of it; `None` where it is too long.
+    #[must_use]
+    pub fn line(&self) -> Option<[u8; LINE]> {
+        let [x, y, z] = self.position.map(|metres| metres * 1e3);
+        let [a, b, c, d] = self.angles;
+        padded(&format!(
+            "{x:.3} {y:.3} {z:.3} {a:.4} {b:.4} {c:.4} {d:.4} {}",
+            self.info
+        ))
+    }
+
+    /// The orientation of the grip.
+    #[must_use]
+    pub fn orientation(&self) -> UnitQuaternion<f64> {
+        let [a, lambda, d, e] = self.angles;
+        let about = UnitQuaternion::from_axis_angle;
+        about(&Vector3::z_axis(), a)
+            * about(&Vector3::y_axis(), -lambda)
+            * about(&Vector3::x_axis(), d)
+            * about(&Vector3::y_axis(), e)
+    }
+}
+
+/// The line that commands a force, N; zero where it is not finite.
+#[must_use]
+pub fn force_frame(force: &[f64; 3]) -> [u8; LINE] {
+    let is_finite = force.iter().all(|part| part.is_finite());
+    let [x, y, z] = force.map(|newtons| {
+        let limited = (newtons * 1e3).round().clamp(-LARGEST_MN, LARGEST_MN);
+        if is_finite { limited as i32 } else { 0 }
+    });
+    let mut text = String::with_capacity(LINE);
+    let _ = write!(text, "{x} {y} {z} 0 0 0 0");
+    padded(&text).unwrap_or([b' '; LINE]) // six digits each: it fits
+}
+
+/// The force that a line commands, N; `None` where it is none.
+#[must_use]
+pub fn read_force(line: &[u8]) -> Option<[f64; 3]> {
+    let text = line.strip_suffix(b"\n").filter(|_| line.len() == LINE)?;
+    let words: Vec<i32> = str::from_utf8(text)
+        .ok()?
+        .split(' ')
+        .filter(|word| !word.is_empty())
+        .map(|word| word.parse().ok())
+        .collect::<Option<_>>()?;
+    let &[x, y, z, _, _, _, _] = &words[..] else {
+        return None;
+    };
+    Some([x, y, z].map(|millinewtons| f64::from(millinewtons) * 1e-3))
+}
+
+fn padded(text: &str) -> Option<[u8; LINE]> {
+    let mut line = [b' '; LINE];
+    line[LINE - 1] = b'\n';
+    line.get_mut(..text.len())
+        .filter(|_| text.len() < LINE)?
+        .copy_from_slice(text.as_bytes());
+    Some(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(text: &str) -> Vec<u8> {
+        format!("{text:<62}\n").into_bytes()
+    }
+
+    #[test]
+    fn a_line_is_read_to_the_letter() {
+        let frame = Frame::parse(&line("12.5 -3.25 0.125 0.1 -0.2 0.3 -0.4 1")).expect("a line");
+        let micrometres = frame.position.map(|part| (part * 1e6).round());
+        assert_eq!(micrometres, [12_500.0, -3250.0, 125.0]);
+        assert_eq!((frame.angles, frame.info), ([0.1, -0.2, 0.3, -0.4], 1));
+        assert_eq!(
+            frame.line().map(|line| line.to_vec()),
+            Some(line("12.500 -3.250 0.125 0.1000 -0.2000 0.3000 -0.4000 1"))
+        );
+        let turned = Frame {
+            angles: [0.5, 0.0, 0.0, 0.0],
+            ..frame
+        }
+        .orientation();
+        assert!((turned.scaled_axis() - Vector3::z() * 0.5).norm() < 1e-12);
+        let turned = Frame {
+            angles: [0.0, 0.5, 0.0, 0.0],
+            ..frame
+        }
+        .orientation();
+        assert!((turned.scaled_axis() + Vector3::y() * 0.5).norm() < 1e-12);
+        assert_eq!(
+            force_frame(&[1.0, -0.5, 0.0004])[..],
+            line("1000 -500 0 0 0 0 0")[..]
+        );
+        assert_eq!(
+            force_frame(&[f64::NAN, 1.0, 1.0])[..],
+            line("0 0 0 0 0 0 0")[..]
+        );
+        assert_eq!(
+            read_force(&force_frame(&[1.0, -0.5, 0.25])),
+            Some([1.0, -0.5, 0.25])
+        );
+    }
+
+    #[test]
+    fn what_is_no_line_is_refused() {
+        let good = line("12.5 -3.25 0.125 0.1 -0.2 0.3 -0.4 1");
+        for at in 0..good.len() {
+            assert!(Frame::parse(&good[..at]).is_err(), "cut at {at}");
+            let mut long = good.clone();
+            long.insert(at, b' ');
+            assert_eq!(Frame::parse(&long), Err(BrokenFrame::Length));
+        }
+        for (text, why) in [
+            ("1 2 3 0 0 0 0", BrokenFrame::Numbers),
+            ("1 2 3 0 0 0 0 0 0", BrokenFrame::Numbers),
+            ("1 2 3 0 0 0 nan 0", BrokenFrame::Numbers),
+            ("1 2 inf 0 0 0 0 0", BrokenFrame::Numbers),
+            ("1 2 3e2 0 0 0 0 0", BrokenFrame::Numbers),
+            ("1 2 900 0 0 0 0 0", BrokenFrame::OutOfRange),
+            ("1 2 3 0 0 0 70 0", BrokenFrame::OutOfRange),
+        ] {
+            assert_eq!(Frame::parse(&line(text)), Err(why), "{text}");
+        }
+        assert_eq!(read_force(&line("1 2 3 0 0 0")), None);
+    }
+}

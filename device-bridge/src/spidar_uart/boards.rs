@@ -1,0 +1,408 @@
+//! The thread on the serial port: a cycle a millisecond, and the boards looked for again when they are gone.
+//!
+//! What keeps a current from outliving its reason, since no board is known to let go by itself: this thread sends zero currents whenever the
+//! device's loop has not written for 20 ms or no answer was believed for 20 ms, at every end that it sees, and first of all after the boards were found.
+
+use std::io::{Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use serialport::{ClearBuffer, SerialPort};
+use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHardware};
+
+use super::counters::Counters;
+use super::cycle::{BrokenCycle, Cycle};
+use super::packet::{BoardInfo, INFO, INFO_ANSWER, INFO_PADDING, MAX_BOARDS, header};
+use crate::realtime::{self, Ticker, monotonic_now};
+
+/// Of the boards.
+const BAUD: u32 = 2_000_000;
+/// From cycle to cycle.
+const PERIOD: Duration = Duration::from_millis(1);
+/// Where in the millisecond a cycle goes out: just after the device's loop, whose tensions it carries.
+const PHASE: Duration = Duration::from_micros(350);
+/// An answer that is not there by then is none.
+const ANSWER_WITHIN: Duration = Duration::from_millis(3);
+/// The same of a board that is looked for.
+const FOUND_WITHIN: Duration = Duration::from_millis(15);
+/// Without a write of the device's loop, or without an answer, for this long all currents are zero.
+const HOLDS: Duration = Duration::from_millis(20);
+/// Without a believed answer for this long the line is opened anew.
+const GIVEN_UP: Duration = Duration::from_millis(300);
+/// How often a line is asked for its boards before it has none.
+const FIND_ATTEMPTS: u32 = 3;
+/// Between two attempts.
+const RETRY: Duration = Duration::from_millis(200);
+/// For the first attempt.
+const OPEN_WITHIN: Duration = Duration::from_secs(5);
+/// Cycles of zero currents at an end, in case one is lost.
+const LAST_CYCLES: u32 = 3;
+/// Digits per volt of the boards' converter, and its largest.
+const DIGITS: (f64, f64) = (4096.0 / 3.3, 4095.0);
+
+/// Why there are no boards.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BoardsError {
+    /// The port cannot be opened.
+    #[error(
+        "the serial port {path} cannot be opened ({cause}); look at the cable and at `taut doctor`, and let your user open it: sudo usermod -aG dialout $USER, then log in again"
+    )]
+    Port {
+        /// As given.
+        path: String,
+        /// What the system says.
+        cause: String,
+    },
+    /// Nobody answers, or not eight motors.
+    #[error(
+        "on {path} there are motor boards with {motors} motors together, but a SPIDAR-G needs 8; look at the boards' supply and at their cables"
+    )]
+    Motors {
+        /// As given.
+        path: String,
+        /// That were found.
+        motors: usize,
+    },
+    /// Nothing is known of the amplifiers.
+    #[error(
+        "the geometry {0} has no `volts_per_newton`, without which no current is known; write it into its file"
+    )]
+    NoVolts(String),
+    /// No thread.
+    #[error(
+        "cannot start a thread for the motor boards: {0}; end other programs or raise the limit"
+    )]
+    Thread(String),
+}
+
+/// What the thread hands on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counted {
+    readings: u64,
+    counts: [i32; STRINGS],
+    is_there: bool,
+}
+
+/// What the device's loop wants.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wanted {
+    writes: u64,
+    digits: [i16; STRINGS],
+}
+
+/// Motor boards on a serial line. Dropping it leaves no current.
+pub struct SpidarBoards {
+    counted: triple_buffer::Output<Counted>,
+    wanted: triple_buffer::Input<Wanted>,
+    newest: Wanted,
+    digits_per_newton: PerString,
+    seen: (u64, Duration),
+    end: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl SpidarBoards {
+    /// Opens the line and looks for the boards; `priority` asks for real time, 0 does not. Waits for the first counts.
+    ///
+    /// # Errors
+    /// [`BoardsError`].
+    pub fn open(path: &str, geometry: &Geometry, priority: u8) -> Result<Self, BoardsError> {
+        let digits_per_newton = digits_per_newton(geometry)?;
+        let (output, counted) = triple_buffer::TripleBuffer::new(&Counted::default()).split();
+        let (wanted, taken) = triple_buffer::TripleBuffer::new(&Wanted::default()).split();
+        let end = Arc::new(AtomicBool::new(false));
+        let (ready, readied) = sync_channel(1);
+        let count = geometry
+            .metres_per_count
+            .iter()
+            .fold(f64::INFINITY, |least, count| least.min(count.abs()));
+        let mut line = Line {
+            path: path.to_owned(),
+            out: output,
+            wanted: taken,
+            counters: Counters::new(count),
+            counted: Counted::default(),
+            writes: (0, Duration::ZERO),
+            end: Arc::clone(&end),
+            bytes: Vec::with_capacity(256),
+            heard: Vec::with_capacity(512),
+        };
+        let thread = thread::Builder::new()
+            .name("taut-spidar".to_owned())
+            .spawn(move || {
+                if priority > 0 {
+                    let grant = realtime::request_fifo(priority);
+                    if !grant.is_granted() {
+                        tracing::warn!("{grant}: cycles of the motor boards may be late");
+                    }
+                }
+                line.run(&ready);
+            })
+            .map_err(|error| BoardsError::Thread(error.to_string()))?;
+        let boards = Self {
+            counted,
+            wanted,
+            newest: Wanted::default(),
+            digits_per_newton,
+            seen: (0, Duration::ZERO),
+            end,
+            thread: Some(thread),
+        };
+        match readied.recv_timeout(OPEN_WITHIN) {
+            Ok(Ok(())) => Ok(boards),
+            Ok(Err(error)) => Err(error),
+            Err(_) => Err(BoardsError::Motors {
+                path: path.to_owned(),
+                motors: STRINGS,
+            }),
+        }
+    }
+}
+
+/// Digits of a board's converter per newton of a string's tension, with the sign of its winding.
+pub(crate) fn digits_per_newton(geometry: &Geometry) -> Result<PerString, BoardsError> {
+    let volts = geometry.volts(&[1.0; STRINGS]);
+    let volts = volts.ok_or_else(|| BoardsError::NoVolts(geometry.name.clone()))?;
+    Ok(volts.map(|volts| volts * DIGITS.0))
+}
+
+/// The digit that a tension is; zero where it is no number.
+pub(crate) fn digit(tension: f64, per_newton: f64) -> i16 {
+    // Within 16 bits, and zero for NaN.
+    (tension * per_newton).round().clamp(-DIGITS.1, DIGITS.1) as i16
+}
+
+impl StringHardware for SpidarBoards {
+    fn read_counts(&mut self, now: Duration) -> Result<Reading, StringFault> {
+        let counted = *self.counted.read();
+        if counted.readings != self.seen.0 {
+            self.seen = (counted.readings, now);
+        }
+        let age = now.saturating_sub(self.seen.1);
+        if !counted.is_there || counted.readings == 0 || age > HOLDS {
+            return Err(StringFault::Hardware);
+        }
+        Ok(Reading {
+            time: self.seen.1,
+            counts: counted.counts,
+            tensions: None,
+            buttons: 0,
+        })
+    }
+
+    fn write_tensions(&mut self, _now: Duration, tensions: &PerString) {
+        self.newest.writes += 1;
+        self.newest.digits = std::array::from_fn(|i| digit(tensions[i], self.digits_per_newton[i]));
+        self.wanted.write(self.newest);
+    }
+}
+
+impl Drop for SpidarBoards {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // it panics nowhere
+        }
+    }
+}
+
+type Port = Box<dyn SerialPort>;
+
+/// The thread's own.
+struct Line {
+    path: String,
+    out: triple_buffer::Input<Counted>,
+    wanted: triple_buffer::Output<Wanted>,
+    counters: Counters,
+    counted: Counted,
+    /// Writes of the device's loop, and when the last was seen.
+    writes: (u64, Duration),
+    end: Arc<AtomicBool>,
+    bytes: Vec<u8>,
+    heard: Vec<u8>,
+}
+
+impl Line {
+    fn run(&mut self, ready: &SyncSender<Result<(), BoardsError>>) {
+        let mut told = String::new();
+        let mut is_first = true;
+        while !self.is_over() {
+            let lost = match self.find() {
+                Ok((mut port, cycle)) => {
+                    told.clear();
+                    let lost = self.turn(&mut port, &cycle, ready);
+                    is_first = false;
+                    self.let_go(&mut port, &cycle);
+                    lost.err().map(|error| error.to_string())
+                }
+                Err(error) => {
+                    if is_first {
+                        let _ = ready.try_send(Err(error));
+                        return;
+                    }
+                    Some(error.to_string())
+                }
+            };
+            self.counted.is_there = false;
+            self.out.write(self.counted);
+            if let Some(text) = lost
+                && text != told
+            {
+                tracing::warn!(
+                    "the motor boards on {} are gone: {text}; looking for them",
+                    self.path
+                );
+                told = text;
+            }
+            if !self.is_over() {
+                thread::sleep(RETRY);
+            }
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// Opens the port and looks for the boards.
+    fn find(&mut self) -> Result<(Port, Cycle), BoardsError> {
+        let path = self.path.clone();
+        let failed = |error: &dyn std::fmt::Display| BoardsError::Port {
+            path: path.clone(),
+            cause: error.to_string(),
+        };
+        let port = serialport::new(&self.path, BAUD)
+            .timeout(FOUND_WITHIN)
+            .open();
+        let mut port = port.map_err(|error| failed(&error))?;
+        // An answer may be late, or one of a question before.
+        let mut found = (None, 0, Vec::new());
+        for _ in 0..FIND_ATTEMPTS {
+            let boards = self.ask_all(&mut port).map_err(|error| failed(&error))?;
+            let motors = boards
+                .iter()
+                .map(|(_, info)| usize::from(info.motors))
+                .sum();
+            let models: Vec<u8> = boards.iter().map(|(_, info)| info.model).collect();
+            found = (Cycle::new(boards), motors, models);
+            if found.0.is_some() {
+                break;
+            }
+        }
+        let (cycle, motors, models) = found;
+        let cycle = cycle.ok_or_else(|| BoardsError::Motors {
+            path: self.path.clone(),
+            motors,
+        })?;
+        cycle.set_up(&mut self.bytes);
+        port.write_all(&self.bytes)
+            .map_err(|error| failed(&error))?;
+        port.set_timeout(ANSWER_WITHIN)
+            .map_err(|error| failed(&error))?;
+        tracing::info!("motor boards on {}: models {models:?}", self.path);
+        Ok((port, cycle))
+    }
+
+    /// Asks each number on the line what it is.
+    fn ask_all(&mut self, port: &mut Port) -> std::io::Result<Vec<(u8, BoardInfo)>> {
+        let mut boards = Vec::new();
+        for board in 0..MAX_BOARDS {
+            self.bytes.clear();
+            self.bytes.resize(INFO_PADDING.0, 0);
+            self.bytes.push(header(board, INFO));
+            self.bytes.resize(INFO_PADDING.0 + 1 + INFO_PADDING.1, 0);
+            port.clear(ClearBuffer::Input)?;
+            port.write_all(&self.bytes)?;
+            let mut answer = [0; INFO_ANSWER];
+            match port.read_exact(&mut answer) {
+                Ok(()) => boards.extend(BoardInfo::parse(board, &answer).map(|info| (board, info))),
+                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(boards)
+    }
+
+    /// Cycles until the end, or until the line is lost.
+    fn turn(
+        &mut self,
+        port: &mut Port,
+        cycle: &Cycle,
+        ready: &SyncSender<Result<(), BoardsError>>,
+    ) -> std::io::Result<()> {
+        let mut ticker = Ticker::at_phase(PERIOD, PHASE);
+        let mut believed = monotonic_now();
+        port.clear(ClearBuffer::Input)?;
+        while !self.is_over() {
+            ticker.wait();
+            let now = monotonic_now();
+            let wanted = *self.wanted.read();
+            if wanted.writes != self.writes.0 {
+                self.writes = (wanted.writes, now);
+            }
+            let trusted = now.saturating_sub(believed) < HOLDS
+                && now.saturating_sub(self.writes.1) < HOLDS
+                && wanted.writes > 0;
+            let digits = if trusted { wanted.digits } else { [0; STRINGS] };
+            match self.exchange(port, cycle, &digits)? {
+                Ok(raw) => {
+                    if let Some(counts) = self.counters.take(monotonic_now(), &raw) {
+                        believed = monotonic_now();
+                        self.counted.readings += 1;
+                        (self.counted.counts, self.counted.is_there) = (counts, true);
+                        self.out.write(self.counted);
+                        let _ = ready.try_send(Ok(()));
+                    } else if self.counters.were_reset() {
+                        return Err(std::io::Error::other(
+                            "they began to count anew, so that the calibration is lost; hold the grip at the centre and start again",
+                        ));
+                    }
+                }
+                // What else is on its way belongs to nothing.
+                Err(_) => port.clear(ClearBuffer::Input)?,
+            }
+            if monotonic_now().saturating_sub(believed) > GIVEN_UP {
+                return Err(std::io::Error::other("no answer is to be believed"));
+            }
+        }
+        Ok(())
+    }
+
+    /// One cycle: what is sent, and what is answered.
+    fn exchange(
+        &mut self,
+        port: &mut Port,
+        cycle: &Cycle,
+        digits: &[i16; STRINGS],
+    ) -> std::io::Result<Result<[i16; STRINGS], BrokenCycle>> {
+        cycle.send(digits, &mut self.bytes);
+        port.write_all(&self.bytes)?;
+        let until = monotonic_now() + ANSWER_WITHIN;
+        self.heard.clear();
+        let mut chunk = [0; 256];
+        loop {
+            match port.read(&mut chunk) {
+                Ok(0) => return Err(std::io::ErrorKind::UnexpectedEof.into()),
+                Ok(bytes) => self.heard.extend(&chunk[..bytes]),
+                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => {}
+                Err(error) => return Err(error),
+            }
+            let heard = cycle.hear(&self.heard);
+            if heard != Err(BrokenCycle::Short) || monotonic_now() >= until {
+                return Ok(heard);
+            }
+        }
+    }
+
+    /// Zero currents, as far as the line still takes them.
+    fn let_go(&mut self, port: &mut Port, cycle: &Cycle) {
+        for _ in 0..LAST_CYCLES {
+            if self.exchange(port, cycle, &[0; STRINGS]).is_err() {
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! SPIDAR's UART motor boards: 2,000,000 baud, up to 8 boards on a line, currents in and counts out once a millisecond.
+//!
+//! | file           | what                                                                        |
+//! |----------------|-----------------------------------------------------------------------------|
+//! | `packet.rs`    | bytes of the commands and their answers                                       |
+//! | `cycle.rs`     | the boards of a line: what a cycle sends, what it must be answered            |
+//! | `counters.rs`  | from counters of 16 bits that wrap to counts that may be believed             |
+//! | `boards.rs`    | the thread on the serial port: [`SpidarBoards`], a `StringHardware`           |
+//! | `simulated.rs` | the boards' side, with strings and hand, byte by byte                         |
+//!
+//! Facts: the published host side of Springhead (Boost, MIT or BSD licence), read for facts. The boards' firmware is not public, and no board was at hand:
+//! how fast they answer, what they do with a broken packet, and whether they let go of a current by themselves are not known.
+
+mod boards;
+mod counters;
+mod cycle;
+mod packet;
+mod simulated;
+
+pub use boards::{BoardsError, SpidarBoards};
+pub use counters::Counters;
+pub use cycle::{BrokenCycle, Cycle};
+pub use packet::BoardInfo;
+pub use simulated::SimulatedBoards;

@@ -1,0 +1,134 @@
+//! Where reports come from and go to: hidraw, or a socket in its place.
+
+use std::io::ErrorKind;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A device that reads and writes whole reports.
+pub trait ReportLine: Send {
+    /// Waits at most `timeout` for one report; 0 bytes where none came.
+    ///
+    /// # Errors
+    /// The device is gone, in words for people.
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, String>;
+
+    /// Writes a report, its number first.
+    ///
+    /// # Errors
+    /// The device is gone, in words for people.
+    fn write(&mut self, report: &[u8]) -> Result<(), String>;
+}
+
+/// USB ids of the boards: a Teensy, an mbed.
+#[cfg(feature = "hid")]
+pub(crate) const IDS: [(u16, u16); 2] = [(0x16c0, 0x0486), (0x1234, 0x0006)];
+
+/// Opens the device at `path`, a hidraw or a socket; without one the first board on USB.
+pub(crate) fn open(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
+    if let Some(path) = path.filter(|path| is_socket(path)) {
+        return Ok(Box::new(SocketLine::connect(path)?));
+    }
+    open_hid(path)
+}
+
+fn is_socket(path: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    path.metadata()
+        .is_ok_and(|about| about.file_type().is_socket())
+}
+
+#[cfg(feature = "hid")]
+fn open_hid(path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
+    let said = |error: hidapi::HidError| error.to_string();
+    let hid = hidapi::HidApi::new().map_err(said)?;
+    let wanted = path.and_then(Path::to_str);
+    let found = hid.device_list().find(|device| match wanted {
+        Some(path) => device.path().to_str() == Ok(path),
+        None => IDS.contains(&(device.vendor_id(), device.product_id())),
+    });
+    let found = found
+        .ok_or_else(|| "no such board is plugged in (USB 16c0:0486 or 1234:0006)".to_owned())?;
+    Ok(Box::new(HidLine(found.open_device(&hid).map_err(said)?)))
+}
+
+#[cfg(not(feature = "hid"))]
+fn open_hid(_path: Option<&Path>) -> Result<Box<dyn ReportLine>, String> {
+    Err("this program was built without HID; build it with the feature `hid`".to_owned())
+}
+
+/// A board at `/dev/hidraw*`.
+#[cfg(feature = "hid")]
+struct HidLine(hidapi::HidDevice);
+
+#[cfg(feature = "hid")]
+impl ReportLine for HidLine {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, String> {
+        let milliseconds = i32::try_from(timeout.as_millis()).unwrap_or(i32::MAX);
+        self.0
+            .read_timeout(buffer, milliseconds)
+            .map_err(|error| error.to_string())
+    }
+
+    fn write(&mut self, report: &[u8]) -> Result<(), String> {
+        self.0
+            .write(report)
+            .map(drop)
+            .map_err(|error| error.to_string())
+    }
+}
+
+/// A socket keeps the borders of reports as hidraw does.
+pub struct SocketLine {
+    socket: UnixDatagram,
+    own: PathBuf,
+}
+
+impl SocketLine {
+    /// Connects to a simulated board.
+    ///
+    /// # Errors
+    /// Nobody is there, in words for people.
+    pub fn connect(path: &Path) -> Result<Self, String> {
+        let said = |error: std::io::Error| error.to_string();
+        let own = path.with_extension(format!("host-{}", std::process::id()));
+        let _ = std::fs::remove_file(&own); // of a process before with this number
+        let socket = UnixDatagram::bind(&own).map_err(said)?;
+        let line = Self { socket, own };
+        line.socket.connect(path).map_err(said)?;
+        Ok(line)
+    }
+}
+
+impl Drop for SocketLine {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.own);
+    }
+}
+
+impl ReportLine for SocketLine {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, String> {
+        let said = |error: std::io::Error| error.to_string();
+        // A time of zero would wait for ever, and a short one for a tick of the kernel.
+        self.socket
+            .set_nonblocking(timeout.is_zero())
+            .map_err(said)?;
+        if !timeout.is_zero() {
+            self.socket.set_read_timeout(Some(timeout)).map_err(said)?;
+        }
+        match self.socket.recv(buffer) {
+            Ok(bytes) => Ok(bytes),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                Ok(0)
+            }
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn write(&mut self, report: &[u8]) -> Result<(), String> {
+        self.socket
+            .send(report)
+            .map(drop)
+            .map_err(|error| error.to_string())
+    }
+}

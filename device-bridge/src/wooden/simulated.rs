@@ -1,0 +1,201 @@
+//! The board's side: a report for each report, with an arm in a simulated hand; and the same on a socket.
+
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use nalgebra::{Vector3, Vector6};
+use taut_plant::{Hand, MinJerkPath, Plant, Tremor, ViaPoint};
+
+use super::kinematics::WoodenModel;
+use super::report::{BoardReport, HostReport};
+use crate::device::Pose;
+use crate::realtime::monotonic_now;
+
+/// The firmware turns the motors off so long after the last report.
+const MOTORS_OFF: Duration = Duration::from_millis(500);
+/// Most that is simulated in one call.
+const LONGEST_SILENCE: Duration = Duration::from_secs(1);
+/// How often a thread that waits looks for the end.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// An arm on its board.
+pub struct SimulatedWooden {
+    model: WoodenModel,
+    plant: Plant,
+    /// What a host that set the counters added to them.
+    offsets: [i16; 6],
+    epoch: Option<Duration>,
+    elapsed: Duration,
+    commanded: Duration,
+    reports: u64,
+    largest_force: f64,
+}
+
+impl SimulatedWooden {
+    /// The hand holds the arm at its home for a second, then goes 40 mm down from the middle of the workspace and up again, for ever; or along `path`,
+    /// which has positions from that middle.
+    #[must_use]
+    pub fn new(
+        model: WoodenModel,
+        hand: Hand,
+        path: Option<MinJerkPath>,
+        tremor: Option<Tremor>,
+    ) -> Self {
+        let home = model.position(&model.home);
+        let at = |time_s, place: Vector3<f64>| ViaPoint {
+            time_s,
+            pose: Pose::translation(place.x, place.y, place.z),
+        };
+        let down = Vector3::new(0.0, 0.0, -0.04);
+        let zero = Vector3::zeros();
+        let points = vec![
+            at(0.0, home),
+            at(1.0, home),
+            at(2.5, zero),
+            at(4.0, down),
+            at(6.0, down),
+            at(7.0, zero),
+        ];
+        let path = path.or_else(|| MinJerkPath::new(points, false).ok());
+        let path = path.unwrap_or_else(|| MinJerkPath::hold(Pose::identity())); // growing times: never
+        let mut plant = Plant::new(crate::devices::polhem_grip(), hand, path);
+        if let Some(tremor) = tremor {
+            plant = plant.with_tremor(tremor);
+        }
+        Self {
+            model,
+            plant,
+            offsets: [0; 6],
+            epoch: None,
+            elapsed: Duration::ZERO,
+            commanded: Duration::ZERO,
+            reports: 0,
+            largest_force: 0.0,
+        }
+    }
+
+    /// What the motors render, N.
+    #[must_use]
+    pub fn rendered(&self) -> Vector3<f64> {
+        self.plant.rendered_wrench().fixed_rows::<3>(0).into()
+    }
+
+    /// Largest norm of a rendered force so far, N.
+    #[must_use]
+    pub fn largest_force(&self) -> f64 {
+        self.largest_force
+    }
+
+    /// Reports taken so far.
+    #[must_use]
+    pub fn reports(&self) -> u64 {
+        self.reports
+    }
+
+    /// Takes a report of the host at `now`; the board's.
+    pub fn take(&mut self, now: Duration, report: &[u8]) -> [u8; 14] {
+        self.advance(now);
+        self.reports += 1;
+        let encoders = self.encoders();
+        match HostReport::parse(report) {
+            Some(HostReport::Currents(currents)) => {
+                self.commanded = now;
+                let force = self.model.force(&encoders, &currents).unwrap_or_default();
+                self.plant
+                    .command(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0));
+                self.largest_force = self.largest_force.max(self.rendered().norm());
+            }
+            Some(HostReport::SetCounters(counters)) => {
+                self.offsets = std::array::from_fn(|i| counters[i].wrapping_sub(encoders[i]));
+            }
+            None => {}
+        }
+        let counters = std::array::from_fn(|i| encoders[i].wrapping_add(self.offsets[i]));
+        BoardReport {
+            encoders: counters,
+            info: 1,
+        }
+        .bytes()
+    }
+
+    fn encoders(&self) -> [i16; 6] {
+        let place = self.plant.measured_pose().translation.vector;
+        self.model.encoders(&place).unwrap_or(self.model.home)
+    }
+
+    fn advance(&mut self, now: Duration) {
+        let epoch = *self.epoch.get_or_insert(now);
+        let passed = now.saturating_sub(epoch);
+        let due = passed.saturating_sub(self.elapsed);
+        self.elapsed = self.elapsed.max(passed);
+        if now.saturating_sub(self.commanded) > MOTORS_OFF {
+            self.plant.command(&Vector6::zeros());
+        }
+        self.plant
+            .advance(self.plant.time() + due.min(LONGEST_SILENCE));
+    }
+}
+
+/// A simulated board on a socket, in place of hidraw. Dropping it is pulling the cable.
+pub struct WoodenService {
+    arm: Arc<Mutex<SimulatedWooden>>,
+    path: PathBuf,
+    end: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl WoodenService {
+    /// Answers at `path`, replaced where there is a socket already.
+    ///
+    /// # Errors
+    /// The socket or the thread cannot be had.
+    pub fn start(arm: Arc<Mutex<SimulatedWooden>>, path: &Path) -> std::io::Result<Self> {
+        let _ = std::fs::remove_file(path); // most often there is none
+        let socket = UnixDatagram::bind(path)?;
+        socket.set_read_timeout(Some(LOOK))?;
+        let end = Arc::new(AtomicBool::new(false));
+        let (ended, its) = (Arc::clone(&end), Arc::clone(&arm));
+        let thread = thread::Builder::new()
+            .name("wooden-board".to_owned())
+            .spawn(move || {
+                let mut report = [0; 64];
+                while !ended.load(Ordering::Relaxed) {
+                    let Ok((bytes, host)) = socket.recv_from(&mut report) else {
+                        continue; // nothing for a moment
+                    };
+                    let answer = its
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .take(monotonic_now(), &report[..bytes]);
+                    if let Some(host) = host.as_pathname() {
+                        let _ = socket.send_to(&answer, host); // a host that is gone hears nothing
+                    }
+                }
+            })?;
+        Ok(Self {
+            arm,
+            path: path.to_owned(),
+            end,
+            thread: Some(thread),
+        })
+    }
+
+    /// The arm.
+    pub fn arm(&self) -> MutexGuard<'_, SimulatedWooden> {
+        self.arm.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for WoodenService {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
