@@ -335,7 +335,7 @@ pub struct HaplyFound {
     pub answers: Vec<Duration>,
 }
 
-/// Looks at a service: reads its inventory, and asks for the state of its arms [`LOOKS`] times, without force.
+/// Looks at a service: reads its inventory, and asks for the state of its arms `LOOKS` times, without force.
 ///
 /// # Errors
 /// [`HaplyError`]: nobody answers, or too old a service.

@@ -65,7 +65,7 @@ pub struct Arm {
     pub model: Option<String>,
     /// `left` or `right`, where it was told.
     pub handedness: Option<String>,
-    /// Order of its axes, where it was told; see [`PERMUTATION`].
+    /// Order of its axes, where it was told; see `PERMUTATION`.
     pub permutation: Option<String>,
     /// Of the cursor, m.
     pub position: Option<[f64; 3]>,

@@ -115,7 +115,7 @@ impl BoardInfo {
         ]
     }
 
-    /// Length of the answer to [`CURRENT`]: positions, velocities, forces.
+    /// Length of the answer to `CURRENT`: positions, velocities, forces.
     #[must_use]
     pub fn cycle_answer(&self) -> usize {
         1 + 4 * usize::from(self.motors) + 2 * usize::from(self.forces)

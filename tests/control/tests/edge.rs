@@ -54,7 +54,7 @@ fn single_precision_on_the_wire_changes_the_force_by_less_than_1e_4_of_it() {
             let pose = device.read(now).expect("no faults").pose;
             body.step(&pose, None);
             let set = body.constraint_set();
-            write_set(set, false, &mut wire);
+            write_set(set, scene.settings.implicit_rounds > 0, &mut wire);
             let mut assembler = Assembler::new();
             let division = Division::of(&wire);
             for part in 0..division.parts() {
