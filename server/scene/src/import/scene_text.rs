@@ -2,10 +2,12 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, center};
 
 /// What is drawn is about this wide, m.
 const DRAWN_WIDTH: f64 = 0.3;
+/// Where the shipped workbench has a scene's origin: above the middle of its table, m.
+const SHOWN_AT: Point3<f64> = Point3::new(0.0, -0.45, 0.25);
 /// A body that begins above the others begins this share of all their size above them.
 const START_GAP: f64 = 0.1;
 /// Radius of the sphere in the hand, as a share of the longest side of all parts.
@@ -86,7 +88,27 @@ pub(super) fn scene_text(
         text,
         "\n[view]\ndisplay_scale = {scale:?}    # drawn about {DRAWN_WIDTH} m wide"
     );
+    let begins = held.map(|part| Placed {
+        low: part.low + start.coords,
+        high: part.high + start.coords,
+        ..part.clone()
+    });
+    if let Some((low, high)) = around(obstacles.iter().chain(&begins)) {
+        let [x, y, z] = (SHOWN_AT - center(&low, &high).coords * scale)
+            .coords
+            .map(to_millimetres)
+            .into();
+        let _ = writeln!(
+            text,
+            "origin = [{x:?}, {y:?}, {z:?}]    # m: the middle of the parts above the middle of the shipped workbench's table"
+        );
+    }
     text
+}
+
+/// Whole millimetres, for the same people; no minus zero.
+fn to_millimetres(metres: f64) -> f64 {
+    (metres * 1e3).round() / 1e3 + 0.0
 }
 
 /// Two significant digits, for people who read the file.

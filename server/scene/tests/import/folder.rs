@@ -143,3 +143,27 @@ fn a_place_is_told_in_metres_of_the_part() {
     );
     assert!(report.to_string().contains("NOT MENDED"), "{report}");
 }
+
+/// A body that begins above them moves the middle by some centimetres.
+#[test]
+fn parts_far_from_the_origin_are_shown_in_the_middle_of_the_workbench() {
+    for way in [[0.0; 3], [5.0, -3.0, 2.0], [-0.4, 0.7, -0.2]] {
+        let parts = Parts::new(&[("a.ply", &moved(part(), way))]);
+        for obstacles_only in [false, true] {
+            let request = ImportRequest {
+                obstacles_only,
+                folder: parts.path(&format!("out-{obstacles_only}")),
+                ..parts.request(&["a.ply"])
+            };
+            let report = import(&request).unwrap();
+            let scene = Scene::load(Path::new(&report.scene)).unwrap();
+            let (view, built) = (scene.view(), scene.build().unwrap());
+            let (origin, body) = (view.origin.unwrap(), usize::from(obstacles_only));
+            let (low, high) = built.bodies[body].mesh.bounds().unwrap();
+            let seen = [0, 1, 2].map(|k| origin[k] + view.display_scale * 0.5 * (low[k] + high[k]));
+            assert!(seen[0].abs() < 1e-3, "{seen:?}");
+            assert!((seen[1] + 0.45).abs() < 1e-3, "{seen:?}");
+            assert!((seen[2] - 0.25).abs() < 0.05, "{seen:?}");
+        }
+    }
+}
