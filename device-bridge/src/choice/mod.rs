@@ -2,27 +2,31 @@
 //!
 //! `simulated,strings=wb`, `trace:FILE`, `haply=HOST:PORT`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
 
+mod option_text;
+mod settings;
+
 use std::path::PathBuf;
 use std::str::FromStr;
-use std::time::Duration;
 
 use taut_plant::Grip;
-use taut_vrpn::{Address, AddressError, Axes, SensorMapping};
+use taut_vrpn::{Address, AddressError};
+
+use option_text::nearest;
+#[cfg(unix)]
+use settings::wooden_settings;
+use settings::{
+    cap_settings, haply_settings, polhem_settings, spidar_settings, strings_option, vrpn_settings,
+};
 
 use crate::device::Device;
 #[cfg(unix)]
 use crate::devices::WoodenSettings;
 use crate::devices::{
-    Anchor, ArmDevice, CapMode, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError,
-    SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
+    ArmDevice, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError, SpaceMouse,
+    SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
 use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
-use crate::simulated_strings::string_geometry;
-use crate::vrpn::{VrpnMode, VrpnSource};
-
-/// Similarity (Jaro-Winkler, 0 to 1) from which a name is offered for an unknown one.
-const SUGGESTION_SIMILARITY: f64 = 0.7;
 
 /// A driver, for lists that people read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -314,273 +318,6 @@ impl FromStr for DeviceChoice {
     }
 }
 
-fn strings_option(options: &str) -> Result<Option<String>, UnknownDevice> {
-    let mut strings = None;
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("simulated", option);
-        if let Some(named) = option.asked("strings") {
-            if named.is_empty() {
-                return Err(option.wrong("strings", "g6x3r, g6x4r, g6x5r, wb or a geometry file"));
-            }
-            strings = Some(named.to_owned());
-        }
-        option.finish()?;
-    }
-    Ok(strings)
-}
-
-fn cap_settings(options: &str) -> Result<CapSettings, UnknownDevice> {
-    let mut settings = CapSettings::default();
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("space-mouse", option);
-        option.choice("mode", &CapMode::NAMED, &mut settings.mode)?;
-        option.number("dead-zone", 0.0, 0.9, &mut settings.dead_zone)?;
-        option.number("speed", 1e-3, 10.0, &mut settings.speed)?;
-        option.number("turn-rate", 1e-2, 100.0, &mut settings.turn_rate)?;
-        option.number("reach", 1e-3, 10.0, &mut settings.reach)?;
-        option.number("tilt", 1e-2, 3.0, &mut settings.tilt)?;
-        option.number("yield-force", 1e-2, 1e3, &mut settings.yield_force)?;
-        option.number("yield-torque", 1e-3, 1e3, &mut settings.yield_torque)?;
-        option.finish()?;
-    }
-    Ok(settings)
-}
-
-fn vrpn_settings(text: &str) -> Result<VrpnSettings, UnknownDevice> {
-    let (address, options) = text.split_once(',').unwrap_or((text, ""));
-    let mut settings = VrpnSettings {
-        source: VrpnSource {
-            address: address.parse()?,
-            sensor: 0,
-            mode: VrpnMode::default(),
-        },
-        mapping: SensorMapping::identity(),
-        anchor: Anchor::default(),
-        max_age: VrpnSettings::DEFAULT_MAX_AGE,
-    };
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("vrpn", option);
-        let (mut sensor, mut max_age) = (None, None);
-        option.number("sensor", 0.0, 1e6, sensor.get_or_insert(0.0))?;
-        option.choice("mode", &VrpnMode::NAMED, &mut settings.source.mode)?;
-        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
-        option.number("scale", 1e-6, 1e6, &mut settings.mapping.scale)?;
-        option.number("max-age", 1e-3, 10.0, max_age.get_or_insert(0.0))?;
-        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
-        match option.name {
-            "sensor" => settings.source.sensor = sensor.unwrap_or(0.0) as i32,
-            "max-age" => settings.max_age = Duration::from_secs_f64(max_age.unwrap_or(0.1)),
-            _ => {}
-        }
-        option.finish()?;
-    }
-    Ok(settings)
-}
-
-fn spidar_settings(text: &str) -> Result<SpidarUartSettings, UnknownDevice> {
-    let (path, options) = text.split_once(',').unwrap_or((text, ""));
-    let (mut named, mut axes) = ("g6x4r", SpidarUartSettings::AXES);
-    let mut right = true;
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("spidar", option);
-        named = option.asked("geometry").unwrap_or(named);
-        let mut wanted = Axes::SAME;
-        option.parsed("axes", "such as `x -z y`", &mut wanted)?;
-        if option.name == "axes" {
-            right = wanted.matrix().determinant() > 0.0;
-            axes = wanted;
-        }
-        if !right {
-            return Err(option.wrong(
-                "axes",
-                "right-handed, such as `x -z y`: a frame has no mirror image",
-            ));
-        }
-        option.finish()?;
-    }
-    let geometry =
-        string_geometry(named).map_err(|error| UnknownDevice::Geometry(error.to_string()))?;
-    Ok(SpidarUartSettings {
-        path: path.to_owned(),
-        geometry,
-        axes,
-    })
-}
-
-fn polhem_settings(text: &str) -> Result<PolhemSettings, UnknownDevice> {
-    let (path, options) = text.split_once(',').unwrap_or((text, ""));
-    let mut settings = PolhemSettings::at(path);
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("polhem", option);
-        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
-        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
-        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
-        option.finish()?;
-    }
-    Ok(settings)
-}
-
-#[cfg(unix)]
-fn wooden_settings(text: &str) -> Result<WoodenSettings, UnknownDevice> {
-    use crate::wooden::{WOODEN_MODELS, WoodenModel};
-
-    let mut settings = WoodenSettings::default();
-    let (path, options) = match text.strip_prefix('=') {
-        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
-        None => ("", text.trim_start_matches(',')),
-    };
-    settings.path = (!path.is_empty()).then(|| path.into());
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("wooden", option);
-        if let Some(model) = option.asked("model") {
-            settings.model = WoodenModel::named(model).ok_or_else(|| {
-                let names: Vec<_> = WOODEN_MODELS.iter().map(|model| model.name).collect();
-                option.wrong("model", names.join(" or "))
-            })?;
-        }
-        option.parsed("axes", "such as `y -x z`", &mut settings.mapping.axes)?;
-        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
-        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
-        option.finish()?;
-    }
-    Ok(settings)
-}
-
-fn haply_settings(text: &str) -> Result<HaplySettings, UnknownDevice> {
-    let mut settings = HaplySettings::default();
-    let (address, options) = match text.strip_prefix('=') {
-        Some(rest) => rest.split_once(',').unwrap_or((rest, "")),
-        None => ("", text.trim_start_matches(',')),
-    };
-    if text.starts_with('=') {
-        settings.address = address.parse()?;
-    }
-    for option in options.split(',').filter(|option| !option.is_empty()) {
-        let mut option = OptionText::new("haply", option);
-        let exchange = &mut settings.exchange;
-        if let Some(arm) = option.asked("arm") {
-            if arm.is_empty() {
-                return Err(option.wrong("arm", "the service's name of the arm, such as 04C3"));
-            }
-            exchange.arm = Some(arm.to_owned());
-        }
-        let yes_or_no = [("yes", true), ("no", false)];
-        option.choice("grip", &yes_or_no, &mut exchange.with_grip)?;
-        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
-        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
-        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
-        option.finish()?;
-    }
-    Ok(settings)
-}
-
-/// One option as it was written; each question that names it takes its value.
-struct OptionText<'a> {
-    device: &'static str,
-    name: &'a str,
-    value: &'a str,
-    known: Vec<&'static str>,
-}
-
-impl<'a> OptionText<'a> {
-    fn new(device: &'static str, text: &'a str) -> Self {
-        let (name, value) = text.split_once('=').unwrap_or((text, ""));
-        Self {
-            device,
-            name: name.trim(),
-            value: value.trim(),
-            known: Vec::new(),
-        }
-    }
-
-    /// The value, if this is the option.
-    fn asked(&mut self, option: &'static str) -> Option<&'a str> {
-        self.known.push(option);
-        (self.name == option).then_some(self.value)
-    }
-
-    fn wrong(&self, option: &'static str, wanted: impl Into<String>) -> UnknownDevice {
-        UnknownDevice::Value {
-            device: self.device,
-            option,
-            value: self.value.to_owned(),
-            wanted: wanted.into(),
-        }
-    }
-
-    fn number(
-        &mut self,
-        option: &'static str,
-        low: f64,
-        high: f64,
-        target: &mut f64,
-    ) -> Result<(), UnknownDevice> {
-        let Some(value) = self.asked(option) else {
-            return Ok(());
-        };
-        match value.parse() {
-            Ok(number) if (low..=high).contains(&number) => *target = number,
-            _ => return Err(self.wrong(option, format!("a number from {low} to {high}"))),
-        }
-        Ok(())
-    }
-
-    fn choice<T: Copy>(
-        &mut self,
-        option: &'static str,
-        choices: &[(&'static str, T)],
-        target: &mut T,
-    ) -> Result<(), UnknownDevice> {
-        let Some(value) = self.asked(option) else {
-            return Ok(());
-        };
-        match choices.iter().find(|(name, _)| *name == value) {
-            Some((_, choice)) => *target = *choice,
-            None => {
-                let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
-                return Err(self.wrong(option, names.join(" or ")));
-            }
-        }
-        Ok(())
-    }
-
-    fn parsed<T: FromStr>(
-        &mut self,
-        option: &'static str,
-        wanted: &str,
-        target: &mut T,
-    ) -> Result<(), UnknownDevice> {
-        let Some(value) = self.asked(option) else {
-            return Ok(());
-        };
-        *target = value.parse().map_err(|_| self.wrong(option, wanted))?;
-        Ok(())
-    }
-
-    fn finish(self) -> Result<(), UnknownDevice> {
-        if self.known.contains(&self.name) {
-            return Ok(());
-        }
-        Err(UnknownDevice::Option {
-            device: self.device,
-            option: self.name.to_owned(),
-            hint: nearest(self.name, self.known.iter().copied()),
-            known: self.known.join(", "),
-        })
-    }
-}
-
-/// "; did you mean `x`?" for the most similar name, if one is similar.
-fn nearest(name: &str, names: impl Iterator<Item = &'static str>) -> String {
-    names
-        .map(|known| (strsim::jaro_winkler(name, known), known))
-        .filter(|(similarity, _)| *similarity >= SUGGESTION_SIMILARITY)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or_else(String::new, |(_, known)| {
-            format!(" (did you mean `{known}`?)")
-        })
-}
-
 /// The forms of all drivers, in a sentence.
 fn names_and_forms() -> String {
     let forms: Vec<&str> = DRIVERS.iter().map(|driver| short(driver.form)).collect();
@@ -606,6 +343,9 @@ pub fn drivers_help() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::devices::{Anchor, CapMode};
+    use crate::vrpn::VrpnMode;
+    use std::time::Duration;
 
     fn choice(text: &str) -> DeviceChoice {
         text.parse().unwrap_or_else(|error| panic!("{error}"))
