@@ -4,22 +4,14 @@
 //! The bridge is a process of its own (this program again, in [`is_the_bridge`]) with a device that sends everything written to it to the test.
 #![cfg(unix)]
 
-#[allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    reason = "shared with other tests, which use other parts of it"
-)]
-mod support;
-
 use std::io::{PipeReader, PipeWriter, Read, Write, pipe};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::support::{PATIENCE, Workbench};
 use nalgebra::{Point3, Vector6};
-use support::{PATIENCE, Workbench};
 use taut_bridge::signals::EndFlag;
 use taut_bridge::{
     BridgeArgs, Device, DeviceFault, DeviceInfo, DeviceSample, Grip, Hand, MinJerkPath, Pose,
@@ -133,7 +125,7 @@ impl Pressing {
         let args = workbench.args(&[]);
         let mut command = Command::new(std::env::current_exe().expect("this program"));
         command
-            .args(["--exact", "is_the_bridge", "--ignored", "--nocapture"])
+            .args(["--exact", "ends::is_the_bridge", "--ignored", "--nocapture"])
             .env(SERVER, &args.server)
             .env(KEY, args.key.as_ref().expect("given"))
             .env(RECORD, record.local_addr().expect("bound").to_string())

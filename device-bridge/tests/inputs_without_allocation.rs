@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use nalgebra::{Point3, Vector3, Vector6};
 use taut_bridge::{
     Anchor, CapSettings, Device, LedDevice, Placement, Pose, ReportPort, ReportSource, SourceError,
@@ -10,9 +10,6 @@ use taut_bridge::{
     VrpnSource,
 };
 use taut_vrpn::{PoseReport, SensorMapping};
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 fn placement() -> Placement {
     Placement::plain(

@@ -1,17 +1,9 @@
 //! A bridge and a server on this machine: poses one way, wrenches the other, and what happens when one is lost.
 
-#[allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    reason = "shared with other tests, which use other parts of it"
-)]
-mod support;
-
 use std::process::{Command, Stdio};
 use std::thread::{self, JoinHandle};
 
-use support::Workbench;
+use crate::support::Workbench;
 use taut_bridge::{BridgeArgs, BridgeError, BridgeReport, run};
 use taut_link::create_key_file;
 

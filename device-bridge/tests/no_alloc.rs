@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use nalgebra::{Point3, Vector6};
 use taut_bridge::edge::EdgeCoupler;
 use taut_bridge::{
@@ -15,9 +15,6 @@ use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;
 use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings, EdgeSolver, EdgeSurface};
 use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
-
-#[global_allocator]
-static HEAP: AllocDisabler = AllocDisabler;
 
 /// Two seconds of ticks, with a silence in the middle, damping on, and events on the way.
 fn drive(device: impl Device + 'static, before_tick: &mut dyn FnMut(u64)) {

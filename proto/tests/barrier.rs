@@ -1,8 +1,6 @@
 //! The barrier under a virtual clock and a bad network: one master, some nodes, everything lost, doubled, delayed and dying by a seed.
 
-mod barrier_support;
-
-use barrier_support::*;
+use crate::barrier_support::*;
 use proptest::prelude::*;
 use taut_proto::barrier::{
     ARRIVE_PERIOD_NS, Answer, Arrive, Drawn, FARTHEST_AHEAD, HUSH_NS, LEAD_NS, MAX_MEMBERS,

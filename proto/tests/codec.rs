@@ -1,9 +1,7 @@
 //! Values to bytes and back; and what is not a value.
 
-mod samples;
-
+use crate::samples::*;
 use proptest::prelude::*;
-use samples::*;
 use taut_proto::{
     ClientStats, ControlMessage, DecodeError, EncodeError, HotState, Kind, MeshBlob,
     PROTOCOL_VERSION, Payload, Refusal, SceneDescription, Untrusted, VersionRange,

@@ -1,10 +1,8 @@
 //! Constraint sets: divided into datagrams, mixed up by a network, and whole again or not used.
 
-mod samples;
-
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use crate::samples::*;
+use assert_no_alloc::assert_no_alloc;
 use proptest::prelude::*;
-use samples::*;
 use taut_proto::{
     Assembler, ConstraintPart, ConstraintSet, DecodeError, Division, Kind, PartTaken, Payload,
     constraint_parts::SLOTS,
@@ -12,9 +10,6 @@ use taut_proto::{
     header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
 };
-
-#[global_allocator]
-static HEAP: AllocDisabler = AllocDisabler;
 
 fn set(sequence: u64, rows: usize) -> ConstraintSet {
     let row = |k: usize| ConstraintRow {

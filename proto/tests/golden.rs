@@ -3,9 +3,7 @@
 //! A datagram's line is the whole sealed datagram under the key material 00 01 02 .. 1b, epoch 0x01020304, sender 5, sequence 0, 1, 2 ..;
 //! a message's line is its frame on the stream; a mesh's line is its blob.
 
-mod samples;
-
-use samples::*;
+use crate::samples::*;
 use taut_proto::{
     MeshBlob,
     header::MAX_DATAGRAM_BYTES,

@@ -1,6 +1,6 @@
 //! Group keys: who may say what under them, and how generations change.
 
-mod samples;
+use crate::samples;
 
 use proptest::prelude::*;
 use taut_proto::{

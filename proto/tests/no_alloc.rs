@@ -1,8 +1,8 @@
 //! Sealing and opening take no memory: across a roll of keys, under group keys, and with events to repeat.
 
-mod samples;
+use crate::samples;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use taut_proto::{
     EventInbox, EventOutbox, GroupOpener, GroupSealer, Kind, Payload,
     group::{GroupKeys, SERVER_SENDER, SPREAD_NS},
@@ -10,9 +10,6 @@ use taut_proto::{
     seal::{Opener, ROLL_PACKETS, Sealer},
     state::EventRecord,
 };
-
-#[global_allocator]
-static GUARD: AllocDisabler = AllocDisabler;
 
 const MATERIAL: [u8; 28] = [3; 28];
 

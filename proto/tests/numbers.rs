@@ -1,8 +1,6 @@
 //! Every number of every message has a range: listed in `docs/numbers.md`, refused beyond it by name.
 
-mod samples;
-
-use samples::*;
+use crate::samples::*;
 use taut_proto::{
     DecodeError, EdgeCoupling, EncodeError, HeadSample, HotState, InputSample, Payload, PoseF64,
     barrier::{Arrive, ReleaseHead},

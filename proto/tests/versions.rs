@@ -2,9 +2,7 @@
 //!
 //! `golden_version_3.txt` keeps the first messages of the release before ranges were stated, byte for byte.
 
-mod samples;
-
-use samples::messages;
+use crate::samples::messages;
 use taut_proto::{
     ControlMessage, DecodeError, PROTOCOL_VERSION, VersionRange,
     control::{LENGTH_BYTES, RefusalCode},

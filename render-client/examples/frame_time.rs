@@ -6,6 +6,7 @@
 //! obstacle did, too, and all shadows are drawn again. Rows are drawn in turns, so that a machine that
 //! other programs use does not favour one of them.
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/support/mod.rs"]
 mod support;
 

@@ -1,6 +1,7 @@
 //! Draws a synthetic peg in a hole in every stereo mode, without a server:
 //! `cargo run -p taut-render --example synthetic -- FOLDER`.
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/support/mod.rs"]
 mod support;
 

@@ -1,11 +1,9 @@
 //! One world on two screens and in two eyes: by the projection matrices, and in rendered pictures.
 
-mod support;
-
+use crate::support::{canvas, l_shape, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use support::{canvas, l_shape, peg_in_hole, state};
 use taut_render::renderer::shapes;
 use taut_render::stage::{Show, Stage};
 use taut_render::stereo::Stereo;

@@ -3,18 +3,13 @@
 //! After a wanted change: `TAUT_WRITE_GOLDEN=1 cargo test -p taut-render --test golden`, and look at
 //! the pictures in tests/golden before they are committed. They are half as large as drawn.
 
-mod support;
-
-#[path = "support/perceptual.rs"]
-mod perceptual;
-
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::perceptual::{difference, halved};
+use crate::support::{canvas, peg_in_hole, state};
 use image::{RgbImage, RgbaImage};
 use nalgebra::Isometry3;
-use perceptual::{difference, halved};
-use support::{canvas, peg_in_hole, state};
 use taut_render::node_status::{FrameMode, LinkHealth, NodeStatus};
 use taut_render::stage::{Show, Stage};
 use taut_render::stereo::Stereo;

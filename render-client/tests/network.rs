@@ -1,7 +1,7 @@
 //! A node in a session with a real server on this machine: joins, fetches, draws, reports, ends.
 //! Left out, said aloud, without a graphics adapter.
 
-mod support;
+use crate::support;
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;

@@ -1,10 +1,8 @@
 //! What the pictures show, measured in their pixels. Skipped, said aloud, without an adapter.
 
-mod support;
-
+use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
-use support::{canvas, peg_in_hole, state};
 use taut_render::renderer::shapes;
 use taut_render::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::stereo::Stereo;

@@ -1,13 +1,11 @@
 //! The program from outside: what bad input gives, and that nothing is left running or lying about.
 
-mod support;
-
 use std::net::UdpSocket;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use support::{Workplace, start, taut, workbench};
+use crate::support::{Workplace, start, taut, workbench};
 
 /// Only a hang takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -1,23 +1,14 @@
 //! A bridge that couples by itself, against a real session, over a relay that delays by 20 ms each way and loses one datagram in
 //! twenty: the force at the device is that of the device's own pose. The same with the force computed at the server is not.
 
-#[allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    reason = "shared with the link's tests, which use other parts of it"
-)]
-#[path = "../../proto/link/tests/support/relay.rs"]
-mod relay;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::relay::{Impairment, Waiting};
 use clap::Parser;
-use relay::{Impairment, Waiting};
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::DeviceSource;

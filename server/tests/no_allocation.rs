@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use god_object::{GodObject, Pose};
 use taut::loops::wiring::WiredLoops;
 use taut::session::setup::DeviceSource;
@@ -11,9 +11,6 @@ use taut::session::setup::devices::device;
 use taut_bridge::{EventKind, SafetySettings};
 use taut_recording::{FORMAT, Lost, Manifest, Recorder, SceneOrigin};
 use taut_scene::{Device, Scene};
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 fn manifest() -> Manifest {
     Manifest {

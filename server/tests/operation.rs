@@ -1,7 +1,5 @@
 //! The program as its operator meets it: lines on the terminal, the audit trail, metrics, signs of life, a terminal that stands.
 
-mod support;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpStream, UdpSocket};
 use std::os::unix::net::UnixDatagram;
@@ -9,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use support::{Workplace, workbench};
+use crate::support::{Workplace, workbench};
 use taut_link::proto::control::LogLevel;
 use taut_link::{
     ClientOptions, ClusterKey, JoinKey, Role, Transport, connect, create_key_file, read_key_file,

@@ -1,7 +1,5 @@
 //! `taut record` beside servers that stop, are killed and come back.
 
-mod support;
-
 use std::io::Read;
 use std::net::UdpSocket;
 use std::path::Path;
@@ -9,7 +7,7 @@ use std::process::{Child, Command};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use support::{Workplace, start};
+use crate::support::{Workplace, start};
 
 /// Longer than processes take that start one after the other on a busy machine.
 const LONG_PATIENCE: Duration = Duration::from_secs(60);

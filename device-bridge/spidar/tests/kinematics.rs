@@ -1,12 +1,10 @@
 //! Pose from lengths: convergence, singular grips, twist, and calibration from many poses.
 
-mod support;
-
 use std::time::Duration;
 
+use crate::support::{Random, all, apart, motion, reach, shipped};
 use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
 use proptest::prelude::*;
-use support::{Random, all, apart, motion, reach, shipped};
 use taut_spidar::{
     DISAGREEMENT, Encoders, ForwardKinematics, Geometry, LengthRates, PerString, Pose,
     SelfCalibrationError, StringFault, self_calibrate,

@@ -1,19 +1,14 @@
 //! What runs in the loop of a string device never allocates, faults included.
 
-mod support;
-
 use std::time::Duration;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use crate::support::{all, motion, reach};
+use assert_no_alloc::assert_no_alloc;
 use nalgebra::Vector6;
-use support::{all, motion, reach};
 use taut_spidar::{
     Encoders, ForwardKinematics, LengthRates, MotorState, Pose, ResidualMonitor, SimulatedStrings,
     StringHardware, StringLosses, StringMatrix, TensionSettings, TensionSolver,
 };
-
-#[global_allocator]
-static HEAP: AllocDisabler = AllocDisabler;
 
 #[test]
 fn a_loop_of_a_string_device_does_not_allocate() {

@@ -2,10 +2,8 @@
 //!
 //! The reference column of each test was computed independently of this code, from the same geometry.
 
-mod support;
-
+use crate::support::{Random, apart, motion, plain_distribution, published_kinematics, shipped};
 use nalgebra::Vector6;
-use support::{Random, apart, motion, plain_distribution, published_kinematics, shipped};
 use taut_spidar::{
     ForwardKinematics, Pose, StringMatrix, TensionSettings, TensionSolver, capability,
 };

@@ -1,14 +1,14 @@
 //! Tensions against an interior-point reference, their certificate, and their continuity.
 
-mod support;
+use crate::support;
 
+use crate::support::{Random, all, motion, reach};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
     DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, ZeroConeT,
 };
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
-use support::{Random, all, motion, reach};
 use taut_spidar::{
     Geometry, MotorState, Pose, StringMatrix, TensionAnswer, TensionSettings, TensionSolver,
     TensionStatus,

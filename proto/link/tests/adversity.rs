@@ -1,9 +1,7 @@
 //! What the network and other programs do to a session: garbage, replay, damage, loss, sudden death.
 
-mod support;
-
+use crate::support::{relay::Impairment, *};
 use std::{net::UdpSocket, time::Duration};
-use support::{relay::Impairment, *};
 use taut_link::{ClientLink, LinkEvent, Role, ServerLink, ServerOptions};
 use taut_proto::{PROTOCOL_VERSION, version::MAGIC};
 

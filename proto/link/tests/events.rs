@@ -1,9 +1,7 @@
 //! Discrete events over sockets: each reaches each client once, in order, whatever the hot plane loses.
 
-mod support;
-
+use crate::support::{relay::Impairment, *};
 use std::time::{Duration, Instant};
-use support::{relay::Impairment, *};
 use taut_link::{Broadcaster, ClientLink, ClientOptions, Role, Transport};
 use taut_proto::{HotState, state::EventRecord};
 

@@ -2,8 +2,10 @@
 //!
 //! Nothing here measures: how sharp the swaps are is told by the report of `tests/network`.
 
-mod support;
-
+use crate::support::{
+    relay::{Impairment, Relay, Waiting},
+    *,
+};
 use std::{
     collections::HashMap,
     sync::{
@@ -12,10 +14,6 @@ use std::{
     },
     thread::JoinHandle,
     time::{Duration, Instant},
-};
-use support::{
-    relay::{Impairment, Relay, Waiting},
-    *,
 };
 use taut_link::{ClientLink, FrameTurn, Role, ServerLink, ServerOptions};
 use taut_proto::barrier::{MasterSettings, Swap};

@@ -1,13 +1,11 @@
 //! The group over sockets: keys and roster reach the members, nodes speak to each other, and nothing under a group key commands anything.
 
-mod support;
-
+use crate::support::*;
 use std::{
     net::UdpSocket,
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
-use support::*;
 use taut_link::{ClientLink, ClientOptions, Role, Roster, Transport};
 use taut_proto::{
     Group, GroupSealer, Header, Kind, PROTOCOL_VERSION, Payload,

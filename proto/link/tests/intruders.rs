@@ -1,14 +1,12 @@
 //! People in the middle and at the door: another certificate, a relayed proof, a stolen credential, guesses.
 
-mod support;
-
+use crate::support::*;
 use ring::digest::{SHA256, digest};
 use std::{
     net::SocketAddr,
     sync::Arc,
     time::{Duration, Instant},
 };
-use support::*;
 use taut_link::{
     ClientOptions, Credential, FloodLimits, Holder, LinkError, Role, ServerLink, ServerOptions,
     ServerPin, binding, connect, pinning::PinnedServer, transport,

@@ -1,7 +1,6 @@
 //! Nodes that come, go, die and come back; servers that do.
 
-mod support;
-
+use crate::support::*;
 use std::{
     fs,
     net::SocketAddr,
@@ -11,7 +10,6 @@ use std::{
     },
     time::{Duration, Instant},
 };
-use support::*;
 use taut_link::{
     ClientOptions, Content, LinkError, LinkEvent, LinkHealth, MeshCache, RejoinPolicy, Renewal,
     Role, ServerLink, ServerOptions, SessionEnd, SupervisedLink, connect, serve,

@@ -2,8 +2,9 @@
 //!
 //! Where the system gives no multicast on loopback, the tests of it say so and end.
 
-mod support;
+use crate::support;
 
+use crate::support::*;
 use std::{
     net::{Ipv4Addr, SocketAddrV4, UdpSocket},
     sync::{
@@ -13,7 +14,6 @@ use std::{
     thread::JoinHandle,
     time::{Duration, Instant},
 };
-use support::*;
 use taut_link::{
     ClientLink, ClientOptions, MulticastOptions, Role, ServerLink, ServerOptions, Transport,
 };

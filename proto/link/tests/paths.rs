@@ -1,10 +1,8 @@
 //! Where a client's datagrams go: nowhere that the client has not answered from.
 
-mod support;
-
+use crate::support::*;
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
-use support::*;
 use taut_link::{ClientOptions, Role, ServerOptions, connect};
 
 /// Holds what a client sends, sends it on from elsewhere, and looks what comes there.

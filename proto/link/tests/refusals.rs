@@ -1,13 +1,11 @@
 //! Who is not let in, and what they are told: wrong key, other version, taken name, wrong address.
 
-mod support;
-
+use crate::support::*;
 use std::{
     net::SocketAddr,
     sync::Arc,
     time::{Duration, Instant},
 };
-use support::*;
 use taut_link::{
     ClientOptions, LinkError, LinkEvent, Role, ServerOptions, binding, connect,
     pinning::PinnedServer, serve, transport,

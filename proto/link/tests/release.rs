@@ -1,12 +1,10 @@
 //! Two releases meet: they agree on a version, or part by name, at both ends.
 
-mod support;
-
-use std::{net::SocketAddr, sync::Arc, time::Duration};
-use support::{
+use crate::support::{
     relay::{Impairment, Waiting},
     *,
 };
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 use taut_link::{
     ClientLink, ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, connect,
     pinning::PinnedServer, transport,

@@ -1,8 +1,6 @@
 //! What each role may do once it is in: every role against every act, over both transports; and who is shut out.
 
-mod support;
-
-use support::*;
+use crate::support::*;
 use taut_link::{
     Act, ClientLink, ClientOptions, Credential, Holder, JoinPolicy, LinkError, LinkEvent, Role,
     ServerLink, ServerOptions, Transport, connect,

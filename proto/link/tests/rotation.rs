@@ -1,9 +1,7 @@
 //! A new cluster key comes while the old one still counts: nobody has to stop.
 
-mod support;
-
+use crate::support::*;
 use std::time::{Duration, SystemTime};
-use support::*;
 use taut_link::{
     AlsoKey, ClientLink, ClientOptions, ClusterKey, Holder, JoinKey, LinkError, Role, ServerLink,
     ServerOptions, connect,

@@ -1,9 +1,7 @@
 //! Two ends on real sockets: joining, scene, states, device, clock, leaving.
 
-mod support;
-
+use crate::support::*;
 use std::time::Duration;
-use support::*;
 use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, serve};
 use taut_proto::{
     ClientStats, MeshHash, WrenchCommand,

@@ -2,8 +2,7 @@
 //!
 //! Nothing here measures: the report of `tests/network` does.
 
-mod support;
-
+use crate::support::*;
 use std::{
     collections::{HashMap, HashSet},
     net::SocketAddr,
@@ -14,7 +13,6 @@ use std::{
     thread::JoinHandle,
     time::{Duration, Instant},
 };
-use support::*;
 use taut_link::{
     ClientLink, ClientOptions, FrameTurn, LinkError, LinkHealth, RejoinPolicy, Renewal, Role,
     ServerLink, ServerOptions, SupervisedLink, serve,

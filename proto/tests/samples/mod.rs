@@ -1,10 +1,4 @@
 //! One sample of every datagram payload and control message, and strategies that vary them: a file per family.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    unused_imports,
-    reason = "each test binary uses its own part of the samples"
-)]
 
 mod barrier;
 mod constraints;
@@ -16,11 +10,11 @@ mod hot;
 mod scene;
 mod values;
 
-pub use barrier::{any_arrive, any_release, arrive, release};
-pub use constraints::{any_part, any_row, part};
+pub use barrier::{arrive, release};
+pub use constraints::{any_row, part};
 pub use control::messages;
 pub use coupling::coupling;
 pub use datagrams::{any_payload, datagrams};
 pub use group::group;
-pub use hot::{any_hot, hot};
+pub use hot::hot;
 pub use scene::{any_scene, scene};

@@ -1,5 +1,4 @@
 //! A synthetic peg in a hole on an L-shaped workbench, and what tests need to look at pictures.
-#![allow(dead_code, reason = "each test and the example use their own part")]
 
 use std::sync::Arc;
 

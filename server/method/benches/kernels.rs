@@ -1,7 +1,9 @@
 //! The kernels of an update: `cargo bench -p god-object --bench kernels`. Wall-clock time.
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/projection_support/mod.rs"]
 mod projection_support;
 

@@ -2,6 +2,7 @@
 //!
 //! Wall-clock time; percentiles of thread CPU time over many steps are printed by `conforming_variants` of `tests/method`. An iteration of `update` is one update at 1 kHz in the midst of the motion.
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
 mod scene;

@@ -10,8 +10,10 @@
     reason = "an example reads files and writes a picture; the method does neither"
 )]
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/exact_collision/mod.rs"]
 mod exact_collision;
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
 #[path = "update_support/mod.rs"]

@@ -7,6 +7,7 @@
     reason = "a measurement needs a clock; the method itself has none"
 )]
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/support/mod.rs"]
 mod support;
 

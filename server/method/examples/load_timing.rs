@@ -8,6 +8,7 @@
     reason = "a measurement reads files and arguments; the method does not"
 )]
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/geometry_shapes/mod.rs"]
 mod geometry_shapes;
 mod update_support;

@@ -7,6 +7,7 @@
     reason = "an example may read the clock"
 )]
 
+#[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/support/box_shape.rs"]
 mod box_shape;
 

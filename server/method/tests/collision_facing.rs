@@ -1,16 +1,13 @@
 //! Time of impact of spiky, hollow, thin and far meshes: what does not face is left out, and nothing is missed by it.
 
-mod geometry_shapes;
-mod mesh_impact;
-
-use geometry_shapes::{cuboid, grid_box, icosphere, mesh, peg, torus};
+use crate::geometry_shapes::{cuboid, grid_box, icosphere, mesh, peg, torus};
+use crate::mesh_impact::{SETTINGS, search, straight, vector};
 use god_object::collision::{
     CollisionWorkspace, Motion, TimeOfImpact, Work, distance, meshes_intersect, time_of_impact,
 };
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, from_reference_point, six};
-use mesh_impact::{SETTINGS, search, straight, vector};
 use proptest::prelude::*;
 
 /// A sphere whose vertices stand out or in by up to `spikes` of the radius: saddles, hollows and needles.

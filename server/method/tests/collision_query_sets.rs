@@ -1,9 +1,8 @@
 //! Published queries with exact truth, most of them degenerate by design: no contact is missed, none is late.
 
-mod exact_collision;
-mod geometry_shapes;
+use crate::geometry_shapes;
 
-use exact_collision::{Outcome, answer, first_contact, judge, query_sets};
+use crate::exact_collision::{Outcome, answer, first_contact, judge, query_sets};
 
 /// Minimum gaps relative to the size of a query.
 const RELATIVE_GAPS: [f64; 6] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12];

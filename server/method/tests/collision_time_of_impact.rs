@@ -1,9 +1,9 @@
 //! Time of impact: never late, hardly early, free where the motion is free.
 
-mod geometry_shapes;
-mod mesh_impact;
+use crate::geometry_shapes;
 
-use geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
+use crate::geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
+use crate::mesh_impact::{SETTINGS, search, straight, vector};
 use god_object::collision::{
     AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, distance,
     meshes_intersect, time_of_impact,
@@ -11,7 +11,6 @@ use god_object::collision::{
 use god_object::geometry::Mesh;
 use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, from_reference_point, six};
-use mesh_impact::{SETTINGS, search, straight, vector};
 use proptest::prelude::*;
 
 fn translation(x: f64, y: f64, z: f64) -> Vector6 {

@@ -1,6 +1,6 @@
 //! Prints what an update costs; asserts nothing about time.
 
-mod geometry_shapes;
+use crate::geometry_shapes;
 
 use god_object::collision::{
     AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work, time_of_impact,

@@ -1,10 +1,8 @@
 //! Contacts: every one that there is, none that there is not.
 
-mod geometry_shapes;
-
 use std::collections::BTreeSet;
 
-use geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
+use crate::geometry_shapes::{cuboid, grid_box, hole, icosphere, mesh, peg, tetrahedron, torus};
 use god_object::collision::{CollisionWorkspace, Work, distance, meshes_intersect};
 use god_object::constraint::{Collected, Contact, Feature, collect_contacts};
 use god_object::geometry::Mesh;
@@ -472,7 +470,3 @@ fn collection_and_search_do_not_allocate() {
     });
     assert!(work.node_pairs > 0 && work.feature_pairs > 0);
 }
-
-#[cfg(debug_assertions)]
-#[global_allocator]
-static ALLOCATOR: assert_no_alloc::AllocDisabler = assert_no_alloc::AllocDisabler;

@@ -1,7 +1,7 @@
 //! Constraint adaptation as the hand feels it, on constraint sets made by hand: an unexpected constraint enters without a
 //! jump, and new names for an old constraint change nothing. Source: Ortega et al. 2007, Section 5, Figure 6.
 
-mod support;
+use crate::support;
 
 use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Point3, Vector3};

@@ -1,6 +1,6 @@
 //! Contact damping: along the contacts that hold the body, and nowhere else.
 
-mod support;
+use crate::support;
 
 use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Point3, Vector3};

@@ -1,6 +1,6 @@
 //! A device sample that is answered again, on a newer set, is no motion: passivity and the muting of textures go on from sample to sample.
 
-mod support;
+use crate::support;
 
 use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Point3, Vector3};

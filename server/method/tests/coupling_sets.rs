@@ -1,14 +1,13 @@
 //! What the coupling keeps from set to set is no history: without adaptation, its force is that of a coupling made anew.
 
-mod projection_support;
-mod support;
+use crate::support;
 
+use crate::projection_support::Random;
 use god_object::constraint::{Feature, FeaturePair};
 use god_object::nalgebra::Point3;
 use god_object::{
     ConstraintSet, Coupling, NonPenetrationConstraint, Pose, ProjectionStatus, Settings,
 };
-use projection_support::Random;
 use std::collections::BTreeSet;
 
 fn set_of(names: &BTreeSet<u32>, sequence: u64, pose: Pose) -> ConstraintSet {

@@ -1,8 +1,6 @@
 //! Closest points of triangles and distances of meshes, against certificates and brute force.
 
-mod geometry_shapes;
-
-use geometry_shapes::{cuboid, icosphere, mesh, tetrahedron, torus};
+use crate::geometry_shapes::{cuboid, icosphere, mesh, tetrahedron, torus};
 use god_object::collision::{distance, meshes_intersect};
 use god_object::geometry::distance::{
     closest_on_triangle, closest_on_triangles, triangles_intersect,

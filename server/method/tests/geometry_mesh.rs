@@ -1,8 +1,10 @@
 //! Meshes: what is accepted, what is refused and why, and what is derived from them.
 
-mod geometry_shapes;
+use crate::geometry_shapes;
 
-use geometry_shapes::{cuboid, grid_box, icosphere, mesh, peg, read_ply, tetrahedron, torus};
+use crate::geometry_shapes::{
+    cuboid, grid_box, icosphere, mesh, peg, read_ply, tetrahedron, torus,
+};
 use god_object::geometry::{Mesh, MeshError, MeshReport, corner_normals, mass_properties};
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
 

@@ -1,12 +1,10 @@
 //! The whole method on a box over a table: forces in closed form, invariants on any input.
 
-mod support;
-
+use crate::support::{box_on_table, penetrates};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Pose, ProjectionStatus, Settings};
 use proptest::prelude::*;
-use support::{box_on_table, penetrates};
 
 const HALF_HEIGHT: f64 = 0.01;
 const STIFFNESS: f64 = 1000.0;

@@ -2,10 +2,9 @@
 //!
 //! Other presses: `PROPTEST_RNG_SEED=2 PROPTEST_CASES=20000 cargo test --release -p god-object --test god_object_convergence`.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{box_body, box_obstacle, penetrates};
 use god_object::constraint::contact_jacobian;
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::quasi_statics::{HalfSpace, Projector, SolverKind, kkt_residual};
@@ -13,7 +12,6 @@ use god_object::spatial::{angular, linear, pose_difference};
 use god_object::{GodObject, Obstacle, Pose, Settings, World};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use support::{box_body, box_obstacle, penetrates};
 
 /// Updates after which nothing may move any more. Most presses take a hundred; where the contacts are bent so that they nearly cancel the
 /// metric, an update leaves 99 % of the way.

@@ -1,15 +1,13 @@
 //! Flat faces as computer-aided design exports them, fans of long triangles that lie over each other in their thousands: a body
 //! lands flat on them foreseen and at the cost of its rim, not of every pair of triangles.
 
-mod support;
-
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use crate::support::penetrates;
 use god_object::geometry::mass_properties;
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Settings, Surface, World};
-use support::penetrates;
 
 /// Corners of a drum's rim: each cap has two triangles less.
 const CORNERS: u32 = 500;

@@ -1,19 +1,16 @@
 //! A peg in a hole, anywhere in the world: it slides without friction, and the wall pushes back straight.
 
-mod geometry_shapes;
-mod support;
-
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use geometry_shapes::{hole, mesh, peg};
+use crate::geometry_shapes::{hole, mesh, peg};
+use crate::support::penetrates;
 use god_object::geometry::mass_properties;
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, World};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
-use support::penetrates;
 
 const SIDES: u32 = 72;
 const RADIUS: f64 = 0.01;

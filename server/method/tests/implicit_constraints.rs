@@ -3,15 +3,14 @@
 //! The reference is the pose at which the body would come to rest, `min |x_h - x|_M^2` over poses that touch, found by one-
 //! or three-dimensional search on the true geometry; its force is `k_h k_s M (x - x_h)`.
 
-mod geometry_shapes;
-mod support;
+use crate::geometry_shapes;
 
 use std::sync::Arc;
 
+use crate::support::{box_body, box_mesh, box_obstacle, box_on_table, penetrates};
 use god_object::nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear, six};
 use god_object::{Coupling, GodObject, Obstacle, Pose, RotationMetric, Settings, Vector6, World};
-use support::{box_body, box_mesh, box_obstacle, box_on_table, penetrates};
 
 const HALF: Vector3<f64> = Vector3::new(0.02, 0.02, 0.01);
 /// Radius of gyration where a test asks for the same inertia about every axis, m.

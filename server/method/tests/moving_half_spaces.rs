@@ -1,14 +1,12 @@
 //! A half-space that moves: what is in the hand is pushed and never passed through, whatever its form, with tilt and at any speed.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{box_body, box_obstacle};
 use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Primitive, Settings, World};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use support::{box_body, box_obstacle};
 
 const RADIUS: f64 = 0.01;
 const HALF_LENGTH: f64 = 0.015;

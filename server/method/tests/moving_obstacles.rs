@@ -1,14 +1,12 @@
 //! Obstacles that move: the body is pushed and never passed through, at any speed, on thin plates, with rotation.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{box_body, box_obstacle, penetrates};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::linear;
 use god_object::{Coupling, GodObject, Pose, ProjectionStatus, Settings, World};
 use proptest::prelude::*;
-use support::{box_body, box_obstacle, penetrates};
 
 /// A box of 40 x 40 x 20 mm; a plate of 200 x 200 mm and the given thickness below it, its upper face at z = 0; and a wall over it.
 fn world(thickness: f64, ceiling: f64) -> Arc<World> {

@@ -1,16 +1,13 @@
 //! Both loops' steps allocate nothing after start.
 
-mod support;
+use crate::support;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use god_object::nalgebra::Vector3;
 use god_object::{
     Coupling, ForceShading, GodObject, Pose, Settings, SineTexture, Surface, Texture, World,
 };
 use std::sync::Arc;
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 #[test]
 fn god_object_and_coupling_steps_allocate_nothing() {

@@ -1,13 +1,13 @@
 //! The three solvers against each other, against non-negative least squares and against all active sets tried in turn.
 
-mod projection_support;
+use crate::projection_support;
 
+use crate::projection_support::{
+    FAMILIES, Random, hand_motion, hand_sized_metric, oracle, project, rows_of,
+};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector, SolverKind};
 use god_object::spatial::Vector6;
 use nalgebra::{DMatrix, DVector};
-use projection_support::{
-    FAMILIES, Random, hand_motion, hand_sized_metric, oracle, project, rows_of,
-};
 
 /// The nearest feasible point among those that hold some subset of at most six rows at equality.
 fn brute_force(metric: &Metric, a_u: &Vector6, rows: &[HalfSpace]) -> Option<Vector6> {

@@ -1,15 +1,15 @@
 //! Inputs that break solvers, each by name.
 
-mod projection_support;
+use crate::projection_support;
 
+use crate::projection_support::{
+    FAMILIES, Random, contact, hand_motion, hand_sized_metric, oracle, project, rows_of,
+};
 use god_object::quasi_statics::{
     HalfSpace, Metric, ProjectionStatus, Projector, SolverKind, kkt_residual,
 };
 use god_object::spatial::Vector6;
 use nalgebra::{Matrix3, Vector3};
-use projection_support::{
-    FAMILIES, Random, contact, hand_motion, hand_sized_metric, oracle, project, rows_of,
-};
 
 const ALL: [SolverKind; 3] = [
     SolverKind::ActiveSet,

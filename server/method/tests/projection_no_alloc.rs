@@ -1,13 +1,10 @@
 //! The active set allocates nothing after `Projector::new`, whatever it is given.
 
-mod projection_support;
-
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use crate::projection_support::{
+    FAMILIES, Random, contact, hand_motion, hand_sized_metric, rows_of,
+};
+use assert_no_alloc::assert_no_alloc;
 use god_object::quasi_statics::{ProjectionStatus, Projector, SolverKind};
-use projection_support::{FAMILIES, Random, contact, hand_motion, hand_sized_metric, rows_of};
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 const MAX_ROWS: usize = 5000;
 

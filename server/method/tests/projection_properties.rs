@@ -2,14 +2,12 @@
 //!
 //! Source: Ortega et al. 2007, Sections 4.2, 5 (footnote 3) and 7.3.1 (footnote 4).
 
-mod projection_support;
-
+use crate::projection_support::{FAMILIES, Random, hand_motion, hand_sized_metric, rows_of};
 use god_object::quasi_statics::{
     ActiveRow, HalfSpace, KKT_TOLERANCE, Metric, ProjectionStatus, Projector, SolverKind,
     kkt_residual,
 };
 use god_object::spatial::Vector6;
-use projection_support::{FAMILIES, Random, hand_motion, hand_sized_metric, rows_of};
 use proptest::prelude::*;
 
 /// Error of an answer relative to |a_u|_M: rounding, amplified by nearly parallel rows.

@@ -1,11 +1,9 @@
 //! Projections with known answers: one contact, flat on flat, near-parallel walls, groove, corner, thousands of contacts.
 
-mod projection_support;
-
+use crate::projection_support::{Random, contact, hand_motion, hand_sized_metric, oracle, project};
 use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, SolverKind};
 use god_object::spatial::{Vector6, six};
 use nalgebra::{Matrix3, Vector3};
-use projection_support::{Random, contact, hand_motion, hand_sized_metric, oracle, project};
 use std::f64::consts::PI;
 
 const K_S: f64 = 0.5;

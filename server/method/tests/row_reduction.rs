@@ -1,11 +1,11 @@
 //! Few rows instead of all: same force and motion as every facing pair, no ghost edges, no flicker, no allocation.
 
-mod geometry_shapes;
-
 use std::sync::Arc;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use geometry_shapes::{Soup, cuboid, fine_hole, fine_peg, grid_box, hole, mesh, peg, roughened};
+use crate::geometry_shapes::{
+    Soup, cuboid, fine_hole, fine_peg, grid_box, hole, mesh, peg, roughened,
+};
+use assert_no_alloc::assert_no_alloc;
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{FeaturePair, collect_contacts, contact_jacobian};
 use god_object::geometry::mass_properties;
@@ -13,9 +13,6 @@ use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::quasi_statics::{HalfSpace, Projection, Projector, SolverKind};
 use god_object::spatial::{angular, linear, pose_difference, six};
 use god_object::{Body, Coupling, GodObject, Obstacle, Pose, Settings, Surface, Vector6, World};
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 const STEPS: usize = 300;
 

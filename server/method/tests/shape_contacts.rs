@@ -1,7 +1,6 @@
 //! Contacts of primitives: closed forms, and the nearest one against parry's distance.
 
-mod shape_support;
-
+use crate::shape_support::{Form, forms, obstacles, oracle_distance, turned, vectors};
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{Contact, Feature};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
@@ -9,7 +8,6 @@ use god_object::shape;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use shape_support::{Form, forms, obstacles, oracle_distance, turned, vectors};
 use std::f64::consts::FRAC_PI_2;
 
 /// The closed forms hold to this, m and as components of normals.

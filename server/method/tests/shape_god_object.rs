@@ -1,20 +1,15 @@
 //! The whole method with exact primitives: forces in closed form, a peg in a hole, worlds of mixed shapes, no allocation.
 
-mod shape_support;
-
 use std::sync::Arc;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use crate::shape_support::{Form, turned};
+use assert_no_alloc::assert_no_alloc;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{Coupling, GodObject, Pose, Settings, StartError, World, shape};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use shape_support::{Form, turned};
 use std::f64::consts::FRAC_PI_2;
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 const STIFFNESS: f64 = 1000.0;
 

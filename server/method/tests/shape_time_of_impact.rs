@@ -1,7 +1,8 @@
 //! Time of impact of primitives with each other and with meshes, against parry's distances.
 
-mod shape_support;
+use crate::shape_support;
 
+use crate::shape_support::{Form, forms, obstacles, oracle_distance, vectors};
 use god_object::collision::{AdvancementSettings, CollisionWorkspace, Motion, TimeOfImpact, Work};
 use god_object::nalgebra::{Point3, UnitQuaternion, Vector3};
 use god_object::shape;
@@ -9,7 +10,6 @@ use god_object::spatial::six;
 use god_object::{Pose, Vector6};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use shape_support::{Form, forms, obstacles, oracle_distance, vectors};
 
 const SETTINGS: AdvancementSettings = AdvancementSettings {
     minimum_gap: 1e-5,

@@ -1,17 +1,15 @@
 //! Coulomb friction: closed forms on a box, stick without creep, round cones, and no energy out of closed paths.
 
-mod support;
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
+use crate::support::{box_body, box_obstacle, box_on_table};
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
 use god_object::{
     Coupling, CouplingOutput, ForceShading, GodObject, Pose, Settings, Vector6, World,
 };
 use proptest::prelude::*;
-use support::{box_body, box_obstacle, box_on_table};
 
 const HALF: f64 = 0.02;
 const HALF_HEIGHT: f64 = 0.01;

@@ -1,7 +1,6 @@
 //! Force shading and passivity: directions on a polygonised cylinder and over an edge, energy on closed paths.
 
-mod geometry_shapes;
-mod support;
+use crate::geometry_shapes;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

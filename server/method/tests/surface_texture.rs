@@ -1,11 +1,11 @@
 //! Textures: tilts in closed form, averaged over contacts, and a clean tone at any rate of the god-object loop.
 
-mod geometry_shapes;
-mod support;
+use crate::geometry_shapes;
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use crate::support::{box_obstacle, box_on_table};
 use god_object::constraint::Feature;
 use god_object::nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
@@ -14,7 +14,6 @@ use god_object::{
     Body, Coupling, GodObject, HeightMap, HeightMapTexture, Obstacle, Pose, Settings, SineTexture,
     Texture, TextureCoordinates, UvHeightMapTexture, Vector6, World,
 };
-use support::{box_obstacle, box_on_table};
 
 const SINE: SineTexture = SineTexture {
     axis: Vector3::new(1.0, 0.0, 0.0),

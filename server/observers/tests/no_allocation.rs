@@ -1,15 +1,12 @@
 //! Publishing is for the broadcaster's real-time thread: it allocates nothing, whether anybody reads or not.
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use taut_observers::{MAX_WAITING, state_channel};
 use taut_proto::HotState;
 use taut_proto::state::{
     BodyState, ContactState, EventRecord, MAX_BODIES, MAX_CONTACTS, MAX_EVENTS, MAX_TOOLS,
     ToolState,
 };
-
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 /// As full as a state can be; its events are those after `newest`.
 fn full_state(newest: u32) -> HotState {

@@ -1,14 +1,12 @@
 //! Observers over real sockets: WebSocket, plain HTTP, and those who should get nothing.
 
-mod support;
-
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
+use crate::support::{PATIENCE, Workbench, wait_for};
 use futures_util::StreamExt;
 use serde_json::Value;
-use support::{PATIENCE, Workbench, wait_for};
 use taut_observers::{Hello, StreamServer, StreamSettings};
 use taut_proto::scene::BodyDescription;
 use taut_proto::{MeshHash, PoseF64, SceneDescription};

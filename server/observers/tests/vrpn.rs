@@ -1,13 +1,11 @@
 //! Our client against our server over real sockets, in both modes; and those who are no clients.
 
-mod support;
-
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, Shutdown, SocketAddrV4, TcpListener, TcpStream, UdpSocket};
 use std::time::{Duration, Instant};
 
+use crate::support::{PATIENCE, Workbench, wait_for};
 use nalgebra::{Isometry3, Point3};
-use support::{PATIENCE, Workbench, wait_for};
 use taut_observers::{VrpnFrame, VrpnServer, VrpnSettings};
 use taut_vrpn::{Client, Event, Stamp, callback_request};
 

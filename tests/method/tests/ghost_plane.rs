@@ -1,11 +1,8 @@
 //! A plane cut into 10,000 triangles feels like one of two.
 
-#[path = "../../../server/method/tests/geometry_shapes/mod.rs"]
-mod geometry_shapes;
-
 use std::sync::Arc;
 
-use geometry_shapes::{Soup, cuboid, grid_box, mesh, read_ply};
+use crate::geometry_shapes::{Soup, cuboid, grid_box, mesh, read_ply};
 use god_object::geometry::mass_properties;
 use god_object::{Body, Mesh, Obstacle, Pose, Settings, Surface, World};
 use nalgebra::Vector3;

@@ -1,5 +1,4 @@
 //! Poses, wrenches and the published algorithms, for tests to compare with.
-#![allow(dead_code, reason = "each test file uses its own share")]
 
 use nalgebra::{Matrix6, SMatrix, SVector, UnitQuaternion, Vector3, Vector6};
 use taut_spidar::{Geometry, PerString, Pose, StringMatrix};

@@ -1,9 +1,4 @@
 //! A small scene, states, and a server on free ports of 127.0.0.1.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    reason = "each test binary uses its own part of the support"
-)]
 
 pub mod relay;
 

@@ -36,7 +36,6 @@ struct Seen {
 
 /// A running relay; stops when dropped.
 pub struct Relay {
-    port: u16,
     seen: Arc<Seen>,
     thread: Option<JoinHandle<()>>,
 }
@@ -56,7 +55,6 @@ impl Waiting {
     }
 
     pub fn start(self, server: SocketAddr, impairment: Impairment, seed: u64) -> Relay {
-        let port = self.port();
         let seen = Arc::new(Seen::default());
         let of_thread = seen.clone();
         let thread = std::thread::Builder::new()
@@ -64,7 +62,6 @@ impl Waiting {
             .spawn(move || run(&self.socket, server, impairment, seed, &of_thread))
             .unwrap_or_else(|error| panic!("{error}"));
         Relay {
-            port,
             seen,
             thread: Some(thread),
         }
@@ -72,10 +69,6 @@ impl Waiting {
 }
 
 impl Relay {
-    pub fn port(&self) -> u16 {
-        self.port
-    }
-
     pub fn lost_down(&self) -> u64 {
         self.seen.lost_down.load(Ordering::SeqCst)
     }

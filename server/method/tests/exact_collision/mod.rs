@@ -3,7 +3,6 @@
 //! Every coordinate is a double, hence an integer over a power of two, so that the conditions for contact are signs of integer
 //! polynomials of the time t. They are decided exactly at the roots of the coplanarity cubic; where the points stay coplanar, at
 //! the roots of all conditions. Nothing here rounds, and nothing is shared with the method.
-#![allow(dead_code, reason = "each test file uses some of it")]
 
 mod outcome;
 mod polynomial;
@@ -11,10 +10,8 @@ mod queries;
 
 use god_object::nalgebra::Point3;
 use num_bigint::BigInt;
-#[allow(unused_imports, reason = "each test file uses some of it")]
 pub(crate) use outcome::{Outcome, answer, judge};
 use polynomial::{Dyadic, Polynomial};
-#[allow(unused_imports, reason = "each test file uses some of it")]
 pub(crate) use queries::{Kind, Query, query_sets};
 
 type Vector = [Polynomial; 3];

@@ -1,9 +1,4 @@
 //! Shapes for the tests of geometry, collision and contact; a reader of test meshes; where test data lies.
-#![allow(
-    dead_code,
-    unused_imports,
-    reason = "each test file uses some of the shapes"
-)]
 
 mod conforming;
 

@@ -1,8 +1,4 @@
 //! Problems for the tests of the projection: seeded generators, and an oracle that shares no code with the solvers.
-#![allow(
-    dead_code,
-    reason = "every test binary uses its own part of this module"
-)]
 
 use god_object::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
 use god_object::spatial::{Vector6, six};

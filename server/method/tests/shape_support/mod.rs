@@ -1,8 +1,4 @@
 //! Shapes with an independent distance oracle for the tests of primitives: parry's shapes and queries.
-#![allow(dead_code, reason = "each test binary uses its own part")]
-
-#[path = "../support/box_shape.rs"]
-mod box_shape;
 
 use god_object::nalgebra::{Matrix3, Point3, Unit, UnitQuaternion, Vector3};
 use god_object::{Body, Mesh, Obstacle, Pose, Primitive, Surface};
@@ -11,7 +7,7 @@ use parry3d_f64::query;
 use parry3d_f64::shape::{Ball, Cylinder, HalfSpace, Segment, Shape, TriMesh};
 use proptest::prelude::*;
 
-use box_shape::box_mesh;
+use crate::support::box_mesh;
 
 /// Forms about the origin, axis y, in metres.
 #[derive(Clone, Copy, Debug)]

@@ -1,5 +1,4 @@
 //! Meshes, worlds and an independent intersection check for the tests of the method.
-#![allow(dead_code, reason = "each test binary uses its own part")]
 
 mod box_shape;
 

@@ -93,7 +93,6 @@ fn run(mut outlet: StateOutlet, stopped: &AtomicBool, count: &AtomicU64) {
 }
 
 /// Looks until `found` has something.
-#[allow(dead_code, reason = "not every test waits so")]
 pub(crate) fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let end = Instant::now() + PATIENCE;
     loop {

@@ -1,8 +1,8 @@
 //! Triangles and parts that look the wrong way, and cavities.
 
 use super::{Case, ONE, bad, good};
-use crate::solids::{Soup, Triangle, VOLUME, cuboid, flipped, joined, moved, part};
-use crate::write::{ply, stl};
+use crate::import::solids::{Soup, Triangle, VOLUME, cuboid, flipped, joined, moved, part};
+use crate::import::write::{ply, stl};
 
 pub(super) fn directions() -> Vec<Case> {
     let inner = || cuboid([0.01, 0.008, 0.005]);

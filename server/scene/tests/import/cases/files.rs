@@ -1,8 +1,8 @@
 //! Formats, units, places, and files that are broken.
 
 use super::{Case, MM, ONE, bad, good};
-use crate::solids::{VOLUME, moved, part, scaled};
-use crate::write::{glb, obj_soup, ply, stl, stl_text};
+use crate::import::solids::{VOLUME, moved, part, scaled};
+use crate::import::write::{glb, obj_soup, ply, stl, stl_text};
 
 pub(super) fn formats_and_units() -> Vec<Case> {
     vec![

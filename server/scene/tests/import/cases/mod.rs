@@ -5,7 +5,7 @@ mod files;
 mod openings;
 mod surfaces;
 
-use crate::solids::{Soup, VOLUME};
+use crate::import::solids::{Soup, VOLUME};
 
 /// One file.
 pub(crate) struct Case {

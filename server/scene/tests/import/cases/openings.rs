@@ -3,11 +3,11 @@
 use taut_scene::shapes::Axis;
 
 use super::{Case, ONE, bad, good};
-use crate::solids::{
+use crate::import::solids::{
     HALF, Soup, VOLUME, ball, flipped, joined, mapped, moved, part, sheet, six_volumes, soup_of,
     without,
 };
-use crate::write::{obj_soup, ply, stl};
+use crate::import::write::{obj_soup, ply, stl};
 
 pub(super) fn openings() -> Vec<Case> {
     let holed = |count: usize| {

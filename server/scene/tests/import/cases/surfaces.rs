@@ -1,11 +1,11 @@
 //! Vertices that are not shared, and triangles that are none or too many.
 
 use super::{Case, ONE, bad, good};
-use crate::solids::{
+use crate::import::solids::{
     HALF, Noise, Soup, ball, flipped, joined, mapped, moved, part, sheet, six_volumes, with,
     without,
 };
-use crate::write::{obj_soup, ply, ply_soup, stl};
+use crate::import::write::{obj_soup, ply, ply_soup, stl};
 
 pub(super) fn shared_vertices() -> Vec<Case> {
     let ball_volume = || {

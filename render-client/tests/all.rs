@@ -1,0 +1,10 @@
+//! The tests of this package in one binary: linked once, run side by side.
+#![allow(unreachable_pub, reason = "helpers of the tests")]
+
+mod geometry;
+mod golden;
+mod network;
+#[path = "support/perceptual.rs"]
+mod perceptual;
+mod pictures;
+mod support;

@@ -1,0 +1,30 @@
+//! The tests of this package in one binary: linked once, run side by side.
+#![allow(unreachable_pub, reason = "helpers of the tests")]
+
+use assert_no_alloc::AllocDisabler;
+
+mod blocked_terminal;
+mod cli;
+mod edge_coupling;
+mod loops;
+mod moving_obstacle;
+mod no_allocation;
+mod operation;
+mod record;
+mod recording;
+#[allow(
+    dead_code,
+    unused_imports,
+    reason = "shared with another package, which uses the rest"
+)]
+#[path = "../../proto/link/tests/support/relay.rs"]
+mod relay;
+mod replay;
+mod scheduling;
+mod session;
+mod support;
+mod tracked_head;
+
+/// Counts by thread: a test that forbids allocation forbids its own.
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;

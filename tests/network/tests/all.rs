@@ -1,0 +1,9 @@
+//! The tests of this package in one binary: linked once, run side by side.
+#![allow(unreachable_pub, reason = "helpers of the tests")]
+
+mod adversity;
+mod forged;
+mod hostile;
+mod reclaim;
+mod relay;
+mod report;

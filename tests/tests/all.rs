@@ -1,0 +1,18 @@
+//! The tests of this package in one binary: linked once, run side by side.
+#![allow(unreachable_pub, reason = "helpers of the tests")]
+
+mod bad_input;
+mod cluster;
+#[cfg(feature = "monitor")]
+mod demo;
+mod every_test_runs;
+mod failover;
+mod frames;
+mod membership;
+mod method_scenes;
+#[cfg(feature = "monitor")]
+mod monitor;
+mod pictures;
+mod replay;
+mod revocation;
+mod soak;
