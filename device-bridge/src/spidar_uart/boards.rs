@@ -26,14 +26,17 @@ const PERIOD: Duration = Duration::from_millis(1);
 const PHASE: Duration = Duration::from_micros(350);
 /// An answer that is not there by then is none.
 const ANSWER_WITHIN: Duration = Duration::from_millis(3);
-/// The same of a board that is looked for.
-const FOUND_WITHIN: Duration = Duration::from_millis(15);
+/// The same of a board that is looked for: the line is asked once with each patience before it has none. A busy machine on either side answers late.
+const FOUND_WITHIN: [Duration; 4] = [
+    Duration::from_millis(15),
+    Duration::from_millis(15),
+    Duration::from_millis(60),
+    Duration::from_millis(200),
+];
 /// Without a write of the device's loop, or without an answer, for this long all currents are zero.
 const HOLDS: Duration = Duration::from_millis(20);
 /// Without a believed answer for this long the line is opened anew.
 const GIVEN_UP: Duration = Duration::from_millis(300);
-/// How often a line is asked for its boards before it has none.
-const FIND_ATTEMPTS: u32 = 3;
 /// Between two attempts.
 const RETRY: Duration = Duration::from_millis(200);
 /// For the first attempt.
@@ -275,12 +278,13 @@ impl Line {
             cause: error.to_string(),
         };
         let port = serialport::new(&self.path, BAUD)
-            .timeout(FOUND_WITHIN)
+            .timeout(FOUND_WITHIN[0])
             .open();
         let mut port = port.map_err(|error| failed(&error))?;
         // An answer may be late, or one of a question before.
         let mut found = (None, 0, Vec::new());
-        for _ in 0..FIND_ATTEMPTS {
+        for patience in FOUND_WITHIN {
+            port.set_timeout(patience).map_err(|error| failed(&error))?;
             let boards = self.ask_all(&mut port).map_err(|error| failed(&error))?;
             let motors = boards
                 .iter()
