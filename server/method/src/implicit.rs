@@ -24,6 +24,7 @@ use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference};
+use crate::surface::FrictionProblem;
 
 /// Rounds whose lengths shrink by less come to nothing; up to this they do in the cases with a closed form, and from 1 they move away.
 const CONVERGING: f64 = 0.85;
@@ -56,6 +57,37 @@ pub(crate) struct LinearAnswer<'a> {
     /// Whether rows have their shading normals.
     pub(crate) shaded: bool,
     pub(crate) projection: &'a Projection,
+}
+
+/// One round's problem, for friction to be added to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Round<'a> {
+    pub(crate) metric: &'a Metric,
+    pub(crate) unconstrained: &'a Vector6,
+    /// Pose of the reference point at which the rows are linearised.
+    pub(crate) candidate: &'a Pose,
+    /// The same, as a point.
+    center: Point3<f64>,
+    rows: &'a [HalfSpace],
+}
+
+impl<'a> LinearAnswer<'a> {
+    /// The same problem for friction; the contacts stuck last at `stuck_at`, as seen from the round's pose.
+    pub(crate) fn rough<'b>(
+        &'b self,
+        round: &'b Round<'b>,
+        stuck_at: &'b Vector6,
+    ) -> FrictionProblem<'b> {
+        FrictionProblem {
+            metric: round.metric,
+            unconstrained: round.unconstrained,
+            stuck_at,
+            reference_point: &round.center,
+            rows: round.rows,
+            constraints: self.constraints,
+            moved: Some((self.start, round.candidate, self.shaded)),
+        }
+    }
 }
 
 /// The answer of the last round.
@@ -121,13 +153,18 @@ impl ImplicitRounds {
 
     /// Projects again from where the linear rows led to. `None` when they were true, or when no round had a certified answer.
     ///
-    /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. At most `implicit_rounds` projections;
-    /// no allocation unless the projector allocates.
+    /// `bound_at` gives the bound of a row at x_s, in the order of the constraints. `with_friction` adds friction to a round's frictionless answer, by
+    /// projections on the same rows. At most `implicit_rounds` rounds; no allocation unless the projector allocates.
     pub(crate) fn solve(
         &mut self,
         given: &LinearAnswer,
         bound_at: impl Fn(usize) -> f64,
         metric_at: impl Fn(&Pose) -> Option<Metric>,
+        mut with_friction: impl FnMut(
+            &Round<'_>,
+            &mut dyn FnMut(&Vector6, &[u32]) -> Projection,
+            Projection,
+        ) -> Projection,
     ) -> Option<ImplicitAnswer> {
         let nothing_held = given.projection.active.is_empty();
         if self.rounds == 0 || nothing_held {
@@ -153,9 +190,18 @@ impl ImplicitRounds {
                 break;
             };
             self.relinearise(given, &bound_at, &candidate);
-            let projection =
-                self.projector
-                    .project(&metric, &unconstrained, &self.rows, &self.warm_start);
+            let (projector, rows) = (&mut self.projector, &self.rows);
+            let mut project =
+                |a_u: &Vector6, warm: &[u32]| projector.project(&metric, a_u, rows, warm);
+            let frictionless = project(&unconstrained, &self.warm_start);
+            let round_problem = Round {
+                metric: &metric,
+                unconstrained: &unconstrained,
+                candidate: &candidate,
+                center: Point3::from(candidate.translation.vector),
+                rows,
+            };
+            let projection = with_friction(&round_problem, &mut project, frictionless);
             if projection.status != ProjectionStatus::Solved {
                 break;
             }

@@ -6,7 +6,7 @@ use crate::shape_support::{Form, turned};
 use assert_no_alloc::assert_no_alloc;
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::spatial::{angular, linear};
-use god_object::{Coupling, GodObject, Pose, Settings, StartError, World, shape};
+use god_object::{ConstraintSet, Coupling, GodObject, Pose, Settings, StartError, World, shape};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::f64::consts::FRAC_PI_2;
@@ -229,6 +229,65 @@ fn the_force_round_a_cylinder_on_an_old_set_is_that_of_a_new_one() {
             );
         }
     }
+}
+
+/// A rough round obstacle: the device goes on round by a seventh of a right angle in steps, on the set of angle 0 and on a new set at every step.
+#[test]
+fn friction_round_a_cylinder_on_an_old_set_is_that_of_new_sets() {
+    let mut worst: f64 = 0.0;
+    let mut worst_linear = f64::INFINITY;
+    for (obstacle, friction) in [
+        (Form::Cylinder(0.03, 0.05), 0.1),
+        (Form::Cylinder(0.03, 0.05), 0.4),
+        (Form::Sphere(0.03), 0.2),
+        (Form::Capsule(0.03, 0.05), 0.8),
+    ] {
+        for radius in [0.01, 0.003] {
+            let mut world = one(Form::Sphere(radius), obstacle, Pose::identity());
+            world.obstacles[0].surface.friction = friction;
+            let world = Arc::new(world);
+            let settings = world.settings_for(Settings {
+                adaptation: None,
+                ..Settings::for_size(0.02)
+            });
+            let place = |depth: f64, angle: f64| {
+                let reach = 0.03 + radius - depth;
+                let (x, z) = (reach * angle.cos(), reach * angle.sin());
+                at(x, 0.0, z, UnitQuaternion::identity())
+            };
+            let start = place(-2.0 * settings.rest_distance, 0.0);
+            let old = GodObject::new(world.clone(), settings, start).expect("a free start");
+            let mut fresh = GodObject::new(world.clone(), settings, start).expect("a free start");
+            let linear_rows = Settings {
+                implicit_rounds: 0,
+                ..settings
+            };
+            let mut couplings = [&settings, &settings, &linear_rows]
+                .map(|settings| Coupling::new(&world, settings));
+            let (mut off, mut off_linear): (f64, f64) = (0.0, 0.0);
+            for step in 0..=220 {
+                let device = place(2e-3, 1e-3 * f64::from(step));
+                let time = 1e-3 * f64::from(step);
+                fresh.step(&device, None);
+                let mut felt = |which: usize, set: &ConstraintSet| {
+                    linear(&couplings[which].step(time, &device, set).wrench)
+                };
+                let expected = felt(0, fresh.constraint_set());
+                let rounds = felt(1, old.constraint_set());
+                let straight = felt(2, old.constraint_set());
+                off = off.max((rounds - expected).norm() / expected.norm());
+                off_linear = off_linear.max((straight - expected).norm() / expected.norm());
+            }
+            println!("{obstacle:?} {radius} mu {friction}: {off:.4} linear {off_linear:.4}");
+            worst = worst.max(off);
+            worst_linear = worst_linear.min(off_linear);
+        }
+    }
+    assert!(worst < 0.04, "off by {worst}");
+    assert!(
+        worst_linear > 0.1,
+        "linear rows would do: off by {worst_linear}"
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::constraint::contact_jacobian;
 use crate::implicit::{ImplicitAnswer, LinearAnswer};
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus};
 use crate::spatial::{Vector6, advance_pose, angular, pose_difference};
-use crate::surface::{Friction, FrictionProblem};
+use crate::surface::FrictionProblem;
 
 /// Rounds that each cover less than this share of the one before add up to no less than an eighth of the linear answer in three rounds: where
 /// that one moves the body, they do.
@@ -63,6 +63,7 @@ impl GodObject {
                 reference_point: &center,
                 rows: &self.rows,
                 constraints: &self.set.constraints,
+                moved: None,
             };
             projection = friction.hold(
                 &problem,
@@ -77,10 +78,6 @@ impl GodObject {
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
         match projection.status {
-            // Friction is on the linear rows.
-            ProjectionStatus::Solved if self.friction.as_ref().is_some_and(Friction::acts) => {
-                Some(Projected::about(projection.acceleration, reference_point))
-            }
             ProjectionStatus::Solved => Some(self.implicit(unconstrained, projection, report)),
             // Two walls nearer to each other than twice the rest distance: the answer without easing out.
             ProjectionStatus::Infeasible if projection.kkt_residual <= KKT_TOLERANCE => {
@@ -119,10 +116,20 @@ impl GodObject {
             shaded: false,
             projection: &linear,
         };
+        let friction = &mut self.friction;
         let answer = self.implicit.solve(
             &given,
             |row| self.rows[row].bound,
             |pose| self.world.body.metric(self.settings.rotation_metric, pose),
+            |round, project, frictionless| match friction {
+                Some(friction) => {
+                    // What stuck did so where the body is.
+                    let stuck_at =
+                        pose_difference(&start, round.candidate, &-angular(&linear.acceleration));
+                    friction.hold(&given.rough(round, &stuck_at), project, frictionless)
+                }
+                None => frictionless,
+            },
         );
         let Some(answer) = answer else {
             return Projected::about(linear.acceleration, reference_point);

@@ -15,7 +15,7 @@ use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
-use crate::spatial::{Vector6, linear};
+use crate::spatial::{Pose, Vector6, linear};
 use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
@@ -61,6 +61,17 @@ pub struct FrictionProblem<'a> {
     pub rows: &'a [HalfSpace],
     /// The constraint of each row.
     pub constraints: &'a [NonPenetrationConstraint],
+    /// Poses of the reference point where the constraints were collected and where the rows were linearised anew, and whether with shading normals.
+    pub moved: Option<(&'a Pose, &'a Pose, bool)>,
+}
+
+impl FrictionProblem<'_> {
+    /// Contact point of a row, world, m.
+    fn point(&self, constraint: &NonPenetrationConstraint) -> Point3<f64> {
+        self.moved.map_or(constraint.point, |(start, at, shaded)| {
+            constraint.moved(start, at, shaded).point
+        })
+    }
 }
 
 impl Friction {
@@ -184,9 +195,9 @@ impl Friction {
             problem.unconstrained - problem.stuck_at,
         );
         let contact = |row: &HalfSpace, constraint: &NonPenetrationConstraint| {
-            let point_row = |direction| {
-                contact_jacobian(&direction, &constraint.point, problem.reference_point)
-            };
+            let point = problem.point(constraint);
+            let point_row =
+                |direction| contact_jacobian(&direction, &point, problem.reference_point);
             let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
             let normal = metric.whiten_row(&row.jacobian);
             // Touching is touching: the contact's own slack at `now` is taken as none.
