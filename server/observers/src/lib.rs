@@ -3,17 +3,27 @@
 //! - [`VrpnServer`]: a VRPN tracker, force device and buttons, for programs that know VRPN.
 //! - [`StreamServer`]: JSON lines over WebSocket and HTTP, and a page that shows them, for browsers and scripts.
 //! - [`lines`]: those lines; other carriers of them use it too.
+//! - [`OperatorServer`]: the operator's page, on a port of its own. The one server here whose clients can do something: arm and disarm, with
+//!   a token.
 //!
-//! Each is a thread of its own with normal scheduling. It reads a [`StateFeed`], whose writer never waits for it, at a rate of
-//! its own, and nothing that its clients send goes anywhere: whoever is connected here can look and can do nothing else.
+//! Each is a thread of its own with normal scheduling. The first two read a [`StateFeed`], whose writer never waits for them, at a rate of
+//! their own, and nothing that their clients send goes anywhere: whoever is connected there can look and can do nothing else.
 //! Clients are bounded in number and in what waits for them; one that does not keep up misses states or is dropped.
 //!
 //! Without the feature `servers` there are the feed and the lines alone.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "servers")]
+mod asking;
 mod event_lines;
 mod feed;
+#[cfg(feature = "servers")]
+mod http;
 pub mod lines;
+#[cfg(feature = "servers")]
+mod operator_request;
+#[cfg(feature = "servers")]
+mod operator_server;
 #[cfg(feature = "servers")]
 mod pump;
 #[cfg(feature = "servers")]
@@ -31,6 +41,10 @@ pub use event_lines::EventLines;
 pub use feed::{Fresh, MAX_WAITING, StateFeed, StateOutlet, state_channel};
 pub use lines::{Hello, Naming};
 #[cfg(feature = "servers")]
+pub use operator_request::Deed;
+#[cfg(feature = "servers")]
+pub use operator_server::{Answer, Desk, OperatorServer, OperatorSettings, Outcome, fresh_token};
+#[cfg(feature = "servers")]
 pub use stream_server::{StreamServer, StreamSettings};
 #[cfg(feature = "servers")]
 pub use vrpn_reports::VrpnFrame;
@@ -43,4 +57,14 @@ pub use vrpn_server::{VrpnServer, VrpnSettings};
 #[must_use]
 pub fn grants_request(head: &[u8], token: Option<&str>) -> Option<bool> {
     request::read(head, token).map(|answer| answer.is_ok())
+}
+
+/// What the head of a request to the operator's page is granted; `None` while it is not whole.
+#[cfg(feature = "servers")]
+#[must_use]
+pub fn grants_operator(head: &[u8], token: &str) -> Option<Option<Deed>> {
+    operator_request::read(head, token).map(|call| match call {
+        Ok(operator_request::Call::Act(deed)) => Some(deed),
+        _ => None,
+    })
 }

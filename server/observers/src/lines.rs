@@ -216,18 +216,24 @@ pub fn state_line(state: &HotState) -> String {
         t: state.sample_time_ns as f64 / 1e9,
         tick: state.tick,
         scene_revision: state.scene_revision,
-        run: match state.run {
-            RunState::Waiting => "waiting",
-            RunState::Running => "running",
-            RunState::Paused => "paused",
-            RunState::Fault => "fault",
-        },
+        run: run_name(state.run),
         constraint_age: f64::from(state.constraint_age_us) / 1e6,
         tools: state.tools.iter().map(tool).collect(),
         head: head(&state.head),
         bodies: state.bodies.iter().map(body).collect(),
         contacts: state.contacts.iter().map(contact).collect(),
     })
+}
+
+/// What the device does, as the lines call it.
+#[must_use]
+pub fn run_name(run: RunState) -> &'static str {
+    match run {
+        RunState::Waiting => "waiting",
+        RunState::Running => "running",
+        RunState::Paused => "paused",
+        RunState::Fault => "fault",
+    }
 }
 
 /// How many events an observer missed because it was too slow, without the line's end.

@@ -70,25 +70,37 @@ impl Refusal {
 
 /// Reads a request's head; `None` while it is not whole.
 pub(crate) fn read(head: &[u8], token: Option<&str>) -> Option<Result<Wish, Refusal>> {
+    parsed(head, |request| match request {
+        Some(request) => judge(request, token),
+        None => Err(Refusal::NotHttp),
+    })
+}
+
+/// What `judge` makes of a head that is whole: of a request, or of `None` where it is none.
+pub(crate) fn parsed<T>(
+    head: &[u8],
+    judge: impl FnOnce(Option<&httparse::Request<'_, '_>>) -> T,
+) -> Option<T> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     match request.parse(head) {
         Ok(httparse::Status::Partial) => None,
-        Ok(httparse::Status::Complete(_)) => Some(judge(&request, token)),
-        Err(_) => Some(Err(Refusal::NotHttp)),
+        Ok(httparse::Status::Complete(_)) => Some(judge(Some(&request))),
+        Err(_) => Some(judge(None)),
     }
+}
+
+/// The first header of this name, if it is text.
+pub(crate) fn header<'b>(request: &httparse::Request<'_, 'b>, name: &str) -> Option<&'b str> {
+    let mut headers = request.headers.iter();
+    let found = headers.find(|h| h.name.eq_ignore_ascii_case(name));
+    found.and_then(|h| std::str::from_utf8(h.value).ok())
 }
 
 fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wish, Refusal> {
     let target = request.path.unwrap_or_default();
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
-    let header = |name: &str| {
-        let found = request
-            .headers
-            .iter()
-            .find(|h| h.name.eq_ignore_ascii_case(name));
-        found.and_then(|h| std::str::from_utf8(h.value).ok())
-    };
+    let header = |name: &str| header(request, name);
     match token {
         Some(token) => {
             let bearer = header("Authorization").and_then(|value| value.strip_prefix("Bearer "));
@@ -123,7 +135,7 @@ fn judge(request: &httparse::Request<'_, '_>, token: Option<&str>) -> Result<Wis
 }
 
 /// Compares hashes: the time that it takes tells nothing of the token.
-fn is_same(given: &str, token: &str) -> bool {
+pub(crate) fn is_same(given: &str, token: &str) -> bool {
     blake3::hash(given.as_bytes()) == blake3::hash(token.as_bytes())
 }
 

@@ -4,45 +4,37 @@
 //! Plain HTTP without TLS: it belongs on the loopback address, behind a tunnel, or, with a token, on a network that is trusted.
 //! Every line is written once, whoever reads it. An observer that does not keep up misses states (the newest is next) and, if
 //! it is far behind, events, which it is told; one that takes nothing for [`SEND_TIME`] is dropped. Who has not asked yet has no place among the
-//! observers, only one of [`MAX_ASKING`] places to ask from, which a newcomer may take (see [`taut_proto::waiting`]).
+//! observers, only one of a bounded number of places to ask from, which a newcomer may take (see [`taut_proto::waiting`]).
 
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
-use taut_proto::waiting::{Ticket, Waiting};
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::io::AsyncWriteExt;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{broadcast, oneshot, watch};
+use tokio::sync::{broadcast, watch};
 use tokio::time::{sleep, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 use tokio_tungstenite::tungstenite::{Message, Utf8Bytes};
 
+use crate::asking::{Asking, Entrance};
 use crate::event_lines::EventLines;
 use crate::feed::StateFeed;
+use crate::http::{
+    End, HTML, JSON_LINES, Lines, REQUEST_TIME, SEND_TIME, TEXT, answer, head, request, send,
+};
 use crate::lines::{Hello, Naming, missed_line, state_line};
-use crate::request::{MAX_REQUEST_BYTES, Refusal, Wish, read};
+use crate::request::{Refusal, Wish, read};
 use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
 
 /// The page at `/`: self-contained, it reads `/ws`.
 const PAGE: &str = include_str!("page.html");
-/// Longest that an observer may take for its request.
-const REQUEST_TIME: Duration = Duration::from_secs(2);
-/// Clients that may be asking at once.
-const MAX_ASKING: usize = 64;
-/// The same of one address: a browser asks for a page on some six connections.
-const MAX_ASKING_OF_ONE: usize = 16;
-/// Longest that an observer may take nothing of what is sent.
-const SEND_TIME: Duration = Duration::from_secs(5);
 /// Events that wait for a slow observer.
 const EVENT_LINES: usize = 256;
-/// Sentences for people.
-const TEXT: &str = "text/plain; charset=utf-8";
 /// Largest message of an observer; they have nothing to say.
 const MAX_INBOUND_BYTES: usize = 4096;
 /// What Prometheus is told that `/metrics` is.
@@ -52,8 +44,6 @@ const NOTHING_MEASURED: (&str, &str) = (
     "503 Service Unavailable",
     "nothing is measured yet; ask again in a second\n",
 );
-/// What every answer says beside its own: nothing is kept, nothing is taken from elsewhere.
-const COMMON_HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nContent-Security-Policy: default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; connect-src 'self'; frame-ancestors 'none'\r\nReferrer-Policy: no-referrer\r\nConnection: close\r\n";
 
 /// How the stream is set up.
 #[derive(Clone, Debug)]
@@ -75,6 +65,7 @@ pub struct StreamSettings {
 pub struct StreamServer {
     address: SocketAddr,
     counts: Arc<Counts>,
+    entrance: Entrance,
     metrics: watch::Sender<Option<Arc<str>>>,
     _service: Service,
 }
@@ -83,7 +74,6 @@ pub struct StreamServer {
 struct Counts {
     observers: AtomicUsize,
     dropped: AtomicU64,
-    crowded_out: AtomicU64,
 }
 
 /// What every observer's task knows.
@@ -96,18 +86,11 @@ struct Shared {
     metrics: watch::Receiver<Option<Arc<str>>>,
     counts: Arc<Counts>,
     max_observers: usize,
-    asking: Arc<Mutex<Waiting<oneshot::Sender<()>>>>,
+    entrance: Entrance,
 }
 
 /// A place among the observers; dropped, it is free again.
 struct Place(Arc<Counts>);
-
-/// A place to ask from; dropped, it is free again. Whoever takes it ends `lost`.
-struct Asking {
-    places: Arc<Mutex<Waiting<oneshot::Sender<()>>>>,
-    ticket: Ticket,
-    lost: oneshot::Receiver<()>,
-}
 
 impl StreamServer {
     /// Opens the port and serves what `feed` has.
@@ -120,7 +103,7 @@ impl StreamServer {
         let listener = listen(settings.address)?;
         let address = listener.local_addr()?;
         drop(guard);
-        let counts = Arc::<Counts>::default();
+        let (counts, entrance) = (Arc::<Counts>::default(), Entrance::default());
         let (sender, states) = watch::channel(None);
         let (events, _) = broadcast::channel(EVENT_LINES);
         let (metrics, shown_metrics) = watch::channel(None);
@@ -132,7 +115,7 @@ impl StreamServer {
             metrics: shown_metrics,
             counts: counts.clone(),
             max_observers: settings.max_observers,
-            asking: Arc::new(Mutex::new(Waiting::new(MAX_ASKING, MAX_ASKING_OF_ONE))),
+            entrance: entrance.clone(),
         };
         let mut trail = EventLines::new(settings.naming);
         let service = Service::start("observers", runtime, move |_| async move {
@@ -148,6 +131,7 @@ impl StreamServer {
         Ok(Self {
             address,
             counts,
+            entrance,
             metrics,
             _service: service,
         })
@@ -173,7 +157,7 @@ impl StreamServer {
     /// Clients that lost their place to ask from to others before they had asked.
     #[must_use]
     pub fn crowded_out(&self) -> u64 {
-        self.counts.crowded_out.load(Ordering::Relaxed)
+        self.entrance.crowded_out()
     }
 
     /// Observers that were given up because they took nothing.
@@ -184,21 +168,6 @@ impl StreamServer {
 }
 
 impl Shared {
-    /// A place to ask from; whoever asks longest of the address that asks most gives it up where there is none.
-    fn ask(&self, peer: SocketAddr) -> Asking {
-        let (place, lost) = oneshot::channel();
-        let mut places = self.asking.lock().unwrap_or_else(PoisonError::into_inner);
-        let (ticket, loser) = places.enter(peer.ip(), place);
-        if loser.is_some() {
-            self.counts.crowded_out.fetch_add(1, Ordering::Relaxed);
-        }
-        Asking {
-            places: self.asking.clone(),
-            ticket,
-            lost,
-        }
-    }
-
     /// A place among the observers, if there is one.
     fn observe(&self) -> Option<Place> {
         let observers = &self.counts.observers;
@@ -206,13 +175,6 @@ impl Shared {
             (observers < self.max_observers).then_some(observers + 1)
         });
         taken.ok().map(|_| Place(self.counts.clone()))
-    }
-}
-
-impl Drop for Asking {
-    fn drop(&mut self) {
-        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
-        places.leave(self.ticket);
     }
 }
 
@@ -228,7 +190,7 @@ async fn accept(listener: TcpListener, shared: &Shared) {
             sleep(ACCEPT_PAUSE).await;
             continue;
         };
-        let asking = shared.ask(peer);
+        let asking = shared.entrance.ask(peer);
         let shared = shared.clone();
         tokio::spawn(async move {
             match observer(stream, &shared, asking).await {
@@ -243,35 +205,21 @@ async fn accept(listener: TcpListener, shared: &Shared) {
     }
 }
 
-/// Why an observer's connection ended.
-#[derive(Debug)]
-enum End {
-    /// It closed, or the network did.
-    Gone,
-    /// It took nothing for [`SEND_TIME`].
-    Slow,
-}
-
-impl From<io::Error> for End {
-    fn from(_: io::Error) -> Self {
-        Self::Gone
-    }
-}
-
 async fn observer(mut stream: TcpStream, shared: &Shared, mut asking: Asking) -> Result<(), End> {
     // A socket that refuses this is merely later.
     let _ = stream.set_nodelay(true);
-    let asked = timeout(REQUEST_TIME, request(&mut stream, shared.token.as_deref()));
+    let understood = |head: &[u8]| read(head, shared.token.as_deref());
+    let asked = timeout(REQUEST_TIME, request(&mut stream, understood));
     let wish = tokio::select! {
         biased;
-        asked = asked => asked.map_err(|_| End::Gone)??,
+        asked = asked => asked.map_err(|_| End::Gone)??.unwrap_or(Err(Refusal::NotHttp)),
         _ = &mut asking.lost => return Err(End::Gone),
     };
     // Those who stay have a place of their own; a page or a line is sent to where it was asked from.
     match wish {
         Ok(Wish::Lines) => {
             let _place = settle(&mut stream, shared, asking).await?;
-            let head = head("200 OK", "application/x-ndjson");
+            let head = head("200 OK", JSON_LINES);
             send(stream.write_all(head.as_bytes())).await?;
             follow(Lines(stream), shared).await
         }
@@ -331,47 +279,11 @@ async fn answer_at_once(
                 }
             }
         }
-        Ok(_) => answer(stream, "200 OK", "text/html; charset=utf-8", PAGE).await,
+        Ok(_) => answer(stream, "200 OK", HTML, PAGE).await,
         Err(refusal) => {
             let (status, text) = refusal.text();
             answer(stream, status, TEXT, &format!("{text}\n")).await
         }
-    }
-}
-
-/// Reads a request's head.
-async fn request(stream: &mut TcpStream, token: Option<&str>) -> io::Result<Result<Wish, Refusal>> {
-    let mut head = Vec::with_capacity(1024);
-    loop {
-        if stream.read_buf(&mut head).await? == 0 {
-            return Err(io::ErrorKind::UnexpectedEof.into());
-        }
-        if let Some(wish) = read(&head, token) {
-            return Ok(wish);
-        }
-        if head.len() > MAX_REQUEST_BYTES {
-            return Ok(Err(Refusal::NotHttp));
-        }
-    }
-}
-
-fn head(status: &str, kind: &str) -> String {
-    format!("HTTP/1.1 {status}\r\nContent-Type: {kind}\r\n{COMMON_HEADERS}\r\n")
-}
-
-/// A whole answer; its length is where the connection ends.
-async fn answer(stream: &mut TcpStream, status: &str, kind: &str, body: &str) -> Result<(), End> {
-    let head = head(status, kind);
-    send(stream.write_all(head.as_bytes())).await?;
-    send(stream.write_all(body.as_bytes())).await?;
-    send(stream.shutdown()).await
-}
-
-/// What `sending` comes to, at most [`SEND_TIME`].
-async fn send(sending: impl Future<Output = io::Result<()>>) -> Result<(), End> {
-    match timeout(SEND_TIME, sending).await {
-        Ok(sent) => Ok(sent?),
-        Err(_) => Err(End::Slow),
     }
 }
 
@@ -383,23 +295,13 @@ trait Carrier {
     fn gone(&mut self) -> impl Future<Output = ()> + Send;
 }
 
-/// Lines as the body of an answer.
-struct Lines(TcpStream);
-
 impl Carrier for Lines {
     async fn line(&mut self, line: Utf8Bytes) -> Result<(), End> {
-        let whole = format!("{line}\n");
-        send(self.0.write_all(whole.as_bytes())).await
+        Lines::line(self, &line).await
     }
 
     async fn gone(&mut self) {
-        let mut ignored = [0; 256];
-        while self
-            .0
-            .read(&mut ignored)
-            .await
-            .is_ok_and(|length| length > 0)
-        {}
+        Lines::gone(self).await;
     }
 }
 

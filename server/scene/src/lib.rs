@@ -45,7 +45,7 @@ pub use trace::{
 };
 pub use workbench::{
     AlsoKeyFile, Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Log, LogLevel,
-    Monitoring, Network, Node, ObserverStream, Passivity, RealTime, RealTimeMode, Rearm,
+    Monitoring, Network, Node, ObserverStream, Operator, Passivity, RealTime, RealTimeMode, Rearm,
     SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer, Vrpn, VrpnSensor,
     Window, Workbench, Zenoh,
 };

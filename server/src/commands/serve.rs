@@ -94,11 +94,11 @@ impl MetricsOutlets {
         })
     }
 
-    fn follow(&mut self, session: &Session) {
+    fn follow(&mut self, session: &mut Session) {
         let age = session.age();
         let (page, line) = (age >= self.next, age >= self.next_line);
         let (page, line) = (
-            page && session.observers().shows_metrics(),
+            page && session.shows_metrics(),
             line && self.lines.is_some(),
         );
         if !page && !line {
@@ -107,9 +107,7 @@ impl MetricsOutlets {
         let metrics = session.metrics();
         if page {
             self.next = age + metrics::PERIOD;
-            if let Ok(text) = metrics.text() {
-                session.observers().publish_metrics(text);
-            }
+            session.show_metrics(&metrics);
         }
         if let Some(lines) = self.lines.as_ref().filter(|_| line) {
             self.next_line = age + self.line_period;
@@ -145,6 +143,9 @@ pub(super) fn announce(session: &Session, terminal: &Terminal) {
     for line in session.observers().lines() {
         terminal.say(&line);
     }
+    if let Some(page) = session.operator() {
+        terminal.say(&page.line());
+    }
     for line in &session.realtime().waived {
         terminal.say(&format!("not in force: {line}"));
     }
@@ -167,6 +168,7 @@ pub(super) fn watch(
             return;
         }
         session.follow_network(terminal);
+        session.follow_operator();
         terminal.status(session.status_line());
         each(session);
         if end.is_some_and(|end| session.age() >= end) {

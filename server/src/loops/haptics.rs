@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use god_object::spatial::Pose;
+use god_object::spatial::{Pose, linear};
 use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Reading, TickReport};
 use taut_recording::{HapticsRecord, Tap};
 
@@ -61,6 +61,8 @@ pub struct HapticsStatistics {
     obstacle_work_bits: AtomicU64,
     /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
     energy_generated_bits: AtomicU64,
+    /// Largest norm of a force that the hand felt, N, as the bits of an `f64`.
+    largest_force_bits: AtomicU64,
     /// The device does not answer now.
     pub device_faulty: AtomicBool,
 }
@@ -74,6 +76,11 @@ impl HapticsStatistics {
     /// Net work that moving obstacles have done on the hand, J.
     pub fn obstacle_work(&self) -> f64 {
         f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+    }
+
+    /// Largest norm of a force that the hand felt since the start, N.
+    pub fn largest_force(&self) -> f64 {
+        f64::from_bits(self.largest_force_bits.load(Ordering::Relaxed))
     }
 
     /// Energy given to the hand beyond what it and the moving obstacles had put in, J: the coupling made it.
@@ -203,6 +210,11 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
+        // What is no number is larger than nothing.
+        let largest = linear(&report.felt).norm().max(statistics.largest_force());
+        statistics
+            .largest_force_bits
+            .store(largest.to_bits(), Ordering::Relaxed);
         self.publish_obstacle_work();
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {

@@ -45,6 +45,7 @@ impl Statistics {
             penetrations: self.checks.penetrations.load(Ordering::Relaxed),
             penetration_checks: self.checks.checks.load(Ordering::Relaxed),
             safety_events: self.haptics.safety_events.load(Ordering::Relaxed),
+            largest_force_n: self.haptics.largest_force(),
             energy_injected_j: self.haptics.energy_injected(),
             energy_from_obstacles_j: self.haptics.obstacle_work(),
             energy_generated_j: self.haptics.energy_generated(),

@@ -67,12 +67,19 @@ pub struct ClientLink {
     pub packets_lost: u64,
     /// 99th percentile of the age of the state that it drew, ms, over its last second.
     pub pose_age_p99_ms: f64,
+    /// Where its control plane comes from.
+    pub address: String,
+    /// How long it has been in, s.
+    pub present_s: f64,
+    /// How long ago it was heard last, s.
+    pub heard_s: f64,
 }
 
 impl ClientLink {
-    /// As the server sees it.
-    pub fn of(status: &ClientStatus) -> Self {
+    /// As the server sees it at session time `now`.
+    pub fn of(status: &ClientStatus, now: Duration) -> Self {
         let stats = status.stats.as_ref();
+        let since = |ns: u64| now.saturating_sub(Duration::from_nanos(ns)).as_secs_f64();
         Self {
             node: status.node.clone(),
             role: status.role.to_string(),
@@ -80,6 +87,9 @@ impl ClientLink {
             send_errors: status.send_errors,
             packets_lost: stats.map_or(0, |stats| stats.packets_lost),
             pose_age_p99_ms: stats.map_or(0.0, |stats| f64::from(stats.pose_age_ms_p99)),
+            address: status.address.to_string(),
+            present_s: since(status.joined_ns),
+            heard_s: since(status.last_heard_ns),
         }
     }
 }

@@ -63,6 +63,7 @@ mod tests {
                 "realtime",
                 "packets_sent",
                 "safety_events",
+                "largest_force_n",
                 "energy_injected_j",
                 "energy_from_obstacles_j",
                 "energy_generated_j",

@@ -58,6 +58,9 @@ pub struct SessionReport {
     pub packets_refused: u64,
     /// Times at which the safety stage or a device fault changed the force.
     pub safety_events: u64,
+    /// Largest norm of a force that the hand felt, N.
+    #[serde(default)]
+    pub largest_force_n: f64,
     /// Energy given to the hand beyond what it had put in, J; obstacles that move may truly give some.
     pub energy_injected_j: f64,
     /// Net work that obstacles that move did on the hand, J; negative where they gave way under it.

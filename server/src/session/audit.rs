@@ -4,15 +4,14 @@
 //! is logged at once and the others as a sum, once a minute; so is what was turned away before it had said anything.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use taut_link::proto::proof::Grant;
 use taut_link::{Act, ClientStatus, Counters, LinkEvent, Role, Untrusted};
 
-/// Time over which refusals of one address are summed.
-const SUM_PERIOD: Duration = Duration::from_secs(60);
-/// Addresses whose refusals are counted apart; those of further ones are summed together.
-const MAX_SOURCES: usize = 256;
+use super::refusals::{Refusals, SUM_PERIOD};
+
 /// Clients that are known by name; more are never in.
 const MAX_PRESENT: usize = 4096;
 
@@ -124,7 +123,7 @@ impl Audit<'_> {
 #[derive(Debug, Default)]
 pub struct AuditTrail {
     present: Vec<Peer>,
-    refusals: Refusals,
+    refusals: Refusals<IpAddr>,
     turned_away: u64,
     looked: Duration,
 }
@@ -225,106 +224,50 @@ impl AuditTrail {
     }
 }
 
-/// How many were refused, by address.
-#[derive(Debug, Default)]
-struct Refusals {
-    sources: Vec<Source>,
-    /// Beyond [`MAX_SOURCES`].
-    others: u64,
-    others_told: Duration,
-}
-
+/// The trail of a page from which an operator acts: what was done, what was refused, and the peer. For any thread.
 #[derive(Debug)]
-struct Source {
-    address: IpAddr,
-    since: Duration,
-    more: u64,
+pub(crate) struct PageAudit {
+    /// By what name it stands in the trail.
+    node: &'static str,
+    refusals: Mutex<Refusals<(IpAddr, &'static str)>>,
 }
 
-impl Refusals {
-    /// Counts one; whether it is to be logged at once.
-    fn is_first(&mut self, address: IpAddr, now: Duration) -> bool {
-        if let Some(source) = self
-            .sources
-            .iter_mut()
-            .find(|source| source.address == address)
-        {
-            source.more += 1;
-            return false;
+impl PageAudit {
+    pub(crate) fn new(node: &'static str) -> Self {
+        Self {
+            node,
+            refusals: Mutex::default(),
         }
-        if self.sources.len() < MAX_SOURCES {
-            self.sources.push(Source {
-                address,
-                since: now,
-                more: 0,
-            });
-            return true;
-        }
-        self.others += 1;
-        false
     }
 
-    /// The sums whose time is over. An address that was quiet meanwhile is forgotten.
-    fn due(&mut self, now: Duration) -> Vec<(Option<IpAddr>, u64)> {
-        let mut sums = Vec::new();
-        self.sources.retain_mut(|source| {
-            if now < source.since + SUM_PERIOD {
-                return true;
+    /// Somebody who has shown the token asked for force, or for none.
+    pub(crate) fn acted(&self, arm: bool, address: SocketAddr) {
+        let (event_is, node) = (if arm { "arm" } else { "disarm" }, self.node);
+        tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node, role = %Role::Operator, credential = "the page's token", %address);
+    }
+
+    /// Somebody was refused. Of one address and reason the first is told at once, further ones as a sum.
+    pub(crate) fn refused(&self, address: SocketAddr, reason: &'static str, now: Duration) {
+        let node = self.node;
+        let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
+        if refusals.is_first((address.ip(), reason), now) {
+            tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, %address, reason);
+        }
+    }
+
+    /// Tells the sums that are due at session time `now`; at the end, those that are left.
+    pub(crate) fn look(&self, now: Duration) {
+        let node = self.node;
+        let mut refusals = self.refusals.lock().unwrap_or_else(PoisonError::into_inner);
+        for (who, times) in refusals.due(now) {
+            match who {
+                Some((address, reason)) => {
+                    tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, %address, reason, times);
+                }
+                None => {
+                    tracing::info!(target: taut_log::AUDIT_TARGET, event = "refused", node, address = "many", times);
+                }
             }
-            if source.more == 0 {
-                return false;
-            }
-            sums.push((Some(source.address), std::mem::take(&mut source.more)));
-            source.since = now;
-            true
-        });
-        if self.others > 0 && now >= self.others_told + SUM_PERIOD {
-            sums.push((None, std::mem::take(&mut self.others)));
-            self.others_told = now;
         }
-        sums
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const S: Duration = Duration::from_secs(1);
-
-    fn address(last: u32) -> IpAddr {
-        IpAddr::from((0x0a00_0000 | last).to_be_bytes())
-    }
-
-    #[test]
-    fn of_an_address_that_keeps_knocking_one_refusal_is_told_and_the_others_are_summed() {
-        let mut refusals = Refusals::default();
-        assert!(refusals.is_first(address(1), 10 * S));
-        for _ in 0..1000 {
-            assert!(!refusals.is_first(address(1), 11 * S));
-        }
-        assert!(refusals.is_first(address(2), 12 * S), "another address");
-        assert!(refusals.due(69 * S).is_empty(), "not yet");
-        assert_eq!(refusals.due(71 * S), [(Some(address(1)), 1000)]);
-        // It goes on: summed still. Then it is quiet, and is forgotten.
-        assert!(!refusals.is_first(address(1), 72 * S));
-        assert_eq!(refusals.due(140 * S), [(Some(address(1)), 1)]);
-        assert!(refusals.due(210 * S).is_empty());
-        assert!(refusals.is_first(address(1), 211 * S));
-    }
-
-    #[test]
-    fn addresses_without_number_take_no_memory_without_bound_and_none_is_lost() {
-        let mut refusals = Refusals::default();
-        let logged = (0..100_000)
-            .filter(|last| refusals.is_first(address(*last), S))
-            .count();
-        assert_eq!((logged, refusals.sources.len()), (MAX_SOURCES, MAX_SOURCES));
-        let summed: u64 = refusals
-            .due(Duration::MAX)
-            .iter()
-            .map(|(_, times)| times)
-            .sum();
-        assert_eq!(logged as u64 + summed, 100_000);
     }
 }

@@ -1,9 +1,6 @@
 //! The end of a session, and what was measured.
 
-use taut_link::ServerLink;
-
 use crate::report::SessionReport;
-use crate::report::frames::FramesReport;
 use crate::report::terminal::Terminal;
 use crate::session::monitor::{MonitorFeed, Severity};
 use crate::session::observers::ObserverServices;
@@ -16,8 +13,7 @@ impl Session {
     pub fn stop(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
         self.follow_network(terminal);
         self.audit.end();
-        let duration = self.age();
-        let mut report = self.statistics.report(duration);
+        let mut report = self.report();
         report.fidelity = self.fidelity.as_ref().map(|f| f.watch.report(&f.plan));
         if let Some(monitor) = &self.monitor {
             monitor.log(
@@ -25,16 +21,6 @@ impl Session {
                 &format!("the session ends after {:.1} s", report.duration_s),
             );
         }
-        if let Some(link) = &self.link {
-            let counters = link.counters();
-            report.packets_sent = counters.packets_sent;
-            report.packets_refused = counters.garbage
-                + counters.wrong_version
-                + counters.forged
-                + counters.replayed
-                + counters.inputs_refused;
-        }
-        let frames = self.link.as_ref().and_then(ServerLink::frame_report);
         let mut failure = self
             .shutdown
             .failure()
@@ -55,8 +41,6 @@ impl Session {
             }
         }
         report.realtime = self.ledger.report();
-        (report.clients, report.observers) = self.clients.reports();
-        report.frames = frames.map(|measured| FramesReport::new(&measured, &mut report.clients));
         (report, failure)
     }
 
@@ -69,6 +53,9 @@ impl Session {
         }
         let monitor = self.monitor.take().map(MonitorFeed::stop);
         self.observers = ObserverServices::default();
+        if let Some(page) = self.operator.take() {
+            page.end();
+        }
         if let Some(link) = self.link.take() {
             self.runtime.block_on(link.shutdown());
         }

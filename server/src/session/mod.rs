@@ -14,6 +14,8 @@ mod frames;
 pub mod head;
 pub(crate) mod monitor;
 pub(crate) mod observers;
+pub(crate) mod operator;
+mod refusals;
 mod remote_head;
 mod reporting;
 pub mod setup;
@@ -38,10 +40,12 @@ use crate::loops::incidents::IncidentCursor;
 use crate::loops::realtime::RealtimeLedger;
 use crate::loops::realtime::RealtimeReport;
 use crate::loops::statistics::Statistics;
+use crate::report::metrics::Metrics;
 use crate::session::audit::AuditTrail;
 use crate::session::clients::ClientLedger;
 use crate::session::monitor::{MonitorFeed, NetworkCounts};
 use crate::session::observers::ObserverServices;
+use crate::session::operator::{Moment, OperatorPage};
 use crate::shared::clock::SessionClock;
 use crate::shared::fanout::Subscriber;
 use crate::shared::shutdown::Shutdown;
@@ -73,6 +77,7 @@ pub struct Session {
     monitor: Option<MonitorFeed>,
     recorder: Option<Recorder>,
     observers: ObserverServices,
+    operator: Option<OperatorPage>,
     link: Option<ServerLink>,
     runtime: Runtime,
     /// While it is held, idle cores wait at work.
@@ -97,12 +102,49 @@ impl Session {
 
     /// Lets in by another policy from now on; how many clients that shut out.
     pub fn set_admission(&self, policy: JoinPolicy) -> usize {
+        if let Some(page) = &self.operator {
+            page.follow_policy(&policy);
+        }
         self.link.as_ref().map_or(0, |link| link.set_policy(policy))
     }
 
     /// Those who look on without taut's own client.
     pub fn observers(&self) -> &ObserverServices {
         &self.observers
+    }
+
+    /// The operator's page, if there is one.
+    pub(crate) fn operator(&self) -> Option<&OperatorPage> {
+        self.operator.as_ref()
+    }
+
+    /// Whether anybody can read metrics of this session.
+    pub fn shows_metrics(&self) -> bool {
+        self.operator.is_some() || self.observers.shows_metrics()
+    }
+
+    /// Gives the newest metrics to all who show them.
+    pub fn show_metrics(&mut self, metrics: &Metrics) {
+        if let Ok(text) = metrics.text() {
+            self.observers.publish_metrics(text);
+        }
+        if let Some(page) = &mut self.operator {
+            page.show_metrics(metrics);
+        }
+    }
+
+    /// Tells the operator's page how things stand. Call it a few times a second.
+    pub fn follow_operator(&mut self) {
+        let Some(page) = &mut self.operator else {
+            return;
+        };
+        page.follow(&Moment {
+            now: self.clock.now(),
+            computed: self.wrench.newest(),
+            contacts: self.statistics.god_object.contacts.newest(),
+            largest_force: self.statistics.haptics.largest_force(),
+            is_recorded: self.recorder.is_some(),
+        });
     }
 
     /// The running monitor.

@@ -83,7 +83,8 @@ impl Outlets {
         }
     }
 
-    fn add(&mut self) -> StateFeed {
+    /// One more who is published to.
+    pub(crate) fn add(&mut self) -> StateFeed {
         let (outlet, feed) = state_channel();
         self.0.push(outlet);
         feed

@@ -8,6 +8,8 @@ use taut_link::{LinkEvent, ServerLink, proto};
 use taut_recording::EventRecord;
 
 use crate::loops::incidents::{self};
+use crate::report::SessionReport;
+use crate::report::frames::FramesReport;
 use crate::report::metrics::{self, ClientLink, Metrics};
 use crate::report::terminal::Terminal;
 use crate::session::monitor::Severity;
@@ -44,6 +46,9 @@ impl Session {
             } else {
                 tracing::info!("{line}"); // what was said above is not said twice
             }
+            if let Some(page) = &mut self.operator {
+                page.note_line(now, severity, &line);
+            }
             if let Some(recorder) = &self.recorder {
                 recorder.events().send(EventRecord {
                     time: self.clock.now(),
@@ -75,6 +80,9 @@ impl Session {
     pub(super) fn log_incidents(&mut self) {
         let counts = &self.statistics.haptics.incidents;
         for (event, times) in self.incidents.since_last(counts) {
+            if let Some(page) = &mut self.operator {
+                page.note_event(&event, times);
+            }
             let text = incidents::line(&event, times);
             if event.kind.is_fault() || is_about_arming(event.kind) {
                 self.audit.follow_port(&text, event.kind.is_fault());
@@ -94,20 +102,37 @@ impl Session {
         }
     }
 
-    /// Everything measured so far.
-    pub fn metrics(&self) -> Metrics {
-        let counters = self.link.as_ref().map(ServerLink::counters);
-        let clients = self.link.as_ref().map(ServerLink::clients);
-        let client_links: Vec<ClientLink> = clients.iter().flatten().map(ClientLink::of).collect();
-        let mut session = self.statistics.report(self.age());
-        if let Some(counters) = &counters {
-            session.packets_sent = counters.packets_sent;
-            session.packets_refused = counters.garbage
+    /// The end report as it would be now, but for what the end itself tells.
+    pub(super) fn report(&self) -> SessionReport {
+        let mut report = self.statistics.report(self.age());
+        report.realtime = self.ledger.report();
+        (report.clients, report.observers) = self.clients.reports();
+        if let Some(link) = &self.link {
+            let counters = link.counters();
+            report.packets_sent = counters.packets_sent;
+            report.packets_refused = counters.garbage
                 + counters.wrong_version
                 + counters.forged
                 + counters.replayed
                 + counters.inputs_refused;
+            let frames = link.frame_report();
+            report.frames =
+                frames.map(|measured| FramesReport::new(&measured, &mut report.clients));
         }
+        report
+    }
+
+    /// Everything measured so far.
+    pub fn metrics(&self) -> Metrics {
+        let counters = self.link.as_ref().map(ServerLink::counters);
+        let clients = self.link.as_ref().map(ServerLink::clients);
+        let now = self.clock.now();
+        let client_links: Vec<ClientLink> = clients
+            .iter()
+            .flatten()
+            .map(|status| ClientLink::of(status, now))
+            .collect();
+        let session = self.report();
         let (memory_bytes, open_files) = metrics::process();
         Metrics {
             time_s: metrics::wall_clock_s(),

@@ -21,7 +21,8 @@ use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
 use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
-use crate::session::observers::ObserverServices;
+use crate::session::observers::{ObserverServices, Outlets};
+use crate::session::operator::{Facts, OperatorPage};
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
@@ -69,7 +70,7 @@ impl Session {
             also: setup.link.also,
             max_clients: setup.link.max_clients,
             frames: setup.link.frames,
-            policy: setup.link.policy,
+            policy: setup.link.policy.clone(),
             node_timeout: setup.link.node_timeout,
             clock: clock.for_link(),
             ..ServerOptions::new(setup.link.key)
@@ -79,7 +80,8 @@ impl Session {
             idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
             ..options
         };
-        let (observers, outlets) =
+        let facts = facts(&setup)?;
+        let (observers, mut outlets) =
             ObserverServices::start(&setup.observers, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
@@ -120,6 +122,22 @@ impl Session {
         link.on_arm(move |arm| {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
+        let operator = match (&setup.operator, &facts) {
+            (Some(wanted), Some(facts)) => {
+                let (switch, feed) = (loops.arm_switch.clone(), outlets.add());
+                let page = OperatorPage::start(
+                    wanted,
+                    facts,
+                    feed,
+                    switch,
+                    &loops.statistics,
+                    clock,
+                    &setup.link.policy,
+                );
+                Some(page?)
+            }
+            _ => None,
+        };
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
         ledger.note("process", grant);
@@ -140,6 +158,7 @@ impl Session {
             monitor: None,
             recorder,
             observers,
+            operator,
             link: Some(link),
             runtime,
             _awake: awake,
@@ -252,6 +271,16 @@ fn connect_device(
             Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
         }
     }
+}
+
+/// What the operator's page says of the session, if there is one.
+fn facts(setup: &SessionSetup) -> Result<Option<Facts>, Failure> {
+    let Some(wanted) = &setup.operator else {
+        return Ok(None);
+    };
+    let facts = Facts::of(setup, wanted)
+        .ok_or_else(|| Failure::failed("the system has no random numbers"))?;
+    Ok(Some(facts))
 }
 
 /// What the monitor's log begins with.

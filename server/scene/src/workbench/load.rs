@@ -8,6 +8,7 @@ use super::dynamics::DeviceDynamics;
 use super::frames::Frames;
 use super::log::Log;
 use super::looking_on::{ObserverStream, Vrpn, Zenoh};
+use super::operator::Operator;
 use super::parse::parse;
 use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
 use crate::document::{At, Document};
@@ -55,6 +56,8 @@ pub struct Workbench {
     pub vrpn: Vrpn,
     /// JSON lines for browsers and scripts.
     pub observers: ObserverStream,
+    /// The operator's page.
+    pub operator: Operator,
     /// Publication through Zenoh routers.
     pub zenoh: Zenoh,
     pub(super) scene_at: At,

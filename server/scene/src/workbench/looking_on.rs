@@ -1,9 +1,10 @@
 //! `[vrpn]`, `[observers]` and `[zenoh]`: who may look on without taut's own client. All are off unless the file says otherwise.
 
 use std::net::{IpAddr, Ipv4Addr};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::parts::{Files, bind, port};
+use super::token::read_token;
 use crate::document::{Range, Section};
 
 /// Fastest stream to those who look on, 1/s.
@@ -12,10 +13,6 @@ const MAX_RATE: f64 = 1000.0;
 const MAX_LINE_RATE: f64 = 60.0;
 /// Most that may be let in.
 const MAX_CLIENTS: i64 = 1024;
-/// Shortest token: 16 characters of 64 are 96 bits.
-const MIN_TOKEN: usize = 16;
-/// Most bytes of a token's file.
-const MAX_TOKEN_BYTES: u64 = 1024;
 /// Longest name of a VRPN device, and of a workbench among Zenoh's keys.
 const MAX_NAME: usize = 64;
 
@@ -112,33 +109,9 @@ impl ObserverStream {
     /// # Errors
     /// A sentence, where its file cannot be read or holds none.
     pub fn token(&self) -> Result<Option<String>, String> {
-        self.token_file.as_deref().map(read_token).transpose()
+        let file = self.token_file.as_deref();
+        file.map(|file| read_token("observers", file)).transpose()
     }
-}
-
-/// One line of at least 16 letters, digits, `-` and `_`, as `openssl rand -hex 32` writes it.
-fn read_token(path: &Path) -> Result<String, String> {
-    let refuse = |reason: String| {
-        format!(
-            "the token of [observers] cannot be read from {}: {reason}; make one with: openssl rand -hex 32",
-            path.display()
-        )
-    };
-    let length = std::fs::metadata(path)
-        .map_err(|error| refuse(error.to_string()))?
-        .len();
-    if length > MAX_TOKEN_BYTES {
-        return Err(refuse(format!("it has {length} bytes")));
-    }
-    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
-    let token = text.trim();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if token.len() < MIN_TOKEN || !token.chars().all(is_plain) {
-        return Err(refuse(format!(
-            "a token has at least {MIN_TOKEN} letters, digits, `-` or `_`"
-        )));
-    }
-    Ok(token.to_owned())
 }
 
 pub(super) fn vrpn(section: &Section<'_>) -> Vrpn {

@@ -10,12 +10,14 @@ mod log;
 mod looking_on;
 mod monitoring;
 mod network;
+mod operator;
 mod parse;
 mod parts;
 mod realtime;
 mod safety;
 mod scale;
 mod spec;
+mod token;
 mod tracker;
 mod viewer;
 
@@ -24,6 +26,7 @@ pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
+pub use operator::Operator;
 pub use spec::{
     AlsoKeyFile, Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
     RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,

@@ -14,6 +14,7 @@ use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
 use super::monitoring::monitoring;
 use super::network::{network, places};
+use super::operator::operator;
 use super::parts::{Files, table};
 use super::realtime::realtime;
 use super::safety::safety;
@@ -75,6 +76,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let show = table(&root, "show", show).unwrap_or_default();
     let vrpn = table(&root, "vrpn", vrpn).unwrap_or_default();
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
+    let operator = table(&root, "operator", |s| operator(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
     root.finish();
     let mut found = problems.into_inner();
@@ -115,6 +117,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         show,
         vrpn,
         observers,
+        operator,
         zenoh,
         scene_at,
     })

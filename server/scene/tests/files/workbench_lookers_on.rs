@@ -1,4 +1,4 @@
-//! Those who look on, in a workbench file: off unless wanted, and never open to everybody by a slip.
+//! Those who look on, and the operator's page, in a workbench file: off unless wanted, and never open to everybody by a slip.
 
 use std::net::Ipv4Addr;
 use std::path::Path;
@@ -14,6 +14,7 @@ fn with(assignments: &[&str]) -> Result<Workbench, String> {
 fn nobody_looks_on_unless_the_file_says_so() {
     let shipped = Workbench::shipped().expect("valid");
     assert!(!shipped.vrpn.enabled && !shipped.observers.enabled && !shipped.zenoh.enabled);
+    assert!(!shipped.operator.enabled);
     let begin = SHIPPED_WORKBENCH.find("[vrpn]").expect("there");
     let end = SHIPPED_WORKBENCH.find("[realtime]").expect("there");
     let without = format!(
@@ -23,8 +24,18 @@ fn nobody_looks_on_unless_the_file_says_so() {
     );
     let without = Workbench::parse("w.toml", &without, Path::new("")).expect("valid");
     assert_eq!(
-        (without.vrpn, without.observers, without.zenoh),
-        (shipped.vrpn, shipped.observers, shipped.zenoh),
+        (
+            without.vrpn,
+            without.observers,
+            without.operator,
+            without.zenoh
+        ),
+        (
+            shipped.vrpn,
+            shipped.observers,
+            shipped.operator,
+            shipped.zenoh
+        ),
         "the shipped file shows the defaults"
     );
 }
@@ -66,6 +77,8 @@ fn slips_are_refused_with_what_to_do() {
         (&["zenoh.enabled=true"], "connect ="),
         (&["zenoh.name=\"a/b\""], "letters, digits"),
         (&["observers.tokn=1"], "tokn"),
+        (&["operator.bind=\"0.0.0.0\""], "bind"),
+        (&["operator.port=70000"], "`port`"),
     ] {
         let found = with(assignments).expect_err(wanted);
         assert!(found.contains(wanted), "{found}");
@@ -89,4 +102,12 @@ fn a_token_is_read_from_its_file_and_a_poor_one_is_refused() {
     assert!(stream.token().expect_err("short").contains("at least 16"));
     std::fs::write(&path, "0123456789abcdef_-\n").expect("written");
     assert_eq!(stream.token(), Ok(Some("0123456789abcdef_-".to_owned())));
+    let set = format!("operator.token_file=\"{}\"", path.display());
+    let operator = with(&["operator.enabled=true", &set])
+        .expect("valid")
+        .operator;
+    assert_eq!(operator.token(), Ok(Some("0123456789abcdef_-".to_owned())));
+    std::fs::write(&path, "short\n").expect("written");
+    let refused = operator.token().expect_err("short");
+    assert!(refused.contains("[operator]"), "{refused}");
 }

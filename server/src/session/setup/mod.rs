@@ -23,6 +23,7 @@ use crate::loops::shell::Phases;
 use crate::session::head::HeadSource;
 use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
+use crate::session::operator::OperatorSetup;
 
 /// Everything that a session is made of.
 pub struct SessionSetup {
@@ -47,6 +48,8 @@ pub struct SessionSetup {
     pub link: LinkSettings,
     /// Those who look on without taut's own client.
     pub observers: ObserverSettings,
+    /// The operator's page; `None` does without.
+    pub operator: Option<OperatorSetup>,
     /// Rates and scheduling.
     pub realtime: RealtimeSettings,
     /// Where the monitor is served; `None` does without.

@@ -22,6 +22,7 @@ use crate::session::frames;
 use crate::session::head::{HeadMotion, HeadSource, Sway, TrackerSource};
 use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
+use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input, vrpn_source};
 use crate::session::setup::stability::{declared, judge, of_input, stiffnesses};
@@ -155,6 +156,7 @@ pub fn session_setup(
         content,
         link,
         observers: ObserverSettings::of(workbench)?,
+        operator: OperatorSetup::of(workbench)?,
         realtime,
         monitor: monitor(&workbench.monitoring, overrides),
     })

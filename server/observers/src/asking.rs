@@ -1,0 +1,68 @@
+//! Places to ask from: who has connected and not yet said what for, in bounded number (see [`taut_proto::waiting`]).
+
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use taut_proto::waiting::{Ticket, Waiting};
+use tokio::sync::oneshot;
+
+/// Clients that may be asking at once.
+const MAX_ASKING: usize = 64;
+/// The same of one address: a browser asks for a page on some six connections.
+const MAX_ASKING_OF_ONE: usize = 16;
+
+type Places = Arc<Mutex<Waiting<oneshot::Sender<()>>>>;
+
+/// The places of one server.
+#[derive(Clone, Debug)]
+pub(crate) struct Entrance {
+    places: Places,
+    crowded_out: Arc<AtomicU64>,
+}
+
+/// A place to ask from; dropped, it is free again. Whoever takes it ends `lost`.
+pub(crate) struct Asking {
+    places: Places,
+    ticket: Ticket,
+    /// Done when the place is another's.
+    pub(crate) lost: oneshot::Receiver<()>,
+}
+
+impl Default for Entrance {
+    fn default() -> Self {
+        Self {
+            places: Arc::new(Mutex::new(Waiting::new(MAX_ASKING, MAX_ASKING_OF_ONE))),
+            crowded_out: Arc::default(),
+        }
+    }
+}
+
+impl Entrance {
+    /// A place to ask from; whoever asks longest of the address that asks most gives it up where there is none.
+    pub(crate) fn ask(&self, peer: SocketAddr) -> Asking {
+        let (place, lost) = oneshot::channel();
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        let (ticket, loser) = places.enter(peer.ip(), place);
+        if loser.is_some() {
+            self.crowded_out.fetch_add(1, Ordering::Relaxed);
+        }
+        Asking {
+            places: self.places.clone(),
+            ticket,
+            lost,
+        }
+    }
+
+    /// How many lost their place before they had asked.
+    pub(crate) fn crowded_out(&self) -> u64 {
+        self.crowded_out.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Asking {
+    fn drop(&mut self) {
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        places.leave(self.ticket);
+    }
+}

@@ -1,0 +1,214 @@
+//! The request of an operator's page: what it wants, and whether it may have it.
+//!
+//! To look, the guard of the observers' port is enough: a page of this very server, or a program. To act, the token as well, in the header
+//! `Authorization` alone: an address with a token in its query would stand in histories and logs.
+
+use taut_proto::web::is_from_here;
+
+use crate::request::{header, is_same, parsed};
+
+/// What an operator does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Deed {
+    /// Lets force in.
+    Arm,
+    /// Keeps force out.
+    Disarm,
+}
+
+/// What is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Call {
+    /// The page.
+    Page,
+    /// The newest status line alone.
+    Status,
+    /// Every status line.
+    Lines,
+    /// Whether the token is right.
+    Token,
+    /// Something done.
+    Act(Deed),
+}
+
+/// Why it is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    /// No HTTP, or one that is not understood.
+    NotHttp,
+    /// Asked for by a page from elsewhere, or by a name that may be anybody's.
+    Foreign,
+    /// Nothing is there.
+    NotFound,
+    /// One looks by GET.
+    LookByGet,
+    /// One acts by POST.
+    ActByPost,
+    /// The token is missing.
+    NoToken,
+    /// The token is wrong.
+    WrongToken,
+    /// As many pages are open as may be.
+    Full,
+}
+
+impl Refusal {
+    /// Status and what to do.
+    pub(crate) fn text(self) -> (&'static str, &'static str) {
+        const UNAUTHORIZED: &str = "401 Unauthorized";
+        const NOT_ALLOWED: &str = "405 Method Not Allowed";
+        match self {
+            Self::NotHttp => ("400 Bad Request", "this port speaks HTTP"),
+            Self::Foreign => (
+                "403 Forbidden",
+                "ask by address or as localhost, from a page of this server",
+            ),
+            Self::NotFound => (
+                "404 Not Found",
+                "there are /, /status and /stream to look, /arm, /disarm and /token to act",
+            ),
+            Self::LookByGet => (NOT_ALLOWED, "looking is by GET"),
+            Self::ActByPost => (NOT_ALLOWED, "acting is by POST"),
+            Self::NoToken => (
+                UNAUTHORIZED,
+                "acting needs the token of the address that `taut serve` printed, or of [operator] token_file: the header `Authorization: Bearer TOKEN`",
+            ),
+            Self::WrongToken => (
+                UNAUTHORIZED,
+                "the token is not this server's: open the address that `taut serve` printed last, or the one with the line of [operator] token_file",
+            ),
+            Self::Full => (
+                "503 Service Unavailable",
+                "as many operator's pages are open as may be: close one",
+            ),
+        }
+    }
+
+    /// Why, for the audit trail; `None` for what harms nobody.
+    pub(crate) fn audited(self) -> Option<&'static str> {
+        match self {
+            Self::NotFound | Self::LookByGet | Self::Full => None,
+            Self::NotHttp => Some("no HTTP"),
+            Self::Foreign => Some("a page from elsewhere, or a name that may be anybody's"),
+            Self::ActByPost => Some("acting, but not by POST"),
+            Self::NoToken => Some("no token"),
+            Self::WrongToken => Some("a wrong token"),
+        }
+    }
+}
+
+/// Reads a request's head; `None` while it is not whole.
+pub(crate) fn read(head: &[u8], token: &str) -> Option<Result<Call, Refusal>> {
+    parsed(head, |request| match request {
+        Some(request) => judge(request, token),
+        None => Err(Refusal::NotHttp),
+    })
+}
+
+fn judge(request: &httparse::Request<'_, '_>, token: &str) -> Result<Call, Refusal> {
+    if !is_from_here(header(request, "Host"), header(request, "Origin"), None) {
+        return Err(Refusal::Foreign);
+    }
+    let target = request.path.unwrap_or_default();
+    let path = target.split_once('?').map_or(target, |(path, _)| path);
+    let call = match path {
+        "/" => Call::Page,
+        "/status" => Call::Status,
+        "/stream" => Call::Lines,
+        "/token" => Call::Token,
+        "/arm" => Call::Act(Deed::Arm),
+        "/disarm" => Call::Act(Deed::Disarm),
+        _ => return Err(Refusal::NotFound),
+    };
+    match call {
+        Call::Page | Call::Status | Call::Lines => match request.method {
+            Some("GET") => Ok(call),
+            _ => Err(Refusal::LookByGet),
+        },
+        Call::Token | Call::Act(_) => {
+            if request.method != Some("POST") {
+                return Err(Refusal::ActByPost);
+            }
+            let given = header(request, "Authorization")
+                .and_then(|value| value.strip_prefix("Bearer "))
+                .ok_or(Refusal::NoToken)?;
+            match is_same(given.trim(), token) {
+                true => Ok(call),
+                false => Err(Refusal::WrongToken),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const TOKEN: &str = "0123456789abcdef";
+    const HERE: &str = "Host: 127.0.0.1:4861\r\n";
+    const SHOWN: &str = "Authorization: Bearer 0123456789abcdef\r\n";
+
+    fn ask(line: &str, headers: &str) -> Result<Call, Refusal> {
+        let head = format!("{line} HTTP/1.1\r\n{headers}\r\n");
+        read(head.as_bytes(), TOKEN).expect("whole")
+    }
+
+    #[test]
+    fn looking_needs_no_token_and_acting_does() {
+        assert_eq!(ask("GET /", HERE), Ok(Call::Page));
+        assert_eq!(ask("GET /status?x=1", HERE), Ok(Call::Status));
+        assert_eq!(ask("GET /stream", HERE), Ok(Call::Lines));
+        let own = format!("{HERE}{SHOWN}Origin: http://127.0.0.1:4861\r\n");
+        for (line, call) in [
+            ("POST /arm", Call::Act(Deed::Arm)),
+            ("POST /disarm", Call::Act(Deed::Disarm)),
+            ("POST /token", Call::Token),
+        ] {
+            assert_eq!(ask(line, &own), Ok(call));
+            assert_eq!(ask(line, &format!("{HERE}{SHOWN}")), Ok(call), "a program");
+            assert_eq!(ask(line, HERE), Err(Refusal::NoToken));
+            for wrong in ["", "0123456789abcdeF", "0123456789abcdef0"] {
+                let headers = format!("{HERE}Authorization: Bearer {wrong}\r\n");
+                assert!(matches!(
+                    ask(line, &headers),
+                    Err(Refusal::WrongToken | Refusal::NoToken)
+                ));
+            }
+            let in_query = format!("{line}?token={TOKEN}");
+            assert_eq!(ask(&in_query, HERE), Err(Refusal::NoToken));
+        }
+        assert_eq!(read(b"POST /arm HT", TOKEN), None);
+    }
+
+    #[test]
+    fn acting_is_by_post_and_the_token_helps_no_page_from_elsewhere() {
+        let shown = format!("{HERE}{SHOWN}");
+        for method in ["GET", "HEAD", "PUT", "OPTIONS", "post"] {
+            let refused = ask(&format!("{method} /arm"), &shown);
+            assert_eq!(refused, Err(Refusal::ActByPost), "{method}");
+        }
+        assert_eq!(ask("POST /stream", &shown), Err(Refusal::LookByGet));
+        assert_eq!(ask("POST /favicon.ico", &shown), Err(Refusal::NotFound));
+        for headers in [
+            format!("{shown}Origin: http://evil.example\r\n"),
+            format!("{shown}Origin: http://127.0.0.1:4860\r\n"),
+            format!("{shown}Origin: null\r\n"),
+            format!("Host: rebound.example:4861\r\n{SHOWN}"),
+        ] {
+            for line in ["POST /arm", "POST /disarm", "POST /token", "GET /stream"] {
+                assert_eq!(ask(line, &headers), Err(Refusal::Foreign), "{headers}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_get_by_without_the_token(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+            let mut head = b"POST /arm HTTP/1.1\r\nHost: localhost\r\n".to_vec();
+            head.extend(&bytes);
+            prop_assert!(!matches!(read(&head, TOKEN), Some(Ok(_))));
+            let _ = read(&bytes, TOKEN);
+        }
+    }
+}

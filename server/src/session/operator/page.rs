@@ -1,0 +1,257 @@
+//! What the operator's page shows: one line of JSON, five times a second. What the metrics have is taken from there and not measured again.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde::Serialize;
+use taut_bridge::{ArmSwitch, Rearm, SafetyEvent, SafetySettings};
+use taut_link::JoinPolicy;
+use taut_observers::lines::run_name;
+use taut_observers::{OperatorServer, StateFeed, fresh_token};
+use taut_proto::HotState;
+use taut_proto::state::{RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED};
+
+use super::desk::OperatorDesk;
+use super::recent::Recent;
+use super::settings::OperatorSetup;
+use crate::loops::statistics::Statistics;
+use crate::report::metrics::Metrics;
+use crate::session::monitor::Severity;
+use crate::session::setup::{DeviceSource, SessionSetup};
+use crate::shared::clock::SessionClock;
+use crate::shared::failure::Failure;
+use crate::shared::wrench_command::WrenchCommand;
+
+/// Shortest time between two lines.
+const PERIOD: Duration = Duration::from_millis(150);
+
+/// What a session is: told again in every line, so that each stands for itself.
+#[derive(Debug, Serialize)]
+pub(crate) struct Facts {
+    program: &'static str,
+    workbench: String,
+    scene: String,
+    /// Another one at each start of the server.
+    instance: String,
+    /// Whether a device behind a bridge is commanded, which is armed at the bridge as well.
+    device_behind_bridge: bool,
+    /// Whether a person arms.
+    manual: bool,
+    force_limit_n: f64,
+    torque_limit_n: f64,
+    ramp_in_s: f64,
+}
+
+/// What the thread that looks after the session knows at a moment.
+#[derive(Debug)]
+pub(crate) struct Moment<'m> {
+    /// Session time.
+    pub(crate) now: Duration,
+    /// The newest force of the coupling.
+    pub(crate) computed: &'m WrenchCommand,
+    /// Rows in the newest constraint set.
+    pub(crate) contacts: u64,
+    /// Largest force that was felt, N.
+    pub(crate) largest_force: f64,
+    /// Whether the session is being recorded.
+    pub(crate) is_recorded: bool,
+}
+
+/// How it stands now.
+#[derive(Debug, Default, Serialize)]
+struct Now {
+    t: f64,
+    run: &'static str,
+    /// `null` before the first.
+    sample_age_s: Option<f64>,
+    force_age_s: Option<f64>,
+    force_n: f64,
+    torque_nm: f64,
+    force_limited: bool,
+    device_silent: bool,
+    largest_force_n: f64,
+    contacts: u64,
+    recorded: bool,
+    /// Why arming would not even be asked for; `null` where it would.
+    why_not_armed: Option<String>,
+}
+
+/// A running page. Dropped, it ends.
+#[derive(Debug)]
+pub(crate) struct OperatorPage {
+    server: OperatorServer,
+    desk: Arc<OperatorDesk>,
+    token: Shown,
+    feed: StateFeed,
+    facts: String,
+    state: Now,
+    sampled: Option<Duration>,
+    recent: Recent,
+    /// The newest metrics as JSON.
+    metrics: String,
+    next: Duration,
+}
+
+/// What is said of the token when the server starts.
+#[derive(Debug)]
+enum Shown {
+    /// The token itself.
+    Fresh(String),
+    /// Where it is.
+    In(std::path::PathBuf),
+}
+
+impl Facts {
+    /// Of a session that is about to start; `None` where the system has no random numbers.
+    pub(crate) fn of(setup: &SessionSetup, wanted: &OperatorSetup) -> Option<Self> {
+        let safety: &SafetySettings = &setup.safety;
+        Some(Self {
+            program: concat!("taut ", env!("CARGO_PKG_VERSION")),
+            workbench: wanted.workbench.clone(),
+            scene: setup.content.description.name.to_string(),
+            instance: fresh_token()?,
+            device_behind_bridge: matches!(setup.device, DeviceSource::Remote { .. }),
+            manual: safety.rearm == Rearm::Manual,
+            force_limit_n: safety.max_force,
+            torque_limit_n: safety.max_torque,
+            ramp_in_s: safety.ramp_in.as_secs_f64(),
+        })
+    }
+}
+
+impl OperatorPage {
+    /// Opens the page.
+    ///
+    /// # Errors
+    /// The port cannot be had.
+    pub(crate) fn start(
+        wanted: &OperatorSetup,
+        facts: &Facts,
+        feed: StateFeed,
+        switch: Arc<ArmSwitch>,
+        statistics: &Statistics,
+        clock: SessionClock,
+        policy: &JoinPolicy,
+    ) -> Result<Self, Failure> {
+        let haptics = statistics.haptics.clone();
+        let desk = Arc::new(OperatorDesk::new(switch, haptics, clock, policy));
+        let server = OperatorServer::start(wanted.server.clone(), desk.clone()).map_err(|error| {
+            Failure::bad_input(format!(
+                "[operator] cannot listen on port {} of 127.0.0.1 ({error}); free it or choose another port",
+                wanted.server.port
+            ))
+        })?;
+        Ok(Self {
+            server,
+            desk,
+            token: match &wanted.token_file {
+                Some(file) => Shown::In(file.clone()),
+                None => Shown::Fresh(wanted.server.token.clone()),
+            },
+            feed,
+            facts: json(facts),
+            state: Now {
+                run: run_name(RunState::Waiting),
+                ..Now::default()
+            },
+            sampled: None,
+            recent: Recent::default(),
+            metrics: "null".to_owned(),
+            next: Duration::ZERO,
+        })
+    }
+
+    /// Where it is, with the port that it got.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.server.address()
+    }
+
+    /// Where it is, and what opens it, for the person who started the server.
+    pub(crate) fn line(&self) -> String {
+        let address = self.address();
+        match &self.token {
+            Shown::Fresh(token) => format!(
+                "operator's page: http://{address}/#token={token} (who has this address can arm)"
+            ),
+            Shown::In(file) => format!(
+                "operator's page: http://{address}/#token= and the line in {}",
+                file.display()
+            ),
+        }
+    }
+
+    /// Takes who may join.
+    pub(crate) fn follow_policy(&self, policy: &JoinPolicy) {
+        self.desk.follow_policy(policy);
+    }
+
+    /// Takes an event of the device port.
+    pub(crate) fn note_event(&mut self, event: &SafetyEvent, times: u64) {
+        self.recent.event(event, times);
+    }
+
+    /// Takes a line about the network.
+    pub(crate) fn note_line(&mut self, now: Duration, severity: Severity, line: &str) {
+        self.recent.line(now, severity, line);
+    }
+
+    /// Takes the newest metrics.
+    pub(crate) fn show_metrics(&mut self, metrics: &Metrics) {
+        self.metrics = json(metrics);
+    }
+
+    /// Takes the newest state, and tells how things stand if it is time.
+    pub(crate) fn follow(&mut self, moment: &Moment<'_>) {
+        if let Some(fresh) = self.feed.fresh() {
+            self.state.follow(fresh.state);
+            let sampled = Duration::from_nanos(fresh.state.sample_time_ns);
+            self.sampled = Some(sampled);
+            self.desk.follow_state(fresh.state.run, sampled);
+        }
+        self.desk.look(moment.now);
+        if moment.now < self.next {
+            return;
+        }
+        self.next = moment.now + PERIOD;
+        let (state, computed) = (&mut self.state, moment.computed);
+        let age = |then: Duration| moment.now.saturating_sub(then).as_secs_f64();
+        state.t = moment.now.as_secs_f64();
+        state.sample_age_s = self.sampled.map(age);
+        state.force_age_s = (computed.sequence > 0).then(|| age(computed.time));
+        state.contacts = moment.contacts;
+        state.largest_force_n = moment.largest_force;
+        state.recorded = moment.is_recorded;
+        state.why_not_armed = self.desk.why_not();
+        self.server.publish(format!(
+            r#"{{"type":"status","session":{},"now":{},"recent":{},"metrics":{}}}"#,
+            self.facts,
+            json(&self.state),
+            json(&self.recent.newest_first()),
+            self.metrics
+        ));
+    }
+
+    /// Writes what the audit trail has left.
+    pub(crate) fn end(&self) {
+        self.desk.look(Duration::MAX);
+    }
+}
+
+impl Now {
+    fn follow(&mut self, state: &HotState) {
+        self.run = run_name(state.run);
+        let Some(tool) = state.tools.first() else {
+            return;
+        };
+        let norm = |v: &[f32; 3]| v.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
+        (self.force_n, self.torque_nm) = (norm(&tool.force), norm(&tool.torque));
+        self.force_limited = tool.flags & TOOL_FORCE_LIMITED != 0;
+        self.device_silent = tool.flags & TOOL_DEVICE_SILENT != 0;
+    }
+}
+
+/// As JSON: numbers, texts and lists always have a form.
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_else(|_| "null".to_owned())
+}
