@@ -10,6 +10,7 @@ mod loops;
 mod moving_obstacle;
 mod no_allocation;
 mod operation;
+mod operator;
 mod record;
 mod recording;
 #[allow(
