@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use god_object::spatial::{Pose, linear};
+use god_object::spatial::{Pose, Vector6, angular, linear};
 use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Reading, TickReport};
 use taut_recording::{HapticsRecord, Tap};
 
@@ -61,6 +61,8 @@ pub struct HapticsStatistics {
     obstacle_work_bits: AtomicU64,
     /// Energy given to the hand beyond what it and the obstacles had put in, J, as the bits of an `f64`.
     energy_generated_bits: AtomicU64,
+    /// Norms of the force, N, and the torque, N m, that the hand feels, as the bits of an `f64`.
+    felt_bits: [AtomicU64; 2],
     /// Largest norm of a force that the hand felt, N, as the bits of an `f64`.
     largest_force_bits: AtomicU64,
     /// The device does not answer now.
@@ -68,6 +70,17 @@ pub struct HapticsStatistics {
 }
 
 impl HapticsStatistics {
+    /// Takes what the hand feels from this tick on.
+    fn count_felt(&self, felt: &Vector6) {
+        let norms = [linear(felt).norm(), angular(felt).norm()];
+        for (bits, norm) in self.felt_bits.iter().zip(norms) {
+            bits.store(norm.to_bits(), Ordering::Relaxed);
+        }
+        let largest = self.largest_force().max(norms[0]); // NaN: as before
+        self.largest_force_bits
+            .store(largest.to_bits(), Ordering::Relaxed);
+    }
+
     /// Energy given to the hand beyond what it had put in, J.
     pub fn energy_injected(&self) -> f64 {
         f64::from_bits(self.energy_injected_bits.load(Ordering::Relaxed))
@@ -76,6 +89,12 @@ impl HapticsStatistics {
     /// Net work that moving obstacles have done on the hand, J.
     pub fn obstacle_work(&self) -> f64 {
         f64::from_bits(self.obstacle_work_bits.load(Ordering::Relaxed))
+    }
+
+    /// Norms of the force, N, and the torque, N m, that the hand feels now.
+    pub fn felt(&self) -> [f64; 2] {
+        let value = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
+        [value(&self.felt_bits[0]), value(&self.felt_bits[1])]
     }
 
     /// Largest norm of a force that the hand felt since the start, N.
@@ -210,11 +229,7 @@ impl HapticsLoop {
         statistics
             .energy_injected_bits
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
-        // What is no number is larger than nothing.
-        let largest = linear(&report.felt).norm().max(statistics.largest_force());
-        statistics
-            .largest_force_bits
-            .store(largest.to_bits(), Ordering::Relaxed);
+        statistics.count_felt(&report.felt);
         self.publish_obstacle_work();
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {

@@ -142,6 +142,7 @@ impl Session {
             now: self.clock.now(),
             computed: self.wrench.newest(),
             contacts: self.statistics.god_object.contacts.newest(),
+            felt: self.statistics.haptics.felt(),
             largest_force: self.statistics.haptics.largest_force(),
             is_recorded: self.recorder.is_some(),
         });

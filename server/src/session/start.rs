@@ -21,7 +21,7 @@ use crate::session::broadcast::{BridgeCommands, StateWriter};
 use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
 use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
-use crate::session::observers::{ObserverServices, Outlets};
+use crate::session::observers::ObserverServices;
 use crate::session::operator::{Facts, OperatorPage};
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::clock::SessionClock;
@@ -50,6 +50,7 @@ impl Session {
         let runtime = network_runtime(&ledger)?;
         let picture = picture(&setup);
         let opening = opening(&setup);
+        let facts = facts(&setup)?;
         let scene_revision = setup.content.description.revision;
         let coupling = match &setup.device {
             DeviceSource::Remote { .. } => offer_of(
@@ -80,7 +81,6 @@ impl Session {
             idle_timeout: options.idle_timeout.max(2 * options.node_timeout),
             ..options
         };
-        let facts = facts(&setup)?;
         let (observers, mut outlets) =
             ObserverServices::start(&setup.observers, &setup.content.description)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;

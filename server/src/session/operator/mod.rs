@@ -6,4 +6,4 @@ mod recent;
 mod settings;
 
 pub(crate) use page::{Facts, Moment, OperatorPage};
-pub use settings::OperatorSetup;
+pub(crate) use settings::OperatorSetup;

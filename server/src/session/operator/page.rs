@@ -52,6 +52,8 @@ pub(crate) struct Moment<'m> {
     pub(crate) computed: &'m WrenchCommand,
     /// Rows in the newest constraint set.
     pub(crate) contacts: u64,
+    /// Force, N, and torque, N m, that the hand feels: what the device port lets through.
+    pub(crate) felt: [f64; 2],
     /// Largest force that was felt, N.
     pub(crate) largest_force: f64,
     /// Whether the session is being recorded.
@@ -220,6 +222,7 @@ impl OperatorPage {
         state.sample_age_s = self.sampled.map(age);
         state.force_age_s = (computed.sequence > 0).then(|| age(computed.time));
         state.contacts = moment.contacts;
+        [state.force_n, state.torque_nm] = moment.felt;
         state.largest_force_n = moment.largest_force;
         state.recorded = moment.is_recorded;
         state.why_not_armed = self.desk.why_not();
@@ -244,8 +247,6 @@ impl Now {
         let Some(tool) = state.tools.first() else {
             return;
         };
-        let norm = |v: &[f32; 3]| v.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-        (self.force_n, self.torque_nm) = (norm(&tool.force), norm(&tool.torque));
         self.force_limited = tool.flags & TOOL_FORCE_LIMITED != 0;
         self.device_silent = tool.flags & TOOL_DEVICE_SILENT != 0;
     }
