@@ -22,12 +22,10 @@ FLAGS = [
     "--disable-extensions",
     "--hide-scrollbars",
     "--mute-audio",
-    # WebGL without a graphics card.
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
     "--remote-debugging-pipe",
 ]
+# WebGL without a graphics card.
+WEBGL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 DEADLINE_S = 30.0  # for one answer of the browser; a busy machine needs seconds
 
 
@@ -43,10 +41,10 @@ class NoPage(RuntimeError):
 class Browser:
     """A headless browser, driven over two pipes; messages end with a zero byte."""
 
-    def __init__(self, program, size, profile, sandbox):
+    def __init__(self, program, size, profile, sandbox, drawing=WEBGL):
         to_browser, self.write_end = os.pipe()
         self.read_end, from_browser = os.pipe()
-        command = [program, *FLAGS, f"--window-size={size[0]},{size[1]}", f"--user-data-dir={profile}"]
+        command = [program, *FLAGS, *drawing, f"--window-size={size[0]},{size[1]}", f"--user-data-dir={profile}"]
         if not sandbox:
             command.append("--no-sandbox")
 

@@ -203,6 +203,13 @@ impl Collector for Exposition {
         }
         gauge(
             to,
+            "largest_force",
+            "largest norm of a force that the hand felt since the start",
+            Some(Unit::Other("newtons".to_owned())),
+            session.largest_force_n,
+        )?;
+        gauge(
+            to,
             "energy_injected",
             "energy given to the hand beyond what it had put in",
             Some(Unit::Joules),

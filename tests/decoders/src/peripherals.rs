@@ -79,18 +79,21 @@ pub(crate) fn space_mouse(bytes: &[u8]) {
 /// What observers must show in the checks.
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
-/// An observer's request: without a token and with one, which nobody gets past who does not show it; bytes that follow change no answer.
+/// A request to look, and one to act: without a token and with one, which nobody gets past who does not show it; bytes that follow change no answer.
 pub(crate) fn http_request(bytes: &[u8]) {
     let open = taut_observers::grants_request(bytes, None);
     let closed = taut_observers::grants_request(bytes, Some(TOKEN));
     assert_eq!(open.is_some(), closed.is_some(), "whole or not");
-    if closed == Some(true) {
+    let acts = taut_observers::grants_operator(bytes, TOKEN);
+    assert_eq!(open.is_some(), acts.is_some(), "whole or not");
+    if closed == Some(true) || acts.flatten().is_some() {
         let mut parts = bytes.windows(TOKEN.len());
         assert!(parts.any(|part| part == TOKEN.as_bytes()), "no token");
     }
     if open.is_some() {
         let more = [bytes, b"more"].concat();
         assert_eq!(taut_observers::grants_request(&more, None), open);
+        assert_eq!(taut_observers::grants_operator(&more, TOKEN), acts);
     }
 }
 
@@ -100,6 +103,8 @@ pub(crate) fn http_seeds() -> Vec<Vec<u8>> {
         "GET / HTTP/1.0\r\n\r\n".to_owned(),
         "GET /hello HTTP/1.1\r\nHost: [::1]:4860\r\n\r\n".to_owned(),
         format!("GET /stream HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\n\r\n"),
+        format!("POST /arm HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {TOKEN}\r\n\r\n"),
+        format!("POST /disarm HTTP/1.1\r\nHost: [::1]:1\r\nAuthorization: Bearer {TOKEN}\r\n\r\n"),
         format!("GET /ws?token={TOKEN} HTTP/1.1\r\nHost: localhost\r\n{key}\r\n\r\n"),
         format!(
             "GET /ws HTTP/1.1\r\nHost: 127.0.0.1:1\r\nOrigin: http://127.0.0.1:1\r\n{key}\r\n\r\n"
