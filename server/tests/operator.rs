@@ -248,7 +248,9 @@ fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
         ])
     });
 
-    // A program with the token, beside the page.
+    // A program with the token, beside the page, and beside many who connect and say nothing.
+    let connect = |_| TcpStream::connect(&served.address).expect("the page's port");
+    let _silent: Vec<TcpStream> = (0..100).map(connect).collect();
     let program = host.clone() + &bearer(TOKEN);
     assert_eq!(
         served.ask("POST /disarm", &program),
@@ -281,6 +283,10 @@ fn a_status_line_says_who_is_there_and_how_the_loops_do_and_ends_with_the_server
         "--out",
         &served.place.text("trace.csv"),
     ]);
+    let (found, page) = served.ask("GET /", &served.host());
+    assert!(found == 200 && page.ends_with("</html>"));
+    let elsewhere = ["http:", "https:", "src=", "@import", "url("];
+    assert!(!elsewhere.iter().any(|way| page.contains(way)));
     let stream = served.send("GET /stream", &served.host());
     let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
     assert_eq!(lines.next().as_deref(), Some("HTTP/1.1 200 OK"));
