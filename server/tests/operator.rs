@@ -232,7 +232,10 @@ fn the_token_arms_and_disarms_and_whoever_has_none_is_refused_and_audited() {
     );
     served.wait_for_run("running");
     wait_until("the hand feels it", || {
-        served.now("force_n").as_f64().is_some_and(|force| force > FELT)
+        served
+            .now("force_n")
+            .as_f64()
+            .is_some_and(|force| force > FELT)
     });
     assert_eq!(
         served.ask("POST /arm", &shown),
@@ -288,7 +291,9 @@ fn a_status_line_says_who_is_there_and_how_the_loops_do_and_ends_with_the_server
     let elsewhere = ["http:", "https:", "src=", "@import", "url("];
     assert!(!elsewhere.iter().any(|way| page.contains(way)));
     let stream = served.send("GET /stream", &served.host());
-    let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
+    let mut lines = BufReader::new(stream)
+        .lines()
+        .map(|line| line.expect("a line"));
     assert_eq!(lines.next().as_deref(), Some("HTTP/1.1 200 OK"));
     let mut lines = lines.skip_while(|line| !line.is_empty()).skip(1);
     let mut next = || lines.next();
@@ -315,7 +320,9 @@ fn a_status_line_says_who_is_there_and_how_the_loops_do_and_ends_with_the_server
     assert!(now["force_age_s"].is_number() && now["contacts"].is_number());
     let link = &metrics["client_links"][0];
     assert!(
-        link["address"].as_str().is_some_and(|at| at.starts_with("127.0.0.1:")),
+        link["address"]
+            .as_str()
+            .is_some_and(|at| at.starts_with("127.0.0.1:")),
         "{link}"
     );
     assert!(link["present_s"].is_number() && link["heard_s"].is_number());
@@ -337,7 +344,9 @@ fn arming_is_refused_where_taut_arm_is_and_disarming_is_not() {
     // No device: the port finds its inputs not in order, as it tells `taut arm`.
     let text = with_token_file();
     let remote = text.replacen("kind = \"simulated\"", "kind = \"remote\"", 1);
-    let lonely = remote.replacen("tremor = ", "# tremor = ", 1).replacen("seed = ", "# seed = ", 1);
+    let lonely = remote
+        .replacen("tremor = ", "# tremor = ", 1)
+        .replacen("seed = ", "# seed = ", 1);
     let served = Served::start(&lonely);
     wait_until("a status", || served.status().is_some());
     let (status, said) = served.ask("POST /arm", &served.shown());
@@ -377,7 +386,10 @@ fn a_token_that_others_know_or_may_read_does_not_start() {
     // A fresh token would go to a file or a journal.
     place.write("workbench.toml", &with_page());
     let said = refusal(&place);
-    assert!(said.contains("token_file") && !said.contains("#token="), "{said}");
+    assert!(
+        said.contains("token_file") && !said.contains("#token="),
+        "{said}"
+    );
 
     place.write("workbench.toml", &with_token_file());
     write_token(&place, TOKEN, 0o644);
@@ -388,8 +400,11 @@ fn a_token_that_others_know_or_may_read_does_not_start() {
     assert!(said.contains("at least 16"), "{said}");
 
     write_token(&place, TOKEN, 0o600);
-    let shared = with_token_file()
-        .replacen("port = 4860", "port = 0\ntoken_file = \"operator.token\"", 1);
+    let shared = with_token_file().replacen(
+        "port = 4860",
+        "port = 0\ntoken_file = \"operator.token\"",
+        1,
+    );
     let (before, observers) = shared.split_once("[observers]").expect("a table");
     let observers = observers.replacen("enabled = false", "enabled = true", 1);
     place.write("workbench.toml", &format!("{before}[observers]{observers}"));

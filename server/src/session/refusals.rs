@@ -36,11 +36,7 @@ impl<K> Default for Refusals<K> {
 impl<K: Copy + PartialEq> Refusals<K> {
     /// Counts one; whether it is to be logged at once.
     pub(super) fn is_first(&mut self, who: K, now: Duration) -> bool {
-        if let Some(source) = self
-            .sources
-            .iter_mut()
-            .find(|source| source.who == who)
-        {
+        if let Some(source) = self.sources.iter_mut().find(|source| source.who == who) {
             source.more += 1;
             return false;
         }

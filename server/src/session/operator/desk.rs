@@ -93,9 +93,7 @@ impl OperatorDesk {
         }
         match seen.sampled {
             Some(sampled) if now.saturating_sub(sampled) < SAMPLE_PATIENCE => None,
-            _ => Some(
-                "not armed: no device sample comes; check that the device runs".to_owned(),
-            ),
+            _ => Some("not armed: no device sample comes; check that the device runs".to_owned()),
         }
     }
 
@@ -104,7 +102,10 @@ impl OperatorDesk {
     }
 
     /// Looks for an event of one of these kinds from now on.
-    fn watch<const N: usize>(&self, answers: [(EventKind, Answer); N]) -> impl FnMut() -> Option<Answer> + use<N> {
+    fn watch<const N: usize>(
+        &self,
+        answers: [(EventKind, Answer); N],
+    ) -> impl FnMut() -> Option<Answer> + use<N> {
         let haptics = self.haptics.clone();
         let before = answers.map(|(kind, _)| haptics.incidents.of(kind));
         move || {
