@@ -348,7 +348,7 @@ fn arming_is_refused_where_taut_arm_is_and_disarming_is_not() {
         .replacen("tremor = ", "# tremor = ", 1)
         .replacen("seed = ", "# seed = ", 1);
     let served = Served::start(&lonely);
-    wait_until("a status", || served.status().is_some());
+    served.wait_for_run("fault");
     let (status, said) = served.ask("POST /arm", &served.shown());
     assert_eq!(status, 409, "{said}");
     assert!(said.contains("not in order"), "{said}");

@@ -1,6 +1,6 @@
 //! What an operator's page does: the same wish that `taut arm` makes, to the same switch, and the port's own answer.
 //!
-//! Called on the page's thread. Arming is refused where `taut arm` would be refused: no device sample, or a workbench that lets in no operator;
+//! Called on the page's thread. Arming is refused where `taut arm` would be refused: no state of the device, or a workbench that lets in no operator;
 //! what the port thinks of it is the port's matter. Nothing but the token stands before disarming.
 
 use std::net::SocketAddr;
@@ -17,8 +17,8 @@ use crate::loops::haptics::HapticsStatistics;
 use crate::session::audit::PageAudit;
 use crate::shared::clock::SessionClock;
 
-/// Age of the newest device sample up to which arming is asked for at all: `taut arm` waits as long for one.
-const SAMPLE_PATIENCE: Duration = Duration::from_secs(2);
+/// Age of the newest state up to which arming is asked for at all: `taut arm` waits as long for one.
+const STATE_PATIENCE: Duration = Duration::from_secs(2);
 /// A force that is asked away is gone by then.
 const FADE: Duration = Duration::from_millis(250);
 /// By what name the audit trail and `[network] revoked` know the page.
@@ -28,8 +28,8 @@ pub(super) const NODE: &str = "operator-page";
 #[derive(Debug, Default)]
 struct Seen {
     run: RunState,
-    /// Session time of the newest device sample.
-    sampled: Option<Duration>,
+    /// Session time at which that was told.
+    told: Option<Duration>,
     /// Why nobody arms from here, if that is so.
     closed: Option<String>,
 }
@@ -73,10 +73,10 @@ impl OperatorDesk {
         self.seen().closed = closed.map(|shut_out| shut_out.to_string());
     }
 
-    /// Takes what a state says.
-    pub(super) fn follow_state(&self, run: RunState, sampled: Duration) {
+    /// Takes what a state says that came at session time `now`.
+    pub(super) fn follow_state(&self, run: RunState, now: Duration) {
         let mut seen = self.seen();
-        (seen.run, seen.sampled) = (run, Some(sampled));
+        (seen.run, seen.told) = (run, Some(now));
     }
 
     /// Writes the sums of the audit trail that are due.
@@ -91,8 +91,8 @@ impl OperatorDesk {
         if let Some(closed) = &seen.closed {
             return Some(format!("not armed: {closed}"));
         }
-        match seen.sampled {
-            Some(sampled) if now.saturating_sub(sampled) < SAMPLE_PATIENCE => None,
+        match seen.told {
+            Some(told) if now.saturating_sub(told) < STATE_PATIENCE => None,
             _ => Some("not armed: no device sample comes; check that the device runs".to_owned()),
         }
     }
@@ -149,10 +149,10 @@ impl OperatorDesk {
     }
 }
 
-/// What the device does, if that was told of a sample after `moment`.
+/// What the device does, if that was told after `moment`.
 fn run_after(seen: &Mutex<Seen>, moment: Duration) -> Option<RunState> {
     let seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    (seen.sampled? > moment).then_some(seen.run)
+    (seen.told? > moment).then_some(seen.run)
 }
 
 impl Desk for OperatorDesk {

@@ -207,9 +207,8 @@ impl OperatorPage {
     pub(crate) fn follow(&mut self, moment: &Moment<'_>) {
         if let Some(fresh) = self.feed.fresh() {
             self.state.follow(fresh.state);
-            let sampled = Duration::from_nanos(fresh.state.sample_time_ns);
-            self.sampled = Some(sampled);
-            self.desk.follow_state(fresh.state.run, sampled);
+            self.sampled = Some(Duration::from_nanos(fresh.state.sample_time_ns));
+            self.desk.follow_state(fresh.state.run, moment.now);
         }
         self.desk.look(moment.now);
         if moment.now < self.next {
