@@ -183,9 +183,10 @@ impl BridgeLoop {
         self.next_index += 1;
         let (newest, edge) = (self.newest, &mut self.edge);
         let report = self.port.tick(now, |reading| match edge {
-            Some(edge) => edge
-                .step(now, &reading.sample)
-                .map(|felt| Command::on_set(felt.origin, felt.wrench)),
+            Some(edge) => edge.step(now, &reading.sample).map(|felt| Command {
+                obstacle_work: felt.obstacle_work,
+                ..Command::on_set(felt.origin, felt.wrench)
+            }),
             None => newest.map(|newest| command(&newest)),
         });
 
@@ -252,7 +253,10 @@ fn command(newest: &Newest) -> Command {
     } else {
         Vector6::zeros()
     };
-    Command::fresh(newest.origin, wrench)
+    Command {
+        obstacle_work: newest.command.obstacle_work,
+        ..Command::fresh(newest.origin, wrench)
+    }
 }
 
 #[cfg(test)]
@@ -298,6 +302,7 @@ mod tests {
             time_ns: time_ms * 1_000_000,
             origin_ns: origin_ms * 1_000_000,
             wrench: [0.0, 0.0, newtons, 0.0, 0.0, 0.0],
+            obstacle_work: 0.0,
             flags: 0,
         }
     }

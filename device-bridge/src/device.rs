@@ -30,9 +30,9 @@ pub trait Device: Send {
     /// The one caller is [`crate::DevicePort`], which has made the wrench safe; a driver still refuses what is not finite.
     fn write(&mut self, now: Duration, wrench: &Vector6<f64>);
 
-    /// Tells, before a write, when the device was read for what that write comes from; `None` where it comes from nothing. For a device at the far end
-    /// of a network, which counts the age of a force from there.
-    fn comes_from(&mut self, _origin: Option<Duration>) {}
+    /// Tells, before a write, when the device was read for what that write comes from, `None` where it comes from nothing; and the net work of moving
+    /// obstacles on the hand so far, J. For a device at the far end of a network, which counts the age of a force and its energy from there.
+    fn comes_from(&mut self, _origin: Option<Duration>, _obstacle_work: f64) {}
 
     /// What the hand feels as far as the device knows, where that may differ from what [`Device::write`] was given: what a device at
     /// the far end of a network told with its last reading, or what the motors here can render of the last write. `None` where

@@ -90,6 +90,8 @@ pub const FORCE: Bounds = bounds(
     1e6,
     "-10^6 to 10^6 N or N m; the device port limits it",
 );
+/// Work on the hand: the device port keeps account of no more than it may owe.
+pub const ENERGY: Bounds = bounds(-1e9, 1e9, "-10^9 to 10^9 J");
 /// Between the pupils.
 pub const PUPILS: Bounds = bounds(0.0, 1.0, "0 to 1 m");
 /// A share.

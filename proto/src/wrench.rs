@@ -2,7 +2,7 @@
 
 use crate::{
     codec::wire_ranged,
-    range::{BITS, FORCE, TIME},
+    range::{BITS, ENERGY, FORCE, TIME},
 };
 
 /// One command to the device. A bridge gives zero force once the reading that the newest command was computed from is too old.
@@ -15,6 +15,8 @@ pub struct WrenchCommand {
     pub origin_ns: u64,
     /// Force then torque on the user's hand at the reference point, N and N m, scene axes, limited already.
     pub wrench: [f64; 6],
+    /// Net work of moving obstacles on the hand since the server's coupling began, J: what the hand is given that it need not have put in.
+    pub obstacle_work: f64,
     /// [`WRENCH_PAUSED`], [`WRENCH_AT_EDGE`].
     pub flags: u16,
 }
@@ -28,5 +30,6 @@ wire_ranged!(WrenchCommand {
     time_ns in TIME,
     origin_ns in TIME,
     wrench in FORCE,
+    obstacle_work in ENERGY,
     flags in BITS
 });

@@ -35,6 +35,7 @@ const NO_FORCE: WrenchCommand = WrenchCommand {
     time_ns: 0,
     origin_ns: 0,
     wrench: [0.0; 6],
+    obstacle_work: 0.0,
     flags: 0,
 };
 
@@ -50,6 +51,8 @@ pub struct RemoteDevice {
     on_clock: bool,
     /// What the next command comes from.
     origin: Option<Duration>,
+    /// Of the obstacles on the hand so far, J.
+    obstacle_work: f64,
     faulty: bool,
     /// What the bridge says that it renders.
     felt: Option<Felt>,
@@ -82,6 +85,7 @@ impl RemoteDevice {
             session: None,
             on_clock: false,
             origin: None,
+            obstacle_work: 0.0,
             faulty: true,
             felt: None,
         };
@@ -167,8 +171,9 @@ impl Device for RemoteDevice {
         sample
     }
 
-    fn comes_from(&mut self, origin: Option<Duration>) {
+    fn comes_from(&mut self, origin: Option<Duration>, obstacle_work: f64) {
         self.origin = origin;
+        self.obstacle_work = obstacle_work;
     }
 
     /// Hands the wrench to the broadcast thread; a zero one while the device is faulty.
@@ -183,6 +188,7 @@ impl Device for RemoteDevice {
             time_ns: nanoseconds(now),
             origin_ns: nanoseconds(self.origin.unwrap_or_default()),
             wrench,
+            obstacle_work: self.obstacle_work,
             // A bridge that is faulty gets no sets: their silence lets its force fade.
             flags: if self.felt.is_some_and(|felt| felt.at_edge) {
                 WRENCH_AT_EDGE
@@ -251,10 +257,11 @@ mod tests {
         assert_eq!(sample.pose.translation.vector.as_slice(), [0.1, 0.2, 0.3]);
         assert_eq!((sample.velocity[2], sample.buttons), (-0.5, 5));
 
-        device.comes_from(Some(ms(997)));
+        device.comes_from(Some(ms(997)), 0.25);
         device.write(ms(1001), &Vector6::new(1.0, 2.0, 3.0, 0.1, 0.2, 0.3));
         let command = commands.read();
         assert_eq!(command.wrench, [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]);
+        assert_eq!(command.obstacle_work, 0.25);
         let times = (command.origin_ns, command.time_ns);
         assert_eq!(times, (997_000_000, 1_001_000_000));
     }

@@ -36,6 +36,8 @@ pub struct EdgeWrench {
     pub origin: Duration,
     /// Number of that set.
     pub sequence: u64,
+    /// Net work that moving obstacles have done on the hand since this coupling began, J.
+    pub obstacle_work: f64,
     /// The projection was solved; if not, the wrench is zero.
     pub solved: bool,
 }
@@ -140,6 +142,7 @@ impl EdgeCoupler {
             },
             origin: origin.min(sample.time),
             sequence: self.set.sequence,
+            obstacle_work: self.coupling.obstacle_work(),
             solved: output.status == ProjectionStatus::Solved,
         })
     }

@@ -108,7 +108,7 @@ impl DevicePort {
         Self {
             check: SampleCheck::new(settings.validation, reference_point, settings.period),
             arming: Arming::new(&settings),
-            controller: PassivityController::new(settings.passivity),
+            controller: PassivityController::new(settings.passivity, settings.contact),
             slew: SlewLimit::new(&settings),
             motion: Motion::default(),
             energy: EnergyObserver::new(reference_point),
@@ -193,6 +193,7 @@ impl DevicePort {
     pub fn restart(&mut self, source: CommandSource) {
         self.last_command = None;
         self.held = Vector6::zeros();
+        self.controller.restart();
         self.arming.restart(source);
     }
 
@@ -212,8 +213,13 @@ impl DevicePort {
         self.motion.fade(passed);
         let reading = self.sense(now);
         let command = command(&reading);
+        if let Some(command) = &command {
+            self.controller
+                .grant(command.obstacle_work, &command.wrench, self.slew.rendered());
+        }
         let wrench = self.render(now, passed, command);
-        self.device.comes_from(self.held_origin);
+        self.device
+            .comes_from(self.held_origin, self.controller.obstacle_work());
         self.device.write(now, &wrench);
         // The device's own word is what does the work.
         let felt = self.device.felt().map_or(wrench, |felt| felt.wrench);
@@ -319,7 +325,7 @@ impl DevicePort {
             passed.as_secs_f64(),
             &shared,
         );
-        let damped = shared + damping.wrench * gain;
+        let damped = self.controller.within_reserve(&shared) + damping.wrench * gain;
         let safe = clamp(&damped, settings.max_force, settings.max_torque).wrench;
         // A force that comes, goes away or is held is led by the port: only one in full answers the motion.
         let speed = match self.arming.state() {

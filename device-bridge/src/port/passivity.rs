@@ -1,23 +1,40 @@
-//! Passivity controller: damping that takes out the energy which the port gave out.
+//! Passivity controller: damping that takes out the energy which the port gave out, and a reserve that bounds what it can give out at all.
 //!
 //! | symbol | name in code | unit | meaning |
 //! |--------|--------------|------|---------|
-//! | E      | `debt`       | J    | energy given to the hand that it had not put in; negative is credit |
+//! | E      | `debt`       | J    | energy given to the hand that neither it nor a moving obstacle had put in; negative is credit |
 //! | v      | `velocity`   | m/s, rad/s | of the reference point, over the last tick |
 //! | alpha  | `damping`    | N s/m | `E / (T v^2)`, at most `max_damping` |
+//! | K, r   | [`ContactBound`] | N/m, m | the stiffest contact that the port renders |
 //!
 //! While E > 0 the wrench gets `-alpha v` on top, so that the next tick takes E back, as far as the damping's limit allows; what
 //! is left waits for the next tick. A spring stores energy that the hand has put in and may give it back: that is credit, kept up to
-//! `max_credit`. After [`WINDOW`] ticks without a commanded wrench nothing is stored any more, and credit is forgotten.
+//! `max_credit`. After [`WINDOW`] without a commanded wrench nothing is stored any more, and credit is forgotten.
 //!
-//! Source: Hannaford & Ryu 2002, time-domain passivity control; impedance causality.
+//! Damping cannot undo a force that should not be there: one of a surface which a late network moves under a hand that rests. So a commanded wrench (f, t)
+//! is also scaled to what a spring of the stiffest contact has when all that it stores is in reserve,
+//!
+//! ```text
+//!   |f|^2 / (2 K) + |t|^2 / (2 K r^2) <= max_debt - E
+//! ```
+//!
+//! A contact that the hand pressed itself is never scaled: it stores no more than was put in. What is scaled is let go as a spring of stiffness K is, which
+//! the slew limit explains by the motion, and from no reserve at all a hand that presses on meets that spring where it is. Debt is forgiven by
+//! [`FORGIVEN`].
+//!
+//! Sources: Hannaford & Ryu 2002, time-domain passivity control, impedance causality; Franken, Stramigioli, Misra, Secchi & Macchelli 2011, a reserve of
+//! energy that bounds the force.
 
 use nalgebra::{Vector3, Vector6};
 
 use super::clamp::join;
+use super::settings::ContactBound;
 
-/// Ticks of free motion after which no credit is left.
-const WINDOW: u32 = 30;
+/// Free motion after which no credit is left, s.
+const WINDOW: f64 = 0.03;
+
+/// Debt that is forgiven, W: a hundredth of what a hand dissipates in an ordinary motion.
+const FORGIVEN: f64 = 1e-3;
 
 /// Slower than this nothing can be taken out, and a noisy velocity would only rattle: m/s, rad/s.
 const SLOWEST: (f64, f64) = (1e-3, 1e-2);
@@ -41,14 +58,16 @@ pub struct PassivitySettings {
     pub max_damping: f64,
     /// Largest rotational damping, N m s/rad.
     pub max_rotational_damping: f64,
-    /// Most energy that may be owed to the hand, J: what the stiffest contact stores at the largest force.
+    /// Most energy that is kept account of either way, J: what the stiffest contact stores at the largest force.
     pub max_credit: f64,
-    /// Energy below which nothing is done, J: what the zero-order hold of a gentle contact leaks.
+    /// Energy below which nothing is damped, J: what the zero-order hold of a gentle contact leaks.
     pub dead_band: f64,
+    /// Most that the hand may be given that neither it nor a moving obstacle had put in, J.
+    pub max_debt: f64,
 }
 
 impl Default for PassivitySettings {
-    /// Observe; 20 N s/m, 0.02 N m s/rad; 0.2 J (20 N at 1000 N/m); 0.01 mJ.
+    /// Observe; 20 N s/m, 0.02 N m s/rad; 0.2 J (20 N at 1000 N/m); 0.01 mJ; 10 mJ (4.5 N of a contact of 1000 N/m that is there at once).
     fn default() -> Self {
         Self {
             mode: Passivity::Observe,
@@ -56,6 +75,7 @@ impl Default for PassivitySettings {
             max_rotational_damping: 0.02,
             max_credit: 0.2,
             dead_band: 1e-5,
+            max_debt: 0.01,
         }
     }
 }
@@ -64,8 +84,12 @@ impl Default for PassivitySettings {
 #[derive(Clone, Debug)]
 pub(super) struct PassivityController {
     settings: PassivitySettings,
+    contact: ContactBound,
     debt: f64,
-    free_ticks: u32,
+    /// Time without a commanded wrench, s.
+    free: f64,
+    /// Work of moving obstacles as it was told last, J.
+    obstacles: Option<f64>,
 }
 
 /// What the controller adds.
@@ -85,11 +109,36 @@ impl Damping {
 }
 
 impl PassivityController {
-    pub(super) fn new(settings: PassivitySettings) -> Self {
+    pub(super) fn new(settings: PassivitySettings, mut contact: ContactBound) -> Self {
+        let explains = contact.stiffness > 0.0 && contact.radius_of_gyration > 0.0; // false for NaN
+        if !explains {
+            // What the slew limit is not to explain by motion is a contact all the same.
+            contact = ContactBound::default();
+        }
         Self {
             settings,
+            contact,
             debt: 0.0,
-            free_ticks: 0,
+            free: 0.0,
+            obstacles: None,
+        }
+    }
+
+    /// Another source of commands: its obstacles have their own account.
+    pub(super) fn restart(&mut self) {
+        self.obstacles = None;
+    }
+
+    /// Takes the net work of moving obstacles on the hand, J, since whenever it was first told, with a force of which `rendered` came to the hand where
+    /// it was `commanded`. What is not finite is left alone.
+    pub(super) fn grant(&mut self, total: f64, commanded: &Vector6<f64>, rendered: &Vector6<f64>) {
+        if !total.is_finite() {
+            return;
+        }
+        let done = total - self.obstacles.replace(total).unwrap_or(total);
+        let share = rendered.dot(commanded) / commanded.norm_squared();
+        if share > 0.0 {
+            self.debt -= done * share.min(1.0);
         }
     }
 
@@ -107,13 +156,15 @@ impl PassivityController {
             return Damping::NONE;
         }
         let is_free = *commanded == Vector6::zeros();
-        self.free_ticks = if is_free { self.free_ticks + 1 } else { 0 };
+        self.free = if is_free { self.free + seconds } else { 0.0 };
         if work.is_finite() {
-            self.debt = (self.debt + work).max(-settings.max_credit);
+            self.debt = (self.debt + work).clamp(-settings.max_credit, settings.max_credit);
         }
-        if self.free_ticks >= WINDOW {
-            self.free_ticks = WINDOW;
+        if self.free >= WINDOW {
             self.debt = self.debt.max(0.0);
+        }
+        if self.debt > 0.0 {
+            self.debt = (self.debt - FORGIVEN * seconds).max(0.0);
         }
         let due = self.debt > settings.dead_band && seconds > 0.0; // false for NaN
         if !due {
@@ -134,6 +185,32 @@ impl PassivityController {
         Damping {
             wrench: join(&force, &torque),
             debt: self.debt,
+        }
+    }
+
+    /// Net work of moving obstacles as it was told last, J.
+    pub(super) fn obstacle_work(&self) -> f64 {
+        self.obstacles.unwrap_or(0.0)
+    }
+
+    /// The commanded wrench, scaled to what the reserve allows.
+    pub(super) fn within_reserve(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
+        if self.settings.mode == Passivity::Observe {
+            return *commanded;
+        }
+        let ContactBound {
+            stiffness,
+            radius_of_gyration: radius,
+        } = self.contact;
+        let force = commanded.fixed_rows::<3>(0).norm_squared();
+        let torque = commanded.fixed_rows::<3>(3).norm_squared() / (radius * radius);
+        let stored = 0.5 * (force + torque) / stiffness;
+        let reserve = (self.settings.max_debt - self.debt).max(0.0);
+        let fits = stored <= reserve; // false for NaN
+        if fits {
+            *commanded
+        } else {
+            commanded * (reserve / stored).sqrt()
         }
     }
 
@@ -161,10 +238,11 @@ mod tests {
     use super::*;
 
     fn controller() -> PassivityController {
-        PassivityController::new(PassivitySettings {
+        let settings = PassivitySettings {
             mode: Passivity::Control,
             ..PassivitySettings::default()
-        })
+        };
+        PassivityController::new(settings, ContactBound::default())
     }
 
     const T: f64 = 1e-3;
@@ -174,9 +252,9 @@ mod tests {
         let mut controller = controller();
         let travel = Vector6::x() * (0.1 * T);
         let damping = controller.step(1e-4, &travel, T, &Vector6::x());
-        // 1e-4 J at 0.1 m/s in 1 ms: 10 N s/m.
-        assert!((damping.wrench.x + 1.0).abs() < 1e-12);
-        // At the same velocity that force gives -1e-4 J: the debt is paid.
+        // 1e-4 J, of which 1e-6 are forgiven, at 0.1 m/s in 1 ms: 9.9 N s/m.
+        assert!((damping.wrench.x + 0.99).abs() < 1e-12);
+        // At the same velocity that force gives as much back: the debt is paid.
         let paid = controller.step(damping.wrench.x * travel.x, &travel, T, &Vector6::x());
         assert_eq!(paid.wrench, Vector6::zeros());
     }
@@ -207,11 +285,114 @@ mod tests {
 
         let mut let_go = controller();
         let _ = let_go.step(-0.01, &travel, T, &Vector6::x());
-        for _ in 0..WINDOW {
+        for _ in 0..31 {
             let _ = let_go.step(0.0, &travel, T, &Vector6::zeros());
         }
         let acts = let_go.step(0.009, &travel, T, &Vector6::x());
         assert!(acts.debt > 0.0 && acts.wrench.x < 0.0);
+    }
+
+    /// A hand whose way along x the caller says, m, under `commanded` N along x: what it is given in all, J, and the force at the end, N.
+    fn along(
+        controller: &mut PassivityController,
+        commanded: f64,
+        way: impl Iterator<Item = f64>,
+    ) -> (f64, f64) {
+        let wrench = Vector6::x() * commanded;
+        let (mut given, mut held) = (0.0, 0.0);
+        for step in way {
+            let travel = Vector6::x() * step;
+            given += held * step;
+            let damping = controller.step(held * step, &travel, T, &wrench);
+            held = controller.within_reserve(&wrench).x + damping.wrench.x;
+        }
+        (given, held)
+    }
+
+    #[test]
+    fn a_force_that_is_there_at_once_gives_no_more_than_the_reserve_and_a_hand_that_presses_on_meets_the_contact()
+     {
+        let standing = |ticks| std::iter::repeat_n(0.0, ticks);
+        let (_, force) = along(&mut controller(), 20.0, standing(10));
+        assert!((force - 4.472).abs() < 1e-3, "sqrt(2 K 10 mJ), not {force}");
+        let mut pushed = controller();
+        let (given, force) = along(&mut pushed, 20.0, std::iter::repeat_n(1e-4, 500));
+        let forgiven = 0.5 * FORGIVEN;
+        assert!((0.007..0.0102 + forgiven).contains(&given), "{given}");
+        assert!(force.abs() < 2.1, "{force}: nothing but damping is left");
+        // Nothing is left: a hand that turns round builds a spring of K up from there.
+        let (_, force) = along(&mut pushed, 20.0, std::iter::repeat_n(-1e-5, 1000));
+        assert!(
+            (10.0..13.0).contains(&force),
+            "1 cm of 1000 N/m, and what was forgiven: {force}"
+        );
+    }
+
+    #[test]
+    fn a_contact_that_was_pressed_is_given_back_whole() {
+        let mut controller = controller();
+        let (mut given, mut depth) = (0.0, 0.0_f64);
+        for tick in 0..4000 {
+            // 12 mm deep and out again, at most 19 mm/s; K all the way.
+            let next = 0.006 * (1.0 - (f64::from(tick) * T * std::f64::consts::PI / 2.0).cos());
+            let (force, travel) = (1000.0 * depth, Vector6::x() * (depth - next));
+            given += force * travel.x;
+            let commanded = Vector6::x() * (1000.0 * next);
+            let _ = controller.step(force * travel.x, &travel, T, &commanded);
+            assert_eq!(controller.within_reserve(&commanded), commanded, "{tick}");
+            depth = next;
+        }
+        assert!(given.abs() < 1e-3, "{given}");
+    }
+
+    #[test]
+    fn what_a_moving_obstacle_gives_is_no_debt_as_far_as_its_force_is_felt() {
+        let push = Vector6::x() * 10.0;
+        for (share, scaled) in [(1.0, false), (0.5, true), (0.0, true)] {
+            let mut controller = controller();
+            for tick in 0..100 {
+                controller.grant(7.0 + 1e-3 * f64::from(tick), &push, &(push * share));
+                let _ = controller.step(1e-3, &(Vector6::x() * 1e-4), T, &push);
+            }
+            let left = controller.within_reserve(&(Vector6::x() * 4.0));
+            assert_eq!(left.x < 3.9, scaled, "{share}: {left}");
+        }
+        let mut controller = controller();
+        controller.grant(f64::NAN, &push, &push);
+        assert_eq!(controller.obstacle_work(), 0.0);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn whatever_is_commanded_and_however_the_hand_moves_it_is_given_no_more_than_the_reserve(
+            seed in 0_u64..1 << 32,
+            most in 1.0..20.0_f64,
+        ) {
+            let mut state = seed;
+            let mut random = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+            };
+            let mut controller = controller();
+            let (mut velocity, mut held, mut commanded) = (Vector6::zeros(), Vector6::zeros(), Vector6::zeros());
+            let (mut given, mut most_given) = (0.0, 0.0_f64);
+            for tick in 0..2000 {
+                if tick % 17 == 0 {
+                    commanded = Vector6::from_fn(|k, _| if k < 3 { most * random() } else { 0.1 * most * random() });
+                }
+                // What moves a hand of 0.3 kg by 10 N, or turns it as much at 0.1 m.
+                velocity += Vector6::from_fn(|k, _| (if k < 3 { 1.0 } else { 10.0 }) * 0.03 * random());
+                velocity *= 0.98;
+                let travel = velocity * T;
+                let work = held.dot(&travel);
+                given += work;
+                most_given = most_given.max(given);
+                let damping = controller.step(work, &travel, T, &commanded);
+                held = controller.within_reserve(&commanded) + damping.wrench;
+            }
+            // One tick at a third of a metre per second.
+            proptest::prop_assert!(most_given < 0.01 + 2.0 * FORGIVEN + 0.002, "{most_given}");
+        }
     }
 
     #[test]

@@ -17,6 +17,8 @@ pub struct Command {
     pub constraint_age: Duration,
     /// Age up to which it is rendered in full, where that is longer than the port's hold.
     pub full_until: Duration,
+    /// Net work that moving obstacles have done on the hand since the source of commands began, J.
+    pub obstacle_work: f64,
 }
 
 impl Command {
@@ -33,6 +35,7 @@ impl Command {
             origin: now,
             constraint_age: Duration::ZERO,
             full_until: Duration::ZERO,
+            obstacle_work: 0.0,
         }
     }
 
@@ -145,6 +148,7 @@ mod tests {
             origin: ms(made_ms),
             constraint_age: ms(constraint_age_ms),
             full_until: Duration::ZERO,
+            obstacle_work: 0.0,
         };
         freshness(ms(now_ms), &command, &SafetySettings::default())
     }

@@ -237,7 +237,7 @@ fn spawn_haptics(link: &ServerLink, stop: Arc<AtomicBool>, rest: Arc<Rest>) -> J
                 seen.lowest_z = seen.lowest_z.min(z);
                 rest.note(z);
                 wrench.z = STIFFNESS * (-z).max(0.0);
-                device.comes_from(Some(sample.time));
+                device.comes_from(Some(sample.time), 0.0);
             }
             device.write(now, &wrench);
             let _ = broadcaster.send_wrench(commands.read());

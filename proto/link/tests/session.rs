@@ -158,6 +158,7 @@ async fn device_input_reaches_the_haptics_loop_and_the_wrench_comes_back() {
         time_ns: 1,
         origin_ns: taken.sample.sample_time_ns,
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.01],
+        obstacle_work: -0.5,
         flags: 0,
     };
     wait_until("wrench", || {

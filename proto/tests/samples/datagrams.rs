@@ -33,6 +33,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         time_ns: 1_000_000_500,
         origin_ns: 999_500_000,
         wrench: [0.0, 1.0, 0.0, 0.0, 0.0, 0.5],
+        obstacle_work: 0.125,
         flags: 0,
     };
     let head = HeadSample {
@@ -118,11 +119,12 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             },
         );
     let wrench =
-        ((far(), far(), any::<u16>()), six()).prop_map(|((time_ns, origin_ns, flags), wrench)| {
+        ((far(), far(), any::<u16>()), six(), -1e9..1e9).prop_map(|((time_ns, origin_ns, flags), wrench, obstacle_work)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
                 origin_ns,
                 wrench,
+                obstacle_work,
                 flags,
             })
         });

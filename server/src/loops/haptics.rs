@@ -278,6 +278,7 @@ fn newest_command(wrench: &mut Subscriber<WrenchCommand>, is_felt: bool) -> Comm
     let constraints = command.time.saturating_sub(command.constraint_age);
     Command {
         constraint_age: origin.saturating_sub(constraints),
+        obstacle_work: command.obstacle_work,
         ..Command::fresh(origin, command.wrench)
     }
 }

@@ -82,6 +82,7 @@ pub fn run(
             time_ns: nanoseconds(clock.now()),
             origin_ns: 0,
             wrench: [0.0; 6],
+            obstacle_work: 0.0,
             flags: WRENCH_PAUSED,
         });
     }

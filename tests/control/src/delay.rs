@@ -18,6 +18,7 @@ use taut_bridge::{
     SimulatedDevice, ValidationSettings, ViaPoint,
 };
 use taut_link::DeviceInput;
+use taut_method_tests::hand::Random;
 use taut_proto::time::{TimeRequest, TimeResponse};
 use taut_proto::{
     Assembler, ClockFilter, ConstraintSet, CouplingOffer, InputSample, PartTaken, Payload,
@@ -44,6 +45,10 @@ pub enum Course {
     Doubling(Duration),
     /// By as many seconds each second.
     Steady(f64),
+    /// At once to the largest, for good.
+    Jump,
+    /// From anything to anything between none and the largest, by this seed, held for 20 to 400 ms each.
+    Jumps(u64),
 }
 
 /// How a network's delay grows.
@@ -69,15 +74,31 @@ impl Growth {
     };
 
     fn delay_ns(&self, now: Duration, way: usize) -> u64 {
-        if !self.ways[way] {
+        if !self.ways[way] || now < self.begin {
             return 0;
         }
         let elapsed = now.saturating_sub(self.begin).as_secs_f64();
         let grown = match self.course {
             Course::Doubling(time) => 1e-3 * ((elapsed / time.as_secs_f64()).exp2() - 1.0),
             Course::Steady(slope) => slope * elapsed,
+            Course::Jump => self.most.as_secs_f64(),
+            Course::Jumps(seed) => self.jumped(seed, elapsed),
         };
         (grown.min(self.most.as_secs_f64()) * 1e9) as u64
+    }
+}
+
+impl Growth {
+    fn jumped(&self, seed: u64, elapsed: f64) -> f64 {
+        let mut random = Random(seed);
+        let mut until = 0.0;
+        loop {
+            until += 0.02 + 0.38 * random.unit();
+            let delay = self.most.as_secs_f64() * random.unit();
+            if elapsed < until {
+                return delay;
+            }
+        }
     }
 }
 
@@ -132,6 +153,23 @@ impl Rubbing {
         )
     }
 
+    /// Holds still while a plate comes up at 0.1 m/s, lifts and tilts what is held and goes down again: the shipped scene, softer by hand.
+    #[must_use]
+    pub fn lifted_by_plate() -> Self {
+        let start = Pose::translation(0.0, 0.0, 0.030);
+        let still = |time_s| ViaPoint {
+            time_s,
+            pose: start,
+        };
+        match MinJerkPath::new(vec![still(0.0), still(8.0)], true) {
+            Ok(path) => Self {
+                task: Task::plate(),
+                path,
+            },
+            Err(error) => panic!("{error}"),
+        }
+    }
+
     /// Does once what the hand does in the study of coupling at the edge.
     #[must_use]
     pub fn once(task: Task) -> Self {
@@ -166,10 +204,26 @@ impl Rubbing {
 /// When the scene of the task is none.
 #[must_use]
 pub fn run(rubbing: &Rubbing, mode: Mode, growth: Growth, duration: Duration) -> Outcome {
+    // As `taut bridge` has it.
+    run_with(Passivity::Control, rubbing, mode, growth, duration)
+}
+
+/// The same with this said of energy.
+///
+/// # Panics
+/// When the scene of the task is none.
+#[must_use]
+pub fn run_with(
+    passivity: Passivity,
+    rubbing: &Rubbing,
+    mode: Mode,
+    growth: Growth,
+    duration: Duration,
+) -> Outcome {
     let near = Impairment::new(0.3, 0.0);
     let (mut up, mut down) = (Way::new(near, 11), Way::new(near, 12));
     let mut server = Server::new(&rubbing.task);
-    let mut bridge = Bridge::new(rubbing, mode);
+    let mut bridge = Bridge::new(rubbing, mode, passivity);
     let mut outcome = Outcome {
         given: 0.0,
         largest: [0.0; 2],
@@ -232,7 +286,8 @@ impl Server {
                 Box::new(device),
                 safety,
                 None,
-            ),
+            )
+            .with_motions(scene.motions.clone()),
             inputs,
             newest: 0,
             wrenches,
@@ -294,15 +349,14 @@ struct Bridge {
 }
 
 impl Bridge {
-    fn new(rubbing: &Rubbing, mode: Mode) -> Self {
+    fn new(rubbing: &Rubbing, mode: Mode, passivity: Passivity) -> Self {
         let scene = &rubbing.task.scene;
         let point = scene.reference_point();
         let device =
             SimulatedDevice::new(Grip::workbench(), Hand::LIGHT, rubbing.path.clone(), point);
-        // As `taut bridge` has it.
         let safety = SafetySettings {
             passivity: PassivitySettings {
-                mode: Passivity::Control,
+                mode: passivity,
                 ..PassivitySettings::default()
             },
             ..SafetySettings::default()

@@ -169,6 +169,7 @@ impl Server {
                     time_ns: now_ns,
                     origin_ns: input.sample_time_ns,
                     wrench: output.wrench.into(),
+                    obstacle_work: self.coupling.obstacle_work(),
                     flags: 0,
                 };
                 down.send(now_ns, &Payload::Wrench(command));

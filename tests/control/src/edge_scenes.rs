@@ -100,6 +100,21 @@ impl Task {
         }
     }
 
+    /// A plate comes up under what is held: the shipped scene.
+    #[must_use]
+    pub fn plate() -> Self {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../server/scenes/moving-plate.toml");
+        let start = Pose::translation(0.0, 0.0, 0.030);
+        Self {
+            name: "plate",
+            scene: build(Scene::load(&file)),
+            intention: intention(&[(0.0, start), (8.0, start)]),
+            rest: 2.0..2.3,
+            duration: 8.0,
+        }
+    }
+
     /// Slides a ball along a floor into one wall and then into another.
     #[must_use]
     pub fn corner() -> Self {

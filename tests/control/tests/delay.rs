@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use taut_bridge::EventKind;
-use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, run};
+use taut_bridge::{EventKind, Passivity};
+use taut_control_tests::delay::{Course, Growth, Rubbing, ZERO_AFTER, run, run_with};
 use taut_control_tests::edge::Mode;
 use taut_control_tests::edge_scenes::Task;
 
@@ -127,4 +127,96 @@ fn a_steadily_slower_network_and_a_dome() {
 fn a_steadily_slower_network_and_a_corner() {
     let corner = Rubbing::once(Task::corner());
     keeps_its_promise_at_any_slope("corner", &corner, &[300, 1000, 1600]);
+}
+
+/// The delay jumps: once to one length, or again and again to anything, on either way or both, wherever the hand is.
+fn keeps_its_promise_when_the_delay_jumps(name: &str, rubbing: &Rubbing, mode: Mode) {
+    let usual = run(rubbing, mode, Growth::NONE, Duration::from_secs(6));
+    assert!(usual.largest[1] > 1.0, "{usual:?}");
+    let mut worst = (f64::NEG_INFINITY, String::new());
+    let mut try_it = |growth: Growth| {
+        let attacked = run(rubbing, mode, growth, Duration::from_secs(6));
+        let case = format!("{growth:?}");
+        assert!(attacked.oldest < ZERO_AFTER, "{case}: {attacked:?}");
+        let more = attacked.given - usual.given;
+        if more > worst.0 {
+            worst = (more, case);
+        }
+    };
+    for ways in [[true, true], [true, false], [false, true]] {
+        for most in [40, 110].map(Duration::from_millis) {
+            for begin in [2250, 2900].map(Duration::from_millis) {
+                let course = Course::Jump;
+                try_it(Growth {
+                    begin,
+                    ways,
+                    course,
+                    most,
+                });
+            }
+            for seed in [3, 5, 14] {
+                let (begin, course) = (Duration::from_millis(300), Course::Jumps(seed));
+                try_it(Growth {
+                    begin,
+                    ways,
+                    course,
+                    most,
+                });
+            }
+        }
+    }
+    let (more, case) = worst;
+    println!(
+        "{name} {}: at most {:+.2} mJ on {:.2}: {case}",
+        mode.name(),
+        more * 1e3,
+        usual.given * 1e3
+    );
+    assert!(more <= MORE, "{more} J: {case}");
+}
+
+#[test]
+fn a_delay_that_jumps_and_a_wall() {
+    keeps_its_promise_when_the_delay_jumps("wall", &Rubbing::on_wall(), Mode::Edge);
+}
+
+#[test]
+fn a_delay_that_jumps_and_a_dome() {
+    keeps_its_promise_when_the_delay_jumps("dome", &Rubbing::over_dome(), Mode::Edge);
+}
+
+#[test]
+fn a_delay_that_jumps_and_shipped_forces_on_a_wall() {
+    keeps_its_promise_when_the_delay_jumps("wall", &Rubbing::on_wall(), Mode::Shipped);
+}
+
+#[test]
+fn a_delay_that_jumps_and_shipped_forces_on_a_dome() {
+    keeps_its_promise_when_the_delay_jumps("dome", &Rubbing::over_dome(), Mode::Shipped);
+}
+
+/// What a plate gives a hand that it lifts is no energy that the bridge's controller may take away.
+#[test]
+fn a_plate_lifts_the_hand_with_the_energy_under_control_as_without() {
+    let rubbing = Rubbing::lifted_by_plate();
+    for mode in [Mode::Edge, Mode::Shipped] {
+        let lifted = |passivity| {
+            let duration = Duration::from_secs(15);
+            run_with(passivity, &rubbing, mode, Growth::NONE, duration)
+        };
+        let (observed, controlled) = (lifted(Passivity::Observe), lifted(Passivity::Control));
+        println!(
+            "{}: {:.1} and {:.1} mJ, {:.2} and {:.2} N",
+            mode.name(),
+            observed.given * 1e3,
+            controlled.given * 1e3,
+            observed.largest[1],
+            controlled.largest[1]
+        );
+        assert!(observed.given > 0.015, "{observed:?}");
+        // The controller damps what the network adds; of the plate's own it takes nothing.
+        assert!(controlled.given > 0.85 * observed.given, "{controlled:?}");
+        let share = controlled.largest[1] / observed.largest[1];
+        assert!(share > 0.88, "{controlled:?}");
+    }
 }
