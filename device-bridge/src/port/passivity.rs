@@ -19,8 +19,8 @@
 //! ```
 //!
 //! A contact that the hand pressed itself is never scaled: it stores no more than was put in. What is scaled is let go as a spring of stiffness K is, which
-//! the slew limit explains by the motion, and from no reserve at all a hand that presses on meets that spring where it is. Debt is forgiven by
-//! [`FORGIVEN`].
+//! the slew limit explains by the motion, and from no reserve at all a hand that presses on meets that spring where it is. The reserve
+//! forgives debt by [`FORGIVEN`]; damping does not, for it would feed the oscillation that it is to calm.
 //!
 //! Sources: Hannaford & Ryu 2002, time-domain passivity control, impedance causality; Franken, Stramigioli, Misra, Secchi & Macchelli 2011, a reserve of
 //! energy that bounds the force.
@@ -33,7 +33,7 @@ use super::settings::ContactBound;
 /// Free motion after which no credit is left, s.
 const WINDOW: f64 = 0.03;
 
-/// Debt that is forgiven, W: a hundredth of what a hand dissipates in an ordinary motion.
+/// Debt that the reserve forgives, W: a hundredth of what a hand dissipates in an ordinary motion.
 const FORGIVEN: f64 = 1e-3;
 
 /// Slower than this nothing can be taken out, and a noisy velocity would only rattle: m/s, rad/s.
@@ -86,6 +86,8 @@ pub(super) struct PassivityController {
     settings: PassivitySettings,
     contact: ContactBound,
     debt: f64,
+    /// Of that, what the reserve counts no longer, J; damping does.
+    forgiven: f64,
     /// Time without a commanded wrench, s.
     free: f64,
     /// Work of moving obstacles as it was told last, J.
@@ -119,6 +121,7 @@ impl PassivityController {
             settings,
             contact,
             debt: 0.0,
+            forgiven: 0.0,
             free: 0.0,
             obstacles: None,
         }
@@ -163,9 +166,7 @@ impl PassivityController {
         if self.free >= WINDOW {
             self.debt = self.debt.max(0.0);
         }
-        if self.debt > 0.0 {
-            self.debt = (self.debt - FORGIVEN * seconds).max(0.0);
-        }
+        self.forgiven = (self.forgiven + FORGIVEN * seconds).clamp(0.0, self.debt.max(0.0));
         let due = self.debt > settings.dead_band && seconds > 0.0; // false for NaN
         if !due {
             return Damping::NONE;
@@ -205,7 +206,7 @@ impl PassivityController {
         let force = commanded.fixed_rows::<3>(0).norm_squared();
         let torque = commanded.fixed_rows::<3>(3).norm_squared() / (radius * radius);
         let stored = 0.5 * (force + torque) / stiffness;
-        let reserve = (self.settings.max_debt - self.debt).max(0.0);
+        let reserve = (self.settings.max_debt + self.forgiven - self.debt).max(0.0);
         let fits = stored <= reserve; // false for NaN
         if fits {
             *commanded
@@ -252,9 +253,9 @@ mod tests {
         let mut controller = controller();
         let travel = Vector6::x() * (0.1 * T);
         let damping = controller.step(1e-4, &travel, T, &Vector6::x());
-        // 1e-4 J, of which 1e-6 are forgiven, at 0.1 m/s in 1 ms: 9.9 N s/m.
-        assert!((damping.wrench.x + 0.99).abs() < 1e-12);
-        // At the same velocity that force gives as much back: the debt is paid.
+        // 1e-4 J at 0.1 m/s in 1 ms: 10 N s/m.
+        assert!((damping.wrench.x + 1.0).abs() < 1e-12);
+        // At the same velocity that force gives -1e-4 J: the debt is paid.
         let paid = controller.step(damping.wrench.x * travel.x, &travel, T, &Vector6::x());
         assert_eq!(paid.wrench, Vector6::zeros());
     }

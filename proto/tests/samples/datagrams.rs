@@ -118,8 +118,8 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 })
             },
         );
-    let wrench =
-        ((far(), far(), any::<u16>()), six(), -1e9..1e9).prop_map(|((time_ns, origin_ns, flags), wrench, obstacle_work)| {
+    let wrench = ((far(), far(), any::<u16>()), six(), -1e9..1e9).prop_map(
+        |((time_ns, origin_ns, flags), wrench, obstacle_work)| {
             Payload::Wrench(WrenchCommand {
                 time_ns,
                 origin_ns,
@@ -127,7 +127,8 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
                 obstacle_work,
                 flags,
             })
-        });
+        },
+    );
     let response = (far(), far(), far()).prop_map(|(client_sent, server_received, server_sent)| {
         Payload::TimeResponse(TimeResponse {
             client_sent,
