@@ -27,10 +27,12 @@ const PHASE: Duration = Duration::from_micros(350);
 /// An answer that is not there by then is none.
 const ANSWER_WITHIN: Duration = Duration::from_millis(3);
 /// The same of a board that is looked for: the line is asked once with each patience before it has none. A busy machine on either side answers late.
-const FOUND_WITHIN: [Duration; 4] = [
+const FOUND_WITHIN: [Duration; 6] = [
     Duration::from_millis(15),
     Duration::from_millis(15),
     Duration::from_millis(60),
+    Duration::from_millis(60),
+    Duration::from_millis(200),
     Duration::from_millis(200),
 ];
 /// Without a write of the device's loop, or without an answer, for this long all currents are zero.
@@ -39,8 +41,8 @@ const HOLDS: Duration = Duration::from_millis(20);
 const GIVEN_UP: Duration = Duration::from_millis(300);
 /// Between two attempts.
 const RETRY: Duration = Duration::from_millis(200);
-/// For the first attempt.
-const OPEN_WITHIN: Duration = Duration::from_secs(5);
+/// For the first attempt: all of the above at each number of a board, and the first counts.
+const OPEN_WITHIN: Duration = Duration::from_secs(8);
 /// Cycles of zero currents at an end, in case one is lost.
 const LAST_CYCLES: u32 = 3;
 /// Digits per volt of the boards' converter, and its largest.
