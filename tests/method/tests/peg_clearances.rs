@@ -21,9 +21,9 @@ use taut_scene::shapes::{Axis, box_with_hole, cylinder};
 
 const CLEARANCES: [f64; 3] = [0.5e-3, 0.1e-3, 0.05e-3];
 const FACETS: [usize; 2] = [72, 144];
-const ORIENTATIONS: u64 = 12;
+const ORIENTATIONS: u64 = 4;
 /// Every so many of them with the finer tessellation, too.
-const FINE_EVERY: usize = 3;
+const FINE_EVERY: usize = 4;
 const PEG_RADIUS: f64 = 0.010;
 /// Half the length of the peg and of the box, m.
 const HALF_LENGTH: f64 = 0.030;
