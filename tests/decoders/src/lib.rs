@@ -1,7 +1,7 @@
 //! Every decoder of taut that takes bytes from outside: packets, files, reports.
 //!
 //! A [`Decoder`] is fed bytes; it must read them or refuse them, never panic, and what it reads must keep the promise that its function
-//! states. Two users: the targets in `fuzz/`, which search with coverage for as long as they are let, and the test of this package, which
+//! states. Two users: the targets in `tests/fuzz`, which search with coverage for as long as they are let, and the test of this package, which
 //! changes golden samples by a seed for a fixed number of times and watches the memory.
 #![forbid(unsafe_code)]
 
