@@ -6,6 +6,7 @@ mod bad_input;
 mod cluster;
 #[cfg(feature = "monitor")]
 mod demo;
+mod documents;
 mod every_test_runs;
 mod failover;
 mod frames;

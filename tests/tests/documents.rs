@@ -1,0 +1,123 @@
+//! The documents hang together: the book has every page, links lead somewhere, and words of the glossary are those of the code.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Files with this ending under `folder`, but for what is built.
+fn files(folder: &Path, ending: &str, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder").flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        if path.is_dir() {
+            let built = name == "target" || name.to_string_lossy().starts_with('.');
+            if !built {
+                files(&path, ending, found);
+            }
+        } else if path.extension().is_some_and(|of| of == ending) {
+            found.push(path);
+        }
+    }
+}
+
+/// Where the links of a page lead, without those to the web and within the page.
+fn links(page: &str) -> Vec<&str> {
+    let outside_code = page
+        .split("```")
+        .step_by(2)
+        .flat_map(|text| text.split("](").skip(1));
+    outside_code
+        .filter_map(|rest| rest.split_once(')'))
+        .map(|(target, _)| target)
+        .filter(|target| !target.contains("://") && !target.starts_with('#'))
+        .collect()
+}
+
+/// The part of an address that a heading is found by.
+fn anchor(heading: &str) -> String {
+    let kept = heading.trim_start_matches('#').trim().to_lowercase();
+    let letters = kept
+        .chars()
+        .filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_'));
+    letters.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+#[test]
+fn every_link_leads_to_something() {
+    let mut pages = Vec::new();
+    files(&root(), "md", &mut pages);
+    assert!(pages.len() > 25, "{pages:?}");
+    let mut broken = Vec::new();
+    for page in &pages {
+        let text = read(page);
+        for link in links(&text) {
+            let (path, part) = link.split_once('#').unwrap_or((link, ""));
+            let target = page.parent().expect("a folder").join(path);
+            let there = target.exists()
+                && (part.is_empty()
+                    || read(&target)
+                        .lines()
+                        .any(|line| line.starts_with('#') && anchor(line) == part));
+            if !there {
+                broken.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn the_book_has_every_page_once() {
+    let docs = root().join("docs");
+    let summary = read(&docs.join("SUMMARY.md"));
+    let mut named = links(&summary);
+    named.sort_unstable();
+    let mut there: Vec<String> = fs::read_dir(&docs)
+        .expect("the documents")
+        .flatten()
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| name.ends_with(".md") && name != "SUMMARY.md")
+        .collect();
+    there.sort_unstable();
+    assert_eq!(named, there);
+}
+
+#[test]
+fn every_picture_is_shown_or_made_for_one_that_is() {
+    let mut pages = Vec::new();
+    files(&root(), "md", &mut pages);
+    let all: String = pages.iter().map(|page| read(page)).collect();
+    let pictures = fs::read_dir(root().join("docs/pictures")).expect("pictures");
+    for name in pictures.flatten().map(|entry| entry.file_name()) {
+        let name = name.to_string_lossy();
+        let is_picture = name.ends_with(".png") || name.ends_with(".svg");
+        assert!(!is_picture || all.contains(&*name), "nobody shows {name}");
+    }
+}
+
+#[test]
+fn words_of_the_glossary_are_those_of_the_code() {
+    let page = read(&root().join("docs/glossary.md"));
+    let mut sources = Vec::new();
+    files(&root(), "rs", &mut sources);
+    let code: String = sources
+        .iter()
+        .filter(|path| !path.ends_with("documents.rs"))
+        .map(|path| read(path))
+        .collect();
+    let mut words = 0;
+    for row in page.lines().filter(|line| line.starts_with("| ")) {
+        let cell = row.split('|').nth(2).unwrap_or_default();
+        for name in cell.split('`').skip(1).step_by(2) {
+            words += 1;
+            assert!(code.contains(name), "{name} is not in the code: {row}");
+        }
+    }
+    assert!(words > 30, "{words}");
+}
