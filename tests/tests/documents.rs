@@ -121,3 +121,22 @@ fn words_of_the_glossary_are_those_of_the_code() {
     }
     assert!(words > 30, "{words}");
 }
+
+#[test]
+fn the_papers_sections_lead_to_files() {
+    let page = read(&root().join("server/method/REFERENCES.md"));
+    let (_, section) = page
+        .split_once("## The paper's sections and our files")
+        .expect("the heading");
+    let section = section.split("\n## ").next().unwrap_or(section);
+    let mut paths = 0;
+    for row in section.lines().filter(|line| line.contains("`src/")) {
+        let cell = row.split('|').nth(2).unwrap_or_default();
+        for path in cell.split('`').skip(1).step_by(2) {
+            paths += 1;
+            let file = root().join("server/method").join(path);
+            assert!(file.exists(), "{path} is not there: {row}");
+        }
+    }
+    assert!(paths > 10, "{paths}");
+}
