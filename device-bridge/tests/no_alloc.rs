@@ -13,7 +13,7 @@ use taut_bridge::{
 };
 use taut_link::DeviceInput;
 use taut_link::proto::constraints::ConstraintRow;
-use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings, EdgeSolver, EdgeSurface};
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings, EdgeSurface};
 use taut_link::proto::{ConstraintSet, EdgeCoupling, InputSample, PoseF64};
 
 /// Two seconds of ticks, with a silence in the middle, damping on, and events on the way.
@@ -162,7 +162,6 @@ fn coupling_at_the_edge_does_not_allocate() {
             implicit_rounds: 2,
             max_advancement_steps: 200,
             work_budget: None,
-            solver: EdgeSolver::ActiveSet,
         },
         set_rate_hz: 1000.0,
         obstacles: vec![surface(0.0), surface(0.3)],

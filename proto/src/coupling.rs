@@ -7,7 +7,7 @@
 
 use crate::{
     DecodeError, EncodeError, PoseF64, Untrusted,
-    codec::{Reader, Wire, Writer, wire_ranged, wire_tag},
+    codec::{Reader, Wire, Writer, wire_ranged},
     range::{
         CAPACITY, COUNT, DEPTH, EXTENT, FRICTION, GAIN, INERTIA, LASTS, LENGTH, MASS, ROUNDS,
         SET_RATE, SIZE, SLOPE, STEPS, STIFFNESS, STRENGTH, UNIT,
@@ -96,8 +96,6 @@ pub struct EdgeSettings {
     pub max_advancement_steps: u32,
     /// Work after which an update starts no further sub-step, us; `None` is no budget.
     pub work_budget: Option<u64>,
-    /// Who solves the projection.
-    pub solver: EdgeSolver,
 }
 
 /// How a violated new row enters.
@@ -131,15 +129,6 @@ pub struct EdgeSine {
     pub amplitude: f64,
 }
 
-/// A solver of the method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EdgeSolver {
-    /// Dual active set.
-    ActiveSet,
-    /// Projected Gauss-Seidel.
-    GaussSeidel,
-}
-
 wire_ranged!(EdgeCoupling {
     mass in MASS,
     inertia in INERTIA,
@@ -171,7 +160,6 @@ wire_ranged!(EdgeSettings {
     implicit_rounds in ROUNDS,
     max_advancement_steps in STEPS,
     work_budget in COUNT,
-    solver,
 });
 wire_ranged!(EdgeAdaptation {
     duration in LASTS,
@@ -187,7 +175,6 @@ wire_ranged!(EdgeSine {
     wavelength in EXTENT,
     amplitude in SLOPE
 });
-wire_tag!(EdgeSolver, "solver" { ActiveSet = 0, GaussSeidel = 1 });
 
 impl Wire for CouplingOffer {
     fn write(&self, to: &mut Writer<'_>) -> Result<(), EncodeError> {

@@ -509,8 +509,6 @@ pub enum SolverChoice {
     ActiveSet,
     /// Interior point: the accuracy reference
     Clarabel,
-    /// Projected Gauss-Seidel, as game engines use it: for comparison
-    Pgs,
 }
 
 impl From<SolverChoice> for god_object::SolverKind {
@@ -518,7 +516,6 @@ impl From<SolverChoice> for god_object::SolverKind {
         match choice {
             SolverChoice::ActiveSet => Self::ActiveSet,
             SolverChoice::Clarabel => Self::Clarabel,
-            SolverChoice::Pgs => Self::ProjectedGaussSeidel,
         }
     }
 }

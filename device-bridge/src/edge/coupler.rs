@@ -154,7 +154,7 @@ pub(crate) mod tests {
     use crate::device::Pose;
     use proto::PoseF64;
     use proto::constraints::{ConstraintRow, SetHead};
-    use proto::coupling::{EdgeSettings, EdgeSolver};
+    use proto::coupling::EdgeSettings;
 
     pub(crate) fn offer() -> EdgeCoupling {
         EdgeCoupling {
@@ -184,7 +184,6 @@ pub(crate) mod tests {
                 implicit_rounds: 0,
                 max_advancement_steps: 200,
                 work_budget: None,
-                solver: EdgeSolver::ActiveSet,
             },
             set_rate_hz: 1000.0,
             obstacles: Vec::new(),

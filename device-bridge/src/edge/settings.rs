@@ -4,7 +4,7 @@
 
 use god_object::{Adaptation, RotationMetric, Settings, SolverKind};
 use taut_link::proto::constraints::MAX_SET_ROWS;
-use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings, EdgeSolver};
+use taut_link::proto::coupling::{EdgeAdaptation, EdgeSettings};
 
 use super::offer::OfferError;
 
@@ -46,6 +46,9 @@ pub(super) fn to_wire(settings: &Settings) -> Result<EdgeSettings, NotAtEdge> {
     if max_constraints > MAX_SET_ROWS {
         return Err(NotAtEdge::TooManyRows);
     }
+    if solver != SolverKind::ActiveSet {
+        return Err(NotAtEdge::Solver); // the others allocate
+    }
     Ok(EdgeSettings {
         k_s,
         k_h,
@@ -79,11 +82,6 @@ pub(super) fn to_wire(settings: &Settings) -> Result<EdgeSettings, NotAtEdge> {
         implicit_rounds,
         max_advancement_steps,
         work_budget,
-        solver: match solver {
-            SolverKind::ActiveSet => EdgeSolver::ActiveSet,
-            SolverKind::ProjectedGaussSeidel => EdgeSolver::GaussSeidel,
-            SolverKind::Clarabel => return Err(NotAtEdge::Solver),
-        },
     })
 }
 
@@ -114,7 +112,6 @@ pub(super) fn from_wire(wire: &EdgeSettings) -> Result<Settings, OfferError> {
         implicit_rounds,
         max_advancement_steps,
         work_budget,
-        solver,
     } = *wire;
     if max_constraints as usize > MAX_SET_ROWS {
         return Err(OfferError::Invalid {
@@ -152,10 +149,7 @@ pub(super) fn from_wire(wire: &EdgeSettings) -> Result<Settings, OfferError> {
         implicit_rounds,
         max_advancement_steps,
         work_budget,
-        solver: match solver {
-            EdgeSolver::ActiveSet => SolverKind::ActiveSet,
-            EdgeSolver::GaussSeidel => SolverKind::ProjectedGaussSeidel,
-        },
+        solver: SolverKind::ActiveSet,
     };
     settings.validate()?;
     Ok(settings)
@@ -195,12 +189,12 @@ mod tests {
             implicit_rounds: 2,
             max_advancement_steps: 123,
             work_budget: Some(45),
-            solver: SolverKind::ProjectedGaussSeidel,
+            solver: SolverKind::ActiveSet,
         };
-        // `Debug` prints a field a line: none is as usual.
+        // `Debug` prints a field a line: none is as usual, but for the one solver that an edge has.
         let (these, those) = (format!("{settings:#?}"), format!("{usual:#?}"));
         let same = |line: &&str| line.ends_with(',') && those.lines().any(|other| other == *line);
-        let same = |line: &&str| same(line) && line.contains(": ");
+        let same = |line: &&str| same(line) && line.contains(": ") && !line.contains("solver: ");
         assert_eq!(these.lines().find(same), None);
         settings
     }
@@ -237,7 +231,6 @@ mod tests {
             rotation_metric: RotationMetric::Inertia,
             adaptation: None,
             work_budget: None,
-            solver: SolverKind::ActiveSet,
             ..unusual()
         };
         for settings in [unusual(), plain, Settings::for_size(0.02)] {

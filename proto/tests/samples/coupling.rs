@@ -2,7 +2,7 @@
 
 use taut_proto::{
     EdgeCoupling, PoseF64,
-    coupling::{EdgeAdaptation, EdgeSettings, EdgeSine, EdgeSolver, EdgeSurface},
+    coupling::{EdgeAdaptation, EdgeSettings, EdgeSine, EdgeSurface},
 };
 
 pub fn coupling() -> EdgeCoupling {
@@ -36,7 +36,6 @@ pub fn coupling() -> EdgeCoupling {
             implicit_rounds: 2,
             max_advancement_steps: 200,
             work_budget: Some(40),
-            solver: EdgeSolver::ActiveSet,
         },
         set_rate_hz: 1000.0,
         obstacles: vec![EdgeSurface {

@@ -116,31 +116,6 @@ fn clarabel_agrees_with_the_active_set() {
 }
 
 #[test]
-fn gauss_seidel_agrees_where_its_residual_says_so() {
-    let metric = hand_sized_metric();
-    let random = &mut Random(14);
-    let mut certified = 0;
-    for case in 0..400 {
-        let family = case % FAMILIES.len();
-        let rows = rows_of(family, 1 + case % 30, case % 2 == 0, random);
-        let a_u = hand_motion(random);
-        let fast = project(SolverKind::ActiveSet, &metric, &a_u, &rows);
-        let relaxed = project(SolverKind::ProjectedGaussSeidel, &metric, &a_u, &rows);
-        assert_eq!(relaxed.producer, SolverKind::ProjectedGaussSeidel);
-        let error = metric.norm(&(fast.acceleration - relaxed.acceleration)) / metric.norm(&a_u);
-        if relaxed.status == ProjectionStatus::Solved {
-            certified += 1;
-            assert!(error <= 1e-6, "{} case {case}: {error:e}", FAMILIES[family]);
-        } else {
-            assert_eq!(relaxed.status, ProjectionStatus::IterationLimit);
-            assert!(relaxed.kkt_residual > 1e-9);
-        }
-    }
-    println!("Gauss-Seidel: {certified} of 400 certified");
-    assert!(certified >= 200, "{certified}");
-}
-
-#[test]
 fn contradicting_walls_are_seen_by_both_exact_solvers() {
     let metric = hand_sized_metric();
     let random = &mut Random(15);

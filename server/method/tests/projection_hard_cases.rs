@@ -11,11 +11,7 @@ use god_object::quasi_statics::{
 use god_object::spatial::Vector6;
 use nalgebra::{Matrix3, Vector3};
 
-const ALL: [SolverKind; 3] = [
-    SolverKind::ActiveSet,
-    SolverKind::Clarabel,
-    SolverKind::ProjectedGaussSeidel,
-];
+const ALL: [SolverKind; 2] = [SolverKind::ActiveSet, SolverKind::Clarabel];
 
 fn floor(bound: f64) -> HalfSpace {
     contact(&Vector3::zeros(), &Vector3::z(), bound)

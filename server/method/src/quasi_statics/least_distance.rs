@@ -165,12 +165,6 @@ impl LeastDistance {
         bound - self.rows.jacobian(row).dot(acceleration)
     }
 
-    /// `h_k - n_k . y`, how deep `y` violates row k.
-    #[inline]
-    pub(crate) fn violation(&self, row: usize, y: &Vector6) -> f64 {
-        self.offset(row) - self.normal(row).dot(y)
-    }
-
     /// `a_u + L^-T y`.
     #[inline]
     fn acceleration(&self, y: &Vector6) -> Vector6 {

@@ -3,7 +3,6 @@
 mod active_set;
 mod certificate;
 mod clarabel;
-mod gauss_seidel;
 mod half_space;
 mod kkt;
 mod lanes;

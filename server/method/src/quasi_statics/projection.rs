@@ -20,8 +20,6 @@ pub enum SolverKind {
     ActiveSet,
     /// Interior point with tight tolerances: the accuracy reference. Allocates.
     Clarabel,
-    /// Projected Gauss-Seidel on the multipliers, as game engines do: for comparison only.
-    ProjectedGaussSeidel,
 }
 
 /// How the projection ended. The acceleration is finite and usable whatever it says.

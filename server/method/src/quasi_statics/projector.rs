@@ -11,7 +11,6 @@
 use super::active_set::{self, ActiveSet, PivotRule};
 use super::certificate::Certificate;
 use super::clarabel::Clarabel;
-use super::gauss_seidel::{self, GaussSeidel};
 use super::half_space::HalfSpace;
 use super::least_distance::{Bounds, LeastDistance};
 use super::metric::Metric;
@@ -31,23 +30,17 @@ pub struct Projector {
     reference_fallback: bool,
     problem: LeastDistance,
     active_set: ActiveSet,
-    gauss_seidel: GaussSeidel,
     clarabel: Clarabel,
 }
 
 impl Projector {
     /// A projector for at most `max_rows` rows by the solver `kind`, without reference fallback.
     pub fn new(kind: SolverKind, max_rows: usize) -> Projector {
-        let relaxed_rows = match kind {
-            SolverKind::ProjectedGaussSeidel => max_rows,
-            SolverKind::ActiveSet | SolverKind::Clarabel => 0,
-        };
         Projector {
             kind,
             reference_fallback: false,
             problem: LeastDistance::with_capacity(max_rows),
             active_set: ActiveSet::new(),
-            gauss_seidel: GaussSeidel::with_capacity(relaxed_rows),
             clarabel: Clarabel::default(),
         }
     }
@@ -64,23 +57,19 @@ impl Projector {
     #[must_use]
     pub fn with_limits(mut self, limits: SolverLimits) -> Projector {
         self.active_set.limits = limits;
-        self.gauss_seidel.limits = limits;
         self.clarabel.limits = Some(limits);
         self
     }
 
-    /// Lets the active set and projected Gauss-Seidel take at most so many steps, and never more than their own limits: bounds the time of a projection
-    /// whatever its rows are. A projection that needs more says [`ProjectionStatus::IterationLimit`].
+    /// Lets the active set take at most so many steps, and never more than its own limit: bounds the time of a projection whatever its rows are. A projection that needs more says [`ProjectionStatus::IterationLimit`].
     pub fn limit_iterations(&mut self, most: u32) {
         self.active_set.limits.max_iterations = most.min(active_set::MAX_ITERATIONS);
-        self.gauss_seidel.limits.max_iterations = most.min(gauss_seidel::MAX_SWEEPS);
     }
 
     /// The acceleration nearest to `unconstrained` in `metric` that satisfies every row.
     ///
     /// `warm_start` holds row indices, best those that carried the last answer; wrong ones cost time and nothing else.
-    /// The solver `ActiveSet` without reference fallback allocates nothing, and neither does `ProjectedGaussSeidel`; both take
-    /// a bounded number of steps. The answer's status says whether it is certified.
+    /// The solver `ActiveSet` without reference fallback allocates nothing and takes a bounded number of steps. The answer's status says whether it is certified.
     pub fn project(
         &mut self,
         metric: &Metric,
@@ -164,9 +153,6 @@ impl Projector {
         let problem = &self.problem;
         match self.kind {
             SolverKind::Clarabel => attempt(&mut self.clarabel, problem, warm_start),
-            SolverKind::ProjectedGaussSeidel => {
-                attempt(&mut self.gauss_seidel, problem, warm_start)
-            }
             SolverKind::ActiveSet => {
                 let solver = self.active_set.with_pivot_rule(PivotRule::MostViolated);
                 let best = attempt(solver, problem, warm_start);

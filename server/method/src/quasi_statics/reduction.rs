@@ -1,6 +1,6 @@
 //! Six rows instead of many: the same force from an independent subset.
 //!
-//! Interior-point and relaxation methods spread a force over all rows that can carry it. Here it is moved onto few rows,
+//! An interior-point method spreads a force over all rows that can carry it. Here it is moved onto few rows,
 //! without changing it and without letting any row pull.
 //!
 //! Source: Caratheodory 1907, for cones; the exchange is the dual step of Goldfarb, Idnani 1983.

@@ -16,9 +16,9 @@ pub(crate) enum Outcome {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverLimits {
     /// What is still violated, changes or gapes when a solver may stop, relative to the problem's scale: a row's violation of the active set,
-    /// the change of a multiplier in a sweep of projected Gauss-Seidel, the duality gap and feasibility of Clarabel.
+    /// the duality gap and feasibility of Clarabel.
     pub tolerance: f64,
-    /// Most rows taken in, sweeps over all rows, or interior-point steps.
+    /// Most rows taken in, or interior-point steps.
     pub max_iterations: u32,
 }
 

@@ -250,10 +250,9 @@ fn limits(section: Section<'_>) -> LimitSpec {
 
 fn method(section: Section<'_>) -> MethodSpec {
     let count = |key| section.integer(key, 1, MAX_COUNT);
-    const SOLVERS: [(&str, SolverKind); 3] = [
+    const SOLVERS: [(&str, SolverKind); 2] = [
         ("active-set", SolverKind::ActiveSet),
         ("clarabel", SolverKind::Clarabel),
-        ("pgs", SolverKind::ProjectedGaussSeidel),
     ];
     let spec = MethodSpec {
         clearance: section.number("clearance", Range::Positive),

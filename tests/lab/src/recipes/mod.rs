@@ -30,6 +30,7 @@ mod thin_plate;
 mod wrong_side;
 
 pub(crate) use bodies::{ball, force, ground};
+pub(crate) use oracles::SolverName;
 pub(crate) use oracles::many_contacts::random_contacts;
 
 use crate::recipe::Recipe;

@@ -1,11 +1,10 @@
 //! The three solvers of the projection by tolerance and by cap of iterations, on random contacts, against the oracle of R38.
 
-use god_object::SolverKind;
 use god_object::quasi_statics::SolverLimits;
 
 use super::{Cost, Point, Runs, Sweep};
 use crate::crew;
-use crate::recipes::{Extent, random_contacts};
+use crate::recipes::{Extent, SolverName, random_contacts};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "solver-limits",
@@ -23,16 +22,11 @@ const CAPS: [u32; 6] = [1, 3, 10, 30, 100, 1000];
 /// No cap.
 const ALL: u32 = 10_000;
 const FINEST: f64 = 1e-13;
-const SOLVERS: [(SolverKind, &str); 3] = [
-    (SolverKind::ActiveSet, "active set"),
-    (SolverKind::Clarabel, "Clarabel"),
-    (SolverKind::ProjectedGaussSeidel, "projected Gauss-Seidel"),
-];
 
 fn run(extent: Extent, threads: usize) -> Vec<Point> {
     let mut tasks = Vec::new();
     for count in COUNTS {
-        for (kind, name) in SOLVERS {
+        for (kind, name) in SolverName::ALL {
             let by_tolerance = TOLERANCES.map(|tolerance| (tolerance, ALL));
             let by_cap = CAPS.map(|cap| (FINEST, cap));
             for (index, (tolerance, cap)) in by_tolerance.into_iter().chain(by_cap).enumerate() {

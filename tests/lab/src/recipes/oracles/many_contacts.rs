@@ -14,12 +14,11 @@
 //!
 //! Source: Lawson and Hanson 1974, chapter 23: least distance programming by non-negative least squares.
 
-use god_object::SolverKind;
 use god_object::Vector6;
-use god_object::quasi_statics::{HalfSpace, Metric, Projector, SolverLimits};
+use god_object::quasi_statics::{HalfSpace, Metric, SolverLimits};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::{Random, contact, for_solvers};
+use super::{Projecting, Random, SolverName, contact, for_solvers};
 use crate::cpu_time::{quantile, thread_us};
 use crate::recipes::Extent;
 use crate::row::Row;
@@ -63,7 +62,7 @@ pub(in crate::recipes) fn run(extent: Extent) -> Vec<Row> {
                 let off = answer.acceleration - expected.acceleration;
                 worst = worst.max(metric.norm(&off) / metric.norm(&wish));
                 doubt = doubt.max(expected.doubt);
-                most_active = most_active.max(answer.active.len());
+                most_active = most_active.max(answer.active_rows);
             }
             let row = solver.row("R38", &format!("{count} contacts"));
             rows.push(
@@ -97,12 +96,12 @@ fn contacts(count: usize, random: &mut Random) -> Vec<HalfSpace> {
 pub(crate) fn random_contacts(
     extent: Extent,
     count: usize,
-    kind: SolverKind,
+    name: SolverName,
     limits: SolverLimits,
 ) -> (f64, f64) {
     let inertia = Matrix3::from_diagonal(&INERTIA);
     let metric = Metric::new(1.0, &inertia).expect("the tensor is positive definite");
-    let mut projector = Projector::new(kind, count).with_limits(limits);
+    let mut projecting = Projecting::new(name, count, Some(limits));
     let mut random = Random(38);
     let mut worst = 0.0_f64;
     let mut times = Vec::new();
@@ -110,7 +109,7 @@ pub(crate) fn random_contacts(
         let set = contacts(count, &mut random);
         let wish = random.wish();
         let before = thread_us();
-        let answer = projector.project(&metric, &wish, &set, &[]);
+        let answer = projecting.project(&metric, &wish, &set);
         times.push(thread_us() - before);
         let off = answer.acceleration - oracle(&inertia, &wish, &set).acceleration;
         worst = worst.max(metric.norm(&off) / metric.norm(&wish));

@@ -4,12 +4,13 @@
 
 pub(super) mod corner;
 pub(super) mod flat_on_flat;
+mod gauss_seidel;
 pub(super) mod groove;
 pub(super) mod many_contacts;
 pub(super) mod near_parallel;
 pub(super) mod one_contact;
 
-use god_object::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
+use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector, SolverLimits};
 use god_object::spatial::six;
 use god_object::{SolverKind, Vector6};
 use nalgebra::{Matrix3, Vector3};
@@ -21,19 +22,91 @@ use crate::row::Row;
 /// k_h of the recipes, 1/s^2.
 pub(super) const K_H: f64 = 2000.0;
 
+/// Who solves the projection: the method's solvers, and the one of game engines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SolverName {
+    Ours(SolverKind),
+    GaussSeidel,
+}
+
+impl SolverName {
+    /// All of them, as a chart names them.
+    pub(crate) const ALL: [(Self, &'static str); 3] = [
+        (Self::Ours(SolverKind::ActiveSet), "active set"),
+        (Self::Ours(SolverKind::Clarabel), "Clarabel"),
+        (Self::GaussSeidel, "projected Gauss-Seidel"),
+    ];
+}
+
+/// What a solver says.
+pub(super) struct Solved {
+    pub(super) acceleration: Vector6,
+    pub(super) active_rows: usize,
+    certified: bool,
+}
+
+/// A solver with its memory and limits.
+pub(super) struct Projecting {
+    /// `None`: projected Gauss-Seidel.
+    projector: Option<Projector>,
+    limits: SolverLimits,
+}
+
+impl Projecting {
+    pub(super) fn new(name: SolverName, max_rows: usize, limits: Option<SolverLimits>) -> Self {
+        let projector = match name {
+            SolverName::Ours(kind) => Some(Projector::new(kind, max_rows)),
+            SolverName::GaussSeidel => None,
+        };
+        Self {
+            projector: match limits {
+                Some(limits) => projector.map(|projector| projector.with_limits(limits)),
+                None => projector,
+            },
+            limits: limits.unwrap_or(gauss_seidel::LIMITS),
+        }
+    }
+
+    pub(super) fn project(
+        &mut self,
+        metric: &Metric,
+        wish: &Vector6,
+        rows: &[HalfSpace],
+    ) -> Solved {
+        match &mut self.projector {
+            Some(projector) => {
+                let answer = projector.project(metric, wish, rows, &[]);
+                Solved {
+                    acceleration: answer.acceleration,
+                    active_rows: answer.active.len(),
+                    certified: answer.status == ProjectionStatus::Solved,
+                }
+            }
+            None => {
+                let answer = gauss_seidel::relax(metric, wish, rows, self.limits);
+                Solved {
+                    acceleration: answer.acceleration,
+                    active_rows: answer.active.len(),
+                    certified: answer.solved,
+                }
+            }
+        }
+    }
+}
+
 /// A solver under test; counts what it does not solve, and takes its times.
 pub(super) struct Solver {
-    kind: SolverKind,
-    projector: Projector,
+    name: SolverName,
+    projecting: Projecting,
     pub(super) unsolved: usize,
     times: Vec<f64>,
 }
 
 impl Solver {
-    fn new(kind: SolverKind) -> Self {
+    fn new(name: SolverName) -> Self {
         Self {
-            kind,
-            projector: Projector::new(kind, 16_384),
+            name,
+            projecting: Projecting::new(name, 16_384, None),
             unsolved: 0,
             times: Vec::new(),
         }
@@ -45,11 +118,11 @@ impl Solver {
         metric: &Metric,
         wish: &Vector6,
         rows: &[HalfSpace],
-    ) -> Projection {
+    ) -> Solved {
         let before = thread_us();
-        let answer = self.projector.project(metric, wish, rows, &[]);
+        let answer = self.projecting.project(metric, wish, rows);
         self.times.push(thread_us() - before);
-        self.unsolved += usize::from(answer.status != ProjectionStatus::Solved);
+        self.unsolved += usize::from(!answer.certified);
         answer
     }
 
@@ -71,10 +144,10 @@ impl Solver {
 
     /// A row of this solver: the active set is that of this project's method.
     pub(super) fn row(&self, recipe: &'static str, case: &str) -> Row {
-        let (method, settings) = match self.kind {
-            SolverKind::ActiveSet => (Method::Ours.name(), "active set"),
-            SolverKind::Clarabel => ("Clarabel", "interior point"),
-            SolverKind::ProjectedGaussSeidel => ("projected Gauss-Seidel", "capped iterations"),
+        let (method, settings) = match self.name {
+            SolverName::Ours(SolverKind::ActiveSet) => (Method::Ours.name(), "active set"),
+            SolverName::Ours(SolverKind::Clarabel) => ("Clarabel", "interior point"),
+            SolverName::GaussSeidel => ("projected Gauss-Seidel", "capped iterations"),
         };
         Row {
             settings: settings.to_owned(),
@@ -87,12 +160,8 @@ impl Solver {
 /// Runs an oracle for every solver, and says of the methods why they are not run.
 pub(super) fn for_solvers(recipe: &'static str, run: impl Fn(&mut Solver) -> Vec<Row>) -> Vec<Row> {
     let mut rows = Vec::new();
-    for kind in [
-        SolverKind::ActiveSet,
-        SolverKind::Clarabel,
-        SolverKind::ProjectedGaussSeidel,
-    ] {
-        let mut solver = Solver::new(kind);
+    for (name, _) in SolverName::ALL {
+        let mut solver = Solver::new(name);
         rows.extend(run(&mut solver));
         let case = "all answers certified";
         rows.push(solver.row(recipe, case).never("unsolved", solver.unsolved));
