@@ -113,6 +113,8 @@ pub enum Command {
     Track(TrackArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
+    /// Makes an archive for each machine of a workbench: its configuration, key, services, firewall, and a script that installs them
+    Deploy(DeployArgs),
     /// Prints completions for a shell
     #[command(
         after_help = "Example: taut completions bash > /usr/share/bash-completion/completions/taut"
@@ -423,6 +425,29 @@ pub struct KeysArgs {
     /// Instead, say what this key file allows and its fingerprint
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "master"])]
     pub show: Option<PathBuf>,
+}
+
+/// `taut deploy`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example: taut deploy workbench.toml --master cluster.key --out deploy\n\nThe machines are those of [[machine]] in the workbench file. The same files make the same archives; one that is there and differs is not replaced without --force."
+)]
+pub struct DeployArgs {
+    /// The workbench file
+    #[arg(value_name = "WORKBENCH.toml")]
+    pub config: PathBuf,
+    /// The folder of the archives, made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The cluster key (default: `key_file` of the workbench file)
+    #[arg(long, value_name = "FILE")]
+    pub master: Option<PathBuf>,
+    /// Which issue of the credentials: a later one stays good when an earlier one is revoked
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub issue: u16,
+    /// Replace archives that are there and differ
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// `taut completions`.

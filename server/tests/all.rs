@@ -5,6 +5,8 @@ use assert_no_alloc::AllocDisabler;
 
 mod blocked_terminal;
 mod cli;
+#[cfg(unix)]
+mod deploy;
 mod edge_coupling;
 mod loops;
 mod moving_obstacle;

@@ -5,6 +5,7 @@
 pub mod arguments;
 pub mod arm;
 mod demo;
+mod deploy;
 mod doctor;
 mod finished_file;
 mod import;
@@ -81,6 +82,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),
+        Command::Deploy(args) => print(deploy::run(&args)?).map(|()| ExitCode::SUCCESS),
         Command::Completions(args) => {
             print(manual::completions(args.shell)?).map(|()| ExitCode::SUCCESS)
         }
