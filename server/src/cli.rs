@@ -61,6 +61,7 @@ pub const FIRST_STEPS: &str = "taut: six-degree-of-freedom god-object haptics fo
 
   taut demo                          the whole workbench on this machine, with a simulated device and hand
   taut doctor                        what this machine lacks for real time and for rendering
+  taut setup                         asks what your workbench is made of; then `taut deploy` for its machines
   taut serve --config workbench.toml the haptic PC; then `taut render` on each screen's PC
 
 taut --help lists all commands, taut COMMAND --help shows each with an example.
@@ -113,6 +114,8 @@ pub enum Command {
     Track(TrackArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
+    /// Asks what a workbench is made of, and writes its file
+    Setup(SetupArgs),
     /// Makes an archive for each machine of a workbench: its configuration, key, services, firewall, and a script that installs them
     Deploy(DeployArgs),
     /// Prints completions for a shell
@@ -427,6 +430,20 @@ pub struct KeysArgs {
     pub show: Option<PathBuf>,
 }
 
+/// `taut setup`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Examples:\n  taut setup\n  taut setup --yes --out workbench.toml\n\nOne line answers one question; an empty one takes the default. Answers may come through a pipe."
+)]
+pub struct SetupArgs {
+    /// The file to write; one that is there is refused
+    #[arg(long, value_name = "FILE", default_value = "workbench.toml")]
+    pub out: PathBuf,
+    /// Take every default, and ask nothing
+    #[arg(long)]
+    pub yes: bool,
+}
+
 /// `taut deploy`.
 #[derive(Clone, Debug, Args)]
 #[command(
@@ -652,7 +669,7 @@ mod tests {
             assert!(Cli::try_parse_from(&command).is_ok(), "{command:?}");
             count += 1;
         }
-        assert_eq!(count, 3);
+        assert_eq!(count, 4);
     }
 
     #[test]

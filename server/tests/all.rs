@@ -25,6 +25,7 @@ mod relay;
 mod replay;
 mod scheduling;
 mod session;
+mod setup;
 mod support;
 mod tracked_head;
 

@@ -1,6 +1,7 @@
 //! `taut deploy`: what is in each machine's archive, and that what is in them works together.
 
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -272,21 +273,36 @@ fn processes_of_two_archives_join_each_other() {
     let place = prepared();
     assert_eq!(deploy(&place, &[]).0, Some(0));
     let (haptic, device) = (unpacked(&place, "haptic-pc"), unpacked(&place, "device-pc"));
-    let serve = command(&haptic, "taut-serve.service");
     let mut bridge = command(&device, "taut-bridge.service");
-    bridge.extend(["--duration", "2", "--json"].map(str::to_owned));
+    bridge.push("--json".to_owned());
     // The service waits for its server, whichever machine starts first.
-    let mut joining = Running(start(&bridge));
-    let _server = Running(start(&serve));
+    let mut bridge = Running(start(&bridge));
+    let mut server = Running(start(&command(&haptic, "taut-serve.service")));
+    let said = BufReader::new(server.0.stderr.take().expect("piped")).lines();
+    let joined = said
+        .map_while(Result::ok)
+        .find(|line| line.contains("bridge joined as"));
+    assert!(joined.is_some(), "the server ended");
+    std::thread::sleep(Duration::from_millis(500));
+    interrupt(&bridge.0);
     let begun = Instant::now();
-    while joining.0.try_wait().expect("a child").is_none() {
+    while bridge.0.try_wait().expect("a child").is_none() {
         assert!(begun.elapsed() < PATIENCE, "the bridge does not end");
         std::thread::sleep(Duration::from_millis(50));
     }
     let mut report = String::new();
-    let mut out = joining.0.stdout.take().expect("piped");
-    std::io::Read::read_to_string(&mut out, &mut report).expect("text");
+    let mut out = bridge.0.stdout.take().expect("piped");
+    out.read_to_string(&mut report).expect("text");
     let report: serde_json::Value = serde_json::from_str(&report).expect("a report");
     assert_eq!(report["sessions"], 1, "{report}");
     assert!(report["packets_received"].as_u64() > Some(0), "{report}");
+}
+
+/// Ctrl-C.
+fn interrupt(child: &Child) {
+    let pid = child.id().to_string();
+    let sent = std::process::Command::new("kill")
+        .args(["-INT", &pid])
+        .status();
+    assert!(sent.is_ok_and(|status| status.success()));
 }

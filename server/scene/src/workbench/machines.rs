@@ -54,13 +54,16 @@ fn machine(section: &Section<'_>, others: &[Machine]) -> Option<Machine> {
     Some(machine)
 }
 
-/// Letters, digits and a few signs: the name is a file's, and needs no quotes in a shell.
-fn plain_name(section: &Section<'_>, name: String) -> Option<String> {
+/// Whether a machine may be called so: the name is a file's, and needs no quotes in a shell.
+pub fn is_machine_name(name: &str) -> bool {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if name.len() <= MAX_NAME
+    name.len() <= MAX_NAME
         && name.starts_with(|c: char| c.is_ascii_alphanumeric())
         && name.chars().all(is_plain)
-    {
+}
+
+fn plain_name(section: &Section<'_>, name: String) -> Option<String> {
+    if is_machine_name(&name) {
         return Some(name);
     }
     complain(
@@ -201,9 +204,9 @@ fn complain_of_all(root: &Section<'_>, machines: &[Machine], named: &Named<'_>) 
     }
     let server = machines.iter().find(|machine| machine.server);
     if let (Some(server), Some(network)) = (server, named.network) {
-        if machines.len() > 1 && !network.bind.is_unspecified() && network.bind != server.address {
+        if !network.bind.is_unspecified() && network.bind != server.address {
             complain(format!(
-                "the other machines reach {} at {}, but it listens at {} alone; write bind = \"0.0.0.0\" in [network]",
+                "clients reach {} at {}, but it listens at {} alone; write bind = \"0.0.0.0\" in [network]",
                 server.name, server.address, network.bind
             ));
         }

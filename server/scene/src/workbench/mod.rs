@@ -28,6 +28,7 @@ pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
+pub use machines::is_machine_name;
 pub use needed_files::NeededFile;
 pub use operator::Operator;
 pub use spec::{

@@ -34,8 +34,14 @@ impl Scripts<'_> {
     }
 
     fn begin(&self, what: &str, usage: &str) -> String {
+        let account = match self.has(true) {
+            true => {
+                "# ACCOUNT is the one whose graphical session draws the screens; without it, the one that calls sudo.\n"
+            }
+            false => "",
+        };
         format!(
-            "#!/bin/sh\n# {what} {} of the workbench {:?}. Run it as root: {usage}\nset -eu\n",
+            "#!/bin/sh\n# {what} {} of the workbench {:?}; a second time does no harm. Run it as root: {usage}\n{account}set -eu\n",
             self.machine.name, self.workbench
         )
     }
@@ -49,9 +55,6 @@ impl Scripts<'_> {
             "sudo ./install"
         };
         let mut text = self.begin("Sets up", usage);
-        if session {
-            text.push_str("# ACCOUNT is the one whose graphical session draws the screens; without it, the one that calls sudo.\n");
-        }
         text.push_str("cd \"$(dirname \"$0\")\"\nfail() { echo \"install: $*\" >&2; exit 1; }\n");
         let _ = writeln!(
             text,
@@ -135,7 +138,7 @@ impl Scripts<'_> {
                 "account=${{1:-${{SUDO_USER:-}}}}\n\
                  [ -n \"$account\" ] || {{ echo \"uninstall: say whose session draws: ./uninstall ACCOUNT\" >&2; exit 1; }}\n\
                  if [ -d \"/run/user/$(id -u \"$account\")/systemd\" ]; then systemctl --user -M \"$account@\" stop {units} || true; fi\n\
-                 su -l -s /bin/sh \"$account\" -c 'SYSTEMD_OFFLINE=1 systemctl --user disable {units}'\n"
+                 su -l -s /bin/sh \"$account\" -c 'SYSTEMD_OFFLINE=1 systemctl --user disable {units}' || true # not there: nothing to do\n"
             );
             for unit in self.units.iter().filter(|unit| unit.is_session) {
                 let _ = writeln!(text, "rm -f /etc/systemd/user/{}", unit.name);
@@ -146,7 +149,7 @@ impl Scripts<'_> {
             let _ = write!(
                 text,
                 "if [ -d /run/systemd/system ]; then systemctl stop {units}; fi\n\
-                 systemctl disable {units}\n"
+                 systemctl disable {units} || true # not there: nothing to do\n"
             );
             for unit in self.units.iter().filter(|unit| !unit.is_session) {
                 let _ = writeln!(text, "rm -f /etc/systemd/system/{}", unit.name);
