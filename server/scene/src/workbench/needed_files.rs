@@ -51,6 +51,9 @@ impl Workbench {
         if self.observers.enabled {
             files.extend(self.observers.token_file.clone().map(NeededFile::Secret));
         }
+        if self.operator.enabled {
+            files.extend(self.operator.token_file.clone().map(NeededFile::Secret));
+        }
         let also = self.network.also_key.as_ref();
         files.extend(also.map(|key| NeededFile::Secret(key.file.clone())));
         Ok(files)

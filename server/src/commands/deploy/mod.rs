@@ -17,6 +17,7 @@ use zeroize::Zeroizing;
 
 use archive::{File, Mode, pack};
 use scripts::Scripts;
+pub(super) use units::reached_by_a_service;
 use units::{Unit, units};
 
 use super::keys::{NamedCredential, credentials, file_name};
@@ -190,6 +191,7 @@ impl Plan<'_> {
             }
         }
         self.writes_where_it_may()?;
+        self.operator_has_a_token()?;
         Ok(files)
     }
 
@@ -207,6 +209,18 @@ impl Plan<'_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// A service has no terminal on which it could show a fresh token.
+    fn operator_has_a_token(&self) -> Result<(), Failure> {
+        let operator = &self.workbench.operator;
+        if operator.enabled && operator.token_file.is_none() {
+            return Err(Failure::BadInput(format!(
+                "[operator] of {} names no token_file, without which the service does not start; make one beside it: openssl rand -hex 32 > operator.token && chmod 600 operator.token",
+                self.config.display()
+            )));
+        }
+        Ok(())
     }
 }
 

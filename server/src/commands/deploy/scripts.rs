@@ -34,16 +34,16 @@ impl Scripts<'_> {
     }
 
     fn begin(&self, what: &str, usage: &str) -> String {
-        let account = match self.has(true) {
-            true => {
-                "# ACCOUNT is the one whose graphical session draws the screens; without it, the one that calls sudo.\n"
-            }
-            false => "",
-        };
         format!(
-            "#!/bin/sh\n# {what} {} of the workbench {:?}; a second time does no harm. Run it as root: {usage}\n{account}set -eu\n",
+            "#!/bin/sh\n# {what} {} of the workbench {:?}; a second time does no harm. Run it as root: {usage}\n",
             self.machine.name, self.workbench
         )
+    }
+
+    /// The session's credential on the machine: its owner is the account that draws.
+    fn key_of_session(&self) -> Option<String> {
+        let mut keys = self.files.iter().filter(|file| is_of_session(&file.path));
+        keys.next().map(installed)
     }
 
     /// Sets the machine up; a second time does no harm.
@@ -55,7 +55,12 @@ impl Scripts<'_> {
             "sudo ./install"
         };
         let mut text = self.begin("Sets up", usage);
-        text.push_str("cd \"$(dirname \"$0\")\"\nfail() { echo \"install: $*\" >&2; exit 1; }\n");
+        if session {
+            text.push_str("# ACCOUNT is the one whose graphical session draws the screens; without it, the one that calls sudo.\n");
+        }
+        text.push_str(
+            "set -eu\ncd \"$(dirname \"$0\")\"\nfail() { echo \"install: $*\" >&2; exit 1; }\n",
+        );
         let _ = writeln!(
             text,
             "[ \"$(id -u)\" = 0 ] || fail \"run it as root: {usage}\""
@@ -68,16 +73,12 @@ impl Scripts<'_> {
                  id \"$account\" >/dev/null 2>&1 || fail \"there is no account $account here\"\n",
             );
         }
+        text.push_str("\n# What an earlier archive set up goes first: this one may not have it.\nif [ -x /etc/taut/uninstall ]; then /etc/taut/uninstall >/dev/null; fi\n");
         if self.has(false) {
             text.push_str("\n# The account taut, which runs the services.\nsystemd-sysusers \"$PWD/taut.sysusers\"\n");
         }
-        text.push_str("\n# Configuration; a secret belongs to the account that reads it.\ninstall -d -m 0755 /etc/taut\n");
+        text.push_str("\n# Configuration; a secret belongs to the account that reads it.\ninstall -d -m 0755 /etc/taut\ninstall -m 0755 uninstall /etc/taut/uninstall\n");
         for file in self.files {
-            let path = file
-                .path
-                .strip_prefix("etc")
-                .unwrap_or(&file.path)
-                .display();
             let owner = match (file.mode, is_of_session(&file.path)) {
                 (Mode::Secret, true) => " -o \"$account\"",
                 (Mode::Secret, false) => " -o taut -g taut",
@@ -88,9 +89,14 @@ impl Scripts<'_> {
                 "install -D -m {:04o}{owner} {} {}",
                 file.mode.bits(),
                 word(&file.path.display().to_string()),
-                word(&format!("/etc/taut/{path}")),
+                installed(file),
             );
         }
+        self.install_services(&mut text);
+        text
+    }
+
+    fn install_services(&self, text: &mut String) {
         text.push_str("\n# Services.\n");
         if self.has(false) {
             let units = self.names(false);
@@ -101,7 +107,7 @@ impl Scripts<'_> {
                  if [ -d /run/systemd/system ]; then systemctl daemon-reload; systemctl restart {units}; fi\n"
             );
         }
-        if session {
+        if self.has(true) {
             let units = self.names(true);
             let _ = write!(
                 text,
@@ -114,31 +120,26 @@ impl Scripts<'_> {
         if self.has_firewall {
             text.push_str("echo \"if this machine has a firewall: nft -f /etc/taut/firewall.nft, for good as its first lines say\"\n");
         }
-        text
     }
 
-    /// Takes away what `install` put there.
+    /// Takes away what `install` put there; `install` keeps it as `/etc/taut/uninstall`.
     pub(super) fn uninstall(&self) -> String {
-        let session = self.has(true);
-        let usage = if session {
-            "sudo ./uninstall [ACCOUNT]"
-        } else {
-            "sudo ./uninstall"
-        };
+        let usage = "sudo /etc/taut/uninstall";
         let mut text = self.begin("Takes taut away from", usage);
-        text.push_str("# The program, the account taut and what was recorded stay.\n");
+        text.push_str("# The program, the account taut and what was recorded stay.\nset -eu\n");
         let _ = writeln!(
             text,
             "[ \"$(id -u)\" = 0 ] || {{ echo \"uninstall: run it as root: {usage}\" >&2; exit 1; }}"
         );
-        if session {
+        if let Some(key) = self.key_of_session() {
             let units = self.names(true);
             let _ = write!(
                 text,
-                "account=${{1:-${{SUDO_USER:-}}}}\n\
-                 [ -n \"$account\" ] || {{ echo \"uninstall: say whose session draws: ./uninstall ACCOUNT\" >&2; exit 1; }}\n\
-                 if [ -d \"/run/user/$(id -u \"$account\")/systemd\" ]; then systemctl --user -M \"$account@\" stop {units} || true; fi\n\
-                 su -l -s /bin/sh \"$account\" -c 'SYSTEMD_OFFLINE=1 systemctl --user disable {units}' || true # not there: nothing to do\n"
+                "account=$(stat -c %U {key} 2>/dev/null || true) # whose session draws; none: nothing to do\n\
+                 if [ -n \"$account\" ]; then\n\
+                 \x20 if [ -d \"/run/user/$(id -u \"$account\")/systemd\" ]; then systemctl --user -M \"$account@\" stop {units} || true; fi\n\
+                 \x20 su -l -s /bin/sh \"$account\" -c 'SYSTEMD_OFFLINE=1 systemctl --user disable {units}' || true\n\
+                 fi\n"
             );
             for unit in self.units.iter().filter(|unit| unit.is_session) {
                 let _ = writeln!(text, "rm -f /etc/systemd/user/{}", unit.name);
@@ -148,7 +149,7 @@ impl Scripts<'_> {
             let units = self.names(false);
             let _ = write!(
                 text,
-                "if [ -d /run/systemd/system ]; then systemctl stop {units}; fi\n\
+                "if [ -d /run/systemd/system ]; then systemctl stop {units} || true; fi\n\
                  systemctl disable {units} || true # not there: nothing to do\n"
             );
             for unit in self.units.iter().filter(|unit| !unit.is_session) {
@@ -157,19 +158,20 @@ impl Scripts<'_> {
             text.push_str("if [ -d /run/systemd/system ]; then systemctl daemon-reload; fi\n");
         }
         for file in self.files {
-            let path = file
-                .path
-                .strip_prefix("etc")
-                .unwrap_or(&file.path)
-                .display();
-            let _ = writeln!(text, "rm -f {}", word(&format!("/etc/taut/{path}")));
+            let _ = writeln!(text, "rm -f {}", installed(file));
         }
-        text.push_str("# Folders that are empty now.\nfind /etc/taut -depth -type d -empty -delete 2>/dev/null || true\n");
+        text.push_str("rm -f /etc/taut/uninstall\n# Folders that are empty now.\nfind /etc/taut -depth -type d -empty -delete 2>/dev/null || true\n");
         if self.has_firewall {
             text.push_str("echo \"if its rules were loaded or included in /etc/nftables.conf, take them out there: nft -a list chain inet filter input\"\n");
         }
         text
     }
+}
+
+/// Where a file of the archive is on the machine, as a word of a shell command.
+fn installed(file: &File) -> String {
+    let path = file.path.strip_prefix("etc").unwrap_or(&file.path);
+    word(&format!("/etc/taut/{}", path.display()))
 }
 
 /// A render node's credential is read by the account that draws, everything else by `taut`.

@@ -81,7 +81,13 @@ pub(super) fn units(
         units.push(Unit {
             name: format!("taut-{key}.service"),
             is_session: true,
-            text: filled(RENDER, machine, &command, &[]).replace("%i", &file_name(node)),
+            // Before the command is in it: a node may have `%i` in its name.
+            text: filled(
+                &RENDER.replace("%i", &file_name(node)),
+                machine,
+                &command,
+                &[],
+            ),
         });
     }
     Ok(units)
@@ -147,27 +153,26 @@ fn filled(unit: &str, machine: &Machine, command: &str, more: &[String]) -> Stri
     text
 }
 
-/// What the unit of the bridge must be allowed, so that it reaches its device.
 fn reached_by(device: &str, machine: &Machine) -> Result<Vec<String>, Failure> {
-    let refuse = |why: &str| {
+    reached_by_a_service(device).map_err(|why| {
         Failure::BadInput(format!(
             "the device of {} is \"{device}\": {why}",
             machine.name
         ))
-    };
+    })
+}
+
+/// What the unit of the bridge must be allowed, so that it reaches this device; or why a service cannot have it.
+pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<String>, String> {
     let choice = device
         .parse::<DeviceChoice>()
-        .map_err(|error| refuse(&error.to_string()))?;
+        .map_err(|error| error.to_string())?;
     let lines: &[&str] = match &choice {
         DeviceChoice::Mouse => {
-            return Err(refuse(
-                "that is a render window's; run `taut render --hold` there by hand",
-            ));
+            return Err("that is a render window's; run `taut render --hold` there by hand".into());
         }
         DeviceChoice::Trace(path) if !path.is_absolute() => {
-            return Err(refuse(
-                "a service finds a file by its whole path; begin it with /",
-            ));
+            return Err("a service finds a file by its whole path; begin it with /".into());
         }
         DeviceChoice::Input(InputChoice::Spidar(_) | InputChoice::Polhem(_)) => {
             let port = device.split([':', ',']).nth(1).unwrap_or_default();

@@ -8,13 +8,13 @@ use std::io::{BufRead, Write};
 use std::net::IpAddr;
 use std::path::Path;
 
-use taut_bridge::DeviceChoice;
 use taut_scene::{Stereo, Workbench};
 
 use file::{Answers, Pc, Place, Wall};
 use found::Found;
 use questions::Questions;
 
+use super::deploy::reached_by_a_service;
 use crate::cli::SetupArgs;
 use crate::shared::failure::Failure;
 
@@ -45,9 +45,17 @@ pub(super) fn run(
         std::io::ErrorKind::AlreadyExists => in_the_way(out),
         _ => Failure::BadInput(format!("{}: {error}; choose another --out", out.display())),
     })?;
-    file.write_all(text.as_bytes()).map_err(|error| {
-        Failure::Failed(format!("{}: {error}; check the free space", out.display()))
-    })?;
+    if let Err(error) = file
+        .write_all(text.as_bytes())
+        .and_then(|()| file.sync_all())
+    {
+        // Half a workbench is none; it was made here, just now.
+        let _ = std::fs::remove_file(out);
+        return Err(Failure::Failed(format!(
+            "{}: {error}; check the free space",
+            out.display()
+        )));
+    }
     Ok(format!(
         "{0} is written; measure the corners of your screens and mend them there, then: taut check {0} && taut keys --out cluster.key && taut deploy {0} --master cluster.key --out deploy",
         out.display()
@@ -71,11 +79,11 @@ fn ask(
         "my workbench",
         |_| Ok(()),
     )?;
-    let screens = questions.number(
+    let screens = questions.count(
         "number of screens",
         "flat ones: front wall, table, left wall, right wall, in this order",
-        2.0,
-        (1.0, MAX_SCREENS as f64),
+        2,
+        MAX_SCREENS,
     )?;
     let server = Pc {
         name: questions.text(
@@ -88,7 +96,7 @@ fn ask(
     };
     let mut walls: Vec<Wall> = Vec::new();
     let mut pcs: Vec<Pc> = vec![server];
-    for place in Place::ALL.into_iter().take(screens as usize) {
+    for place in Place::ALL.into_iter().take(screens) {
         let screen = place.name();
         let (width, height) = place.size();
         let width = questions.number(
@@ -124,11 +132,7 @@ fn ask(
         "the haptic device",
         "as `taut bridge --help` lists them; a simulated one needs nothing and pushes nobody",
         found.device.as_deref().unwrap_or("simulated"),
-        |text| {
-            text.parse::<DeviceChoice>()
-                .map(|_| ())
-                .map_err(|error| error.to_string())
-        },
+        |text| reached_by_a_service(text).map(|_| ()),
     )?;
     Ok(Answers {
         name,

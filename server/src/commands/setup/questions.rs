@@ -76,6 +76,24 @@ impl<R: BufRead, W: Write> Questions<R, W> {
         read(&text).map_err(Failure::BadInput)
     }
 
+    /// A whole number from 1 on.
+    pub(super) fn count(
+        &mut self,
+        what: &str,
+        explained: &str,
+        default: usize,
+        most: usize,
+    ) -> Result<usize, Failure> {
+        let read = |text: &str| match text.parse::<usize>() {
+            Ok(count) if (1..=most).contains(&count) => Ok(count),
+            _ => Err(format!("write a whole number from 1 to {most}")),
+        };
+        let text = self.text(what, explained, &default.to_string(), |text| {
+            read(text).map(|_| ())
+        })?;
+        read(&text).map_err(Failure::BadInput)
+    }
+
     fn line(&mut self, what: &str) -> Result<String, Failure> {
         let mut line = String::new();
         let read = (&mut self.input).take(MAX_ANSWER).read_line(&mut line);
@@ -83,6 +101,12 @@ impl<R: BufRead, W: Write> Questions<R, W> {
             Ok(0) => Err(Failure::BadInput(format!(
                 "the answers ended before \"{what}\"; give one line for each question, empty for its default, or --yes"
             ))),
+            // What is left of it would answer the next question.
+            Ok(read) if read as u64 == MAX_ANSWER && !line.ends_with('\n') => {
+                Err(Failure::BadInput(format!(
+                    "the answer to \"{what}\" has more than {MAX_ANSWER} bytes; give a shorter one"
+                )))
+            }
             Ok(_) => Ok(line.trim().to_owned()),
             Err(error) => Err(Failure::BadInput(format!(
                 "the answer to \"{what}\" cannot be read: {error}"
