@@ -119,3 +119,50 @@ fn answers_that_end_early_leave_no_file() {
     );
     assert!(!place.path("mine.toml").exists());
 }
+
+/// The answers up to the number of screens; what follows is the test's.
+const BEGUN: &str = "mine\n";
+
+#[test]
+fn an_answer_that_would_make_another_workbench_is_asked_for_again() {
+    let place = Workplace::new();
+    let rest = "haptics\n10.1.2.3\n\n\n\n\nmono\nmouse\ntrace:hand.csv\nsimulated\n";
+    let output = answered(&place, &format!("{BEGUN}2.5\n0\n1\n{rest}"));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{output:?}");
+    for part in [
+        "\"2.5\" does not do: write a whole number from 1 to 4",
+        "\"0\" does not do",
+        "\"mouse\" does not do: that is a render window's",
+        "\"trace:hand.csv\" does not do: a service finds a file by its whole path",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    assert_eq!(loaded(&place).screens.len(), 1);
+}
+
+#[test]
+fn wrong_answers_without_end_long_ones_and_a_place_that_cannot_be_written_leave_no_file() {
+    let place = Workplace::new();
+    let endless = format!("{BEGUN}{}", "many\n".repeat(100));
+    let long = format!("{BEGUN}{}\n", "1".repeat(5000));
+    for (answers, part) in [(endless, "5 answers did not do"), (long, "4096 bytes")] {
+        let output = answered(&place, &answers);
+        assert_eq!(output.status.code(), Some(2));
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            error.contains(part) && error.contains("number of screens"),
+            "{error}"
+        );
+        assert!(!place.path("mine.toml").exists());
+    }
+    place.write("file", "");
+    let below = place.text("file/mine.toml");
+    let output = taut(&["setup", "--yes", "--out", &below]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        error.contains(&below) && error.contains("another --out"),
+        "{error}"
+    );
+}
