@@ -333,6 +333,28 @@ fn a_folder_that_cannot_be_had_is_named_and_nothing_is_half_written() {
     assert_eq!(fs::read(place.path("a-file")).expect("there"), b"mine");
 }
 
+#[test]
+fn the_archive_of_a_machine_that_is_gone_is_named() {
+    let place = prepared();
+    let (code, said) = deploy(&place, &[]);
+    assert!(code == Some(0) && !said.contains("remove it"), "{said}");
+    let renamed = workbench_text(&place).replace("\"right\"", "\"table-pc\"");
+    place.write("workbench.toml", &renamed);
+    let (code, said) = deploy(&place, &["--force"]);
+    assert_eq!(code, Some(0), "{said}");
+    let gone = place.text("out/taut-right.tar.gz");
+    let named = said.lines().filter(|line| line.contains("remove it"));
+    let named: Vec<&str> = named.collect();
+    assert!(
+        matches!(named[..], [line] if line.starts_with(&gone)),
+        "{said}"
+    );
+}
+
+fn workbench_text(place: &Workplace) -> String {
+    fs::read_to_string(place.path("workbench.toml")).expect("written")
+}
+
 /// A folder that others may look into does not open the archives to them.
 #[test]
 fn archives_are_readable_by_their_owner_alone() {

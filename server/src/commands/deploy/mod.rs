@@ -278,6 +278,13 @@ fn report(
     if !changed {
         text.push_str("nothing was changed: these archives were there already\n");
     }
+    for stray in output::strays(out, archives) {
+        let _ = writeln!(
+            text,
+            "{} is of no machine of this workbench; a credential may be in it: remove it",
+            stray.display()
+        );
+    }
     text.push_str("copy each to its machine and to no other; there: tar xzf ARCHIVE, then `install` in the folder it makes");
     text
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
@@ -55,8 +55,27 @@ pub(super) fn write(folder: &Path, archives: &[Archive], force: bool) -> Result<
     written.map(|()| true)
 }
 
+/// Archives in the folder that none of these machines has: of one that was renamed or is gone.
+pub(super) fn strays(folder: &Path, archives: &[Archive]) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return Vec::new();
+    };
+    let is_stray = |name: &str| {
+        name.starts_with("taut-")
+            && name.ends_with(".tar.gz")
+            && archives.iter().all(|archive| archive.name != name)
+    };
+    let mut strays: Vec<PathBuf> = entries
+        .flatten()
+        .filter(|entry| entry.file_name().to_str().is_some_and(is_stray))
+        .map(|entry| entry.path())
+        .collect();
+    strays.sort();
+    strays
+}
+
 /// All under other names first, which vanish by themselves if one fails; readable by this account alone, as secrets are in them.
-fn write_all(folder: &Path, wanted: &[(std::path::PathBuf, &Archive)]) -> Result<(), Failure> {
+fn write_all(folder: &Path, wanted: &[(PathBuf, &Archive)]) -> Result<(), Failure> {
     let fail = |error: std::io::Error| {
         Failure::Failed(format!(
             "{}: {error}; check its permissions and the free space",
