@@ -24,6 +24,10 @@ const TEENSY: u16 = 0x16c0;
 /// The system does not say, in words for people.
 #[cfg(unix)]
 pub fn plugged_ports() -> Result<Vec<PluggedPort>, String> {
+    // serialport panics without it, as in a container.
+    if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").exists() {
+        return Err("/sys/class/tty is not there; mount /sys, where serial ports are".to_owned());
+    }
     let ports = serialport::available_ports().map_err(|error| error.to_string())?;
     let on_usb = ports.into_iter().filter_map(|port| {
         let serialport::SerialPortType::UsbPort(usb) = port.port_type else {

@@ -53,7 +53,7 @@ pub struct Quantiles {
 }
 
 /// The end report of `taut bridge`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BridgeReport {
     /// Name of the device.
     pub device: String,
@@ -114,8 +114,55 @@ pub struct BridgeReport {
     pub realtime: Vec<String>,
 }
 
+/// Share of missed periods from which the verdict names them: a hand feels one late tick in a thousand as nothing.
+const NOTABLE_MISSES: f64 = 1e-3;
+
+impl BridgeReport {
+    /// In one line: whether the device was served as it should be, or what was not.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        let missed = self.missed_periods as f64 / (self.ticks + self.missed_periods).max(1) as f64;
+        let faults: Vec<String> = [
+            (self.ticks == 0, "the device loop never ran".to_owned()),
+            (
+                missed > NOTABLE_MISSES,
+                format!(
+                    "the device loop missed {:.1} % of its periods (`taut doctor` says what the machine lacks)",
+                    100.0 * missed
+                ),
+            ),
+            (
+                self.faulty_ticks > 0,
+                format!("the device had no pose on {} ticks", self.faulty_ticks),
+            ),
+            (
+                self.broken_sets > 0,
+                format!("{} constraint sets made no sense", self.broken_sets),
+            ),
+            (
+                self.sessions > 1,
+                format!("the server was lost or stopped {} times", self.sessions - 1),
+            ),
+            (
+                self.safety_events > 0,
+                format!("{} safety events, in the log", self.safety_events),
+            ),
+        ]
+        .into_iter()
+        .filter_map(|(is_fault, what)| is_fault.then_some(what))
+        .collect();
+        if faults.is_empty() {
+            "verdict: good, periods kept, device and server always there, no safety event"
+                .to_owned()
+        } else {
+            format!("verdict: look at this: {}", faults.join("; "))
+        }
+    }
+}
+
 impl fmt::Display for BridgeReport {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(out, "{}", self.verdict())?;
         writeln!(out, "{} at {}: {}", self.device, self.server, self.ended)?;
         writeln!(
             out,
@@ -165,5 +212,33 @@ impl fmt::Display for BridgeReport {
         self.realtime
             .iter()
             .try_for_each(|grant| writeln!(out, "{grant}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_comes_first_and_names_what_was_wrong() {
+        let mut report = BridgeReport {
+            ticks: 10_000,
+            missed_periods: 5,
+            sessions: 1,
+            ..BridgeReport::default()
+        };
+        assert!(report.verdict().contains("good"), "{}", report.verdict());
+        report.missed_periods = 200;
+        report.sessions = 3;
+        report.safety_events = 4;
+        let text = report.to_string();
+        let first = text.lines().next().unwrap_or_default();
+        for part in [
+            "2.0 % of its periods",
+            "lost or stopped 2 times",
+            "4 safety events",
+        ] {
+            assert!(first.contains(part), "{part}: {first}");
+        }
     }
 }

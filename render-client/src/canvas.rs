@@ -76,6 +76,15 @@ impl Canvas {
         &self.stage
     }
 
+    /// Names and sizes of the pictures, for people.
+    pub fn pictures(&self) -> String {
+        let of = |sheet: &Sheet| {
+            let (width, height) = sheet.image.size();
+            format!("{} {width}x{height}", sheet.name)
+        };
+        self.sheets.iter().map(of).collect::<Vec<_>>().join(", ")
+    }
+
     /// The device that draws.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu

@@ -90,6 +90,7 @@ pub(crate) fn run(
             let shown_ns = session.now_ns().unwrap_or(taken_ns);
             statistics.frame(&latched, taken_ns, shown_ns);
             statistics.swap(late);
+            tell(session, canvas);
             if finish(canvas, statistics, plan)? {
                 return Ok(Ended::Frames);
             }
@@ -113,6 +114,7 @@ pub(crate) fn run(
                 canvas.draw(&latched, show, plan.out.is_some())?;
                 let drawn_ns = session.now_ns().unwrap_or(taken_ns);
                 statistics.frame(&latched, taken_ns, drawn_ns);
+                tell(session, canvas);
                 if finish(canvas, statistics, plan)? {
                     return Ok(Ended::Frames);
                 }
@@ -129,6 +131,10 @@ pub(crate) fn run(
         };
         std::thread::sleep(rest.min(LONGEST_SLEEP));
     }
+}
+
+fn tell(session: &mut Session, canvas: &Canvas) {
+    session.tell_first_frame(|| (canvas.pictures(), canvas.gpu().summary().to_string()));
 }
 
 /// Writes the frame's pictures; whether it was the last.

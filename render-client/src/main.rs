@@ -19,6 +19,7 @@ struct CommandLine {
 
 fn main() -> ExitCode {
     let command_line = CommandLine::parse();
+    taut_render::restart_with_runtime_directory();
     taut_log::start("warn,taut_render=info");
     let code = match run(command_line.args) {
         Ok(report) => {

@@ -37,6 +37,8 @@ pub(crate) struct Session {
     earlier: (u64, u64),
     /// When the node began to join.
     began: Instant,
+    /// Sessions of which the first frame was told.
+    told: u64,
     stop: Arc<AtomicBool>,
 }
 
@@ -123,6 +125,7 @@ impl Session {
             withdrawn: 0,
             earlier: (0, 0),
             began,
+            told: 0,
             stop,
         };
         Ok(Some((session, stage, show)))
@@ -143,6 +146,24 @@ impl Session {
                 Turn::Renewed(prepared.stage.map(Box::new))
             }
         }
+    }
+
+    /// After a frame: says once in each session that this node draws, whom it joined, with what adapter, how large, and how well it knows the time.
+    /// `drawn` gives the pictures and the adapter, for people.
+    pub(crate) fn tell_first_frame(&mut self, drawn: impl FnOnce() -> (String, String)) {
+        let sessions = self.sessions();
+        if std::mem::replace(&mut self.told, sessions) == sessions {
+            return;
+        }
+        let clock = self.link.session_now().map_or_else(
+            || "clock not known yet".to_owned(),
+            |time| format!("clock within {:.0} us", time.uncertainty_ns as f64 * 1e-3),
+        );
+        let (pictures, adapter) = drawn();
+        taut_log::say(&format!(
+            "{}: joined {} and draws {pictures} with {adapter}; {clock}",
+            self.node, self.server,
+        ));
     }
 
     /// How the link is, for the HUD.

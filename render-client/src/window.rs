@@ -29,7 +29,7 @@ use crate::stage::{Show, Stage};
 use crate::statistics::{Ended, Statistics};
 use crate::timeline::Timeline;
 use crate::view::Eyes;
-use display::Display;
+use display::{Display, Pane};
 
 /// Nothing to draw yet: how soon to look again.
 const MOMENT: Duration = Duration::from_millis(2);
@@ -358,6 +358,17 @@ impl App<'_> {
         self.last_drawn = drawn;
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
         self.statistics.frame(&latched, taken_ns, drawn_ns);
+        if let Some(Display { gpu, panes, .. }) = &self.screen {
+            let stage = &self.stage;
+            self.session.tell_first_frame(|| {
+                let of = |pane: &Pane| {
+                    let (name, size) = (&stage.screens[pane.screen].name, &pane.config);
+                    format!("{name} {}x{}", size.width, size.height)
+                };
+                let pictures = panes.iter().map(of).collect::<Vec<_>>().join(", ");
+                (pictures, gpu.summary().to_string())
+            });
+        }
         let enough = self
             .plan
             .frames

@@ -61,6 +61,7 @@ pub const FIRST_STEPS: &str = "taut: six-degree-of-freedom god-object haptics fo
 
   taut demo                          the whole workbench on this machine, with a simulated device and hand
   taut doctor                        what this machine lacks for real time and for rendering
+  taut setup                         asks what your workbench is made of; then `taut deploy` for its machines
   taut serve --config workbench.toml the haptic PC; then `taut render` on each screen's PC
 
 taut --help lists all commands, taut COMMAND --help shows each with an example.
@@ -113,6 +114,10 @@ pub enum Command {
     Track(TrackArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
+    /// Asks what a workbench is made of, and writes its file
+    Setup(SetupArgs),
+    /// Makes an archive for each machine of a workbench: its configuration, key, services, firewall, and a script that installs them
+    Deploy(DeployArgs),
     /// Prints completions for a shell
     #[command(
         after_help = "Example: taut completions bash > /usr/share/bash-completion/completions/taut"
@@ -425,6 +430,43 @@ pub struct KeysArgs {
     pub show: Option<PathBuf>,
 }
 
+/// `taut setup`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Examples:\n  taut setup\n  taut setup --yes --out workbench.toml\n\nOne line answers one question; an empty one takes the default. Answers may come through a pipe."
+)]
+pub struct SetupArgs {
+    /// The file to write; one that is there is refused
+    #[arg(long, value_name = "FILE", default_value = "workbench.toml")]
+    pub out: PathBuf,
+    /// Take every default, and ask nothing
+    #[arg(long)]
+    pub yes: bool,
+}
+
+/// `taut deploy`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Example: taut deploy workbench.toml --master cluster.key --out deploy\n\nThe machines are those of [[machine]] in the workbench file. The same files make the same archives; one that is there and differs is not replaced without --force."
+)]
+pub struct DeployArgs {
+    /// The workbench file
+    #[arg(value_name = "WORKBENCH.toml")]
+    pub config: PathBuf,
+    /// The folder of the archives, made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The cluster key (default: `key_file` of the workbench file)
+    #[arg(long, value_name = "FILE")]
+    pub master: Option<PathBuf>,
+    /// Which issue of the credentials: a later one stays good when an earlier one is revoked
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub issue: u16,
+    /// Replace archives that are there and differ
+    #[arg(long)]
+    pub force: bool,
+}
+
 /// `taut completions`.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct CompletionsArgs {
@@ -624,7 +666,7 @@ mod tests {
             assert!(Cli::try_parse_from(&command).is_ok(), "{command:?}");
             count += 1;
         }
-        assert_eq!(count, 3);
+        assert_eq!(count, 4);
     }
 
     #[test]

@@ -5,6 +5,8 @@ use assert_no_alloc::AllocDisabler;
 
 mod blocked_terminal;
 mod cli;
+#[cfg(unix)]
+mod deploy;
 mod edge_coupling;
 mod loops;
 mod moving_obstacle;
@@ -23,6 +25,7 @@ mod relay;
 mod replay;
 mod scheduling;
 mod session;
+mod setup;
 mod support;
 mod tracked_head;
 

@@ -42,6 +42,8 @@ fn every_command_has_help_with_an_example() {
         "import",
         "doctor",
         "keys",
+        "setup",
+        "deploy",
         "simulate-device",
     ] {
         let output = taut(&[command, "--help"]);

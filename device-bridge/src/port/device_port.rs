@@ -57,6 +57,8 @@ pub struct DevicePort {
     spells: Spells,
     teller: Teller,
     last_tick: Option<Duration>,
+    /// The loop ended in good order after the last tick, the force led down: what passes until the next tick is a pause, no stall.
+    released: bool,
     sample: DeviceSample,
     /// When the newest good sample was seen.
     last_good: Option<Duration>,
@@ -115,6 +117,7 @@ impl DevicePort {
             spells: Spells::default(),
             teller: Teller::default(),
             last_tick: None,
+            released: false,
             sample: at_rest(start),
             last_good: None,
             fault: None,
@@ -206,7 +209,8 @@ impl DevicePort {
         self.teller.begin_tick(now);
         let passed = now.saturating_sub(self.last_tick.unwrap_or(now));
         self.last_tick = Some(now);
-        if passed > self.settings.hold {
+        let paused = std::mem::take(&mut self.released);
+        if passed > self.settings.hold && !paused {
             self.teller
                 .tell(EventKind::PortStalled, passed.as_secs_f64());
         }
@@ -240,7 +244,8 @@ impl DevicePort {
         self.device.write(now, &wrench);
         self.energy.hold(&wrench);
         self.arming.restart(CommandSource::Same);
-        wrench == Vector6::zeros()
+        self.released = wrench == Vector6::zeros();
+        self.released
     }
 
     /// Reads the device.

@@ -363,6 +363,22 @@ fn a_stalled_port_drops_the_force_by_the_slew_limit() {
     assert_eq!(stage.kinds()[0], EventKind::PortStalled);
 }
 
+/// A bridge between two sessions has no loop: its device is not late, it is not read.
+#[test]
+fn a_pause_after_the_force_was_led_down_is_no_stall() {
+    let mut stage = Stage::armed(SafetySettings::default(), force(10.0));
+    while !stage.port.release_step(stage.now) {
+        stage.now += TICK;
+    }
+    stage.now += ms(4900);
+    let _ = stage.good(force(0.0));
+    assert!(!stage.kinds().contains(&EventKind::PortStalled));
+    // Only that pause: the loop is held to its time again.
+    stage.now += ms(4900);
+    let _ = stage.good(force(0.0));
+    assert!(stage.kinds().contains(&EventKind::PortStalled));
+}
+
 #[test]
 fn a_tick_that_comes_early_limits_without_a_word() {
     let mut stage = Stage::armed(SafetySettings::default(), force(10.0));

@@ -108,6 +108,11 @@ impl OffScreen {
     /// The colour format of off-screen pictures.
     pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
+    /// Width and height, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
     /// An empty picture.
     pub fn new(gpu: &Gpu, (width, height): (u32, u32)) -> Self {
         let output = Output {

@@ -60,14 +60,19 @@ pub(super) fn run(args: &KeysArgs) -> Result<String, Failure> {
     }
 }
 
-/// One credential per node of the workbench and one per other role that it lets in. Nothing is written if anything is in the way.
-fn write_all(
+/// A credential, and what its file is called, without the ending.
+pub(super) struct NamedCredential {
+    pub(super) name: String,
+    pub(super) credential: Credential,
+}
+
+/// One credential per node of the workbench and one per other role that it lets in.
+pub(super) fn credentials(
     key: &ClusterKey,
     workbench: &Workbench,
     issue: u16,
-    directory: &Path,
-) -> Result<String, Failure> {
-    let mut wanted: Vec<(PathBuf, Credential)> = Vec::new();
+) -> Result<Vec<NamedCredential>, Failure> {
+    let mut wanted: Vec<NamedCredential> = Vec::new();
     let screens = workbench.nodes.iter().map(|node| {
         let holder = Holder::of(&node.name).map_err(Failure::bad_input)?;
         Ok::<_, Failure>((format!("render-{}", node.name), Role::Render, holder))
@@ -89,13 +94,27 @@ fn write_all(
                 )));
             }
         }
-        let path = directory.join(format!("{}.key", file_name(&name)));
-        if wanted.iter().any(|(other, _)| *other == path) {
+        let name = file_name(&name);
+        if wanted.iter().any(|other| other.name == name) {
             return Err(Failure::BadInput(format!(
-                "two nodes of the workbench would have the file {}; rename one",
-                path.display()
+                "two nodes of the workbench would have the file {name}.key; rename one"
             )));
         }
+        wanted.push(NamedCredential { name, credential });
+    }
+    Ok(wanted)
+}
+
+/// Writes the credentials of a workbench. Nothing is written if anything is in the way.
+fn write_all(
+    key: &ClusterKey,
+    workbench: &Workbench,
+    issue: u16,
+    directory: &Path,
+) -> Result<String, Failure> {
+    let mut wanted: Vec<(PathBuf, Credential)> = Vec::new();
+    for NamedCredential { name, credential } in credentials(key, workbench, issue)? {
+        let path = directory.join(format!("{name}.key"));
         if path.exists() {
             return Err(Failure::BadInput(format!(
                 "{} exists already; choose another directory, or remove it first",
@@ -134,7 +153,7 @@ fn allowed(policy: &JoinPolicy, credential: &Credential) -> Result<(), ShutOut> 
 }
 
 /// A name that is one file in every system.
-fn file_name(name: &str) -> String {
+pub(super) fn file_name(name: &str) -> String {
     name.chars()
         .map(|c| match c {
             'a'..='z' | 'A'..='Z' | '0'..='9' | '.' | '_' | '-' => c,
@@ -143,7 +162,7 @@ fn file_name(name: &str) -> String {
         .collect()
 }
 
-fn create_private(directory: &Path) -> Result<(), Failure> {
+pub(super) fn create_private(directory: &Path) -> Result<(), Failure> {
     let mut builder = fs::DirBuilder::new();
     builder.recursive(true);
     #[cfg(unix)]

@@ -5,6 +5,7 @@
 pub mod arguments;
 pub mod arm;
 mod demo;
+mod deploy;
 mod doctor;
 mod finished_file;
 mod import;
@@ -12,9 +13,11 @@ mod key;
 mod keys;
 mod manual;
 mod record;
+mod recording_size;
 pub(crate) mod render;
 pub mod replay;
 mod serve;
+mod setup;
 mod signals;
 pub mod track;
 
@@ -40,6 +43,9 @@ pub fn main() -> ExitCode {
     // Before any key is read. Where the system has no such thing, the file's mode is all there is.
     taut_link::keep_memory_private();
     let cli = Cli::parse();
+    if matches!(cli.command, Some(Command::Render(_) | Command::Doctor(_))) {
+        render::restart_with_runtime_directory();
+    }
     taut_log::start("warn");
     let done = match cli.command {
         Some(command) => run(command),
@@ -81,6 +87,11 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),
+        Command::Setup(args) => {
+            let done = setup::run(&args, std::io::stdin().lock(), std::io::stdout().lock())?;
+            print(done).map(|()| ExitCode::SUCCESS)
+        }
+        Command::Deploy(args) => print(deploy::run(&args)?).map(|()| ExitCode::SUCCESS),
         Command::Completions(args) => {
             print(manual::completions(args.shell)?).map(|()| ExitCode::SUCCESS)
         }
@@ -191,7 +202,6 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
-    doctor::restart_with_runtime_directory();
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;

@@ -5,6 +5,14 @@ use crate::commands::arguments::RenderArgs;
 /// Whether this build can draw.
 pub(crate) const BUILT_IN: bool = cfg!(feature = "render");
 
+/// Keeps graphics drivers from complaining, before a command that looks for one: [`taut_render::restart_with_runtime_directory`].
+#[cfg(feature = "render")]
+pub(crate) use taut_render::restart_with_runtime_directory;
+
+/// Nothing to do in a build that cannot draw.
+#[cfg(not(feature = "render"))]
+pub(crate) fn restart_with_runtime_directory() {}
+
 /// Draws one node of the workbench until the session ends.
 #[cfg(feature = "render")]
 pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {

@@ -8,7 +8,7 @@ use taut_link::ClusterKey;
 use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
 
 use crate::cli::ServeArgs;
-use crate::commands::key;
+use crate::commands::{key, recording_size};
 use crate::report::SessionReport;
 use crate::report::metrics::{self, MetricsLines};
 use crate::report::terminal::Terminal;
@@ -45,6 +45,9 @@ pub(super) fn run(
     session.end_with(&end);
     taut_bridge::listen_at_console(session.arm_switch());
     announce(&session, terminal);
+    if let Some(directory) = &args.recording {
+        terminal.say(&recording_size::sentence(directory));
+    }
     let mut admission = AdmissionWatch::new(&args.config);
     watch(&mut session, args.duration, terminal, |session| {
         admission.follow(session, terminal);

@@ -267,8 +267,37 @@ impl Scene {
         })
     }
 
-    fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
+    pub(crate) fn locate(&self, name: &str, at: &At) -> Result<PathBuf, Problem> {
         self.origin.locate(name, at)
+    }
+
+    /// Whether a file that the scene names is part of the program.
+    pub(crate) fn is_in_program(&self, name: &str) -> bool {
+        self.origin == Origin::Shipped && shipped_file(name).is_some()
+    }
+
+    /// Meshes, height maps and traces, as written and where; some may be named twice.
+    pub(crate) fn file_names(&self) -> Vec<(&str, &At)> {
+        let held = &self.spec.god_object;
+        let mut names: Vec<(&str, &At)> = Vec::new();
+        names.extend(held.shape.file().map(|name| (name, &held.shape_at)));
+        for obstacle in &self.spec.obstacles {
+            let (map, motion) = (&obstacle.height_map, &obstacle.motion);
+            names.extend(obstacle.shape.file().map(|name| (name, &obstacle.shape_at)));
+            names.extend(map.as_ref().map(|map| (map.path.as_str(), &map.at)));
+            names.extend(
+                motion
+                    .as_ref()
+                    .map(|motion| (motion.trace.as_str(), &motion.at)),
+            );
+        }
+        names.extend(
+            self.spec
+                .hand
+                .as_ref()
+                .map(|hand| (hand.path.as_str(), &hand.at)),
+        );
+        names
     }
 }
 

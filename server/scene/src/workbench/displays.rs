@@ -127,7 +127,7 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
     nodes
 }
 
-fn unique_name<'n>(
+pub(super) fn unique_name<'n>(
     section: &Section<'_>,
     kind: &str,
     mut others: impl Iterator<Item = &'n str>,

@@ -10,7 +10,9 @@ use super::log::Log;
 use super::looking_on::{ObserverStream, Vrpn, Zenoh};
 use super::operator::Operator;
 use super::parse::parse;
-use super::spec::{Device, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer};
+use super::spec::{
+    Device, Machine, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer,
+};
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::problem::FileError;
@@ -32,6 +34,8 @@ pub struct Workbench {
     pub screens: Vec<Screen>,
     /// At least one.
     pub nodes: Vec<Node>,
+    /// The machines; none where the file does not say.
+    pub machines: Vec<Machine>,
     /// The viewer.
     pub viewer: Viewer,
     /// The device.

@@ -8,7 +8,9 @@ mod frames;
 mod load;
 mod log;
 mod looking_on;
+mod machines;
 mod monitoring;
+mod needed_files;
 mod network;
 mod operator;
 mod parse;
@@ -26,8 +28,10 @@ pub use frames::{FrameSwap, Frames};
 pub use load::{SHIPPED_WORKBENCH, Workbench};
 pub use log::{Log, LogLevel};
 pub use looking_on::{ObserverStream, Vrpn, Zenoh};
+pub use machines::is_machine_name;
+pub use needed_files::NeededFile;
 pub use operator::Operator;
 pub use spec::{
-    AlsoKeyFile, Device, HeadTracking, Monitoring, Network, Node, Passivity, RealTime,
+    AlsoKeyFile, Device, HeadTracking, Machine, Monitoring, Network, Node, Passivity, RealTime,
     RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
 };

@@ -12,6 +12,7 @@ use super::frames::frames;
 use super::load::Workbench;
 use super::log::log;
 use super::looking_on::{observers, vrpn, zenoh};
+use super::machines::{Named, machines};
 use super::monitoring::monitoring;
 use super::network::{network, places};
 use super::operator::operator;
@@ -69,6 +70,15 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     if let Some(network) = &network {
         places(&root, network, nodes.len(), &frames);
     }
+    let machines = machines(
+        &root,
+        &Named {
+            nodes: &nodes,
+            network: network.as_ref(),
+            device: device.as_ref(),
+            tracking: viewer.as_ref().map(|viewer| &viewer.tracking),
+        },
+    );
     let monitoring = monitoring(root.section("monitoring"), &root, &files);
     let realtime = realtime(root.section("realtime"));
     let safety = table(&root, "safety", safety).unwrap_or_default();
@@ -105,6 +115,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         scene_origin,
         screens,
         nodes,
+        machines,
         viewer,
         device,
         dynamics,

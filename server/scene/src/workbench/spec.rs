@@ -78,6 +78,23 @@ pub struct Node {
     pub window: Window,
 }
 
+/// A machine of the workbench, for `taut deploy`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Machine {
+    /// Unique; a file's name.
+    pub name: String,
+    /// By which the others reach it; no two have the same.
+    pub address: IpAddr,
+    /// Whether it runs `taut serve`; exactly one does.
+    pub server: bool,
+    /// Nodes that it draws. Each is on one machine.
+    pub nodes: Vec<String>,
+    /// What `taut bridge --device` takes, if the device is here.
+    pub device: Option<String>,
+    /// What `taut track --source` takes, if the head's tracker is here.
+    pub tracker: Option<String>,
+}
+
 /// Where the viewer's head comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HeadTracking {

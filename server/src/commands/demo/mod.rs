@@ -16,8 +16,8 @@ use taut_scene::{Device, HeadTracking, Scene, Workbench};
 use crate::cli::DemoArgs;
 use crate::commands::demo::children::{NamedChild, wait_or_kill};
 use crate::commands::demo::directory::DemoDirectory;
-use crate::commands::render;
 use crate::commands::serve::{announce, watch};
+use crate::commands::{recording_size, render};
 use crate::loops::realtime::after_parent;
 use crate::report::SessionReport;
 use crate::report::terminal::Terminal;
@@ -116,6 +116,9 @@ pub(super) fn run(
     let mut session = Session::start(setup)?;
     session.end_with(&end);
     announce(&session, terminal);
+    if let Some(directory) = &args.recording {
+        terminal.say(&recording_size::sentence(directory));
+    }
     let pushes = |input: &taut_bridge::InputChoice| input.force_device().is_some();
     if overrides.input.as_ref().is_some_and(pushes) {
         // Somebody holds it: a person arms.
@@ -301,10 +304,6 @@ impl<'a> Launcher<'a> {
             command.arg("--headless");
             // Without a display there is no compositor to ask which device it prefers; Mesa's layer would complain that there is none.
             command.env("NODEVICE_SELECT", "1");
-        }
-        if std::env::var_os("XDG_RUNTIME_DIR").is_none_or(|directory| directory.is_empty()) {
-            // Graphics drivers complain without it, though nothing is put there.
-            command.env("XDG_RUNTIME_DIR", self.directory.path());
         }
         if let Some(frames) = self.args.frames {
             command.args(["--frames", &frames.to_string()]);

@@ -1,0 +1,290 @@
+//! `taut deploy`: one archive for each machine of the workbench, with what that machine needs and no other's secret.
+
+mod archive;
+mod firewall;
+mod output;
+mod scripts;
+mod units;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::net::SocketAddr;
+use std::path::{Component, Path, PathBuf};
+
+use taut_link::{ClusterKey, check_secret_file, read_key_file};
+use taut_scene::{Machine, NeededFile, Workbench};
+use zeroize::Zeroizing;
+
+use archive::{File, Mode, pack};
+use scripts::Scripts;
+pub(super) use units::reached_by_a_service;
+use units::{Unit, units};
+
+use super::keys::{NamedCredential, credentials, file_name};
+use crate::cli::DeployArgs;
+use crate::shared::failure::Failure;
+
+/// Account of the services.
+const SYSUSERS: &str = include_str!("../../../../docs/systemd/taut.sysusers");
+
+/// Makes the archives; what to print.
+pub(super) fn run(args: &DeployArgs) -> Result<String, Failure> {
+    let reports = taut_scene::check(std::slice::from_ref(&args.config));
+    if let Some(report) = reports.iter().find(|report| !report.is_good()) {
+        return Err(Failure::bad_input(report));
+    }
+    let workbench = Workbench::load(&args.config)?;
+    let Some(server) = workbench.machines.iter().find(|machine| machine.server) else {
+        return Err(Failure::BadInput(format!(
+            "{} names no machines; write a [[machine]] for each, with name, address and what it does (docs/deployment.md)",
+            args.config.display()
+        )));
+    };
+    let master = args.master.as_ref().or(workbench.network.key_file.as_ref());
+    let master = master.ok_or_else(|| {
+        Failure::bad_input("which cluster key? make one with `taut keys --out cluster.key`, and name it by --master")
+    })?;
+    let key = read_key_file(master)?;
+    let plan = Plan {
+        config: &args.config,
+        workbench: &workbench,
+        address: SocketAddr::new(server.address, workbench.network.quic_port),
+        credentials: credentials(&key, &workbench, args.issue)?,
+        key,
+    };
+    let mut archives = Vec::new();
+    for machine in &workbench.machines {
+        let name = format!("taut-{}.tar.gz", machine.name);
+        let (content, holds) = plan.archive(machine)?;
+        archives.push(output::Archive {
+            name,
+            content,
+            holds,
+        });
+    }
+    let changed = output::write(&args.out, &archives, args.force)?;
+    Ok(report(&args.out, &archives, &workbench, changed))
+}
+
+/// What each archive is made from.
+struct Plan<'w> {
+    config: &'w Path,
+    workbench: &'w Workbench,
+    /// Where the clients reach the server.
+    address: SocketAddr,
+    key: ClusterKey,
+    credentials: Vec<NamedCredential>,
+}
+
+impl Plan<'_> {
+    /// The archive of one machine, and in a few words what it holds.
+    fn archive(&self, machine: &Machine) -> Result<(Vec<u8>, String), Failure> {
+        let mut files = self.secrets(machine)?;
+        if machine.server {
+            files.extend(self.configuration()?);
+        }
+        let units = units(self.workbench, machine, self.address)?;
+        let firewall = firewall::rules(self.workbench, machine);
+        let has_firewall = firewall.is_some();
+        files.extend(firewall.map(|rules| File::new("etc/firewall.nft", Mode::Plain, rules)));
+        let scripts = Scripts {
+            workbench: &self.workbench.name,
+            machine,
+            files: &files,
+            units: &units,
+            has_firewall,
+        };
+        let mut all = vec![
+            File::new("install", Mode::Program, scripts.install()),
+            File::new("uninstall", Mode::Program, scripts.uninstall()),
+        ];
+        if units.iter().any(|unit| !unit.is_session) {
+            all.push(File::new("taut.sysusers", Mode::Plain, SYSUSERS));
+        }
+        let holds = holds(&files, &units);
+        all.extend(
+            units
+                .into_iter()
+                .map(|unit| File::new(Path::new("units").join(unit.name), Mode::Plain, unit.text)),
+        );
+        all.extend(files);
+        let packed = pack(&format!("taut-{}", machine.name), &all);
+        let packed = packed.map_err(|error| {
+            Failure::Failed(format!(
+                "the archive of {} cannot be packed: {error}",
+                machine.name
+            ))
+        })?;
+        Ok((packed, holds))
+    }
+
+    /// The keys of one machine: the server's is the cluster key, which makes all others.
+    fn secrets(&self, machine: &Machine) -> Result<Vec<File>, Failure> {
+        let mut names: Vec<String> = machine
+            .nodes
+            .iter()
+            .map(|node| format!("render-{}", file_name(node)))
+            .collect();
+        names.extend(machine.device.is_some().then(|| "device".to_owned()));
+        names.extend(machine.tracker.is_some().then(|| "tracker".to_owned()));
+        let mut files = Vec::new();
+        for name in names {
+            let held = self.credentials.iter().find(|held| held.name == name);
+            let held = held.ok_or_else(|| {
+                Failure::BadInput(format!(
+                    "{} needs the credential {name}, but `roles` in [network] lets its role not in; add it there",
+                    machine.name
+                ))
+            })?;
+            let text = Zeroizing::new(held.credential.to_text());
+            files.push(File::new(
+                format!("etc/{name}.key"),
+                Mode::Secret,
+                text.as_bytes(),
+            ));
+        }
+        if machine.server {
+            let text = Zeroizing::new(format!("{}\n", &*self.key.to_hex()));
+            files.push(File::new("etc/cluster.key", Mode::Secret, text.as_bytes()));
+        }
+        Ok(files)
+    }
+
+    /// The workbench file as it is, and what it names, where it names it.
+    fn configuration(&self) -> Result<Vec<File>, Failure> {
+        let folder = self.config.parent().unwrap_or(Path::new(""));
+        let mut files = vec![File::new(
+            "etc/workbench.toml",
+            Mode::Plain,
+            read(self.config)?,
+        )];
+        let scene = Path::new(&self.workbench.scene);
+        for needed in self.workbench.needed_files()? {
+            let (place, found, mode) = match needed {
+                NeededFile::Named(path) => (below(folder, &path)?, path, Mode::Plain),
+                NeededFile::Secret(path) => {
+                    check_secret_file(&path)
+                        .map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
+                    (below(folder, &path)?, path, Mode::Secret)
+                }
+                NeededFile::OfScene { name, found } => {
+                    let beside = match scene.is_file() {
+                        true => scene.parent().unwrap_or(Path::new("")).join(name),
+                        false => folder.join("data").join(name),
+                    };
+                    (below(folder, &beside)?, found, Mode::Plain)
+                }
+            };
+            if found.extension().is_some_and(|ending| ending == "gltf") {
+                return Err(Failure::BadInput(format!(
+                    "{}: what lies beside a .gltf file is not copied with it; export it as .glb",
+                    found.display()
+                )));
+            }
+            let place = Path::new("etc").join(place);
+            if files.iter().all(|file| file.path != place) {
+                files.push(File {
+                    path: place,
+                    mode,
+                    content: Zeroizing::new(read(&found)?),
+                });
+            }
+        }
+        self.writes_where_it_may()?;
+        self.operator_has_a_token()?;
+        Ok(files)
+    }
+
+    /// The service may write to its own folder alone.
+    fn writes_where_it_may(&self) -> Result<(), Failure> {
+        match &self.workbench.monitoring.record {
+            Some(path)
+                if self.workbench.monitoring.enabled && !path.starts_with("/var/lib/taut") =>
+            {
+                Err(Failure::BadInput(format!(
+                    "`record` in [monitoring] of {} is {}, where the service may not write; write a file in \"/var/lib/taut\"",
+                    self.config.display(),
+                    path.display()
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A service has no terminal on which it could show a fresh token.
+    fn operator_has_a_token(&self) -> Result<(), Failure> {
+        let operator = &self.workbench.operator;
+        if operator.enabled && operator.token_file.is_none() {
+            return Err(Failure::BadInput(format!(
+                "[operator] of {} names no token_file, without which the service does not start; make one beside it: openssl rand -hex 32 > operator.token && chmod 600 operator.token",
+                self.config.display()
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Where a file is below the workbench file's folder, which is where it will be below /etc/taut.
+fn below(folder: &Path, path: &Path) -> Result<PathBuf, Failure> {
+    let inside = path.strip_prefix(folder).ok().filter(|inside| {
+        inside
+            .components()
+            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+    });
+    inside.map(|inside| inside.components().filter(|part| *part != Component::CurDir).collect()).ok_or_else(|| {
+        Failure::BadInput(format!(
+            "{} is not below the workbench file's folder, so it cannot be copied with it; move it there, and name it by its path from there",
+            path.display()
+        ))
+    })
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|error| {
+        Failure::BadInput(format!(
+            "{}: {error}; check the path and its permissions",
+            path.display()
+        ))
+    })
+}
+
+fn holds(files: &[File], units: &[Unit]) -> String {
+    let secrets = files.iter().filter(|file| file.mode == Mode::Secret);
+    let secrets = secrets
+        .filter_map(|file| file.path.file_name())
+        .map(|name| name.to_string_lossy().into_owned());
+    let units = units.iter().map(|unit| unit.name.clone());
+    units.chain(secrets).collect::<Vec<_>>().join(", ")
+}
+
+fn report(
+    out: &Path,
+    archives: &[output::Archive],
+    workbench: &Workbench,
+    changed: bool,
+) -> String {
+    let mut text = String::new();
+    for (archive, machine) in archives.iter().zip(&workbench.machines) {
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            text,
+            "{}: for {}, {} bytes: {}",
+            out.join(&archive.name).display(),
+            machine.address,
+            archive.content.len(),
+            archive.holds
+        );
+    }
+    if !changed {
+        text.push_str("nothing was changed: these archives were there already\n");
+    }
+    for stray in output::strays(out, archives) {
+        let _ = writeln!(
+            text,
+            "{} is of no machine of this workbench; a credential may be in it: remove it",
+            stray.display()
+        );
+    }
+    text.push_str("copy each to its machine and to no other; there: tar xzf ARCHIVE, then `install` in the folder it makes");
+    text
+}

@@ -1,0 +1,221 @@
+//! systemd units of a machine: those of `docs/systemd`, with this workbench's arguments in place of environment files.
+
+use std::net::SocketAddr;
+
+use taut_bridge::{DeviceChoice, InputChoice};
+use taut_scene::{Device, Machine, TransportKind, Workbench};
+
+use crate::commands::arguments::HeadFrom;
+use crate::commands::keys::file_name;
+use crate::shared::failure::Failure;
+
+const SERVE: &str = include_str!("../../../../docs/systemd/taut-serve.service");
+const BRIDGE: &str = include_str!("../../../../docs/systemd/taut-bridge.service");
+const TRACK: &str = include_str!("../../../../docs/systemd/taut-track.service");
+const RENDER: &str = include_str!("../../../../docs/systemd/taut-render@.service");
+
+/// Where devices of each way of connection are.
+const ON_HID: &[&str] = &[
+    "DeviceAllow=char-hidraw rw",
+    "DeviceAllow=char-usb_device rw",
+];
+
+/// A unit of a machine.
+pub(super) struct Unit {
+    /// With its ending.
+    pub(super) name: String,
+    /// Of the session of the account that draws, else of the system.
+    pub(super) is_session: bool,
+    /// Its file.
+    pub(super) text: String,
+}
+
+/// The units of a machine: one per role, one per node.
+pub(super) fn units(
+    workbench: &Workbench,
+    machine: &Machine,
+    server: SocketAddr,
+) -> Result<Vec<Unit>, Failure> {
+    let mut units = Vec::new();
+    let system = |name: &str, text| Unit {
+        name: name.to_owned(),
+        is_session: false,
+        text,
+    };
+    let client = Client {
+        server,
+        transport: workbench.network.transport,
+    };
+    if machine.server {
+        let command = "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key";
+        let reached: Vec<String> = match workbench.device {
+            Device::SpaceMouse { .. } => ON_HID.iter().map(ToString::to_string).collect(),
+            _ => Vec::new(),
+        };
+        let mut more = reached;
+        more.push("Environment=TAUT_DATA=/etc/taut/data".to_owned());
+        units.push(system(
+            "taut-serve.service",
+            filled(SERVE, machine, command, &more),
+        ));
+    }
+    if let Some(device) = &machine.device {
+        let command = client.command("bridge", "device", &["--device", device]);
+        let more = reached_by(device, machine)?;
+        units.push(system(
+            "taut-bridge.service",
+            filled(BRIDGE, machine, &command, &more),
+        ));
+    }
+    if let Some(source) = &machine.tracker {
+        let command = client.command("track", "tracker", &["--source", source]);
+        check_source(source, machine)?;
+        units.push(system(
+            "taut-track.service",
+            filled(TRACK, machine, &command, &[]),
+        ));
+    }
+    for node in &machine.nodes {
+        let key = format!("render-{}", file_name(node));
+        let command = client.command("render", &key, &["--node", node]);
+        units.push(Unit {
+            name: format!("taut-{key}.service"),
+            is_session: true,
+            // Before the command is in it: a node may have `%i` in its name.
+            text: filled(
+                &RENDER.replace("%i", &file_name(node)),
+                machine,
+                &command,
+                &[],
+            ),
+        });
+    }
+    Ok(units)
+}
+
+/// How clients of this workbench find their server.
+struct Client {
+    server: SocketAddr,
+    transport: TransportKind,
+}
+
+impl Client {
+    fn command(&self, role: &str, key: &str, more: &[&str]) -> String {
+        let mut command = format!(
+            "taut {role} --server {} --key /etc/taut/{key}.key",
+            self.server
+        );
+        for word in more {
+            command.push(' ');
+            command.push_str(&quoted(word));
+        }
+        if self.transport == TransportKind::QuicDatagram {
+            command.push_str(" --transport quic");
+        }
+        command + " --stay"
+    }
+}
+
+/// A word of a command line in a unit: systemd expands `%` and `$`, and splits at blanks.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_.,:;/@=+".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) && !word.starts_with(';') {
+        return word.to_owned();
+    }
+    let mut text = String::from("\"");
+    for c in word.chars() {
+        match c {
+            '"' | '\\' => text.extend(['\\', c]),
+            '%' | '$' => text.extend([c, c]),
+            _ => text.push(c),
+        }
+    }
+    text.push('"');
+    text
+}
+
+/// The unit of `docs/systemd` with its own command; how to install it by hand is left out.
+fn filled(unit: &str, machine: &Machine, command: &str, more: &[String]) -> String {
+    let mut text = format!("# Made for {} by `taut deploy`.\n", machine.name);
+    let lines = unit.lines().skip_while(|line| line.starts_with('#'));
+    for line in lines.filter(|line| !line.starts_with("EnvironmentFile=")) {
+        if line.starts_with("ExecStart=") {
+            text.push_str(&format!("ExecStart={command}\n"));
+            for line in more {
+                text.push_str(line);
+                text.push('\n');
+            }
+        } else {
+            text.push_str(line);
+            text.push('\n');
+        }
+    }
+    text
+}
+
+fn reached_by(device: &str, machine: &Machine) -> Result<Vec<String>, Failure> {
+    reached_by_a_service(device).map_err(|why| {
+        Failure::BadInput(format!(
+            "the device of {} is \"{device}\": {why}",
+            machine.name
+        ))
+    })
+}
+
+/// What the unit of the bridge must be allowed, so that it reaches this device; or why a service cannot have it.
+pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<String>, String> {
+    let choice = device
+        .parse::<DeviceChoice>()
+        .map_err(|error| error.to_string())?;
+    let lines: &[&str] = match &choice {
+        DeviceChoice::Mouse => {
+            return Err("that is a render window's; run `taut render --hold` there by hand".into());
+        }
+        DeviceChoice::Trace(path) if !path.is_absolute() => {
+            return Err("a service finds a file by its whole path; begin it with /".into());
+        }
+        DeviceChoice::Input(InputChoice::Spidar(_) | InputChoice::Polhem(_)) => {
+            let port = device.split([':', ',']).nth(1).unwrap_or_default();
+            return Ok(vec![
+                format!("DeviceAllow={} rw", quoted(port)),
+                "SupplementaryGroups=dialout".to_owned(),
+            ]);
+        }
+        DeviceChoice::Input(InputChoice::SpaceMouse(_)) => ON_HID,
+        #[cfg(unix)]
+        DeviceChoice::Input(InputChoice::Wooden(_)) => ON_HID,
+        DeviceChoice::Input(InputChoice::Vrpn(_) | InputChoice::Haply(_))
+        | DeviceChoice::Simulated { .. }
+        | DeviceChoice::Trace(_) => &[],
+    };
+    Ok(lines.iter().map(ToString::to_string).collect())
+}
+
+fn check_source(source: &str, machine: &Machine) -> Result<(), Failure> {
+    let refuse = |why: String| Failure::BadInput(format!("the tracker of {}: {why}", machine.name));
+    match source.parse::<HeadFrom>() {
+        Ok(HeadFrom::Trace(path)) if !path.is_absolute() => Err(refuse(format!(
+            "a service finds {} by its whole path only; begin it with /",
+            path.display()
+        ))),
+        Ok(_) => Ok(()),
+        Err(error) => Err(refuse(error.to_string())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_that_systemd_would_change_are_quoted() {
+        for (word, text) in [
+            ("front", "front"),
+            ("vrpn:Head@lab,axes=x -z y", "\"vrpn:Head@lab,axes=x -z y\""),
+            ("100%", "\"100%%\""),
+            ("a\"$b", "\"a\\\"$$b\""),
+        ] {
+            assert_eq!(quoted(word), text);
+        }
+    }
+}
