@@ -28,9 +28,17 @@ pub(crate) struct Writer {
     lines: NonBlocking,
     lost: ErrorCounter,
     guard: Mutex<Option<WorkerGuard>>,
-    /// Since when the thread is within a write.
-    busy: Arc<Mutex<Option<Instant>>>,
+    /// The write that the thread is within.
+    busy: Arc<Mutex<Option<Busy>>>,
     status: Arc<Mutex<Status>>,
+}
+
+/// A write that has begun.
+#[derive(Clone, Copy, Debug)]
+struct Busy {
+    since: Instant,
+    /// Lines that were lost before it.
+    lost: u64,
 }
 
 /// One line that is written again below every other.
@@ -45,7 +53,7 @@ impl Writer {
     /// To `to`, with at most `waiting` lines between.
     pub(crate) fn new(to: impl Write + Send + 'static, waiting: usize) -> Self {
         let lost = Arc::<OnceLock<ErrorCounter>>::default();
-        let busy = Arc::<Mutex<Option<Instant>>>::default();
+        let busy = Arc::<Mutex<Option<Busy>>>::default();
         let status = Arc::<Mutex<Status>>::default();
         let telling = Telling {
             to,
@@ -102,8 +110,9 @@ impl Writer {
     pub(crate) fn flush(&self) {
         let guard = lock(&self.guard).take();
         let busy = *lock(&self.busy);
-        if busy.is_some_and(|since| self.lost() > 0 || since.elapsed() >= STANDS_FROM) {
-            // Nobody reads, for long or until the queue was full: there is nothing to wait for, and a guard that cannot say goodbye prints so.
+        let stands = |busy: Busy| self.lost() > busy.lost || busy.since.elapsed() >= STANDS_FROM;
+        if busy.is_some_and(stands) {
+            // Nobody reads, for long or while the queue filled up: there is nothing to wait for, and a guard that cannot say goodbye prints so.
             std::mem::forget(guard);
         }
     }
@@ -112,7 +121,7 @@ impl Writer {
 /// Writes, and says before the next line how many were lost since it last did.
 struct Telling<W> {
     to: W,
-    busy: Arc<Mutex<Option<Instant>>>,
+    busy: Arc<Mutex<Option<Busy>>>,
     lost: Arc<OnceLock<ErrorCounter>>,
     status: Arc<Mutex<Status>>,
     told: usize,
@@ -144,8 +153,11 @@ impl<W: Write> Telling<W> {
 
 impl<W: Write> Write for Telling<W> {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        *lock(&self.busy) = Some(Instant::now());
         let lost = self.lost.get().map_or(0, ErrorCounter::dropped_lines);
+        *lock(&self.busy) = Some(Busy {
+            since: Instant::now(),
+            lost: lost as u64,
+        });
         if lost > self.told {
             let since = lost - self.told;
             let told = writeln!(
@@ -222,12 +234,12 @@ fn process_writer() -> &'static Writer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Read;
+    use std::io::BufRead;
 
     /// A pipe that nobody reads takes 64 KiB, then makes writers wait: a stopped terminal does the same.
     #[test]
     fn a_reader_that_stands_still_costs_lines_and_no_time_and_is_told_how_many() {
-        let (mut reader, pipe) = io::pipe().expect("a pipe");
+        let (reader, pipe) = io::pipe().expect("a pipe");
         let writer = Writer::new(pipe, 64);
         let mut lines = writer.lines();
         let line = format!("{}\n", "x".repeat(1023));
@@ -241,10 +253,13 @@ mod tests {
         assert!((9_000..10_000).contains(&lost), "{lost} lost in {took:?}");
 
         // Somebody reads again: what waited comes, and how much did not.
+        let came = Arc::<Mutex<Vec<String>>>::default();
+        let heard = Arc::clone(&came);
         let reading = std::thread::Builder::new()
             .spawn(move || {
-                let mut text = String::new();
-                reader.read_to_string(&mut text).map(|_| text)
+                for line in io::BufReader::new(reader).lines() {
+                    lock(&heard).push(line.expect("text"));
+                }
             })
             .expect("a thread");
         loop {
@@ -255,14 +270,60 @@ mod tests {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
+        while lock(&came).last().is_none_or(|line| line != "after") {
+            std::thread::sleep(Duration::from_millis(1));
+        }
         writer.flush();
         drop(lines);
         drop(writer);
-        let text = reading.join().expect("no panic").expect("text");
-        assert!(text.contains("lines were lost here"), "it was told");
-        assert!(text.ends_with("after\n"));
-        let shown = text.lines().filter(|line| line.starts_with('x')).count() as u64;
+        reading.join().expect("no panic");
+        let came = lock(&came);
+        let told = |line: &String| line.contains("lines were lost here");
+        assert!(came.iter().any(told), "it was told");
+        let shown = came.iter().filter(|line| line.starts_with('x')).count() as u64;
         assert_eq!(shown + lost, 10_000, "each line came or was counted");
+    }
+
+    /// Takes a piece whenever it is let.
+    struct Gate(std::sync::mpsc::Receiver<()>, Arc<Mutex<Vec<u8>>>);
+
+    impl Write for Gate {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            // Opened for good once nobody holds the other end.
+            let _ = self.0.recv();
+            lock(&self.1).extend(bytes);
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn lines_that_were_lost_long_ago_do_not_cut_off_the_end() {
+        let (open, gate) = std::sync::mpsc::channel();
+        let shown = Arc::default();
+        let writer = Writer::new(Gate(gate, Arc::clone(&shown)), 4);
+        let mut lines = writer.lines();
+        while writer.lost() == 0 {
+            lines.write_all(b"x\n").expect("never fails");
+        }
+        // Somebody reads again, and takes what waited.
+        let taken = || lock(&shown).iter().filter(|byte| **byte == b'x').count();
+        while taken() < 4 {
+            open.send(()).expect("it writes");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        lines.write_all(b"the end\n").expect("never fails");
+        // Now a write has just begun that nothing was lost in.
+        while lock(&writer.busy).is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        drop(open);
+        writer.flush();
+        let shown = lock(&shown);
+        assert!(shown.ends_with(b"the end\n"), "{shown:?}");
     }
 
     #[test]
