@@ -4,6 +4,7 @@
 //! reported together ([`FileError`]). SI units and quaternions `w x y z` in every file.
 #![forbid(unsafe_code)]
 
+mod appearance;
 mod check;
 mod document;
 pub mod fidelity;
@@ -21,6 +22,7 @@ mod simplify;
 mod trace;
 mod workbench;
 
+pub use appearance::Appearance;
 pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
 pub use fidelity::FidelityPlan;

@@ -16,7 +16,9 @@ use crate::check::MeshFigures;
 use crate::document::{At, Document, Node, Value};
 use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
-use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
+use crate::mesh_file::{
+    FileLook, RawMesh, read_mesh, read_mesh_and_look, read_texture_coordinates,
+};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
 
@@ -213,9 +215,9 @@ impl Scene {
         DeviceTrace::parse(&path.display().to_string(), &text)
     }
 
-    /// The mesh file of this name, as written in the scene.
-    pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<RawMesh, FileError> {
-        read_mesh(&self.locate(name, at)?)
+    /// The mesh file of this name, as written in the scene, and how it says that its body looks.
+    pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<(RawMesh, FileLook), FileError> {
+        read_mesh_and_look(&self.locate(name, at)?)
     }
 
     /// The texture of a height map, its picture read and laid on this shape with this mesh.

@@ -4,6 +4,7 @@ mod auto_fidelity;
 mod build;
 mod load;
 mod parse;
+mod parse_look;
 mod parse_shape;
 mod shipped;
 mod spec;

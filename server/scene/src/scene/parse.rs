@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
 
+use super::parse_look::appearance;
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
@@ -90,6 +91,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
     let mass = mass(&section);
     let pose = pose(&section);
     let reference_point = reference_point(&section);
+    let appearance = appearance(&section);
     let at = section.at().clone();
     section.finish();
     Some(BodySpec {
@@ -97,6 +99,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
         mass: mass?,
         pose: pose?,
         reference_point: reference_point?,
+        appearance,
         at,
         shape_at,
     })
@@ -163,6 +166,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
         let (shape, pose) = (shape(&section), pose(&section));
         let (surface, height_map) = surface(&section);
         let motion = section.section("motion").and_then(motion);
+        let appearance = appearance(&section);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
             section.complain(
@@ -179,6 +183,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 pose,
                 surface,
                 motion,
+                appearance,
                 height_map,
                 shape_at,
             });
