@@ -38,7 +38,7 @@ pub(crate) fn linear(value: f64) -> f64 {
 }
 
 /// The sRGB value of linear light, both 0 to 1: the inverse of [`linear`].
-pub(crate) fn encoded(light: f64) -> f64 {
+fn encoded(light: f64) -> f64 {
     if light <= 0.003_130_8 {
         12.92 * light
     } else {
@@ -57,9 +57,14 @@ pub(crate) fn colour_of_text(text: &str) -> Option<[f32; 3]> {
     Some([part(16), part(8), part(0)])
 }
 
+/// sRGB of a linear colour, 0 to 1, in 8 bits.
+pub fn srgb(colour: [f32; 3]) -> [u8; 3] {
+    colour.map(|part| (encoded(f64::from(part)) * 255.0).round() as u8)
+}
+
 /// `#rrggbb` of a colour, rounded to 8 bits.
 pub(crate) fn text_of_colour(colour: [f32; 3]) -> String {
-    let [red, green, blue] = colour.map(|part| (encoded(f64::from(part)) * 255.0).round() as u8);
+    let [red, green, blue] = srgb(colour);
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 

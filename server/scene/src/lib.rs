@@ -22,7 +22,7 @@ mod simplify;
 mod trace;
 mod workbench;
 
-pub use appearance::Appearance;
+pub use appearance::{Appearance, srgb};
 pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
 pub use fidelity::FidelityPlan;
