@@ -11,6 +11,11 @@ mod import;
 mod key;
 mod keys;
 mod manual;
+#[cfg(feature = "render")]
+mod preview;
+#[cfg(not(feature = "render"))]
+#[path = "preview_absent.rs"]
+mod preview;
 mod record;
 pub(crate) mod render;
 pub mod replay;
@@ -78,6 +83,9 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
         Command::Import(args) => import_command(&args),
+        Command::Preview(args) => {
+            print(preview::run(&args)?.join("\n")).map(|()| ExitCode::SUCCESS)
+        }
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),

@@ -25,7 +25,9 @@ const FINISH: Finish = Finish {
 };
 
 /// Everything of a scene that is drawn: each body as clients are told of it, with its mesh. The god-object is the first.
-pub(crate) fn bodies(scene: &BuiltScene) -> Result<Vec<(BodyDescription, MeshBlob)>, Failure> {
+pub(crate) fn bodies(
+    scene: &BuiltScene,
+) -> impl Iterator<Item = Result<(BodyDescription, MeshBlob), Failure>> {
     let described = |(index, body): (usize, &BuiltBody)| {
         let (hash, blob) = mesh(body)?;
         let look = &body.appearance;
@@ -38,7 +40,7 @@ pub(crate) fn bodies(scene: &BuiltScene) -> Result<Vec<(BodyDescription, MeshBlo
         };
         Ok((description, blob))
     };
-    scene.bodies.iter().enumerate().map(described).collect()
+    scene.bodies.iter().enumerate().map(described)
 }
 
 /// The colour of a body that has none of its own.
@@ -70,7 +72,8 @@ pub(super) fn content(
 ) -> Result<Content, Failure> {
     let mut meshes: Vec<(MeshHash, MeshBlob)> = Vec::new();
     let mut described = Vec::new();
-    for (body, blob) in bodies(scene)? {
+    for body in bodies(scene) {
+        let (body, blob) = body?;
         if meshes.iter().all(|(known, _)| *known != body.mesh) {
             meshes.push((body.mesh, blob));
         }
