@@ -162,17 +162,17 @@ fn stage_of(scene: &PreviewScene) -> Result<Stage, RenderError> {
 }
 
 /// The bodies that are brought into view: those with an end; all that are seen if there is no other.
-fn framed<'s>(scene: &PreviewScene, stage: &'s Stage) -> Vec<&'s StageBody> {
+fn framed(scene: &PreviewScene, stage: &Stage) -> Vec<StageBody> {
     let all = std::iter::once(&stage.god_object).chain(&stage.obstacles);
     let seen = |body: &StageBody| body.opacity > 0.0;
-    let with_an_end: Vec<&StageBody> = all
+    let with_an_end: Vec<StageBody> = all
         .clone()
         .enumerate()
         .filter(|(place, body)| !scene.endless.contains(place) && seen(body))
-        .map(|(_, body)| body)
+        .map(|(_, body)| *body)
         .collect();
     if with_an_end.is_empty() {
-        all.collect()
+        all.copied().collect()
     } else {
         with_an_end
     }
@@ -190,7 +190,7 @@ fn points<'s>(stage: &'s Stage, body: &'s StageBody) -> impl Iterator<Item = Poi
 }
 
 /// Sphere around the middle of the box around the bodies, scene frame.
-fn bounds_of(stage: &Stage, bodies: &[&StageBody]) -> Bounds {
+fn bounds_of(stage: &Stage, bodies: &[StageBody]) -> Bounds {
     let all = || bodies.iter().flat_map(|body| points(stage, body));
     let boxes = all().map(|p| (p, p));
     let around = boxes.reduce(|(low, high), (p, q)| (low.inf(&p), high.sup(&q)));
@@ -233,7 +233,7 @@ impl Reach {
 /// As many cameras around the scene, at one distance: the nearest from which all of them see all of it.
 fn cameras(
     stage: &Stage,
-    framed: &[&StageBody],
+    framed: &[StageBody],
     (width, height): (u32, u32),
     views: u32,
 ) -> Result<Vec<Camera>, RenderError> {
