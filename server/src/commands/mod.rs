@@ -84,6 +84,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Check(args) => check_command(&args),
         Command::Import(args) => import_command(&args),
         Command::Preview(args) => {
+            render::restart_with_runtime_directory();
             print(preview::run(&args)?.join("\n")).map(|()| ExitCode::SUCCESS)
         }
         Command::Doctor(args) => doctor_command(&args),
@@ -180,6 +181,7 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
 }
 
 fn import_command(args: &ImportArgs) -> Result<ExitCode> {
+    render::restart_with_runtime_directory();
     let report = import::run(args)?;
     if args.json {
         print_json(&report)?;
@@ -199,7 +201,7 @@ fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
         }
         return Ok(ExitCode::SUCCESS);
     }
-    doctor::restart_with_runtime_directory();
+    render::restart_with_runtime_directory();
     let report = doctor::examine().context("this machine cannot be examined")?;
     if args.json {
         print_json(&report)?;
