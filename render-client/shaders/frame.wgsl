@@ -76,8 +76,10 @@ fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, glos
     }
     // A metal has no colour below its surface: it reflects what is around it in its own, the blurrier the broader its highlight.
     let mirrored = reflect(-to_eye, normal);
-    let fill = max(dot(mirrored, FILL_DIRECTION), 0.0);
-    let around = 1.6 * ambient(position, mirrored) + FILL_COLOUR * (2.0 * fill * fill);
+    let sky = ambient(position, mirrored);
+    let lamp = smoothstep(0.2, 1.0, dot(mirrored, frame.key.xyz));
+    // Half of the sky's blue: the rest would turn gold to olive.
+    let around = 1.8 * mix(sky, vec3(dot(sky, vec3(0.3333))), 0.5) + KEY_COLOUR * (0.5 * lamp * falling.w);
     let blur = 1.0 / (1.0 + 0.05 * gloss.y);
     let metal = colour * (mix(around, falling.rgb, blur) + gloss.x * KEY_COLOUR * (falling.w * highlight))
         + SKY_COLOUR * (0.5 * rim);

@@ -171,33 +171,45 @@ fn a_scene_that_lies_on_its_side_is_set_upright() {
     assert!(red[3] < green[1], "{red:?} {green:?}");
 }
 
-/// The colour in the middle of a picture of a red ball before a green one.
-fn seen_through(opacity: f32) -> Option<([u8; 4], RgbaImage)> {
+/// A picture of a red ball right before a green one, as the eye sees them; `held` says which is in the hand.
+fn one_before_the_other(opacity: f32, held: [f32; 4]) -> Option<RgbaImage> {
     let ball = shapes::sphere(1.0, 48);
+    let ball = |name, at, colour| body(name, blob(&ball, 0.05, [0.0; 3]), at, colour);
     // Along the line of sight: 35 degrees to the right of the front, 28 above the horizon.
-    let away = [0.506_f64, -0.723, 0.469].map(|part| 0.3 * part);
+    let nearer = [0.506_f64, -0.723, 0.469].map(|part| 0.3 * part);
     let mut red = RED;
     red[3] = opacity;
-    let scene = scene(vec![
-        body("held", blob(&ball, 0.05, [0.0; 3]), [0.0; 3], GREEN),
-        body("window", blob(&ball, 0.05, [0.0; 3]), away, red),
-    ]);
-    let picture = draw(&scene, 1)?.remove(0);
-    Some((picture.get_pixel(SIZE.0 / 2, SIZE.1 / 2).0, picture))
+    let mut bodies = vec![ball("red", nearer, red), ball("green", [0.0; 3], GREEN)];
+    if held == GREEN {
+        bodies.swap(0, 1);
+    }
+    // What the floor is under: nothing else is below it.
+    bodies.push(ball("low", [0.0, 0.0, -0.3], [0.0, 0.0, 0.4, 1.0]));
+    Some(draw(&scene(bodies), 1)?.remove(0))
 }
 
 #[test]
 fn one_sees_through_a_translucent_body_and_not_through_an_opaque_one() {
-    let Some((opaque, _)) = seen_through(1.0) else {
-        return;
+    let mixed = |&[red, green, blue, alpha]: &[u8; 4]| {
+        assert_eq!(alpha, 255);
+        red > 40 && green > 40 && blue + 15 < red.min(green)
     };
-    let (half, _) = seen_through(0.5).expect("there was an adapter");
-    let (none, picture) = seen_through(0.0).expect("there was an adapter");
-    assert!(is_red(&opaque), "{opaque:?}");
-    assert!(is_green(&none), "{none:?}");
-    assert_eq!(around(&picture, is_red).1, 0);
-    let [red, green, ..] = half;
-    assert!(red > 60 && green > 60 && half[3] == 255, "{half:?}");
+    for held in [RED, GREEN] {
+        let Some(opaque) = one_before_the_other(1.0, held) else {
+            return;
+        };
+        let half = one_before_the_other(0.5, held).expect("there was an adapter");
+        let none = one_before_the_other(0.0, held).expect("there was an adapter");
+        let count = |image: &RgbaImage, kind: &dyn Fn(&[u8; 4]) -> bool| around(image, kind).1;
+        let (red, green) = (count(&opaque, &is_red), count(&none, &is_green));
+        let both = [&none, &half, &opaque].map(|image| count(image, &mixed));
+        assert!(red > 1000 && green > 1000, "{red} {green}");
+        // Where neither is seen through the other only some edges are mixed.
+        assert!(both[1] > 400 && 4 * both[0].max(both[2]) < both[1], "{both:?}");
+        assert_eq!(count(&none, &is_red), 0);
+        // Of the farther ball a rim is seen beside the nearer one.
+        assert!(3 * count(&opaque, &is_green) < green);
+    }
 }
 
 #[test]

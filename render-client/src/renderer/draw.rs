@@ -390,25 +390,21 @@ fn pose_of<'a>(body: &'a StageBody, state: &'a State) -> &'a Isometry3<f64> {
     moved.map_or(&body.pose, |(_, pose)| pose)
 }
 
-/// The obstacles; the god-object where there are none.
+/// The obstacles that are seen; the god-object where there are none.
 fn standing_bodies(stage: &Stage, mesh_bounds: &[Bounds]) -> Bounds {
     let bounds = |body: &StageBody| stage.body_bounds(body, &body.pose, &mesh_bounds[body.mesh]);
-    let all = stage
-        .obstacles
-        .iter()
-        .map(bounds)
-        .reduce(|a, b| a.union(&b));
+    let seen = stage.obstacles.iter().filter(|body| body.opacity > 0.0);
+    let all = seen.map(bounds).reduce(|a, b| a.union(&b));
     all.unwrap_or_else(|| bounds(&stage.god_object))
 }
 
 /// Height of the lowest vertex of what stands on the workbench, in metres.
 fn lowest_point(stage: &Stage) -> f64 {
-    let god_object = std::slice::from_ref(&stage.god_object);
-    let standing = if stage.obstacles.is_empty() {
-        god_object
-    } else {
-        &stage.obstacles
-    };
+    let seen = |body: &&StageBody| body.opacity > 0.0;
+    let mut standing: Vec<&StageBody> = stage.obstacles.iter().filter(seen).collect();
+    if standing.is_empty() {
+        standing.push(&stage.god_object);
+    }
     let height = |body: &StageBody| {
         let model = god_object::workbench_from_mesh(stage, body, &body.pose);
         let mesh = &stage.meshes[body.mesh];
@@ -418,7 +414,7 @@ fn lowest_point(stage: &Stage) -> f64 {
             .map(move |v| model.transform_point(&Point3::from(*v).cast::<f64>()).z);
         heights.fold(f64::INFINITY, f64::min)
     };
-    let lowest = standing.iter().map(height).fold(f64::INFINITY, f64::min);
+    let lowest = standing.into_iter().map(height).fold(f64::INFINITY, f64::min);
     if lowest.is_finite() { lowest } else { 0.0 }
 }
 
