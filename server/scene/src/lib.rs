@@ -37,7 +37,7 @@ pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
     GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,
     MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene,
-    SceneSource, Shape, ShippedScene, View, shipped_scene_text,
+    SceneSource, ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::{Simplified, simplify};
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};

@@ -87,7 +87,7 @@ fn preview(
 
 fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
     let bodies = bodies(built).map(|body| body.map(|(body, mesh)| (body, Arc::new(mesh))));
-    // The god-object is the first; in the hand a plane is a plate.
+    // The god-object is the first; in the hand a plane is a plate, as in scenery.
     let obstacles = (1..).zip(&built.world.obstacles);
     let endless = obstacles
         .filter(|(_, o)| matches!(o.primitive, Some(Primitive::Plane { .. })))

@@ -224,6 +224,13 @@ fn summarise_scene(
         built.name,
         triangles.join(", ")
     );
+    if !built.scenery.is_empty() {
+        let pieces = built.scenery.iter();
+        let pieces: Vec<String> = pieces
+            .map(|b| format!("{} {}", b.name, b.mesh.triangles.len()))
+            .collect();
+        summary += &format!(", only seen: {}", pieces.join(", "));
+    }
     if !sizes.is_empty() {
         summary += &format!(", longest side: {}", sizes.join(", "));
     }

@@ -32,7 +32,7 @@ pub const GOD_OBJECT_NAME: &str = "god-object";
 /// A body as it is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuiltBody {
-    /// `god-object`, or the obstacle's name.
+    /// `god-object`, or the name of the obstacle or scenery.
     pub name: String,
     /// Vertices and triangles in the body's own frame.
     pub mesh: RawMesh,
@@ -104,6 +104,8 @@ pub struct BuiltScene {
     pub motions: Vec<BuiltMotion>,
     /// What is drawn: the god-object first, then the obstacles in order.
     pub bodies: Vec<BuiltBody>,
+    /// What is drawn besides and never touched: no closed surfaces, maybe.
+    pub scenery: Vec<BuiltBody>,
     /// What mesh files say of their look and is not drawn: a sentence for each file.
     pub lost_looks: Vec<String>,
     /// How meshes were simplified, for each shape that asks for it.
@@ -131,6 +133,7 @@ impl Scene {
             .iter()
             .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
             .unzip();
+        let (scenery, scenery_lost) = self.built_scenery(&mut problems);
         let hand_path = self.hand_path().unwrap_or_else(|error| {
             problems.extend(error.into_problems());
             None
@@ -211,7 +214,7 @@ impl Scene {
         for motion in &motions {
             obstacles[motion.obstacle].pose = motion.pose_at(0.0);
         }
-        let mut lost_looks = BTreeSet::new();
+        let mut lost_looks = scenery_lost;
         let held = &spec.god_object;
         let look = held.appearance.or(body_look.appearance);
         lost_looks.extend(lost_look(&held.shape, &held.appearance, &body_look));
@@ -237,12 +240,33 @@ impl Scene {
             }),
             motions,
             bodies,
+            scenery,
             lost_looks: lost_looks.into_iter().collect(),
             simplified,
             view: spec.view,
             size,
             fidelity: auto.map(|auto| auto.plan),
         })
+    }
+
+    /// What is only seen, and what is lost of its look.
+    fn built_scenery(&self, problems: &mut Vec<Problem>) -> (Vec<BuiltBody>, BTreeSet<String>) {
+        let (mut scenery, mut lost) = (Vec::new(), BTreeSet::new());
+        for spec in &self.spec.scenery {
+            match self.raw_mesh(&spec.shape, &spec.shape_at) {
+                Ok((mesh, look)) => {
+                    lost.extend(lost_look(&spec.shape, &spec.appearance, &look));
+                    scenery.push(BuiltBody {
+                        name: spec.name.clone(),
+                        mesh,
+                        pose: spec.pose,
+                        appearance: spec.appearance.or(look.appearance),
+                    });
+                }
+                Err(error) => problems.extend(error.into_problems()),
+            }
+        }
+        (scenery, lost)
     }
 
     /// Traces of the obstacles that move.

@@ -10,7 +10,7 @@ use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
     BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
-    ObstacleSpec, Shape, View,
+    ObstacleSpec, ScenerySpec, Shape, View,
 };
 use crate::check::MeshFigures;
 use crate::document::{At, Document, Node, Value};
@@ -166,6 +166,11 @@ impl Scene {
     /// Everything else.
     pub fn obstacles(&self) -> &[ObstacleSpec] {
         &self.spec.obstacles
+    }
+
+    /// What is seen and never touched.
+    pub fn scenery(&self) -> &[ScenerySpec] {
+        &self.spec.scenery
     }
 
     /// `[coupling]`.

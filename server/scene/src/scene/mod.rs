@@ -17,5 +17,5 @@ pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,
     HeightMapSpec, LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint,
-    Shape, View,
+    ScenerySpec, Shape, View,
 };

@@ -5,11 +5,11 @@ use std::cell::RefCell;
 use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
 
-use super::parse_look::appearance;
+use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
-    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, View,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;
@@ -27,6 +27,7 @@ pub(super) struct SceneSpec {
     pub(super) name: String,
     pub(super) god_object: BodySpec,
     pub(super) obstacles: Vec<ObstacleSpec>,
+    pub(super) scenery: Vec<ScenerySpec>,
     pub(super) coupling: CouplingSpec,
     pub(super) limits: LimitSpec,
     pub(super) method: MethodSpec,
@@ -51,6 +52,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         }
     };
     let obstacles = obstacles(&root);
+    let scenery = scenery(&root, &obstacles);
     let coupling = root.section("coupling").map(coupling).unwrap_or_default();
     let limits = root.section("limits").map(limits).unwrap_or_default();
     let method = root.section("method").map(method).unwrap_or_default();
@@ -73,6 +75,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         name,
         god_object,
         obstacles,
+        scenery,
         coupling,
         limits,
         method,

@@ -165,6 +165,20 @@ pub struct ObstacleSpec {
     pub(crate) shape_at: At,
 }
 
+/// Something that is seen and never touched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenerySpec {
+    /// Unique in the scene, obstacles included.
+    pub name: String,
+    /// Its form; a mesh need not be closed.
+    pub shape: Shape,
+    /// World from scenery.
+    pub pose: Pose,
+    /// How it looks.
+    pub appearance: Appearance,
+    pub(crate) shape_at: At,
+}
+
 /// `motion = { trace = "plate.csv" }`: an obstacle is where the trace says, whatever its pose is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionSpec {

@@ -24,7 +24,8 @@ const FINISH: Finish = Finish {
     metallic: 0.0,
 };
 
-/// Everything of a scene that is drawn: each body as clients are told of it, with its mesh. The god-object is the first.
+/// Everything of a scene that is drawn: each body as clients are told of it, with its mesh. The god-object first, then obstacles, then
+/// scenery: to clients that is an obstacle of which no state ever tells.
 pub(crate) fn bodies(
     scene: &BuiltScene,
 ) -> impl Iterator<Item = Result<(BodyDescription, MeshBlob), Failure>> {
@@ -40,7 +41,8 @@ pub(crate) fn bodies(
         };
         Ok((description, blob))
     };
-    scene.bodies.iter().enumerate().map(described)
+    let all = scene.bodies.iter().chain(&scene.scenery);
+    all.enumerate().map(described)
 }
 
 /// The colour of a body that has none of its own.
