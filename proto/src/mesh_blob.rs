@@ -3,13 +3,14 @@
 //! | offset | field     | bytes              | meaning                                      |
 //! |--------|-----------|--------------------|----------------------------------------------|
 //! | 0      | magic     | 4                  | "tmsh"                                       |
-//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals          |
+//! | 4      | layout    | 1                  | bit 0: f64 vertices, bit 1: normals, bit 2: finish |
 //! | 5      | reserved  | 3                  | 0                                            |
 //! | 8      | vertices  | 4                  | count n                                      |
 //! | 12     | triangles | 4                  | count m                                      |
 //! | 16     | positions | n × 12 or n × 24   | m, body frame                                |
 //! |        | triangles | m × 12             | vertex indices, counter-clockwise from outside |
 //! |        | normals   | n × 12 or 0        | unit, per vertex                             |
+//! |        | finish    | 8 or 0             | roughness, metallic: 0 to 1                  |
 
 use crate::{DecodeError, EncodeError, codec::wire_ranged};
 
@@ -20,6 +21,8 @@ const BLOB_MAGIC: [u8; 4] = *b"tmsh";
 const PREFIX_BYTES: usize = 16;
 const LAYOUT_F64: u8 = 1;
 const LAYOUT_NORMALS: u8 = 2;
+const LAYOUT_FINISH: u8 = 4;
+const FINISH_BYTES: usize = 8;
 
 /// BLAKE3 hash of an encoded mesh.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -62,12 +65,22 @@ pub enum Positions {
     F64(Vec<[f64; 3]>),
 }
 
+/// How a surface reflects, in the terms of glTF 2.0's metallic-roughness material; its colour is the body's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finish {
+    /// 0 is a mirror, 1 is matt.
+    pub roughness: f32,
+    /// 0 is a dielectric (plastic, paint, wood), 1 a metal.
+    pub metallic: f32,
+}
+
 /// A triangle mesh. Every index is below the number of vertices, every number finite: checked when made or decoded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshBlob {
     positions: Positions,
     triangles: Vec<[u32; 3]>,
     normals: Option<Vec<[f32; 3]>>,
+    finish: Option<Finish>,
 }
 
 impl Positions {
@@ -121,7 +134,21 @@ impl MeshBlob {
             positions,
             triangles,
             normals,
+            finish: None,
         })
+    }
+
+    /// The same mesh with a finish; both its numbers are 0 to 1.
+    pub fn with_finish(mut self, finish: Finish) -> Result<MeshBlob, DecodeError> {
+        let parts = [finish.roughness, finish.metallic];
+        if !parts.iter().all(|part| (0.0..=1.0).contains(part)) {
+            return Err(DecodeError::OutOfRange {
+                number: "MeshBlob.finish",
+                range: "0 to 1",
+            });
+        }
+        self.finish = Some(finish);
+        Ok(self)
     }
 
     /// Positions in the precision of the source.
@@ -155,6 +182,11 @@ impl MeshBlob {
         self.normals.as_deref()
     }
 
+    /// How its surface reflects; `None` is as bodies of its kind do.
+    pub fn finish(&self) -> Option<Finish> {
+        self.finish
+    }
+
     /// The bytes that travel and are hashed. Fails above [`MAX_MESH_BYTES`].
     pub fn encode(&self) -> Result<Vec<u8>, EncodeError> {
         let vertices = self.positions.len();
@@ -168,8 +200,14 @@ impl MeshBlob {
             0
         };
         let normal_bytes = if self.normals.is_some() { 12 } else { 0 };
-        let len =
-            PREFIX_BYTES + vertices * (position_bytes + normal_bytes) + self.triangles.len() * 12;
+        let (finish, finish_bytes) = match self.finish {
+            Some(_) => (LAYOUT_FINISH, FINISH_BYTES),
+            None => (0, 0),
+        };
+        let len = PREFIX_BYTES
+            + vertices * (position_bytes + normal_bytes)
+            + self.triangles.len() * 12
+            + finish_bytes;
         if len > MAX_MESH_BYTES {
             return Err(EncodeError::TooLong {
                 what: "mesh",
@@ -179,7 +217,7 @@ impl MeshBlob {
         }
         let mut bytes = Vec::with_capacity(len);
         bytes.extend(BLOB_MAGIC);
-        bytes.extend([wide | normals, 0, 0, 0]);
+        bytes.extend([wide | normals | finish, 0, 0, 0]);
         bytes.extend((vertices as u32).to_le_bytes()); // far below 2^32: see the limit above
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
         match &self.positions {
@@ -200,6 +238,10 @@ impl MeshBlob {
             .iter()
             .flatten()
             .flatten()
+            .for_each(|x| bytes.extend(x.to_le_bytes()));
+        self.finish
+            .iter()
+            .flat_map(|finish| [finish.roughness, finish.metallic])
             .for_each(|x| bytes.extend(x.to_le_bytes()));
         Ok(bytes)
     }
@@ -230,7 +272,7 @@ impl MeshBlob {
         if [m0, m1, m2, m3] != BLOB_MAGIC {
             return Err(DecodeError::WrongMagic);
         }
-        if layout & !(LAYOUT_F64 | LAYOUT_NORMALS) != 0 || [r0, r1, r2] != [0; 3] {
+        if layout & !(LAYOUT_F64 | LAYOUT_NORMALS | LAYOUT_FINISH) != 0 || [r0, r1, r2] != [0; 3] {
             return Err(DecodeError::UnknownTag {
                 what: "mesh layout",
                 tag: layout,
@@ -240,19 +282,22 @@ impl MeshBlob {
         let triangles = u64::from(u32::from_le_bytes([t0, t1, t2, t3]));
         let wide = layout & LAYOUT_F64 != 0;
         let with_normals = layout & LAYOUT_NORMALS != 0;
+        let with_finish = layout & LAYOUT_FINISH != 0;
 
         // The counts must account for every byte before anything is read.
         let position_len = vertices * if wide { 24 } else { 12 };
         let triangle_len = triangles * 12;
         let normal_len = if with_normals { vertices * 12 } else { 0 };
-        if position_len + triangle_len + normal_len != body.len() as u64 {
+        let finish_len = if with_finish { FINISH_BYTES as u64 } else { 0 };
+        if position_len + triangle_len + normal_len + finish_len != body.len() as u64 {
             return Err(DecodeError::Inconsistent {
                 what: "mesh length",
             });
         }
         let (positions, rest) = body.split_at(position_len as usize);
-        let (triangles, normals) = rest.split_at(triangle_len as usize);
-        MeshBlob::new(
+        let (triangles, rest) = rest.split_at(triangle_len as usize);
+        let (normals, finish) = rest.split_at(normal_len as usize);
+        let mesh = MeshBlob::new(
             if wide {
                 Positions::F64(triples(positions, f64::from_le_bytes))
             } else {
@@ -260,7 +305,14 @@ impl MeshBlob {
             },
             triples(triangles, u32::from_le_bytes),
             with_normals.then(|| triples(normals, f32::from_le_bytes)),
-        )
+        )?;
+        let Ok([a, b, c, d, e, f, g, h]) = <[u8; FINISH_BYTES]>::try_from(finish) else {
+            return Ok(mesh); // none: the lengths above agree
+        };
+        mesh.with_finish(Finish {
+            roughness: f32::from_le_bytes([a, b, c, d]),
+            metallic: f32::from_le_bytes([e, f, g, h]),
+        })
     }
 }
 

@@ -15,7 +15,7 @@ pub struct SceneDescription {
     pub revision: u32,
     /// The god-object.
     pub god_object: BodyDescription,
-    /// The obstacles; a state's body numbers are indices into this list.
+    /// The obstacles, then what is only seen; a state's body numbers are indices into this list.
     pub obstacles: Vec<BodyDescription>,
     /// Reference point of the god-object, m, in its body frame.
     pub reference_point: [f64; 3],

@@ -3,7 +3,7 @@
 use crate::samples::*;
 use proptest::prelude::*;
 use taut_proto::{
-    ClientStats, ControlMessage, DecodeError, EncodeError, HotState, Kind, MeshBlob,
+    ClientStats, ControlMessage, DecodeError, EncodeError, Finish, HotState, Kind, MeshBlob,
     PROTOCOL_VERSION, Payload, Refusal, SceneDescription, Untrusted, VersionRange,
     codec::{MAX_LIST, MAX_TEXT_BYTES, decode, encode_onto},
     control::{Bye, LENGTH_BYTES, MAX_FRAME_BYTES, RefusalCode},
@@ -224,7 +224,7 @@ fn tetrahedron() -> MeshBlob {
 }
 
 #[test]
-fn a_mesh_comes_back_in_both_precisions_with_and_without_normals() {
+fn a_mesh_comes_back_in_both_precisions_with_and_without_normals_and_finish() {
     let double = tetrahedron();
     for positions in [
         double.positions().clone(),
@@ -233,10 +233,45 @@ fn a_mesh_comes_back_in_both_precisions_with_and_without_normals() {
         for normals in [None, Some(vec![[0.0, 0.0, 1.0]; 4])] {
             let mesh = MeshBlob::new(positions.clone(), double.triangles().to_vec(), normals)
                 .unwrap_or_else(|error| panic!("{error}"));
-            let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
+            let finished = mesh.clone().with_finish(FINISH);
+            let finished = finished.unwrap_or_else(|error| panic!("{error}"));
+            for mesh in [mesh, finished] {
+                let bytes = mesh.encode().unwrap_or_else(|error| panic!("{error}"));
+                assert_eq!(MeshBlob::decode(&bytes), Ok(mesh));
+            }
         }
     }
+}
+
+const FINISH: Finish = Finish {
+    roughness: 0.25,
+    metallic: 1.0,
+};
+
+#[test]
+fn a_finish_out_of_its_range_is_refused() {
+    let refused = |roughness: f32| {
+        let mesh = tetrahedron().with_finish(FINISH);
+        let mut bytes = mesh
+            .unwrap_or_else(|error| panic!("{error}"))
+            .encode()
+            .unwrap_or_default();
+        let at = bytes.len() - 8;
+        bytes[at..at + 4].copy_from_slice(&roughness.to_le_bytes());
+        let decoded = MeshBlob::decode(&bytes);
+        assert_eq!(
+            decoded,
+            tetrahedron().with_finish(Finish {
+                roughness,
+                ..FINISH
+            })
+        );
+        decoded.is_err()
+    };
+    for roughness in [-0.01, 1.01, f32::NAN, f32::INFINITY] {
+        assert!(refused(roughness), "{roughness}");
+    }
+    assert!(!refused(0.0) && !refused(1.0));
 }
 
 #[test]

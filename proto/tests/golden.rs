@@ -5,7 +5,7 @@
 
 use crate::samples::*;
 use taut_proto::{
-    MeshBlob,
+    Finish, MeshBlob,
     header::MAX_DATAGRAM_BYTES,
     mesh_blob::{MeshHash, Positions},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
@@ -45,6 +45,13 @@ fn made() -> Vec<(String, String)> {
     let blob = mesh().encode().unwrap_or_else(|error| panic!("{error}"));
     lines.push(("mesh/hash".to_owned(), MeshHash::of(&blob).to_string()));
     lines.push(("mesh/triangle".to_owned(), hex(&blob)));
+    let finished = mesh().with_finish(Finish {
+        roughness: 0.5,
+        metallic: 1.0,
+    });
+    let finished = finished.unwrap_or_else(|error| panic!("{error}"));
+    let blob = finished.encode().unwrap_or_else(|error| panic!("{error}"));
+    lines.push(("mesh/triangle-with-finish".to_owned(), hex(&blob)));
     lines
 }
 

@@ -62,15 +62,28 @@ fn falling_light(position: vec3<f32>, normal: vec3<f32>) -> vec4<f32> {
     return vec4(light, key_share);
 }
 
-// Light leaving a surface towards the eye. `gloss`: x strength, y exponent of the highlight.
-fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, gloss: vec2<f32>) -> vec3<f32> {
+// Light leaving a surface towards the eye. `gloss`: x strength, y exponent of the highlight, w share of a metal.
+fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, gloss: vec4<f32>) -> vec3<f32> {
     let to_eye = normalize(frame.eye.xyz - position);
     let falling = falling_light(position, normal);
     let away = 1.0 - max(dot(normal, to_eye), 0.0);
     let rim = away * away * away * away;
     let highlight = pow(max(dot(normal, normalize(frame.key.xyz + to_eye)), 0.0), gloss.y);
     let shine = KEY_COLOUR * (falling.w * highlight) + SKY_COLOUR * (0.9 * rim);
-    return MATT_SHARE * colour * falling.rgb + gloss.x * shine;
+    let dielectric = MATT_SHARE * colour * falling.rgb + gloss.x * shine;
+    if gloss.w == 0.0 {
+        return dielectric;
+    }
+    // A metal has no colour below its surface: it reflects what is around it in its own, the blurrier the broader its highlight.
+    let mirrored = reflect(-to_eye, normal);
+    let sky = ambient(position, mirrored);
+    let lamp = smoothstep(0.2, 1.0, dot(mirrored, frame.key.xyz));
+    // Half of the sky's blue: the rest would turn gold to olive.
+    let around = 1.8 * mix(sky, vec3(dot(sky, vec3(0.3333))), 0.5) + KEY_COLOUR * (0.5 * lamp * falling.w);
+    let blur = 1.0 / (1.0 + 0.05 * gloss.y);
+    let metal = colour * (mix(around, falling.rgb, blur) + gloss.x * KEY_COLOUR * (falling.w * highlight))
+        + SKY_COLOUR * (0.5 * rim);
+    return mix(dielectric, metal, gloss.w);
 }
 
 // Keeps bright parts from clipping and their hue from turning: about linear below 0.6.

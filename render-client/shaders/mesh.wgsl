@@ -1,4 +1,4 @@
-// Opaque lit bodies: obstacles, god-object, contact dots, force arrow.
+// Lit bodies: obstacles, god-object, contact dots, force arrow.
 
 struct Instance {
     @location(2) model_x: vec4<f32>,
@@ -6,7 +6,7 @@ struct Instance {
     @location(4) model_z: vec4<f32>,
     @location(5) model_w: vec4<f32>,
     @location(6) colour: vec4<f32>,
-    @location(7) gloss: vec4<f32>,   // x strength, y exponent, z own light
+    @location(7) gloss: vec4<f32>,   // x strength, y exponent, z own light, w share of a metal
 }
 
 struct Fragment {
@@ -46,13 +46,19 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, inst
 }
 
 fn seen(in: Fragment) -> vec4<f32> {
-    let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss.xy);
+    let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss);
     return vec4(shown(mix(light, in.colour.rgb, in.gloss.z)), 1.0);
 }
 
 @fragment
 fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     return seen(in);
+}
+
+// The same of a body through which others are seen.
+@fragment
+fn translucent(in: Fragment) -> @location(0) vec4<f32> {
+    return vec4(seen(in).rgb, in.colour.a * near_share(in.clip));
 }
 
 // The same where near things fade away: dithered, so that they still hide what is behind them.

@@ -79,7 +79,7 @@ pub struct RenderArgs {
     /// Show the two eyes in this way, whatever the server says.
     #[arg(long, value_name = "MODE", value_enum)]
     pub stereo: Option<StereoArg>,
-    /// Width of a view in pixels.
+    /// Width of a view in pixels [default: the window of the workbench file; 480 off-screen without --out].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub width: Option<u32>,
     /// Height of a view in pixels.
@@ -204,6 +204,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         height: args.height,
         stereo: args.stereo.map(Stereo::from),
         headless: args.headless,
+        pictures: args.out.is_some(),
         show: args.show.as_deref().map(listed),
         hud: args.hud,
     };

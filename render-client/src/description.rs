@@ -15,7 +15,7 @@ use crate::view::{ClipPlanes, Screen};
 /// Id of the god-object among the bodies; obstacles are numbered from 0.
 const GOD_OBJECT_ID: u16 = u16::MAX;
 
-/// Width, in pixels, of a view that is drawn off-screen and no size is asked for: small, because a
+/// Width, in pixels, of a view that is drawn off-screen, for nobody to see, and no size is asked for: small, because a
 /// machine without a display mostly has no graphics card either.
 const OFF_SCREEN_WIDTH: u32 = 480;
 
@@ -26,6 +26,8 @@ pub(crate) struct Overrides {
     pub(crate) height: Option<u32>,
     pub(crate) stereo: Option<Stereo>,
     pub(crate) headless: bool,
+    /// Pictures are written: as large as the windows would be.
+    pub(crate) pictures: bool,
     pub(crate) show: Option<Show>,
     /// Show the HUD, whatever `show` and the server say.
     pub(crate) hud: bool,
@@ -85,14 +87,20 @@ pub(crate) fn stage(
         )));
     }
     let origin = pose(&description.scene_origin, "the scene on the workbench")?;
-    let body = |id, mesh, described: &BodyDescription| -> Result<StageBody, RenderError> {
-        let [red, green, blue, _] = described.colour;
+    let drawn: Vec<(TriangleMesh, Point3<f64>)> = meshes.iter().map(|blob| mesh_of(blob)).collect();
+    let body = |id, mesh: usize, described: &BodyDescription| -> Result<StageBody, RenderError> {
+        let [red, green, blue, opacity] = described.colour;
         Ok(StageBody {
             id,
             mesh,
             scale: 1.0,
+            origin: drawn
+                .get(mesh)
+                .map_or_else(Point3::origin, |(_, origin)| *origin),
             pose: pose(&described.pose, &described.name.to_string())?,
             colour: [red, green, blue],
+            opacity,
+            finish: meshes.get(mesh).and_then(|blob| blob.finish()),
         })
     };
     let obstacle = |(index, described)| body(index as u16, index + 1, described);
@@ -120,7 +128,6 @@ pub(crate) fn stage(
             far: description.far,
         },
         workbench_from_scene: Similarity3::from_isometry(origin, description.display_scale),
-        meshes: meshes.iter().map(|blob| Arc::new(mesh_of(blob))).collect(),
         god_object: body(GOD_OBJECT_ID, 0, &description.god_object)?,
         reference_point: Point3::from(description.reference_point),
         obstacles: description
@@ -129,6 +136,7 @@ pub(crate) fn stage(
             .enumerate()
             .map(obstacle)
             .collect::<Result<_, _>>()?,
+        meshes: drawn.into_iter().map(|(mesh, _)| Arc::new(mesh)).collect(),
     })
 }
 
@@ -159,37 +167,56 @@ fn stage_screen(
             source,
         }
     })?;
+    let stereo = overrides.stereo.unwrap_or(match node.stereo {
+        scene::Stereo::Mono => Stereo::Mono,
+        scene::Stereo::SideBySide => Stereo::SideBySide,
+        scene::Stereo::TopBottom => Stereo::TopBottom,
+        scene::Stereo::Anaglyph => Stereo::Anaglyph,
+        scene::Stereo::TwoWindows => Stereo::TwoWindows,
+    });
     Ok(StageScreen {
         name: described.name.to_string(),
-        pixels: pixels(&screen, node, overrides),
+        pixels: pixels(&screen, node, stereo, overrides),
         screen,
-        stereo: overrides.stereo.unwrap_or(match node.stereo {
-            scene::Stereo::Mono => Stereo::Mono,
-            scene::Stereo::SideBySide => Stereo::SideBySide,
-            scene::Stereo::TopBottom => Stereo::TopBottom,
-            scene::Stereo::Anaglyph => Stereo::Anaglyph,
-            scene::Stereo::TwoWindows => Stereo::TwoWindows,
-        }),
+        stereo,
     })
 }
 
-/// As asked for; a length left open follows from the other and the screen's shape. Windows have
-/// the size that the workbench gives them.
-fn pixels(screen: &Screen, node: &NodeDescription, overrides: &Overrides) -> (u32, u32) {
+/// As asked for; a length left open follows from the other and the screen's shape. Windows, and pictures that are written, have
+/// the size that the workbench gives windows: off-screen this is the share of one view.
+fn pixels(
+    screen: &Screen,
+    node: &NodeDescription,
+    stereo: Stereo,
+    overrides: &Overrides,
+) -> (u32, u32) {
+    let window = (node.window.width.max(1), node.window.height.max(1));
     let shape = screen.height() / screen.width();
     let high = |width: u32| ((f64::from(width) * shape).round() as u32).max(1);
     match (overrides.width, overrides.height) {
         (Some(width), Some(height)) => (width, height),
         (Some(width), None) => (width, high(width)),
         (None, Some(height)) => (((f64::from(height) / shape).round() as u32).max(1), height),
+        (None, None) if overrides.pictures => stereo.view_size(window),
         (None, None) if overrides.headless => (OFF_SCREEN_WIDTH, high(OFF_SCREEN_WIDTH)),
-        (None, None) => (node.window.width.max(1), node.window.height.max(1)),
+        (None, None) => window,
     }
 }
 
-fn mesh_of(blob: &MeshBlob) -> TriangleMesh {
-    TriangleMesh {
-        vertices: blob.positions_f32(),
+/// The mesh about the middle of its box, and where that is: what lies far from the origin of its frame keeps its form in
+/// single precision.
+fn mesh_of(blob: &MeshBlob) -> (TriangleMesh, Point3<f64>) {
+    let positions = blob.positions_f64();
+    let boxes = positions
+        .iter()
+        .map(|p| (Point3::from(*p), Point3::from(*p)));
+    let around = boxes.reduce(|(low, high), (p, q)| (low.inf(&p), high.sup(&q)));
+    let (low, high) = around.unwrap_or_default();
+    let origin = nalgebra::center(&low, &high);
+    let near = |p: [f64; 3]| (Point3::from(p) - origin).cast::<f32>().into();
+    let mesh = TriangleMesh {
+        vertices: positions.into_iter().map(near).collect(),
         triangles: blob.triangles().to_vec(),
-    }
+    };
+    (mesh, origin)
 }

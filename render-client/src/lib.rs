@@ -23,6 +23,7 @@ mod mouse;
 pub mod node_status;
 pub mod normals;
 mod pacing;
+pub mod preview;
 pub mod renderer;
 mod runtime_directory;
 mod session;

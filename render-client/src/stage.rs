@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3};
+use taut_proto::Finish;
 
 use crate::comfort::Comfort;
 use crate::stereo::Stereo;
@@ -59,10 +60,16 @@ pub struct StageBody {
     pub mesh: usize,
     /// Size of the body over that of its mesh.
     pub scale: f64,
+    /// Where its mesh's origin lies, in metres, body frame: near the mesh, whose coordinates are single precision.
+    pub origin: Point3<f64>,
     /// Pose at the start, scene frame.
     pub pose: Isometry3<f64>,
     /// Linear red, green and blue in [0, 1].
     pub colour: [f32; 3],
+    /// 0 is not drawn, 1 hides what is behind it; below 1 it casts no shadow.
+    pub opacity: f32,
+    /// How its surface reflects; `None` is as bodies of its kind do.
+    pub finish: Option<Finish>,
 }
 
 /// Vertices and triangles, counter-clockwise seen from outside.
@@ -120,9 +127,16 @@ impl Stage {
     pub fn body_bounds(&self, body: &StageBody, pose: &Isometry3<f64>, mesh: &Bounds) -> Bounds {
         let Bounds { center, radius } = *mesh;
         Bounds {
-            center: self.workbench_from_scene * (pose * Point3::from(center.coords * body.scale)),
+            center: self.workbench_from_scene * (pose * body.place(&center)),
             radius: radius * body.scale * self.workbench_from_scene.scaling(),
         }
+    }
+}
+
+impl StageBody {
+    /// A point of the mesh in the body's frame.
+    pub fn place(&self, point: &Point3<f64>) -> Point3<f64> {
+        self.origin + point.coords * self.scale
     }
 }
 

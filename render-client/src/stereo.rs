@@ -95,6 +95,15 @@ impl Stereo {
             Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
         }
     }
+
+    /// Size of one eye's view, in pixels, in a picture of `width` × `height`; an odd pixel is left out.
+    pub fn view_size(self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self {
+            Self::SideBySide => ((width / 2).max(1), height),
+            Self::TopBottom => (width, (height / 2).max(1)),
+            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -112,6 +121,7 @@ mod tests {
     #[test]
     fn every_view_gets_the_size_asked_for() {
         for mode in ALL {
+            assert_eq!(mode.picture_size(mode.view_size((960, 640))), (960, 640));
             let (width, height) = mode.picture_size((480, 320));
             for (_, part) in mode.pictures().iter().flat_map(|p| &p.views) {
                 assert_eq!(

@@ -7,4 +7,5 @@ mod network;
 #[path = "support/perceptual.rs"]
 mod perceptual;
 mod pictures;
+mod preview;
 mod support;

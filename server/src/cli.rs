@@ -108,6 +108,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Makes a scene of parts from CAD programs, and mends their meshes within stated bounds
     Import(ImportArgs),
+    /// Draws a scene into a PNG file, without a server
+    Preview(PreviewArgs),
     /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Says where the viewer's head is, from a tracker on this PC
@@ -384,6 +386,36 @@ pub struct ImportArgs {
     pub json: bool,
 }
 
+/// Pixels of a preview that names no size.
+pub const PREVIEW_SIZE: (u32, u32) = (1280, 960);
+/// Most pixels of a preview's side: a poster.
+const MOST_PIXELS: u32 = 8192;
+/// Most pictures of a turn: ten to a degree.
+const MOST_VIEWS: i64 = 3600;
+
+/// `taut preview`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "The eye is before the scene, to its right and above, as near as shows all of it. Bodies are where they start. A half-space is drawn\nas a plate, and is not brought into view. An existing file is replaced.\n\nExamples:\n  taut preview peg-in-a-hole --out peg.png\n  taut preview my-scene.toml --out turn.png --orbit 36 --size 800x600"
+)]
+pub struct PreviewArgs {
+    /// A shipped scene by its name, or a scene file
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// The picture, a PNG file
+    #[arg(long, value_name = "FILE.png", value_parser = png_file)]
+    pub out: PathBuf,
+    /// Pixels across and down, up to 8192 each (default: 1280x960)
+    #[arg(long, value_name = "WxH", value_parser = picture_size)]
+    pub size: Option<(u32, u32)>,
+    /// Draw so many pictures of a turn around the scene instead, FILE-01.png and so on
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_VIEWS))]
+    pub orbit: Option<u32>,
+    /// Graphics adapter by number or part of its name (default: the best; `taut doctor` lists them)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub gpu: Option<String>,
+}
+
 /// `taut doctor`.
 #[derive(Clone, Debug, Args)]
 #[command(
@@ -615,6 +647,33 @@ fn hole_edges(text: &str) -> Result<usize, String> {
         Ok(edges) if edges <= MAX_HOLE_EDGES => Ok(edges),
         _ => Err(format!("give a number of edges up to {MAX_HOLE_EDGES}")),
     }
+}
+
+/// A name that says what is written.
+fn png_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    let is_png = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("png"));
+    if is_png && path.file_stem().is_some() {
+        Ok(path)
+    } else {
+        Err("name a file that ends in .png".to_owned())
+    }
+}
+
+fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| {
+        text.parse()
+            .ok()
+            .filter(|side| (1..=MOST_PIXELS).contains(side))
+    };
+    let sides = text.split_once(['x', 'X']);
+    sides
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| {
+            format!("give a width and a height from 1 to {MOST_PIXELS}, such as 1280x960")
+        })
 }
 
 fn tracking_rate(text: &str) -> Result<f64, String> {

@@ -17,6 +17,7 @@ const MATERIAL: Material = Material {
     gloss: 0.3,
     sharpness: 40.0,
     own_light: 0.35,
+    metallic: 0.0,
 };
 
 /// A dot per contact; `radius` is that of the god-object in the workbench, in metres.

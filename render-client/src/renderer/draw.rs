@@ -46,7 +46,7 @@ pub struct Renderer {
 struct Shadowed {
     light: KeyLight,
     standing: Vec<Instance>,
-    moving: Instance,
+    moving: Vec<Instance>,
 }
 
 #[derive(Debug)]
@@ -54,6 +54,7 @@ struct Pipelines {
     background: wgpu::RenderPipeline,
     floor: wgpu::RenderPipeline,
     mesh: wgpu::RenderPipeline,
+    translucent: wgpu::RenderPipeline,
     ghost: wgpu::RenderPipeline,
 }
 
@@ -62,8 +63,12 @@ struct Pipelines {
 struct Plan {
     light: KeyLight,
     stale: bool,
-    /// God-object and obstacles.
+    /// Opaque bodies, which cast shadows: the god-object, if it is one, then obstacles.
     casters: Vec<Batch>,
+    /// How many of the first of these are the god-object's: 1 or 0.
+    moving: usize,
+    /// Bodies through which others are seen, each with its middle.
+    translucent: Vec<(Point3<f64>, Batch)>,
     /// Contact dots and force arrow.
     marks: Vec<Batch>,
     ghost: Option<Batch>,
@@ -87,6 +92,7 @@ impl Renderer {
                 output,
                 stage.comfort.nearest_disparity.is_some(),
             ),
+            translucent: mesh::translucent_pipeline(device, &layout, output),
             ghost: ghost::pipeline(device, &layout, output),
         };
         let mut meshes: Vec<MeshBuffers> = stage
@@ -115,7 +121,10 @@ impl Renderer {
             shadow: ShadowMap::new(device),
             meshes,
             mesh_bounds,
-            god_object_box: stage.meshes[stage.god_object.mesh].corners(),
+            god_object_box: {
+                let (low, high) = stage.meshes[stage.god_object.mesh].corners();
+                (stage.god_object.place(&low), stage.god_object.place(&high))
+            },
             instances,
             floor: Floor::under(&bodies, lowest_point(stage) - 0.004 * bodies.radius),
             clip_planes: stage.clip_planes,
@@ -128,6 +137,8 @@ impl Renderer {
                 light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
                 stale: true,
                 casters: Vec::new(),
+                moving: 0,
+                translucent: Vec::new(),
                 marks: Vec::new(),
                 ghost: None,
             },
@@ -166,15 +177,25 @@ impl Renderer {
     pub fn set_state(&mut self, gpu: &Gpu, stage: &Stage, latched: &Latched, show: Show) {
         let state = &latched.state;
         let mut list = InstanceList::default();
-        let mut casters = Vec::new();
+        let (mut casters, mut translucent) = (Vec::new(), Vec::new());
         let mut bounds = self.bounds(stage, &stage.god_object, &state.god_object);
         let radius = bounds.radius;
+        let mut add = |body: &StageBody, instance, middle| {
+            let batch = list.batch(body.mesh, [instance]);
+            if body.opacity >= 1.0 {
+                casters.push(batch);
+            } else if body.opacity > 0.0 {
+                translucent.push((middle, batch));
+            }
+        };
         let god_object = god_object::instance(stage, &state.god_object);
-        casters.push(list.batch(stage.god_object.mesh, [god_object]));
+        add(&stage.god_object, god_object, bounds.center);
+        let moving = usize::from(stage.god_object.opacity >= 1.0);
         for body in &stage.obstacles {
             let pose = pose_of(body, state);
-            bounds = bounds.union(&self.bounds(stage, body, pose));
-            casters.push(list.batch(body.mesh, [obstacles::instance(stage, body, pose)]));
+            let own = self.bounds(stage, body, pose);
+            bounds = bounds.union(&own);
+            add(body, obstacles::instance(stage, body, pose), own.center);
         }
 
         let (dot, arrow) = (self.meshes.len() - 2, self.meshes.len() - 1);
@@ -198,15 +219,22 @@ impl Renderer {
             light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
             stale: latched.stale,
             casters,
+            moving,
+            translucent,
             marks,
             ghost,
         };
         gpu.queue
             .write_buffer(&self.instances, 0, bytemuck::cast_slice(&list.instances));
+        let (held, standing) = self.plan.casters.split_at(moving);
+        let of = |batches: &[Batch]| {
+            let instances = batches.iter().flat_map(|batch| batch.instances.clone());
+            instances.map(|i| list.instances[i as usize]).collect()
+        };
         let shadowed = Shadowed {
             light: self.plan.light,
-            moving: list.instances[0],
-            standing: list.instances[1..self.plan.casters.len()].to_vec(),
+            moving: of(held),
+            standing: of(standing),
         };
         self.draw_shadow(gpu, shadowed);
     }
@@ -221,7 +249,7 @@ impl Renderer {
             has.is_some_and(|has| has.light == wanted.light && has.standing == wanted.standing);
         self.shadow.aim(&gpu.queue, &self.plan.light);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let (moving, standing) = self.plan.casters.split_at(1);
+        let (moving, standing) = self.plan.casters.split_at(self.plan.moving);
         if !stands {
             let mut pass = self.shadow.begin_standing(&mut encoder);
             pass.set_vertex_buffer(1, self.instances.slice(..));
@@ -248,20 +276,21 @@ impl Renderer {
         target: &wgpu::TextureView,
     ) {
         let sees = |view: &ViewTarget| self.set_view(gpu, screen, eyes, view);
-        let seen: Vec<bool> = picture.views.iter().map(sees).collect();
+        let seen: Vec<Option<Point3<f64>>> = picture.views.iter().map(sees).collect();
         let marks = self
             .overlay
             .marks((screen.width() / screen.height()) as f32);
         let letters = picture.overlay.set(&gpu.queue, &marks);
-        let draw_eye = |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: bool| {
-            enter(pass, picture, view);
-            if seen {
-                self.draw_view(pass, view);
-            }
-            if letters > 0 {
-                self.text.draw(pass, &picture.overlay, letters);
-            }
-        };
+        let draw_eye =
+            |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: Option<Point3<f64>>| {
+                enter(pass, picture, view);
+                if let Some(eye) = seen {
+                    self.draw_view(pass, view, &eye);
+                }
+                if letters > 0 {
+                    self.text.draw(pass, &picture.overlay, letters);
+                }
+            };
         if let Some(combined) = &picture.anaglyph {
             for (view, seen) in picture.views.iter().zip(&seen) {
                 let own = view.own.as_ref().unwrap_or(target);
@@ -276,12 +305,16 @@ impl Renderer {
         }
     }
 
-    /// Writes a view's uniform; `false` where this eye does not see the screen.
-    fn set_view(&self, gpu: &Gpu, screen: &Screen, eyes: &Eyes, view: &ViewTarget) -> bool {
+    /// Writes a view's uniform; from where it sees, `None` where this eye does not see the screen.
+    fn set_view(
+        &self,
+        gpu: &Gpu,
+        screen: &Screen,
+        eyes: &Eyes,
+        view: &ViewTarget,
+    ) -> Option<Point3<f64>> {
         let eye = eyes.position(view.eye);
-        let Some(clip) = screen.clip_from_workbench(&eye, &self.clip_planes) else {
-            return false;
-        };
+        let clip = screen.clip_from_workbench(&eye, &self.clip_planes)?;
         let Plan { light, stale, .. } = &self.plan;
         let separation = match view.eye {
             Eye::Middle => 0.0,
@@ -291,10 +324,10 @@ impl Renderer {
         let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale, &fade);
         gpu.queue
             .write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
-        true
+        Some(eye)
     }
 
-    fn draw_view(&self, pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget) {
+    fn draw_view(&self, pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, eye: &Point3<f64>) {
         pass.set_bind_group(0, &view.group, &[]);
 
         pass.set_pipeline(&self.pipelines.mesh);
@@ -305,9 +338,24 @@ impl Renderer {
         pass.draw(0..3, 0..1);
         pass.set_pipeline(&self.pipelines.floor);
         pass.draw(0..4, 0..1);
+        self.draw_translucent(pass, eye);
         if let Some(ghost) = &self.plan.ghost {
             pass.set_pipeline(&self.pipelines.ghost);
             self.draw_batches(pass, std::slice::from_ref(ghost));
+        }
+    }
+
+    /// The farthest first, by their middles: a body within another one is drawn as if beside it.
+    fn draw_translucent(&self, pass: &mut wgpu::RenderPass<'_>, eye: &Point3<f64>) {
+        if self.plan.translucent.is_empty() {
+            return;
+        }
+        let away = |middle: &Point3<f64>| (middle - eye).norm_squared();
+        let mut order: Vec<&(Point3<f64>, Batch)> = self.plan.translucent.iter().collect();
+        order.sort_by(|(a, _), (b, _)| away(b).total_cmp(&away(a)));
+        pass.set_pipeline(&self.pipelines.translucent);
+        for (_, batch) in order {
+            self.draw_batches(pass, std::slice::from_ref(batch));
         }
     }
 
@@ -343,25 +391,21 @@ fn pose_of<'a>(body: &'a StageBody, state: &'a State) -> &'a Isometry3<f64> {
     moved.map_or(&body.pose, |(_, pose)| pose)
 }
 
-/// The obstacles; the god-object where there are none.
+/// The obstacles that are seen; the god-object where there are none.
 fn standing_bodies(stage: &Stage, mesh_bounds: &[Bounds]) -> Bounds {
     let bounds = |body: &StageBody| stage.body_bounds(body, &body.pose, &mesh_bounds[body.mesh]);
-    let all = stage
-        .obstacles
-        .iter()
-        .map(bounds)
-        .reduce(|a, b| a.union(&b));
+    let seen = stage.obstacles.iter().filter(|body| body.opacity > 0.0);
+    let all = seen.map(bounds).reduce(|a, b| a.union(&b));
     all.unwrap_or_else(|| bounds(&stage.god_object))
 }
 
 /// Height of the lowest vertex of what stands on the workbench, in metres.
 fn lowest_point(stage: &Stage) -> f64 {
-    let god_object = std::slice::from_ref(&stage.god_object);
-    let standing = if stage.obstacles.is_empty() {
-        god_object
-    } else {
-        &stage.obstacles
-    };
+    let seen = |body: &&StageBody| body.opacity > 0.0;
+    let mut standing: Vec<&StageBody> = stage.obstacles.iter().filter(seen).collect();
+    if standing.is_empty() {
+        standing.push(&stage.god_object);
+    }
     let height = |body: &StageBody| {
         let model = god_object::workbench_from_mesh(stage, body, &body.pose);
         let mesh = &stage.meshes[body.mesh];
@@ -371,7 +415,10 @@ fn lowest_point(stage: &Stage) -> f64 {
             .map(move |v| model.transform_point(&Point3::from(*v).cast::<f64>()).z);
         heights.fold(f64::INFINITY, f64::min)
     };
-    let lowest = standing.iter().map(height).fold(f64::INFINITY, f64::min);
+    let lowest = standing
+        .into_iter()
+        .map(height)
+        .fold(f64::INFINITY, f64::min);
     if lowest.is_finite() { lowest } else { 0.0 }
 }
 

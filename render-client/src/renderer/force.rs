@@ -25,6 +25,7 @@ const MATERIAL: Material = Material {
     gloss: 0.25,
     sharpness: 40.0,
     own_light: 0.25,
+    metallic: 0.0,
 };
 
 /// The arrow for `force` (newtons, scene axes) on the god-object at `pose` (scene frame), whose

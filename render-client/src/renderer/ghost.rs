@@ -13,6 +13,7 @@ const MATERIAL: Material = Material {
     gloss: 0.0,
     sharpness: 1.0,
     own_light: 0.0,
+    metallic: 0.0,
 };
 
 /// The ghost at the device's pose, scene frame.

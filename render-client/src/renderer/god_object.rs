@@ -5,15 +5,18 @@ use nalgebra::{Isometry3, Matrix4};
 use super::mesh::{Instance, Material};
 use crate::stage::{Stage, StageBody};
 
+/// Glossier than what stands.
+const USUAL: Material = Material {
+    colour: [0.0; 4],
+    gloss: 0.5,
+    sharpness: 36.0,
+    own_light: 0.0,
+    metallic: 0.0,
+};
+
 /// The god-object at a pose of the scene frame.
 pub(crate) fn instance(stage: &Stage, pose: &Isometry3<f64>) -> Instance {
-    let [red, green, blue] = stage.god_object.colour;
-    let material = Material {
-        colour: [red, green, blue, 1.0],
-        gloss: 0.5,
-        sharpness: 36.0,
-        own_light: 0.0,
-    };
+    let material = Material::of(&stage.god_object, USUAL);
     Instance::new(
         &workbench_from_mesh(stage, &stage.god_object, pose),
         &material,
@@ -26,6 +29,6 @@ pub(crate) fn workbench_from_mesh(
     body: &StageBody,
     pose: &Isometry3<f64>,
 ) -> Matrix4<f64> {
-    let scaling = Matrix4::new_scaling(body.scale);
-    stage.workbench_from_scene.to_homogeneous() * pose.to_homogeneous() * scaling
+    let in_body = Matrix4::new_translation(&body.origin.coords) * Matrix4::new_scaling(body.scale);
+    (stage.workbench_from_scene * pose).to_homogeneous() * in_body
 }

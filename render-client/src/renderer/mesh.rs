@@ -5,7 +5,7 @@ use nalgebra::Matrix4;
 
 use super::pipeline::{FrameLayout, Layer, Output, PipelineParts, filled};
 use crate::normals::shade;
-use crate::stage::TriangleMesh;
+use crate::stage::{StageBody, TriangleMesh};
 
 /// A vertex with its normal: 16 bytes, so that 1.7 million triangles take about 34 MB with their indices.
 #[repr(C)]
@@ -36,6 +36,43 @@ pub(crate) struct Material {
     pub(crate) sharpness: f32,
     /// Share of the colour shown as it is, without lighting, in [0, 1].
     pub(crate) own_light: f32,
+    /// Share of a metal: reflects in its own colour, and nothing from below its surface.
+    pub(crate) metallic: f32,
+}
+
+impl Material {
+    /// The body's colour and finish; `usual` reflects where it has no finish.
+    pub(crate) fn of(body: &StageBody, usual: Self) -> Self {
+        let [red, green, blue] = body.colour;
+        let colour = [red, green, blue, body.opacity];
+        let Some(finish) = body.finish else {
+            return Self { colour, ..usual };
+        };
+        let sharpness = sharpness(finish.roughness);
+        let reflectance = DIELECTRIC + (1.0 - DIELECTRIC) * finish.metallic;
+        Self {
+            colour,
+            gloss: (reflectance * (sharpness + 8.0) / 8.0).min(MOST_GLOSS),
+            sharpness,
+            own_light: 0.0,
+            metallic: finish.metallic,
+        }
+    }
+}
+
+/// Share of light that a dielectric reflects head-on: that of plastic and glass.
+const DIELECTRIC: f32 = 0.04;
+/// Strongest highlight: beyond it there is nothing but white.
+const MOST_GLOSS: f32 = 1.0;
+/// Narrowest highlight: a narrower one, of a light without size, falls between the pixels.
+const SHARPEST: f32 = 400.0;
+
+/// Blinn-Phong's exponent for a roughness in [0, 1]: 2 / alpha^2 - 2 with alpha = roughness^2.
+///
+/// Source: Karis 2013, "Specular BRDF reference"; the factor (n + 8) / 8 above is Akenine-Möller et al., "Real-Time Rendering", 9.8.
+fn sharpness(roughness: f32) -> f32 {
+    let alpha = roughness * roughness;
+    (2.0 / (alpha * alpha).max(f32::MIN_POSITIVE) - 2.0).clamp(1.0, SHARPEST)
 }
 
 /// A mesh on the graphics card.
@@ -61,7 +98,12 @@ impl Instance {
         Self {
             model: workbench_from_mesh.cast::<f32>().into(),
             colour: material.colour,
-            gloss: [material.gloss, material.sharpness, material.own_light, 0.0],
+            gloss: [
+                material.gloss,
+                material.sharpness,
+                material.own_light,
+                material.metallic,
+            ],
         }
     }
 }
@@ -146,6 +188,24 @@ pub(crate) fn buffer_layouts() -> [Option<wgpu::VertexBufferLayout<'static>>; 2]
             &INSTANCE_ATTRIBUTES,
         ),
     ]
+}
+
+/// The pipeline of lit bodies through which others are seen; their far sides are not drawn.
+pub(crate) fn translucent_pipeline(
+    device: &wgpu::Device,
+    layout: &FrameLayout,
+    output: Output,
+) -> wgpu::RenderPipeline {
+    let parts = PipelineParts {
+        label: "translucent",
+        source: include_str!("../../shaders/mesh.wgsl"),
+        vertex: "vertex",
+        fragment: "translucent",
+        buffers: &buffer_layouts(),
+        topology: wgpu::PrimitiveTopology::TriangleList,
+        layer: Layer::Translucent,
+    };
+    layout.pipeline(device, output, &parts)
 }
 
 /// The pipeline of opaque lit bodies; with `fades` those that come too near fade away.

@@ -33,8 +33,11 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
         id,
         mesh,
         scale: 1.0,
+        origin: Point3::origin(),
         pose: Isometry3::identity(),
         colour,
+        opacity: 1.0,
+        finish: None,
     };
     Stage {
         screens: screens

@@ -4,6 +4,7 @@
 //! reported together ([`FileError`]). SI units and quaternions `w x y z` in every file.
 #![forbid(unsafe_code)]
 
+mod appearance;
 mod check;
 mod document;
 pub mod fidelity;
@@ -21,6 +22,7 @@ mod simplify;
 mod trace;
 mod workbench;
 
+pub use appearance::{Appearance, srgb};
 pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
 pub use fidelity::FidelityPlan;
@@ -35,7 +37,7 @@ pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
     GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec, LimitSpec,
     MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene,
-    SceneSource, Shape, ShippedScene, View, shipped_scene_text,
+    SceneSource, ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::{Simplified, simplify};
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};

@@ -1,7 +1,8 @@
-//! `taut import`: parts into a folder with meshes and a scene. The work is `taut_scene::import`.
+//! `taut import`: parts into a folder with meshes, a scene and its picture. The work is `taut_scene::import`.
 
 use taut_scene::{ImportReport, ImportRequest};
 
+use super::preview;
 use crate::cli::ImportArgs;
 use crate::shared::failure::Failure;
 
@@ -17,8 +18,14 @@ pub(super) fn run(args: &ImportArgs) -> Result<ImportReport, Failure> {
         name: args.name.clone(),
         obstacles_only: args.obstacle,
     };
-    taut_scene::import(&request).map_err(|error| {
+    let mut report = taut_scene::import(&request).map_err(|error| {
         let all: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
         Failure::bad_input(all.join("\n"))
-    })
+    })?;
+    // A picture is a help, not part of the scene.
+    match preview::beside(&report.scene) {
+        Ok(picture) => report.picture = Some(picture),
+        Err(reason) => report.notes.push(format!("no picture was drawn: {reason}")),
+    }
+    Ok(report)
 }

@@ -12,6 +12,11 @@ mod import;
 mod key;
 mod keys;
 mod manual;
+#[cfg(feature = "render")]
+mod preview;
+#[cfg(not(feature = "render"))]
+#[path = "preview_absent.rs"]
+mod preview;
 mod record;
 mod recording_size;
 pub(crate) mod render;
@@ -43,7 +48,11 @@ pub fn main() -> ExitCode {
     // Before any key is read. Where the system has no such thing, the file's mode is all there is.
     taut_link::keep_memory_private();
     let cli = Cli::parse();
-    if matches!(cli.command, Some(Command::Render(_) | Command::Doctor(_))) {
+    let draws = matches!(
+        cli.command,
+        Some(Command::Render(_) | Command::Doctor(_) | Command::Preview(_) | Command::Import(_))
+    );
+    if draws {
         render::restart_with_runtime_directory();
     }
     taut_log::start("warn");
@@ -84,6 +93,9 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
         Command::Import(args) => import_command(&args),
+        Command::Preview(args) => {
+            print(preview::run(&args)?.join("\n")).map(|()| ExitCode::SUCCESS)
+        }
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::Keys(args) => keys_command(&args),

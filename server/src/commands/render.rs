@@ -13,6 +13,11 @@ pub(crate) use taut_render::restart_with_runtime_directory;
 #[cfg(not(feature = "render"))]
 pub(crate) fn restart_with_runtime_directory() {}
 
+/// What a build that cannot draw says.
+#[cfg(not(feature = "render"))]
+pub(crate) const NOT_BUILT_IN: &str =
+    "this program was built without drawing: build it with `--features render`";
+
 /// Draws one node of the workbench until the session ends.
 #[cfg(feature = "render")]
 pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
@@ -30,9 +35,9 @@ pub(crate) fn run(args: RenderArgs) -> Result<(), crate::shared::failure::Failur
 /// Says that this build cannot draw.
 #[cfg(not(feature = "render"))]
 pub(crate) fn run(_args: RenderArgs) -> Result<(), crate::shared::failure::Failure> {
-    Err(crate::shared::failure::Failure::BadInput(
-        "this program was built without drawing: build it with `--features render`, or use the program `taut-render`".into(),
-    ))
+    Err(crate::shared::failure::Failure::BadInput(format!(
+        "{NOT_BUILT_IN}, or use the program `taut-render`"
+    )))
 }
 
 /// What this machine draws with, or why it does not; `None` in a build that cannot draw.

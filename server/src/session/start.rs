@@ -23,6 +23,7 @@ use crate::session::edge_sets::EdgeSets;
 use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
 use crate::session::observers::ObserverServices;
 use crate::session::operator::{Facts, OperatorPage};
+use crate::session::setup::content::own_colours;
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
@@ -311,5 +312,6 @@ fn picture(setup: &SessionSetup) -> MonitorPicture {
         display_scale: description.display_scale,
         head: setup.head.rest,
         rest_distance: setup.settings.rest_distance,
+        colours: own_colours(description),
     }
 }

@@ -8,7 +8,7 @@ use super::report::{FileKind, FileReport, MeshFigures};
 use crate::document::{Document, Value};
 use crate::fidelity::FidelityPlan;
 use crate::files::{MAX_TOML_BYTES, read_text};
-use crate::mesh_file::{is_mesh_path, read_mesh};
+use crate::mesh_file::{is_mesh_path, read_mesh_and_look};
 use crate::problem::{FileError, Problem};
 use crate::scene::{GOD_OBJECT_NAME, Scene, mesh_faults, shipped_scene_text};
 use crate::trace::DeviceTrace;
@@ -76,8 +76,8 @@ fn report(
 }
 
 fn check_mesh(path: &Path) -> FileReport {
-    let mesh = match read_mesh(path) {
-        Ok(mesh) => mesh,
+    let (mesh, look) = match read_mesh_and_look(path) {
+        Ok(read) => read,
         Err(error) => return report(path, FileKind::Mesh, Err(error)),
     };
     let figures = MeshFigures::of(&mesh);
@@ -94,6 +94,12 @@ fn check_mesh(path: &Path) -> FileReport {
     let longest = figures.size_m.iter().copied().fold(0.0, f64::max);
     let mut notes = Vec::new();
     notes.extend(doubt_about_size("the mesh", longest));
+    if !look.lost.is_empty() {
+        notes.push(format!(
+            "of its look is not drawn: {}",
+            look.lost.join(", ")
+        ));
+    }
     let summary = figures.to_string();
     FileReport {
         file: path.display().to_string(),
@@ -200,6 +206,7 @@ fn summarise_scene(
             notes.extend(doubt_about_size(&body.name, longest));
         }
     }
+    notes.extend(built.lost_looks.iter().cloned());
     let triangles: Vec<String> = built
         .bodies
         .iter()
@@ -220,6 +227,13 @@ fn summarise_scene(
         built.name,
         triangles.join(", ")
     );
+    if !built.scenery.is_empty() {
+        let pieces = built.scenery.iter();
+        let pieces: Vec<String> = pieces
+            .map(|b| format!("{} {}", b.name, b.mesh.triangles.len()))
+            .collect();
+        summary += &format!(", only seen: {}", pieces.join(", "));
+    }
     if !sizes.is_empty() {
         summary += &format!(", longest side: {}", sizes.join(", "));
     }

@@ -27,7 +27,7 @@ pub use report::{Finding, ImportReport, PartReport};
 pub use unit::LengthUnit;
 
 use crate::check::{MeshFigures, place_text};
-use crate::mesh_file::{RawMesh, read_mesh, write_ply};
+use crate::mesh_file::{RawMesh, read_mesh_and_look, write_ply};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
 use crate::scene::{GOD_OBJECT_NAME, Scene};
@@ -90,6 +90,7 @@ pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
             Placed {
                 body: report.body.clone(),
                 mesh_file: report.mesh_file.clone(),
+                appearance: report.appearance,
                 low,
                 high,
             }
@@ -104,6 +105,7 @@ pub fn import(request: &ImportRequest) -> Result<ImportReport, FileError> {
     let report = ImportReport {
         folder: request.folder.display().to_string(),
         scene: request.folder.join(SCENE_FILE).display().to_string(),
+        picture: None,
         parts: reports,
         notes,
     };
@@ -149,7 +151,8 @@ fn part(
     request: &ImportRequest,
 ) -> Result<(PartReport, RawMesh), FileError> {
     // A vertex of no triangle is no part of the surface, however far away it is.
-    let raw = read_mesh(path)?.without_unused();
+    let (raw, look) = read_mesh_and_look(path)?;
+    let raw = raw.without_unused();
     let fail = |text: String| FileError::from(Problem::of_file(path.display(), text));
     let (unit, unit_assumed) = unit::unit_of(path, &raw, request.unit).map_err(fail)?;
     let single = is_single(&raw.vertices);
@@ -194,6 +197,7 @@ fn part(
         moved_m: moved,
         thickened_m: thickened,
         simplified_m: None,
+        appearance: look.appearance,
         mesh: MeshFigures::of(&raw),
     };
     if let Some(outcome) = &simplified {
@@ -205,6 +209,11 @@ fn part(
             &Places::of(1, Some(place)),
             "NOT MENDED: the surface touches or runs through itself; its mass counts what overlaps twice, and the force inside is not defined",
         ));
+    }
+    if !look.lost.is_empty() {
+        let text = format!("of its look is not drawn: {}", look.lost.join(", "));
+        let finding = Finding::new("look-lost", &Places::default(), text);
+        report.findings.push(finding);
     }
     Ok((report, raw))
 }

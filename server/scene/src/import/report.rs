@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::Point3;
 use serde::Serialize;
 
+use crate::appearance::Appearance;
 use crate::check::{MeshFigures, place_text};
 use crate::simplify::Simplified;
 
@@ -85,6 +86,8 @@ pub struct PartReport {
     pub thickened_m: Option<f64>,
     /// No point of the simplified surface is farther from the other one, either way, m; absent where nothing was simplified.
     pub simplified_m: Option<f64>,
+    /// How the file says that the part looks; the scene says the same.
+    pub appearance: Appearance,
     /// Figures of the mesh that was written.
     pub mesh: MeshFigures,
 }
@@ -96,6 +99,8 @@ pub struct ImportReport {
     pub folder: String,
     /// The scene file in it.
     pub scene: String,
+    /// A picture of the scene, where one was drawn.
+    pub picture: Option<String>,
     /// Of each part, in order.
     pub parts: Vec<PartReport>,
     /// What the user should know of the scene.
@@ -178,6 +183,9 @@ impl fmt::Display for ImportReport {
         }
         for note in &self.notes {
             writeln!(f, "note: {note}")?;
+        }
+        if let Some(picture) = &self.picture {
+            writeln!(f, "picture: {picture}")?;
         }
         write!(
             f,

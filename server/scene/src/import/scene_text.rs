@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point3, center};
 
+use crate::appearance::{Appearance, text_of_colour};
+
 /// What is drawn is about this wide, m.
 const DRAWN_WIDTH: f64 = 0.3;
 /// Where the shipped workbench has a scene's origin: above the middle of its table, m.
@@ -19,6 +21,7 @@ pub(super) struct Placed {
     /// `god-object`, or the obstacle's name.
     pub(super) body: String,
     pub(super) mesh_file: String,
+    pub(super) appearance: Appearance,
     pub(super) low: Point3<f64>,
     pub(super) high: Point3<f64>,
 }
@@ -74,6 +77,9 @@ pub(super) fn scene_text(
         text,
         "pose = {{ position = [{x:?}, {y:?}, {z:?}], rotation = [1.0, 0.0, 0.0, 0.0] }}    # m; w x y z"
     );
+    if let Some(part) = held {
+        write_look(&mut text, &part.appearance);
+    }
     for part in obstacles {
         let _ = writeln!(
             text,
@@ -81,6 +87,7 @@ pub(super) fn scene_text(
             quoted(&part.body),
             quoted(&part.mesh_file)
         );
+        write_look(&mut text, &part.appearance);
     }
     let longest = around(obstacles).map_or(longest, |(low, high)| longest.max((high - low).max()));
     let scale = two_digits(DRAWN_WIDTH / longest);
@@ -104,6 +111,23 @@ pub(super) fn scene_text(
         );
     }
     text
+}
+
+/// A line for each key that the part's file says.
+fn write_look(text: &mut String, appearance: &Appearance) {
+    // Writing to a String cannot fail.
+    if let Some(colour) = appearance.color {
+        let _ = writeln!(text, "color = \"{}\"", text_of_colour(colour));
+    }
+    for (key, value) in [
+        ("roughness", appearance.roughness),
+        ("metallic", appearance.metallic),
+        ("opacity", appearance.opacity),
+    ] {
+        if let Some(value) = value {
+            let _ = writeln!(text, "{key} = {value:?}");
+        }
+    }
 }
 
 /// Whole millimetres, for the same people; no minus zero.

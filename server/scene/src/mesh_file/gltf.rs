@@ -5,12 +5,15 @@ use std::path::Path;
 use gltf::accessor::{DataType, Dimensions};
 use gltf::buffer::Source;
 use gltf::json::validation::Checked;
+use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use god_object::surface::CornerCoordinates;
 use nalgebra::{Matrix4, Point3};
 
+use super::material::{Material, Materials};
 use super::read::finite_vertex;
 use super::{Fault, RawMesh};
+use crate::appearance::Appearance;
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 
 /// Deepest tree of nodes. Deeper is a loop or a joke.
@@ -18,8 +21,13 @@ const MAX_NODE_DEPTH: usize = 64;
 /// Most nodes visited. A node may hang below several parents.
 const MAX_NODES: usize = 100_000;
 
-pub(super) fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
-    parse_with(bytes, directory, None).map(RawMesh::welded)
+/// The mesh; which material each triangle has goes to `materials`.
+pub(super) fn parse(
+    bytes: &[u8],
+    directory: Option<&Path>,
+    materials: &mut Materials,
+) -> Result<RawMesh, Fault> {
+    parse_with(bytes, directory, materials, None).map(RawMesh::welded)
 }
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v runs down the picture, as it does in the file.
@@ -28,7 +36,8 @@ pub(super) fn parse_texture_coordinates(
     directory: Option<&Path>,
 ) -> Result<Vec<CornerCoordinates>, Fault> {
     let mut coordinates = Vec::new();
-    parse_with(bytes, directory, Some(&mut coordinates))?;
+    let materials = &mut Materials::default();
+    parse_with(bytes, directory, materials, Some(&mut coordinates))?;
     Ok(coordinates)
 }
 
@@ -36,9 +45,11 @@ pub(super) fn parse_texture_coordinates(
 fn parse_with(
     bytes: &[u8],
     directory: Option<&Path>,
+    materials: &mut Materials,
     mut coordinates: Option<&mut Vec<CornerCoordinates>>,
 ) -> Result<RawMesh, Fault> {
     let file = validated(bytes)?;
+    materials.list = file.materials().map(|of| material(&of)).collect();
     let buffers = buffers(&file, directory)?;
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
         return Err(Fault::new("has no scene; export it with one"));
@@ -62,6 +73,7 @@ fn parse_with(
         let world_from_node = world_from_parent * parent_from_node;
         if let Some(of_node) = node.mesh() {
             for primitive in of_node.primitives() {
+                let before = mesh.triangles.len();
                 append(
                     &mut mesh,
                     coordinates.as_deref_mut(),
@@ -76,6 +88,9 @@ fn parse_with(
                         primitive.index()
                     ))
                 })?;
+                let count = mesh.triangles.len() - before;
+                materials.push(primitive.material().index(), count);
+                materials.vertex_colours |= primitive.get(&gltf::Semantic::Colors(0)).is_some();
             }
         }
         pending.extend(
@@ -84,6 +99,32 @@ fn parse_with(
         );
     }
     Ok(mesh)
+}
+
+/// What a material says without pictures: a factor of a picture says nothing alone.
+fn material(of: &gltf::Material<'_>) -> Material {
+    let share = |value: f32| value.is_finite().then(|| value.clamp(0.0, 1.0));
+    let surface = of.pbr_metallic_roughness();
+    let [red, green, blue, alpha] = surface.base_color_factor();
+    let (picture, finish) = (
+        surface.base_color_texture().is_some(),
+        surface.metallic_roughness_texture().is_some(),
+    );
+    let colour = || Some([share(red)?, share(green)?, share(blue)?]);
+    Material {
+        name: of.name().unwrap_or("unnamed").to_owned(),
+        appearance: Appearance {
+            color: if picture { None } else { colour() },
+            roughness: share(surface.roughness_factor()).filter(|_| !finish),
+            metallic: share(surface.metallic_factor()).filter(|_| !finish),
+            opacity: share(alpha).filter(|_| of.alpha_mode() == AlphaMode::Blend && !picture),
+        },
+        textured: picture
+            || finish
+            || of.normal_texture().is_some()
+            || of.occlusion_texture().is_some()
+            || of.emissive_texture().is_some(),
+    }
 }
 
 /// The file as the crate validates it, around what the crate panics at: its reader of containers subtracts lengths unseen, and its
@@ -381,6 +422,10 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse(bytes: &[u8], directory: Option<&Path>) -> Result<RawMesh, Fault> {
+        super::parse(bytes, directory, &mut Materials::default())
+    }
 
     /// One triangle in a data URI; indices in the first 8 bytes, positions after.
     fn triangle(node: &str, last_index: u16) -> String {

@@ -1,6 +1,8 @@
 //! Triangle meshes in files: PLY, OBJ, STL, glTF.
 
 mod gltf;
+mod material;
+mod mtl;
 mod obj;
 mod ply;
 mod raw_mesh;
@@ -8,9 +10,10 @@ mod read;
 mod stl;
 mod texture_coordinates;
 
+pub(crate) use material::FileLook;
 pub use ply::write_ply;
 pub use raw_mesh::RawMesh;
 use read::Fault;
-pub(crate) use read::is_gltf_path;
+pub(crate) use read::{is_gltf_path, read_mesh_and_look};
 pub use read::{is_mesh_path, read_mesh, read_mesh_bytes};
 pub(crate) use texture_coordinates::read_texture_coordinates;

@@ -1,17 +1,22 @@
-//! Wavefront OBJ: `v` and `f` lines, in double precision, with line numbers; `vt` lines where they are asked for. Everything else is
-//! appearance and skipped.
+//! Wavefront OBJ: `v` and `f` lines, in double precision, with line numbers; `usemtl` and `mtllib`; `vt` lines where they are asked for.
+
+use std::collections::HashMap;
 
 use god_object::surface::CornerCoordinates;
 
+use super::material::{Material, Materials};
 use super::read::finite_vertex;
 use super::{Fault, RawMesh};
 
 /// Most corners of one face. More is a broken line.
 const MAX_FACE_CORNERS: usize = 10_000;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
+/// The mesh; which material each face names goes to `materials`.
+pub(super) fn parse(bytes: &[u8], materials: &mut Materials) -> Result<RawMesh, Fault> {
     let text = String::from_utf8_lossy(bytes); // names in comments and groups may be in any encoding
     let mut mesh = RawMesh::default();
+    let mut places: HashMap<String, usize> = HashMap::new();
+    let mut material = None;
     // Faces may name vertices that come later: remember the line, check at the end.
     let mut first_line_of_largest = (0u32, 0usize);
     for (number, line) in text.lines().enumerate().map(|(i, line)| (i + 1, line)) {
@@ -32,7 +37,21 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
                     first_line_of_largest = (largest, number);
                 }
                 mesh.push_polygon(&corners);
+                materials.push(material, corners.len() - 2);
             }
+            // Names may hold blanks.
+            Some(key @ "usemtl") => {
+                let name = named(line, key);
+                let place = places.entry(name.to_owned()).or_insert_with(|| {
+                    materials.list.push(Material {
+                        name: name.to_owned(),
+                        ..Material::default()
+                    });
+                    materials.list.len() - 1
+                });
+                material = Some(*place);
+            }
+            Some(key @ "mtllib") => materials.libraries.push(named(line, key).to_owned()),
             _ => {}
         }
     }
@@ -46,6 +65,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
         return Err(Fault::at(line, text));
     }
     Ok(mesh)
+}
+
+/// What follows the key of a line.
+fn named<'l>(line: &'l str, key: &str) -> &'l str {
+    line.trim_start().trim_start_matches(key).trim()
 }
 
 /// Texture coordinates of every triangle that [`parse`] gives, in its order. v of the file runs up the picture; here it runs down.
@@ -176,6 +200,10 @@ fn face<'w>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
+        super::parse(bytes, &mut Materials::default())
+    }
 
     #[test]
     fn polygons_slashes_and_negative_indices_are_understood() {

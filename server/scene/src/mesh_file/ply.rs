@@ -113,6 +113,15 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, Fault> {
     Ok(mesh)
 }
 
+/// Whether vertices have colours, which are not read.
+pub(super) fn has_colours(bytes: &[u8]) -> bool {
+    let coloured = |element: &Element| {
+        let mut properties = element.properties.iter();
+        element.name == "vertex" && properties.any(|property| property.name == "red")
+    };
+    header(bytes).is_ok_and(|(_, elements, _)| elements.iter().any(coloured))
+}
+
 fn header(bytes: &[u8]) -> Result<(Format, Vec<Element>, &[u8]), Fault> {
     let mut format = None;
     let mut elements: Vec<Element> = Vec::new();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::material::{FileLook, Materials};
 use super::{RawMesh, gltf, obj, ply, stl};
 use crate::files::{MAX_MESH_BYTES, read_bytes};
 use crate::problem::{FileError, Problem};
@@ -66,24 +67,41 @@ pub(super) fn extension(path: &Path) -> String {
 /// exactly equal. All coordinates are finite and all indices in range. Whether the surface is closed is another
 /// question: `god_object::Mesh` answers it.
 pub fn read_mesh(path: &Path) -> Result<RawMesh, FileError> {
+    read_mesh_bytes(path, &mesh_bytes(path)?)
+}
+
+/// The same, and how the file says that its body looks: a material that cannot be read is no fault of the mesh.
+pub(crate) fn read_mesh_and_look(path: &Path) -> Result<(RawMesh, FileLook), FileError> {
+    let bytes = mesh_bytes(path)?;
+    let (mesh, materials) = parse_mesh(path, &bytes).map_err(|fault| fault.in_file(path))?;
+    let look = materials.look(&mesh, path.parent());
+    Ok((mesh, look))
+}
+
+fn mesh_bytes(path: &Path) -> Result<Vec<u8>, Problem> {
     if !is_mesh_path(path) {
         let text = "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf";
-        return Err(Problem::of_file(path.display(), text).into());
+        return Err(Problem::of_file(path.display(), text));
     }
-    read_mesh_bytes(path, &read_bytes(path, MAX_MESH_BYTES)?)
+    read_bytes(path, MAX_MESH_BYTES)
 }
 
 /// The same from bytes that are there already; `path` gives the format, the name in messages and where a .gltf finds its buffers.
 pub fn read_mesh_bytes(path: &Path, bytes: &[u8]) -> Result<RawMesh, FileError> {
-    parse_mesh(path, bytes).map_err(|fault| fault.in_file(path).into())
+    let (mesh, _) = parse_mesh(path, bytes).map_err(|fault| fault.in_file(path))?;
+    Ok(mesh)
 }
 
-fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
+fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<(RawMesh, Materials), Fault> {
+    let mut materials = Materials::default();
     let mesh = match extension(path).as_str() {
-        "ply" => ply::parse(bytes),
-        "obj" => obj::parse(bytes),
+        "ply" => {
+            materials.vertex_colours = ply::has_colours(bytes);
+            ply::parse(bytes)
+        }
+        "obj" => obj::parse(bytes, &mut materials),
         "stl" => stl::parse(bytes),
-        "glb" | "gltf" => gltf::parse(bytes, path.parent()),
+        "glb" | "gltf" => gltf::parse(bytes, path.parent(), &mut materials),
         _ => Err(Fault::new(
             "is no known mesh format; use .ply, .obj, .stl, .glb or .gltf",
         )),
@@ -91,7 +109,7 @@ fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
     if mesh.triangles.is_empty() {
         return Err(Fault::new("has no faces; export it as a triangle mesh"));
     }
-    Ok(mesh)
+    Ok((mesh, materials))
 }
 
 /// A vertex with finite coordinates, or which coordinate is not. `number` counts from 0, as the formats' indices do.
@@ -129,8 +147,9 @@ mod tests {
         fn arbitrary_bytes_never_panic(head in 0usize..5, tail in prop::collection::vec(any::<u8>(), 0..400)) {
             let bytes = [HEADS[head].as_bytes(), &tail].concat();
             for name in ["a.ply", "a.obj", "a.stl", "a.glb", "a.gltf"] {
-                let _ = parse_mesh(Path::new(name), &bytes);
-                let _ = parse_mesh(Path::new(name), &tail);
+                for bytes in [&bytes, &tail] {
+                    let _ = parse_mesh(Path::new(name), bytes).map(|(mesh, materials)| materials.look(&mesh, None));
+                }
             }
         }
 
@@ -140,7 +159,7 @@ mod tests {
             let place = place % bytes.len();
             bytes[place] = value;
             bytes.truncate(bytes.len().saturating_sub(cut % 3));
-            if let Ok(mesh) = parse_mesh(Path::new("a.ply"), &bytes) {
+            if let Ok((mesh, _)) = parse_mesh(Path::new("a.ply"), &bytes) {
                 prop_assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
                 prop_assert!(mesh.vertices.iter().all(|v| v.iter().all(|c| c.is_finite())));
             }

@@ -1,5 +1,7 @@
 //! From a scene to what the method works on: meshes loaded or generated, masses, settings.
 
+use std::collections::BTreeSet;
+
 use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
@@ -8,10 +10,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::auto_fidelity::AutoFidelity;
 use super::load::{Scene, unusable};
 use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
+use crate::appearance::Appearance;
 use crate::check::MeshFigures;
 use crate::document::At;
 use crate::fidelity::FidelityPlan;
-use crate::mesh_file::RawMesh;
+use crate::mesh_file::{FileLook, RawMesh};
 use crate::problem::{FileError, Problem};
 use crate::progress::Progress;
 use crate::shapes;
@@ -29,12 +32,14 @@ pub const GOD_OBJECT_NAME: &str = "god-object";
 /// A body as it is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuiltBody {
-    /// `god-object`, or the obstacle's name.
+    /// `god-object`, or the name of the obstacle or scenery.
     pub name: String,
     /// Vertices and triangles in the body's own frame.
     pub mesh: RawMesh,
     /// World from body, at the start.
     pub pose: Pose,
+    /// How it looks: what the scene says, else its mesh file.
+    pub appearance: Appearance,
 }
 
 /// How an obstacle moves.
@@ -99,6 +104,10 @@ pub struct BuiltScene {
     pub motions: Vec<BuiltMotion>,
     /// What is drawn: the god-object first, then the obstacles in order.
     pub bodies: Vec<BuiltBody>,
+    /// What is drawn besides and never touched: no closed surfaces, maybe.
+    pub scenery: Vec<BuiltBody>,
+    /// What mesh files say of their look and is not drawn: a sentence for each file.
+    pub lost_looks: Vec<String>,
     /// How meshes were simplified, for each shape that asks for it.
     pub simplified: Vec<Simplified>,
     /// How the scene stands on the workbench.
@@ -114,16 +123,17 @@ impl Scene {
     pub fn build(&self) -> Result<BuiltScene, FileError> {
         let mut problems = Vec::new();
         let spec = &self.spec;
-        let mut body_mesh = self.mesh(
+        let (mut body_mesh, body_look) = self.mesh(
             &spec.god_object.shape,
             &spec.god_object.shape_at,
             &mut problems,
         );
-        let mut obstacle_meshes: Vec<Option<Mesh>> = spec
+        let (mut obstacle_meshes, looks): (Vec<Option<Mesh>>, Vec<FileLook>) = spec
             .obstacles
             .iter()
             .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
-            .collect();
+            .unzip();
+        let (scenery, scenery_lost) = self.built_scenery(&mut problems);
         let hand_path = self.hand_path().unwrap_or_else(|error| {
             problems.extend(error.into_problems());
             None
@@ -204,8 +214,16 @@ impl Scene {
         for motion in &motions {
             obstacles[motion.obstacle].pose = motion.pose_at(0.0);
         }
-        let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, spec.god_object.pose)];
-        bodies.extend(obstacles.iter().map(|o| drawn(&o.name, &o.mesh, o.pose)));
+        let mut lost_looks = scenery_lost;
+        let held = &spec.god_object;
+        let look = held.appearance.or(body_look.appearance);
+        lost_looks.extend(lost_look(&held.shape, &held.appearance, &body_look));
+        let mut bodies = vec![drawn(GOD_OBJECT_NAME, &body.mesh, held.pose, look)];
+        for ((obstacle, spec), look) in obstacles.iter().zip(&spec.obstacles).zip(&looks) {
+            lost_looks.extend(lost_look(&spec.shape, &spec.appearance, look));
+            let look = spec.appearance.or(look.appearance);
+            bodies.push(drawn(&obstacle.name, &obstacle.mesh, obstacle.pose, look));
+        }
         let hand = spec.hand.as_ref().zip(hand_path);
         let world = World { body, obstacles };
         GodObject::check_start(&world, &settings, &spec.god_object.pose)
@@ -222,11 +240,33 @@ impl Scene {
             }),
             motions,
             bodies,
+            scenery,
+            lost_looks: lost_looks.into_iter().collect(),
             simplified,
             view: spec.view,
             size,
             fidelity: auto.map(|auto| auto.plan),
         })
+    }
+
+    /// What is only seen, and what is lost of its look.
+    fn built_scenery(&self, problems: &mut Vec<Problem>) -> (Vec<BuiltBody>, BTreeSet<String>) {
+        let (mut scenery, mut lost) = (Vec::new(), BTreeSet::new());
+        for spec in &self.spec.scenery {
+            match self.raw_mesh(&spec.shape, &spec.shape_at) {
+                Ok((mesh, look)) => {
+                    lost.extend(lost_look(&spec.shape, &spec.appearance, &look));
+                    scenery.push(BuiltBody {
+                        name: spec.name.clone(),
+                        mesh,
+                        pose: spec.pose,
+                        appearance: spec.appearance.or(look.appearance),
+                    });
+                }
+                Err(error) => problems.extend(error.into_problems()),
+            }
+        }
+        (scenery, lost)
     }
 
     /// Traces of the obstacles that move.
@@ -247,40 +287,49 @@ impl Scene {
         motions
     }
 
-    fn mesh(&self, shape: &Shape, at: &At, problems: &mut Vec<Problem>) -> Option<Mesh> {
-        let raw = match self.raw_mesh(shape, at) {
-            Ok(raw) => raw,
+    fn mesh(
+        &self,
+        shape: &Shape,
+        at: &At,
+        problems: &mut Vec<Problem>,
+    ) -> (Option<Mesh>, FileLook) {
+        let (raw, look) = match self.raw_mesh(shape, at) {
+            Ok(read) => read,
             Err(error) => {
                 problems.extend(error.into_problems());
-                return None;
+                return (None, FileLook::default());
             }
         };
         let (count, name) = (raw.triangles.len(), shape.file().unwrap_or("a shape"));
         let _progress =
             Progress::on_triangles(count, format_args!("{name}: preparing {count} triangles"));
-        Mesh::new(raw.vertices, raw.triangles)
+        let mesh = Mesh::new(raw.vertices, raw.triangles)
             .map_err(|error| {
                 let Shape::Mesh { path, .. } = shape else {
                     problems.push(at.problem(format!("the shape cannot be used: {error}")));
                     return;
                 };
                 // Made again, since no copy is kept of a mesh that is sound: all its faults, with their places.
-                let raw = self.raw_mesh(shape, at).unwrap_or_default();
+                let (raw, _) = self.raw_mesh(shape, at).unwrap_or_default();
                 let faults = MeshFigures::of(&raw).faults();
                 problems.extend(faults.iter().map(|fault| unusable(at, path, fault)));
                 if faults.is_empty() {
                     problems.push(unusable(at, path, error));
                 }
             })
-            .ok()
+            .ok();
+        (mesh, look)
     }
 
-    /// The surface of a shape of this scene, not yet checked for being closed.
-    pub(crate) fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<RawMesh, FileError> {
-        Ok(match *shape {
+    /// The surface of a shape of this scene, not yet checked for being closed, and how its file says that it looks.
+    fn raw_mesh(&self, shape: &Shape, at: &At) -> Result<(RawMesh, FileLook), FileError> {
+        let mesh = match *shape {
             Shape::Mesh {
                 ref path, scale, ..
-            } => self.mesh_file(path, at)?.scaled(scale),
+            } => {
+                let (mesh, look) = self.mesh_file(path, at)?;
+                return Ok((mesh.scaled(scale), look));
+            }
             Shape::Sphere {
                 radius,
                 subdivisions,
@@ -308,7 +357,8 @@ impl Scene {
                 let [size, thickness] = plate.unwrap_or(shapes::PLATE);
                 shapes::plane(size, thickness, axis)
             }
-        })
+        };
+        Ok((mesh, FileLook::default()))
     }
 
     fn body(&self, mesh: Mesh) -> Result<Body, FileError> {
@@ -431,7 +481,15 @@ fn simplify_as_asked(
     Some(report)
 }
 
-fn drawn(name: &str, mesh: &Mesh, pose: Pose) -> BuiltBody {
+/// What the file of a shape says of its look and nobody draws; a scene that names a colour has said what it wants.
+fn lost_look(shape: &Shape, said: &Appearance, look: &FileLook) -> Option<String> {
+    let file = shape.file()?;
+    let lost = look.lost.join(", ");
+    let wanted = said.color.is_none() && !lost.is_empty();
+    wanted.then(|| format!("of the look of \"{file}\" is not drawn: {lost}"))
+}
+
+fn drawn(name: &str, mesh: &Mesh, pose: Pose, appearance: Appearance) -> BuiltBody {
     let raw = RawMesh {
         vertices: mesh.vertices().to_vec(),
         triangles: mesh.triangles().to_vec(),
@@ -440,6 +498,7 @@ fn drawn(name: &str, mesh: &Mesh, pose: Pose) -> BuiltBody {
         name: name.to_owned(),
         mesh: raw,
         pose,
+        appearance,
     }
 }
 

@@ -10,13 +10,15 @@ use super::parse::{SceneSpec, parse};
 use super::shipped::{SHIPPED_SCENES, shipped_file, shipped_scene_text};
 use super::spec::{
     BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MethodSpec,
-    ObstacleSpec, Shape, View,
+    ObstacleSpec, ScenerySpec, Shape, View,
 };
 use crate::check::MeshFigures;
 use crate::document::{At, Document, Node, Value};
 use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
-use crate::mesh_file::{RawMesh, read_mesh, read_texture_coordinates};
+use crate::mesh_file::{
+    FileLook, RawMesh, read_mesh, read_mesh_and_look, read_texture_coordinates,
+};
 use crate::problem::{FileError, Problem};
 use crate::trace::DeviceTrace;
 
@@ -166,6 +168,11 @@ impl Scene {
         &self.spec.obstacles
     }
 
+    /// What is seen and never touched.
+    pub fn scenery(&self) -> &[ScenerySpec] {
+        &self.spec.scenery
+    }
+
     /// `[coupling]`.
     pub fn coupling(&self) -> &CouplingSpec {
         &self.spec.coupling
@@ -213,9 +220,9 @@ impl Scene {
         DeviceTrace::parse(&path.display().to_string(), &text)
     }
 
-    /// The mesh file of this name, as written in the scene.
-    pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<RawMesh, FileError> {
-        read_mesh(&self.locate(name, at)?)
+    /// The mesh file of this name, as written in the scene, and how it says that its body looks.
+    pub(super) fn mesh_file(&self, name: &str, at: &At) -> Result<(RawMesh, FileLook), FileError> {
+        read_mesh_and_look(&self.locate(name, at)?)
     }
 
     /// The texture of a height map, its picture read and laid on this shape with this mesh.

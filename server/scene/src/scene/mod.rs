@@ -4,6 +4,7 @@ mod auto_fidelity;
 mod build;
 mod load;
 mod parse;
+mod parse_look;
 mod parse_shape;
 mod shipped;
 mod spec;
@@ -16,5 +17,5 @@ pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,
     HeightMapSpec, LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint,
-    Shape, View,
+    ScenerySpec, Shape, View,
 };

@@ -5,10 +5,11 @@ use std::cell::RefCell;
 use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
 
+use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
     AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
-    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, View,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;
@@ -26,6 +27,7 @@ pub(super) struct SceneSpec {
     pub(super) name: String,
     pub(super) god_object: BodySpec,
     pub(super) obstacles: Vec<ObstacleSpec>,
+    pub(super) scenery: Vec<ScenerySpec>,
     pub(super) coupling: CouplingSpec,
     pub(super) limits: LimitSpec,
     pub(super) method: MethodSpec,
@@ -50,6 +52,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         }
     };
     let obstacles = obstacles(&root);
+    let scenery = scenery(&root, &obstacles);
     let coupling = root.section("coupling").map(coupling).unwrap_or_default();
     let limits = root.section("limits").map(limits).unwrap_or_default();
     let method = root.section("method").map(method).unwrap_or_default();
@@ -72,6 +75,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         name,
         god_object,
         obstacles,
+        scenery,
         coupling,
         limits,
         method,
@@ -90,6 +94,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
     let mass = mass(&section);
     let pose = pose(&section);
     let reference_point = reference_point(&section);
+    let appearance = appearance(&section);
     let at = section.at().clone();
     section.finish();
     Some(BodySpec {
@@ -97,6 +102,7 @@ fn god_object(section: Section<'_>) -> Option<BodySpec> {
         mass: mass?,
         pose: pose?,
         reference_point: reference_point?,
+        appearance,
         at,
         shape_at,
     })
@@ -163,6 +169,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
         let (shape, pose) = (shape(&section), pose(&section));
         let (surface, height_map) = surface(&section);
         let motion = section.section("motion").and_then(motion);
+        let appearance = appearance(&section);
         let at = section.at();
         if obstacles.len() >= MAX_OBSTACLES {
             section.complain(
@@ -179,6 +186,7 @@ fn obstacles(root: &Section<'_>) -> Vec<ObstacleSpec> {
                 pose,
                 surface,
                 motion,
+                appearance,
                 height_map,
                 shape_at,
             });

@@ -3,6 +3,7 @@
 use god_object::{Pose, Primitive, RotationMetric, SolverKind, Surface};
 use nalgebra::{Point3, UnitQuaternion};
 
+use crate::appearance::Appearance;
 use crate::document::At;
 use crate::shapes::{Axis, exact_capsule, exact_cylinder, exact_plane, exact_sphere};
 
@@ -138,6 +139,8 @@ pub struct BodySpec {
     pub pose: Pose,
     /// Where forces act.
     pub reference_point: ReferencePoint,
+    /// How it looks.
+    pub appearance: Appearance,
     pub(crate) at: At,
     pub(crate) shape_at: At,
 }
@@ -157,6 +160,22 @@ pub struct ObstacleSpec {
     pub height_map: Option<HeightMapSpec>,
     /// How it moves; `None` stands still at its pose.
     pub motion: Option<MotionSpec>,
+    /// How it looks.
+    pub appearance: Appearance,
+    pub(crate) shape_at: At,
+}
+
+/// Something that is seen and never touched.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenerySpec {
+    /// Unique in the scene, obstacles included.
+    pub name: String,
+    /// Its form; a mesh need not be closed.
+    pub shape: Shape,
+    /// World from scenery.
+    pub pose: Pose,
+    /// How it looks.
+    pub appearance: Appearance,
     pub(crate) shape_at: At,
 }
 

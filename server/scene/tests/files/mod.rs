@@ -4,6 +4,7 @@ mod checks;
 mod exact_shapes;
 mod fidelity;
 mod generated_shapes;
+mod looks;
 mod scene_faults;
 mod scene_page;
 mod shipped;

@@ -13,9 +13,9 @@ const MAX_DEPTH: usize = 6;
 
 type Tables = BTreeMap<String, BTreeSet<String>>;
 
-/// `shape` and `pose` are the same in the god-object as in an obstacle.
+/// `shape` and `pose` are the same in the god-object as in an obstacle and in scenery.
 fn table_name(name: &str) -> String {
-    for owner in ["[god_object] ", "[[obstacle]] "] {
+    for owner in ["[god_object] ", "[[obstacle]] ", "[[scenery]] "] {
         if let Some(inner) = name.strip_prefix(owner)
             && ["shape", "pose"].contains(&inner.split(' ').next().unwrap_or_default())
         {
@@ -43,7 +43,8 @@ fn complaints(scene: &Scene, assignment: &str) -> Vec<(String, BTreeSet<String>)
 /// Every table that the parser reads, found by asking: whatever key it knows may be a table.
 fn known() -> Tables {
     let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"a.ply\" }\n\
-                [[obstacle]]\nname = \"o\"\nshape = { mesh = \"a.ply\" }\n";
+                [[obstacle]]\nname = \"o\"\nshape = { mesh = \"a.ply\" }\n\
+                [[scenery]]\nname = \"s\"\nshape = { mesh = \"a.ply\" }\n";
     let scene = Scene::parse("s.toml", text, Path::new("")).unwrap();
     let mut tables = Tables::new();
     let mut pending = vec![(String::new(), 0)];
@@ -51,7 +52,8 @@ fn known() -> Tables {
         let assignment = match path.as_str() {
             "" => format!("{UNKNOWN}=1"),
             // What is there already keeps its keys: some are known only beside others.
-            "god_object" | "god_object.shape" | "obstacle.0" | "obstacle.0.shape" => {
+            "god_object" | "god_object.shape" | "obstacle.0" | "obstacle.0.shape" | "scenery.0"
+            | "scenery.0.shape" => {
                 format!("{path}.{UNKNOWN}=1")
             }
             _ => format!("{path}={{{UNKNOWN}=1}}"),
@@ -59,7 +61,7 @@ fn known() -> Tables {
         for (name, keys) in complaints(&scene, &assignment) {
             for key in keys.iter().filter(|_| depth < MAX_DEPTH) {
                 let child = match (path.as_str(), key.as_str()) {
-                    ("", "obstacle") => "obstacle.0".to_owned(),
+                    ("", list @ ("obstacle" | "scenery")) => format!("{list}.0"),
                     ("", key) => key.to_owned(),
                     (path, key) => format!("{path}.{key}"),
                 };

@@ -66,6 +66,8 @@ pub struct MonitorPicture {
     pub head: Pose,
     /// Gap at which bodies touch, m.
     pub rest_distance: f64,
+    /// Own colours of the god-object, then of the obstacles, sRGB; `None`: the role's.
+    pub colours: Vec<Option<[u8; 3]>>,
 }
 
 /// The shared data that the monitor reads.

@@ -141,6 +141,7 @@ impl SceneFrame {
 fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
     let world = &picture.world;
     let mut scene = MonitorScene::new(&picture.name);
+    let mut colours = picture.colours.iter().copied();
     let mut body = |name: &str, mesh: &god_object::Mesh, role, pose: &Pose| {
         scene.bodies.push(MonitorBody {
             name: name.to_owned(),
@@ -151,7 +152,7 @@ fn monitor_scene(picture: &MonitorPicture, frame: &SceneFrame) -> MonitorScene {
                 .collect(),
             normals: None,
             triangles: mesh.triangles().to_vec(),
-            colour: None,
+            colour: colours.next().flatten(),
             role,
             pose: *pose,
         });

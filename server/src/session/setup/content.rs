@@ -7,17 +7,64 @@ use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
     BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
 };
-use taut_proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
-use taut_scene::{BuiltBody, BuiltScene, Workbench};
+use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64, SceneDescription};
+use taut_scene::{BuiltBody, BuiltScene, Workbench, srgb};
 
 use crate::shared::failure::Failure;
 
 /// The first description of a session; a change of the scene would raise it.
 const FIRST_REVISION: u32 = 1;
 /// The god-object, linear RGB: warm orange.
-const GOD_OBJECT_COLOUR: [f32; 4] = [0.90, 0.30, 0.05, 1.0];
+const GOD_OBJECT_COLOUR: [f32; 3] = [0.90, 0.30, 0.05];
 /// Obstacles, linear RGB: light grey-blue.
-const OBSTACLE_COLOUR: [f32; 4] = [0.45, 0.53, 0.62, 1.0];
+const OBSTACLE_COLOUR: [f32; 3] = [0.45, 0.53, 0.62];
+/// Where only one of roughness and metalness is said: satin, no metal.
+const FINISH: Finish = Finish {
+    roughness: 0.5,
+    metallic: 0.0,
+};
+
+/// Everything of a scene that is drawn: each body as clients are told of it, with its mesh. The god-object first, then obstacles, then
+/// scenery: to clients that is an obstacle of which no state ever tells.
+pub(crate) fn bodies(
+    scene: &BuiltScene,
+) -> impl Iterator<Item = Result<(BodyDescription, MeshBlob), Failure>> {
+    let described = |(index, body): (usize, &BuiltBody)| {
+        let (hash, blob) = mesh(body)?;
+        let look = &body.appearance;
+        let [red, green, blue] = look.color.unwrap_or(usual_colour(index == 0));
+        let description = BodyDescription {
+            name: body.name.as_str().into(),
+            mesh: hash,
+            pose: PoseF64::from_isometry(&body.pose),
+            colour: [red, green, blue, look.opacity.unwrap_or(1.0)],
+        };
+        Ok((description, blob))
+    };
+    let all = scene.bodies.iter().chain(&scene.scenery);
+    all.enumerate().map(described)
+}
+
+/// The colour of a body that has none of its own.
+fn usual_colour(in_the_hand: bool) -> [f32; 3] {
+    if in_the_hand {
+        GOD_OBJECT_COLOUR
+    } else {
+        OBSTACLE_COLOUR
+    }
+}
+
+/// The colours of god-object and obstacles for the monitor, sRGB; `None` where a body has the usual one.
+pub(crate) fn own_colours(description: &SceneDescription) -> Vec<Option<[u8; 3]>> {
+    let held = std::iter::once((&description.god_object, true));
+    let standing = description.obstacles.iter().map(|body| (body, false));
+    let own = |(body, in_the_hand): (&BodyDescription, bool)| {
+        let [red, green, blue, _] = body.colour;
+        let colour = [red, green, blue];
+        (colour != usual_colour(in_the_hand)).then(|| srgb(colour))
+    };
+    held.chain(standing).map(own).collect()
+}
 
 /// What clients fetch at join. `workbench_from_scene` is where the scene stands.
 pub(super) fn content(
@@ -26,35 +73,26 @@ pub(super) fn content(
     workbench_from_scene: &Pose,
 ) -> Result<Content, Failure> {
     let mut meshes: Vec<(MeshHash, MeshBlob)> = Vec::new();
-    let mut bodies = Vec::new();
-    for (index, body) in scene.bodies.iter().enumerate() {
-        let (hash, blob) = mesh(body)?;
-        if meshes.iter().all(|(known, _)| *known != hash) {
-            meshes.push((hash, blob));
+    let mut described = Vec::new();
+    for body in bodies(scene) {
+        let (body, blob) = body?;
+        if meshes.iter().all(|(known, _)| *known != body.mesh) {
+            meshes.push((body.mesh, blob));
         }
-        bodies.push(BodyDescription {
-            name: body.name.as_str().into(),
-            mesh: hash,
-            pose: PoseF64::from_isometry(&body.pose),
-            colour: if index == 0 {
-                GOD_OBJECT_COLOUR
-            } else {
-                OBSTACLE_COLOUR
-            },
-        });
+        described.push(body);
     }
-    if bodies.is_empty() {
+    if described.is_empty() {
         return Err(Failure::failed(
             "the scene has no bodies to draw: this is a fault of the program",
         ));
     }
-    let god_object = bodies.remove(0);
+    let god_object = described.remove(0);
     let viewer = &workbench.viewer;
     let description = SceneDescription {
         name: scene.name.as_str().into(),
         revision: FIRST_REVISION,
         god_object,
-        obstacles: bodies,
+        obstacles: described,
         reference_point: array(&scene.reference_point()),
         scene_origin: PoseF64::from_isometry(workbench_from_scene),
         display_scale: scene.view.display_scale,
@@ -87,8 +125,18 @@ fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
         ))
     };
     let positions = Positions::F64(body.mesh.vertices.iter().map(array).collect());
-    let blob = MeshBlob::new(positions, body.mesh.triangles.clone(), None)
+    let mut blob = MeshBlob::new(positions, body.mesh.triangles.clone(), None)
         .map_err(|error| refused(error.to_string()))?;
+    let look = &body.appearance;
+    if look.roughness.is_some() || look.metallic.is_some() {
+        let finish = Finish {
+            roughness: look.roughness.unwrap_or(FINISH.roughness),
+            metallic: look.metallic.unwrap_or(FINISH.metallic),
+        };
+        blob = blob
+            .with_finish(finish)
+            .map_err(|error| refused(error.to_string()))?;
+    }
     let hash = MeshHash::of(&blob.encode().map_err(|error| refused(error.to_string()))?);
     Ok((hash, blob))
 }

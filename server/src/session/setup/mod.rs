@@ -1,6 +1,6 @@
 //! What a session is made of: bodies, device, addresses, rates. Plain data; [`crate::session`] brings it to life.
 
-mod content;
+pub(crate) mod content;
 pub mod devices;
 mod fidelity;
 mod stability;

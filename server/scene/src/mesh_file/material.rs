@@ -1,0 +1,158 @@
+//! Materials of mesh files: which covers the most of a body, and what of the file's look is not drawn.
+
+use std::path::{Component, Path};
+
+use super::RawMesh;
+use super::mtl::read_library;
+use crate::appearance::Appearance;
+
+/// A material of a mesh file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Material {
+    pub(super) name: String,
+    pub(super) appearance: Appearance,
+    /// It names pictures.
+    pub(super) textured: bool,
+}
+
+/// The materials of a file, and which triangles are of which.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Materials {
+    pub(super) list: Vec<Material>,
+    /// Lengths of runs of triangles, in the mesh's order, with the place of their material in `list`; `None` is none.
+    runs: Vec<(Option<usize>, usize)>,
+    /// Files beside the mesh that say what materials look like, as the mesh names them.
+    pub(super) libraries: Vec<String>,
+    /// Vertices have colours of their own.
+    pub(super) vertex_colours: bool,
+}
+
+/// How a mesh file says that its body looks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct FileLook {
+    /// Of the material that covers the largest area.
+    pub(crate) appearance: Appearance,
+    /// What else the file says and nobody draws, as parts of a sentence.
+    pub(crate) lost: Vec<String>,
+}
+
+impl Materials {
+    /// The next `triangles` of the mesh are of this material.
+    pub(super) fn push(&mut self, material: Option<usize>, triangles: usize) {
+        match self.runs.last_mut() {
+            Some((last, count)) if *last == material => *count += triangles,
+            _ => self.runs.push((material, triangles)),
+        }
+    }
+
+    /// Reads the libraries that lie in `directory`; then how the body looks.
+    pub(super) fn look(mut self, mesh: &RawMesh, directory: Option<&Path>) -> FileLook {
+        let mut lost = Vec::new();
+        for library in std::mem::take(&mut self.libraries) {
+            let inside = Path::new(&library)
+                .components()
+                .all(|part| matches!(part, Component::Normal(_)));
+            let path = directory.filter(|_| inside).map(|d| d.join(&library));
+            match path.map(|path| read_library(&path, &mut self.list)) {
+                Some(Ok(faults)) => lost.extend(faults),
+                Some(Err(problem)) => lost.push(format!("its materials: {problem}")),
+                None => lost.push(format!(
+                    "its materials in `{library}`, which must lie beside it"
+                )),
+            }
+        }
+        let areas = self.areas(mesh);
+        let seen = |place: &usize| areas[*place] > 0.0;
+        let places: Vec<usize> = (0..areas.len()).filter(seen).collect();
+        // The first of several equal ones.
+        let largest = places
+            .iter()
+            .copied()
+            .reduce(|a, b| if areas[b] > areas[a] { b } else { a });
+        let of = |place: usize| self.list.get(place).cloned().unwrap_or_default();
+        let material = largest.map(of).unwrap_or_default();
+        let others = places
+            .iter()
+            .filter(|place| of(**place).appearance != material.appearance)
+            .count();
+        if others > 0 {
+            lost.push(format!(
+                "{others} of its materials: all of the body has that of the largest area, \"{}\"",
+                material.name
+            ));
+        }
+        if places.iter().any(|place| of(*place).textured) {
+            lost.push("its textures".to_owned());
+        }
+        if self.vertex_colours {
+            lost.push("its colours of vertices".to_owned());
+        }
+        FileLook {
+            appearance: material.appearance,
+            lost,
+        }
+    }
+
+    /// Area of each material of the list, m^2; of no material at the end.
+    fn areas(&self, mesh: &RawMesh) -> Vec<f64> {
+        let mut areas = vec![0.0; self.list.len() + 1];
+        let mut triangles = mesh.triangles.iter();
+        for (material, count) in &self.runs {
+            let place = material.unwrap_or(self.list.len());
+            for triangle in triangles.by_ref().take(*count) {
+                let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
+                areas[place] += 0.5 * (b - a).cross(&(c - a)).norm();
+            }
+        }
+        areas
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes::cuboid;
+
+    fn coloured(name: &str, red: f32) -> Material {
+        let color = Some([red, 0.0, 0.0]);
+        Material {
+            name: name.to_owned(),
+            appearance: Appearance {
+                color,
+                ..Appearance::default()
+            },
+            textured: false,
+        }
+    }
+
+    /// The look of a cube of twelve equal triangles.
+    fn of(runs: &[(Option<usize>, usize)]) -> FileLook {
+        let mut materials = Materials {
+            list: vec![coloured("one", 0.1), coloured("two", 0.2)],
+            ..Materials::default()
+        };
+        for (material, triangles) in runs {
+            materials.push(*material, *triangles);
+        }
+        materials.look(&cuboid([1.0, 1.0, 1.0]), None)
+    }
+
+    #[test]
+    fn the_material_of_the_largest_area_is_the_bodys() {
+        let look = of(&[(Some(0), 5), (Some(1), 7)]);
+        assert_eq!(look.appearance.color, Some([0.2, 0.0, 0.0]));
+        assert_eq!(
+            look.lost,
+            ["1 of its materials: all of the body has that of the largest area, \"two\""]
+        );
+        let look = of(&[(Some(0), 2), (Some(1), 5), (Some(0), 5)]);
+        assert_eq!(look.appearance.color, Some([0.1, 0.0, 0.0]));
+        // A part without a material counts as one that says nothing.
+        assert_eq!(
+            of(&[(None, 7), (Some(1), 5)]).appearance,
+            Appearance::default()
+        );
+        assert_eq!(of(&[(Some(1), 12)]).lost, [""; 0]);
+        assert_eq!(of(&[]), FileLook::default());
+    }
+}

@@ -1,0 +1,305 @@
+//! How bodies look: what a scene says, what their mesh files say, what is lost; and what is only seen.
+
+use std::path::{Path, PathBuf};
+
+use taut_scene::shapes::cuboid;
+use taut_scene::{Appearance, BuiltScene, ImportRequest, Scene, check, import};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+
+    /// A scene with this in the hand, and with more of the file after it.
+    fn built(&self, held: &str, rest: &str) -> BuiltScene {
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{held}\n{rest}");
+        let scene = Scene::parse("s.toml", &text, self.0.path());
+        scene.and_then(|scene| scene.build()).unwrap()
+    }
+
+    /// What the god-object of this mesh file looks like, and what is lost.
+    fn look(&self, file: &str) -> (Appearance, Vec<String>) {
+        let built = self.built(&format!("shape = {{ mesh = \"{file}\" }}"), "");
+        (built.bodies[0].appearance, built.lost_looks)
+    }
+
+    /// A box as glTF: five of its sides of material 0, the last of the second of `materials`.
+    fn gltf(&self, name: &str, materials: &str, more: &str) {
+        let cube = cuboid([0.01, 0.02, 0.03]);
+        let mut bytes = Vec::new();
+        for index in cube.triangles.iter().flatten() {
+            bytes.extend(index.to_le_bytes());
+        }
+        for coordinate in cube.vertices.iter().flat_map(|v| v.iter()) {
+            bytes.extend((*coordinate as f32).to_le_bytes());
+        }
+        self.write("box.bin", &bytes);
+        self.write(
+            name,
+            format!(
+                r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[
+                {{"attributes":{{"POSITION":2{more}}},"indices":0,"material":0}},{{"attributes":{{"POSITION":2}},"indices":1,"material":1}}]}}],
+                "materials":[{materials}],"textures":[{{"source":0}}],"images":[{{"uri":"a.png"}}],
+                "buffers":[{{"uri":"box.bin","byteLength":240}}],
+                "bufferViews":[{{"buffer":0,"byteLength":120}},{{"buffer":0,"byteOffset":120,"byteLength":24}},{{"buffer":0,"byteOffset":144,"byteLength":96}}],
+                "accessors":[{{"bufferView":0,"componentType":5125,"count":30,"type":"SCALAR"}},
+                {{"bufferView":1,"componentType":5125,"count":6,"type":"SCALAR"}},
+                {{"bufferView":2,"componentType":5126,"count":8,"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}}]}}"#
+            ),
+        );
+    }
+}
+
+fn fault(held: &str) -> String {
+    let text = format!(
+        "name = \"x\"\n[god_object]\nmass = 1.0\nshape = {{ sphere = {{ radius = 0.01 }} }}\n{held}\n"
+    );
+    let parsed = Scene::parse("s.toml", &text, Path::new(""));
+    parsed.expect_err("a fault").to_string()
+}
+
+const SPHERE: &str = "shape = { sphere = { radius = 0.01 } }\n";
+const STEEL: &str = r#"{"name":"steel","pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,0.75,0.3],"roughnessFactor":0.5}}"#;
+const RED: &str =
+    r#"{"name":"red","pbrMetallicRoughness":{"baseColorFactor":[1,0,0,1],"metallicFactor":0}}"#;
+
+#[test]
+fn a_scene_says_how_its_bodies_look() {
+    let folder = Folder::new();
+    let held = format!("{SPHERE}color = \"#ff8000\"\nroughness = 0.25\nopacity = 1");
+    let rest = "[[obstacle]]\nname = \"o\"\nshape = { plane = {} }\npose = { position = [0.0, 0.0, -0.1] }\n\
+                color = [0.5, 0, 1]\nmetallic = 1.0\n";
+    let built = folder.built(&held, rest);
+    let [held, stands] = [0, 1].map(|body| built.bodies[body].appearance);
+    let [red, green, blue] = held.color.unwrap();
+    assert!(
+        (red, blue) == (1.0, 0.0) && (green - 0.2159).abs() < 1e-4,
+        "{green}"
+    );
+    assert_eq!(
+        (held.roughness, held.metallic, held.opacity),
+        (Some(0.25), None, Some(1.0))
+    );
+    assert_eq!(stands.color, Some([0.5, 0.0, 1.0]));
+    assert_eq!((stands.roughness, stands.metallic), (None, Some(1.0)));
+    // Nothing said is nothing.
+    assert_eq!(
+        folder.built(SPHERE, "").bodies[0].appearance,
+        Appearance::default()
+    );
+}
+
+#[test]
+fn what_is_no_colour_or_no_share_is_refused_with_its_line() {
+    for (held, expected) in [
+        (
+            "color = \"red\"",
+            "s.toml:5: `color` in [god_object] is \"red\", but must be \"#rrggbb\", or [r, g, b]",
+        ),
+        ("color = \"#12345\"", "must be \"#rrggbb\""),
+        (
+            "color = 7",
+            "but must be \"#rrggbb\", or [r, g, b] with numbers between 0 and 1",
+        ),
+        (
+            "color = [255, 0, 0]",
+            "`color` in [god_object] is 255, but must be between 0 and 1",
+        ),
+        (
+            "color = [0.1, 0.2]",
+            "`color` in [god_object] has 2 numbers, but must have 3",
+        ),
+        ("color = [0.1, nan, 0.2]", "but must be between 0 and 1"),
+        (
+            "roughness = -0.1",
+            "`roughness` in [god_object] is -0.1, but must be between 0 and 1",
+        ),
+        (
+            "metallic = \"yes\"",
+            "`metallic` in [god_object] is a text, but must be between 0 and 1",
+        ),
+        (
+            "opacity = 1.5",
+            "`opacity` in [god_object] is 1.5, but must be between 0 and 1",
+        ),
+        ("colour = \"#ffffff\"", "did you mean `color`?"),
+    ] {
+        let text = fault(held);
+        assert!(text.contains(expected), "{held}: {text}");
+    }
+}
+
+#[test]
+fn the_material_of_a_gltf_file_is_the_bodys_where_the_scene_says_nothing() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{STEEL},{STEEL}"), "");
+    let (look, lost) = folder.look("a.gltf");
+    assert_eq!(look.color, Some([0.25, 0.5, 0.75]));
+    // As glTF has it: no factor is 1, and an opaque material has no opacity.
+    assert_eq!(
+        (look.roughness, look.metallic, look.opacity),
+        (Some(0.5), Some(1.0), None)
+    );
+    assert_eq!(lost, [""; 0]);
+    let held = "shape = { mesh = \"a.gltf\" }\ncolor = [0.0, 0.0, 0.0]\nmetallic = 0";
+    let said = folder.built(held, "").bodies[0].appearance;
+    assert_eq!(
+        (said.color, said.metallic, said.roughness),
+        (Some([0.0; 3]), Some(0.0), Some(0.5))
+    );
+    let blend = STEEL.replace("{\"name\"", "{\"alphaMode\":\"BLEND\",\"name\"");
+    folder.gltf("a.gltf", &format!("{blend},{blend}"), "");
+    assert_eq!(folder.look("a.gltf").0.opacity, Some(0.3));
+}
+
+#[test]
+fn what_a_body_cannot_show_of_its_file_is_said_once() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{STEEL},{RED}"), ",\"COLOR_0\":2");
+    let (look, lost) = folder.look("a.gltf");
+    assert_eq!(look.color, Some([0.25, 0.5, 0.75]));
+    assert_eq!(
+        lost,
+        [
+            "of the look of \"a.gltf\" is not drawn: 1 of its materials: all of the body has that of the largest area, \"steel\", its colours of vertices"
+        ]
+    );
+    // A factor of a picture says nothing without the picture.
+    let picture = STEEL.replace(
+        "\"roughnessFactor\"",
+        "\"baseColorTexture\":{\"index\":0},\"roughnessFactor\"",
+    );
+    folder.gltf("b.gltf", &format!("{picture},{picture}"), "");
+    let (look, lost) = folder.look("b.gltf");
+    assert_eq!((look.color, look.roughness), (None, Some(0.5)));
+    assert_eq!(
+        lost,
+        ["of the look of \"b.gltf\" is not drawn: its textures"]
+    );
+    // A scene that names a colour knows what it does.
+    let built = folder.built("shape = { mesh = \"b.gltf\" }\ncolor = \"#000000\"", "");
+    assert_eq!(built.lost_looks, [""; 0]);
+    let scene = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { mesh = \"b.gltf\" }\n";
+    let report = check(&[folder.write("s.toml", scene)]).remove(0);
+    assert!(report.is_good() && report.notes == lost, "{report}");
+}
+
+const TETRAHEDRON: &str =
+    "v 0 0 0\nv 0.03 0 0\nv 0 0.03 0\nv 0 0 0.03\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+#[test]
+fn the_material_of_an_obj_file_is_in_the_library_beside_it() {
+    let folder = Folder::new();
+    folder.write(
+        "a.obj",
+        format!("mtllib my lib.mtl\nusemtl red paint\n{TETRAHEDRON}"),
+    );
+    folder.write("my lib.mtl", "newmtl red paint\nKd 1 0.5 0\nd 0.5\n");
+    let (look, lost) = folder.look("a.obj");
+    let [red, green, blue] = look.color.unwrap();
+    assert!(
+        (red, blue) == (1.0, 0.0) && (green - 0.214).abs() < 1e-3,
+        "{green}"
+    );
+    assert_eq!((look.opacity, look.roughness), (Some(0.5), None));
+    assert_eq!(lost, [""; 0]);
+    for (library, expected) in [
+        (
+            "../my lib.mtl",
+            "its materials in `../my lib.mtl`, which must lie beside it",
+        ),
+        ("none.mtl", "none.mtl: cannot be opened"),
+    ] {
+        folder.write(
+            "b.obj",
+            format!("mtllib {library}\nusemtl red paint\n{TETRAHEDRON}"),
+        );
+        let (look, lost) = folder.look("b.obj");
+        assert_eq!(look, Appearance::default());
+        assert!(lost.len() == 1 && lost[0].contains(expected), "{lost:?}");
+    }
+}
+
+#[test]
+fn an_import_writes_the_look_of_its_parts_into_the_scene() {
+    let folder = Folder::new();
+    folder.gltf("a.gltf", &format!("{RED},{RED}"), "");
+    let report = import(&ImportRequest {
+        parts: vec![folder.0.path().join("a.gltf")],
+        folder: folder.0.path().join("out"),
+        ..ImportRequest::default()
+    })
+    .unwrap();
+    let text = std::fs::read_to_string(&report.scene).unwrap();
+    assert!(
+        text.contains("\ncolor = \"#ff0000\"\nroughness = 1.0\nmetallic = 0.0\n"),
+        "{text}"
+    );
+    let built = Scene::load(Path::new(&report.scene))
+        .and_then(|scene| scene.build())
+        .unwrap();
+    assert_eq!(built.bodies[0].appearance.color, Some([1.0, 0.0, 0.0]));
+}
+
+#[test]
+fn scenery_is_seen_and_never_touched() {
+    let folder = Folder::new();
+    // An open sheet, right through the body in the hand.
+    folder.write("sheet.obj", "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n");
+    let rest = "[[scenery]]\nname = \"sheet\"\nshape = { mesh = \"sheet.obj\", unit = \"dm\" }\n\
+                color = \"#ffffff\"\npose = { position = [0.0, 0.0, 0.005] }\n";
+    let built = folder.built(SPHERE, rest);
+    assert_eq!((built.bodies.len(), built.world.obstacles.len()), (1, 0));
+    let sheet = &built.scenery[0];
+    assert_eq!(
+        (sheet.name.as_str(), sheet.mesh.triangles.len()),
+        ("sheet", 1)
+    );
+    assert_eq!(
+        (sheet.mesh.vertices[1].x, sheet.pose.translation.z),
+        (0.1, 0.005)
+    );
+    assert_eq!(sheet.appearance.color, Some([1.0; 3]));
+    let refused = |rest: &str| {
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{SPHERE}{rest}");
+        let scene = Scene::parse("s.toml", &text, folder.0.path());
+        scene
+            .and_then(|scene| scene.build())
+            .expect_err("a fault")
+            .to_string()
+    };
+    for (from, to, expected) in [
+        ("name = \"sheet\"\n", "", "`name` is missing in [[scenery]]"),
+        (
+            "sheet.obj",
+            "none.obj",
+            "the file \"none.obj\" does not exist",
+        ),
+        (
+            "unit = \"dm\"",
+            "simplify = { max_error = 1e-3 }",
+            "`simplify` has no meaning for [[scenery]]",
+        ),
+        (
+            "pose =",
+            "surface = {}\npose =",
+            "unknown key `surface` in [[scenery]]",
+        ),
+    ] {
+        let text = refused(&rest.replace(from, to));
+        assert!(text.contains(expected), "{text}");
+    }
+    let twice = refused(&format!("{rest}{rest}"));
+    assert!(
+        twice.contains("two bodies of the name \"sheet\""),
+        "{twice}"
+    );
+}

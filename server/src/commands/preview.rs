@@ -1,0 +1,135 @@
+//! `taut preview`: a picture of a scene without a server. The work is `taut_render::preview`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use god_object::Primitive;
+use nalgebra::UnitQuaternion;
+use taut_render::RenderError;
+use taut_render::preview::{Preview, PreviewScene};
+use taut_render::renderer::{Gpu, GpuChoice};
+use taut_scene::{BuiltScene, Scene};
+
+use crate::cli::{PREVIEW_SIZE, PreviewArgs};
+use crate::commands::finished_file::FinishedFile;
+use crate::session::setup::content::bodies;
+use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
+
+/// Name of the picture beside an imported scene.
+const PICTURE_FILE: &str = "picture.png";
+
+/// Draws what the command line asks for; the files written.
+pub(super) fn run(args: &PreviewArgs) -> Result<Vec<String>, Failure> {
+    let paths: Vec<PathBuf> = match args.orbit {
+        None => vec![args.out.clone()],
+        Some(views) => (1..=views).map(|n| numbered(&args.out, n, views)).collect(),
+    };
+    check_place(&args.out)?;
+    let choice = args
+        .gpu
+        .as_ref()
+        .map_or_else(GpuChoice::default, GpuChoice::named);
+    let size = args.size.unwrap_or(PREVIEW_SIZE);
+    let preview = preview(&args.scene, &choice, size, args.orbit.unwrap_or(1))?;
+    let mut written = Vec::new();
+    for (view, path) in (0..).zip(&paths) {
+        write(path, &preview.png(view).map_err(failure)?)?;
+        written.push(path.display().to_string());
+    }
+    Ok(written)
+}
+
+/// Draws the scene of an import beside it; the reason where that cannot be.
+pub(super) fn beside(scene: &str) -> Result<String, String> {
+    let path = Path::new(scene).with_file_name(PICTURE_FILE);
+    preview(scene, &GpuChoice::default(), PREVIEW_SIZE, 1)
+        .and_then(|preview| preview.png(0).map_err(failure))
+        .and_then(|bytes| write(&path, &bytes))
+        .map_err(|error| error.to_string())?;
+    Ok(path.display().to_string())
+}
+
+/// `turn.png` of 36 becomes `turn-01.png` to `turn-36.png`.
+fn numbered(path: &Path, number: u32, of: u32) -> PathBuf {
+    let width = of.to_string().len();
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{number:0width$}.png"))
+}
+
+/// Said before anything is drawn.
+fn check_place(path: &Path) -> Result<(), Failure> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    if folder.is_dir() {
+        return Ok(());
+    }
+    Err(Failure::bad_input(format!(
+        "{}: there is no folder {}; make it, or name another one with --out",
+        path.display(),
+        folder.display()
+    )))
+}
+
+/// The scene of this name or file, ready to be drawn.
+fn preview(
+    scene: &str,
+    choice: &GpuChoice,
+    size: (u32, u32),
+    views: u32,
+) -> Result<Preview, Failure> {
+    let built = Scene::named_or_file(scene)?.build()?;
+    let gpu = Gpu::open_with(choice).map_err(failure)?;
+    Preview::new(gpu, &described(&built)?, size, views).map_err(failure)
+}
+
+fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
+    let bodies = bodies(built).map(|body| body.map(|(body, mesh)| (body, Arc::new(mesh))));
+    // The god-object is the first; in the hand a plane is a plate, as in scenery.
+    let obstacles = (1..).zip(&built.world.obstacles);
+    let endless = obstacles
+        .filter(|(_, o)| matches!(o.primitive, Some(Primitive::Plane { .. })))
+        .map(|(place, _)| place);
+    Ok(PreviewScene {
+        name: built.name.clone(),
+        bodies: bodies.collect::<Result<_, _>>()?,
+        endless: endless.collect(),
+        upright: built.view.rotation.unwrap_or_else(UnitQuaternion::identity),
+    })
+}
+
+fn failure(error: RenderError) -> Failure {
+    if error.exit_code() == EXIT_BAD_INPUT {
+        Failure::bad_input(error)
+    } else {
+        Failure::failed(error)
+    }
+}
+
+/// The whole file, or none.
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let written = FinishedFile::create(path).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.finish()
+    });
+    written.map_err(|error| {
+        Failure::failed(format!(
+            "{} cannot be written ({error}); name a folder that can be written with --out",
+            path.display()
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_of_a_turn_sort_by_their_names() {
+        let named = |n, of| numbered(Path::new("a/turn.v2.png"), n, of);
+        assert_eq!(named(1, 9), Path::new("a/turn.v2-1.png"));
+        assert_eq!(named(7, 120), Path::new("a/turn.v2-007.png"));
+    }
+}
