@@ -220,3 +220,63 @@ fn mesh_of(blob: &MeshBlob) -> (TriangleMesh, Point3<f64>) {
     };
     (mesh, origin)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taut_proto::scene::WindowDescription;
+
+    fn of(width: u32, height: u32, stereo: Stereo, overrides: &Overrides) -> (u32, u32) {
+        let node = NodeDescription {
+            name: "front".into(),
+            screens: Vec::new(),
+            stereo: scene::Stereo::Mono,
+            window: WindowDescription {
+                width,
+                height,
+                fullscreen: false,
+            },
+            monitors: Vec::new(),
+        };
+        let corner = |x: f64, z: f64| Point3::new(x, 0.0, z);
+        let screen = Screen::from_corners(corner(0.0, 0.0), corner(1.5, 0.0), corner(0.0, 1.0));
+        pixels(&screen.expect("a screen"), &node, stereo, overrides)
+    }
+
+    #[test]
+    fn pictures_that_are_written_are_as_large_as_the_window() {
+        let written = Overrides {
+            headless: true,
+            pictures: true,
+            ..Overrides::default()
+        };
+        for stereo in [Stereo::Mono, Stereo::SideBySide, Stereo::TopBottom] {
+            let view = of(960, 640, stereo, &written);
+            assert_eq!(stereo.picture_size(view), (960, 640), "{stereo:?}");
+        }
+        // What the command line says comes first; the other length follows from the screen.
+        let wide = Overrides {
+            width: Some(300),
+            ..written
+        };
+        assert_eq!(of(960, 640, Stereo::Mono, &wide), (300, 200));
+        let unseen = Overrides {
+            pictures: false,
+            ..written
+        };
+        assert_eq!(of(960, 640, Stereo::Mono, &unseen), (480, 320));
+        assert_eq!(of(960, 640, Stereo::SideBySide, &Overrides::default()), (960, 640));
+    }
+
+    #[test]
+    fn a_mesh_far_from_its_origin_keeps_its_form() {
+        let far = [[1e5, 0.0, 0.0], [1e5 + 1e-3, 0.0, 0.0], [1e5, 1e-3, 0.0]];
+        let positions = taut_proto::mesh_blob::Positions::F64(far.to_vec());
+        let blob = MeshBlob::new(positions, vec![[0, 1, 2]], None).expect("a triangle");
+        let (mesh, origin) = mesh_of(&blob);
+        for (vertex, meant) in mesh.vertices.iter().zip(far) {
+            let place = origin + Point3::from(*vertex).cast::<f64>().coords;
+            assert!((place - Point3::from(meant)).norm() < 1e-9, "{place}");
+        }
+    }
+}

@@ -40,6 +40,7 @@ fn every_command_has_help_with_an_example() {
         "record",
         "check",
         "import",
+        "preview",
         "doctor",
         "keys",
         "setup",
@@ -130,7 +131,8 @@ fn without_a_command_it_says_how_to_begin_and_starts_nothing() {
 fn completions_and_manual_pages_name_every_command() {
     let place = Workplace::new();
     let commands = [
-        "demo", "serve", "bridge", "replay", "record", "check", "import", "doctor", "keys",
+        "demo", "serve", "bridge", "replay", "record", "check", "import", "preview", "doctor",
+        "keys",
     ];
     for shell in ["bash", "zsh", "fish"] {
         let output = taut(&["completions", shell]);
@@ -433,10 +435,47 @@ fn import_makes_a_scene_or_says_what_to_write() {
     assert_eq!(report["parts"][0]["moved_m"], 0.0);
     let scene = report["scene"].as_str().unwrap_or_default();
     assert!(taut(&["check", scene]).status.success());
+    // A picture, or a line that says why there is none.
+    let notes = report["notes"].to_string();
+    let drawn = report["picture"].is_string();
+    assert_eq!(drawn, !notes.contains("no picture was drawn: "), "{report}");
+    assert_eq!(drawn, place.path("out/picture.png").exists());
     refused(
         &["import", &part, "--out", &out, "--unit", "mm"],
         &["exists already"],
     );
+}
+
+#[cfg(feature = "render")]
+#[test]
+fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
+    let place = Workplace::new();
+    place.write(
+        "bad.toml",
+        "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\ncolor = \"red\"\n",
+    );
+    let (bad, out) = (place.text("bad.toml"), place.text("out.png"));
+    let nowhere = place.text("nowhere/out.png");
+    refused(
+        &["preview", &bad, "--out", &out],
+        &["bad.toml:5", "`color` in [god_object] is \"red\"", "#rrggbb"],
+    );
+    refused(
+        &["preview", "peg-in-a-hole", "--out", &nowhere],
+        &["there is no folder", "--out"],
+    );
+    let usage = |arguments: &[&str], expected: &str| {
+        let output = taut(&[&["preview", "peg-in-a-hole", "--out"], arguments].concat());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(expected), "{error}");
+    };
+    usage(&["picture.jpg"], "ends in .png");
+    usage(&[&out, "--size", "640"], "such as 1280x960");
+    usage(&[&out, "--size", "0x640"], "from 1 to 8192");
+    usage(&[&out, "--orbit", "0"], "1..=3600");
+    usage(&[&out, "--gpu", "no-such-card"], "no");
+    assert!(!place.path("out.png").exists());
 }
 
 #[test]

@@ -124,7 +124,92 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
+
+    /// A box of one material as glTF.
+    fn write_box(folder: &Path, material: &str) {
+        let cube = taut_scene::shapes::cuboid([0.02, 0.02, 0.02]);
+        let mut bytes = Vec::new();
+        for index in cube.triangles.iter().flatten() {
+            bytes.extend(index.to_le_bytes());
+        }
+        for coordinate in cube.vertices.iter().flat_map(|v| v.iter()) {
+            bytes.extend((*coordinate as f32).to_le_bytes());
+        }
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":1}},"indices":0,"material":0}}]}}],"materials":[{material}],
+            "buffers":[{{"uri":"box.bin","byteLength":240}}],
+            "bufferViews":[{{"buffer":0,"byteLength":144}},{{"buffer":0,"byteOffset":144,"byteLength":96}}],
+            "accessors":[{{"bufferView":0,"componentType":5125,"count":36,"type":"SCALAR"}},
+            {{"bufferView":1,"componentType":5126,"count":8,"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}}]}}"#
+        );
+        let written = fs::write(folder.join("box.bin"), bytes);
+        assert!(written.and_then(|()| fs::write(folder.join("box.gltf"), text)).is_ok());
+    }
+
+    /// Numbers of red, green and blue pixels of a picture of a scene with this after `[god_object]`; `None`, said aloud, without an adapter.
+    fn counts(folder: &Path, rest: &str) -> Option<[usize; 3]> {
+        let path = folder.join("scene.toml");
+        let text = format!("name = \"x\"\n[god_object]\nmass = 1.0\n{rest}");
+        assert!(fs::write(&path, text).is_ok());
+        let scene = path.display().to_string();
+        let preview = match preview(&scene, &GpuChoice::default(), (320, 240), 1) {
+            Ok(preview) => preview,
+            Err(Failure::BadInput(error)) => panic!("{error}"),
+            Err(error) => {
+                taut_test_kit::left_out(error);
+                return None;
+            }
+        };
+        let Ok(picture) = preview.picture(0) else {
+            panic!("not drawn");
+        };
+        let strong = |pixel: &[u8; 4], part: usize| {
+            let others = (0..3).filter(|other| *other != part).map(|other| pixel[other]);
+            let most = others.max().unwrap_or(0);
+            pixel[part] > 40 && u16::from(pixel[part]) > 2 * u16::from(most)
+        };
+        let count = |part| picture.pixels().filter(|pixel| strong(&pixel.0, part)).count();
+        Some([0, 1, 2].map(count))
+    }
+
+    #[test]
+    fn the_colour_of_a_gltf_material_reaches_the_pixels_unless_the_scene_says_another() {
+        let Ok(folder) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let green = r#"{"pbrMetallicRoughness":{"baseColorFactor":[0.02,0.6,0.02,1],"metallicFactor":0,"roughnessFactor":0.6}}"#;
+        write_box(folder.path(), green);
+        let shape = "shape = { mesh = \"box.gltf\" }\n";
+        let Some([red, green, blue]) = counts(folder.path(), shape) else {
+            return;
+        };
+        assert!(green > 10_000 && red + blue == 0, "{red} {green} {blue}");
+        let said = format!("{shape}color = \"#ff1010\"\n");
+        let Some([red, green, blue]) = counts(folder.path(), &said) else {
+            panic!("there was an adapter");
+        };
+        assert!(red > 10_000 && green + blue == 0, "{red} {green} {blue}");
+    }
+
+    #[test]
+    fn scenery_is_drawn_and_so_is_what_stands_in_its_own_colour() {
+        let Ok(folder) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let rest = "shape = { sphere = { radius = 0.01 } }\ncolor = [0.8, 0.02, 0.02]\n\
+            [[obstacle]]\nname = \"o\"\nshape = { box = { half_extents = [0.01, 0.01, 0.01] } }\n\
+            pose = { position = [0.05, 0.0, 0.0] }\ncolor = [0.02, 0.6, 0.02]\n\
+            [[scenery]]\nname = \"s\"\nshape = { sphere = { radius = 0.012 } }\n\
+            pose = { position = [0.025, 0.0, 0.0] }\ncolor = [0.02, 0.02, 0.8]\n";
+        let Some([red, green, blue]) = counts(folder.path(), rest) else {
+            return;
+        };
+        assert!(red > 500 && green > 500 && blue > 500, "{red} {green} {blue}");
+    }
 
     #[test]
     fn pictures_of_a_turn_sort_by_their_names() {
