@@ -265,7 +265,10 @@ mod tests {
             ..written
         };
         assert_eq!(of(960, 640, Stereo::Mono, &unseen), (480, 320));
-        assert_eq!(of(960, 640, Stereo::SideBySide, &Overrides::default()), (960, 640));
+        assert_eq!(
+            of(960, 640, Stereo::SideBySide, &Overrides::default()),
+            (960, 640)
+        );
     }
 
     #[test]

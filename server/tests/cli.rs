@@ -458,7 +458,11 @@ fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
     let nowhere = place.text("nowhere/out.png");
     refused(
         &["preview", &bad, "--out", &out],
-        &["bad.toml:5", "`color` in [god_object] is \"red\"", "#rrggbb"],
+        &[
+            "bad.toml:5",
+            "`color` in [god_object] is \"red\"",
+            "#rrggbb",
+        ],
     );
     refused(
         &["preview", "peg-in-a-hole", "--out", &nowhere],

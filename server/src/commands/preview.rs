@@ -147,7 +147,11 @@ mod tests {
             {{"bufferView":1,"componentType":5126,"count":8,"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}}]}}"#
         );
         let written = fs::write(folder.join("box.bin"), bytes);
-        assert!(written.and_then(|()| fs::write(folder.join("box.gltf"), text)).is_ok());
+        assert!(
+            written
+                .and_then(|()| fs::write(folder.join("box.gltf"), text))
+                .is_ok()
+        );
     }
 
     /// Numbers of red, green and blue pixels of a picture of a scene with this after `[god_object]`; `None`, said aloud, without an adapter.
@@ -168,11 +172,18 @@ mod tests {
             panic!("not drawn");
         };
         let strong = |pixel: &[u8; 4], part: usize| {
-            let others = (0..3).filter(|other| *other != part).map(|other| pixel[other]);
+            let others = (0..3)
+                .filter(|other| *other != part)
+                .map(|other| pixel[other]);
             let most = others.max().unwrap_or(0);
             pixel[part] > 40 && u16::from(pixel[part]) > 2 * u16::from(most)
         };
-        let count = |part| picture.pixels().filter(|pixel| strong(&pixel.0, part)).count();
+        let count = |part| {
+            picture
+                .pixels()
+                .filter(|pixel| strong(&pixel.0, part))
+                .count()
+        };
         Some([0, 1, 2].map(count))
     }
 
@@ -208,7 +219,10 @@ mod tests {
         let Some([red, green, blue]) = counts(folder.path(), rest) else {
             return;
         };
-        assert!(red > 500 && green > 500 && blue > 500, "{red} {green} {blue}");
+        assert!(
+            red > 500 && green > 500 && blue > 500,
+            "{red} {green} {blue}"
+        );
     }
 
     #[test]

@@ -12,6 +12,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::Arc;
 
 use god_object::nalgebra::{UnitQuaternion, Vector3};
 use god_object::{Pose, Vector6};
@@ -41,7 +42,7 @@ const ROD_FORCE: f64 = 4.15;
 const PRESS: f64 = 0.2;
 
 /// The hand's pose at a time, s.
-pub type Motion = fn(f64) -> Pose;
+pub type Motion = Arc<dyn Fn(f64) -> Pose + Send + Sync>;
 
 /// One scene.
 pub struct FidelityScene {
@@ -84,7 +85,12 @@ pub fn all(directory: &Path) -> std::io::Result<Vec<FidelityScene>> {
 }
 
 /// A scene file: body, its start, obstacle, and what is known of its use: how fast the hand goes, m/s, and turns, rad/s, and how hard it presses, N.
-fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn, force]: [f64; 3]) -> String {
+pub(super) fn text(
+    body: &str,
+    start: [f64; 3],
+    obstacle: &str,
+    [speed, turn, force]: [f64; 3],
+) -> String {
     let [x, y, z] = start;
     format!(
         "name = \"fidelity\"\n[god_object]\nshape = {{ {body} }}\nmass = 1.0\npose = {{ position = [{x:?}, {y:?}, {z:?}] }}\n\
@@ -94,7 +100,7 @@ fn text(body: &str, start: [f64; 3], obstacle: &str, [speed, turn, force]: [f64;
 }
 
 /// Share of a minimum-jerk motion of `PRESS` seconds, as hands make them.
-fn share(time: f64) -> f64 {
+pub(super) fn share(time: f64) -> f64 {
     let t = (time / PRESS).clamp(0.0, 1.0);
     t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
 }
@@ -112,10 +118,10 @@ fn force(vector: Vector3<f64>) -> Vector6 {
 const PLANE: &str = "shape = { plane = {} }";
 
 fn box_on_plane() -> FidelityScene {
-    let device = |time| {
+    let device = Arc::new(|time| {
         let (depth, slid) = pressed(time);
         Pose::translation(SLIDE * slid, 0.0, SMALL_BALL - depth)
-    };
+    });
     FidelityScene {
         name: "box on plane",
         text: text(
@@ -153,7 +159,7 @@ fn sphere_on_sphere() -> FidelityScene {
             "shape = { sphere = { radius = 0.02 } }",
             [SLIDE, 0.0, STIFFNESS * DEPTH],
         ),
-        device: |time| around(time, 2.0 * BALL),
+        device: Arc::new(|time| around(time, 2.0 * BALL)),
         duration: 0.6,
         ideal: Some(|time| outward(time, 2.0 * BALL)),
     }
@@ -168,7 +174,7 @@ fn curved_mesh() -> FidelityScene {
             "shape = { mesh = \"ball.ply\"{simplify} }",
             [SLIDE, 0.0, STIFFNESS * DEPTH],
         ),
-        device: |time| around(time, MESH_BALL + SMALL_BALL),
+        device: Arc::new(|time| around(time, MESH_BALL + SMALL_BALL)),
         duration: 0.6,
         ideal: Some(|time| outward(time, MESH_BALL + SMALL_BALL)),
     }
@@ -184,7 +190,7 @@ fn peg_in_hole() -> FidelityScene {
             [0.05, 0.5, STIFFNESS * DEPTH],
         ),
         // Against the wall, along it, and leaned.
-        device: |time| {
+        device: Arc::new(|time| {
             let on = pressed(time).1;
             let lean = 0.05 * (10.0 * on).sin();
             Pose::from_parts(
@@ -196,7 +202,7 @@ fn peg_in_hole() -> FidelityScene {
                 .into(),
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean),
             )
-        },
+        }),
         duration: 0.6,
         ideal: None,
     }
@@ -211,7 +217,7 @@ fn thin_plate() -> FidelityScene {
             "shape = { box = { half_extents = [0.1, 0.1, 0.0005] } }\npose = { position = [0.0, 0.0, -0.0005] }",
             [FAST, 0.0, STIFFNESS * (SMALL_BALL - ARRIVED)],
         ),
-        device: |time| Pose::translation(0.0, 0.0, arrival(time)),
+        device: Arc::new(|time| Pose::translation(0.0, 0.0, arrival(time))),
         duration: 0.4,
         ideal: Some(|time| {
             let depth = (SMALL_BALL - arrival(time)).max(0.0);
@@ -234,7 +240,7 @@ fn moving_plate(rise: f64) -> FidelityScene {
             "shape = { plane = {} }\nmotion = { trace = \"plate.csv\" }",
             [0.01, 0.0, STIFFNESS * (DEPTH - ABOVE)],
         ),
-        device: |_| Pose::translation(0.0, 0.0, SMALL_BALL + ABOVE),
+        device: Arc::new(|_| Pose::translation(0.0, 0.0, SMALL_BALL + ABOVE)),
         duration: rise + 0.1,
         ideal: Some(|time| {
             let height = (PLATE * time - DEPTH).min(DEPTH);
@@ -253,13 +259,13 @@ fn rod_on_plane() -> FidelityScene {
             [0.05, TURN, ROD_FORCE],
         ),
         // Its end goes down and up again while its middle stays.
-        device: |time| {
+        device: Arc::new(|time| {
             let swing = 0.5 * (TURN / 0.5 * time).sin();
             Pose::from_parts(
                 Vector3::new(0.0, 0.0, 0.005 + ROD * 0.1).into(),
                 UnitQuaternion::from_axis_angle(&Vector3::y_axis(), swing),
             )
-        },
+        }),
         duration: 0.8,
         ideal: None,
     }

@@ -116,6 +116,19 @@ impl Swept {
     }
 }
 
+/// What the scene chooses, from its file alone.
+///
+/// # Errors
+///
+/// Where a scene file is wrong.
+pub fn choice(scene: &FidelityScene, directory: &Path) -> Result<(Setting, f64), SceneError> {
+    let plain = scene.text.replace("{simplify}", "");
+    let chosen = SceneFile::parse("fidelity.toml", &plain, directory)?.build()?;
+    let plan = chosen.fidelity.clone();
+    let plan = plan.unwrap_or_else(|| panic!("the scene chooses"));
+    Ok((setting_of(&chosen, &plan), plan.predicted_j))
+}
+
 /// Builds, runs and measures. `quick` takes every other rate and the ends of the other lists.
 ///
 /// # Errors
@@ -202,6 +215,7 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
         speed: 0.0,
     };
     let moving = built.motions.first().cloned();
+    let device = scene.device.clone();
     Recipe {
         ideal,
         moving: moving
@@ -212,7 +226,7 @@ fn recipe(scene: &FidelityScene, built: &BuiltScene, ideal: Ideal) -> Recipe {
             "fidelity",
             lab_scene,
             scene.duration,
-            scene.device,
+            move |time| device(time),
         )
     }
 }
