@@ -120,7 +120,7 @@ fn help() -> String {
 Runs the recipes for every method and rate; prints the table, and writes it with CSV files and charts.
 
 taut-lab [report] [OPTION...] [RECIPE...]
-taut-lab fidelity [--quick] [--out DIRECTORY]
+taut-lab fidelity [--quick] [--held-out] [--out DIRECTORY]
 taut-lab --measure [FILE]
 taut-lab measured [FILE]
 
@@ -129,6 +129,7 @@ taut-lab measured [FILE]
   measured         replays measured contact forces through every method (tests/data/measured)
   --measure        makes the table of costs anew (tests/lab/data/costs.csv): on a quiet machine
   --quick          a part of the cases
+  --held-out       of fidelity: the twelve scenes whose predictions were written down before they were run; --predict prints these
   --out DIRECTORY  where files go (default: {DIRECTORY})
   --threads N      how many at once (default: one for each core)
   --method NAME    this method only; may be repeated: {}

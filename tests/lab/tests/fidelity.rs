@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use taut_lab::fidelity::command::{choices, every_setting, table};
+use taut_lab::fidelity::held_out;
 use taut_lab::fidelity::scenes::all;
 use taut_lab::fidelity::sweep::{Swept, sweep};
 
@@ -56,4 +57,18 @@ fn a_choice_is_within_the_budget_and_not_far_from_the_cheapest_that_is() {
     let rows: usize = swept.iter().map(|s| s.all.len()).sum();
     assert_eq!(every_setting(&swept).lines().count(), rows + 1);
     assert!(choices(&swept).lines().count() > swept.len());
+}
+
+/// The held-out scenes are of use only against what was foretold before they were run.
+#[test]
+fn what_was_foretold_of_the_held_out_scenes_still_is() {
+    let files = tempfile::tempdir().expect("a temporary directory");
+    let scenes = held_out::all(files.path()).expect("files can be written");
+    assert_eq!(scenes.len(), 12);
+    let now = held_out::predictions(&scenes, files.path()).expect("the scenes are right");
+    assert_eq!(
+        now,
+        held_out::PREDICTIONS,
+        "the choice has changed: its page tells what was, so run them, say so there, and hold out others"
+    );
 }
