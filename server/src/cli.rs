@@ -202,6 +202,9 @@ pub struct ServeArgs {
     /// Instead of the workbench file's address of the state plane
     #[arg(long, value_name = "HOST:PORT")]
     pub udp: Option<SocketAddr>,
+    /// Begin anew when a file of the scene changes, or when the workbench file names another scene: the force fades, everybody follows
+    #[arg(long, conflicts_with_all = ["record", "recording"])]
+    pub follow_scene: bool,
     /// End after this many seconds (default: at Ctrl-C)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,

@@ -89,6 +89,11 @@ impl TestWorkbench {
         }
     }
 
+    /// Writes the workbench file as it is now; its path. For a server that runs: [`Self::serve`] does it.
+    pub fn save(&self) -> PathBuf {
+        self.write("workbench.toml", self.file.to_string())
+    }
+
     /// Where its files are.
     #[must_use]
     pub fn directory(&self) -> &Path {
@@ -161,10 +166,7 @@ impl TestWorkbench {
 
     /// The same under another name: a server that takes the place of one that died.
     pub fn serve_as(&self, name: &str, arguments: &[&str]) -> Server {
-        let config = self
-            .write("workbench.toml", self.file.to_string())
-            .display()
-            .to_string();
+        let config = self.save().display().to_string();
         let key = self.key_path();
         let always = ["serve", "--config", &config, "--key", &key, "--json"];
         let mut process = self.start(name, &[&always, arguments].concat());

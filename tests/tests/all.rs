@@ -9,6 +9,7 @@ mod demo;
 mod documents;
 mod every_test_runs;
 mod failover;
+mod follow_scene;
 mod frames;
 mod membership;
 mod method_scenes;

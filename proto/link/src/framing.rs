@@ -17,6 +17,8 @@ pub(crate) const CLOSE_REFUSED: VarInt = VarInt::from_u32(2);
 pub(crate) const CLOSE_REPLACED: VarInt = VarInt::from_u32(3);
 /// The client was silent for too long.
 pub(crate) const CLOSE_EVICTED: VarInt = VarInt::from_u32(5);
+/// The server ends this session to begin another: whoever hears it joins that one.
+pub(crate) const CLOSE_CHANGING: VarInt = VarInt::from_u32(6);
 /// The peer broke the protocol.
 pub(crate) const CLOSE_PROTOCOL: VarInt = VarInt::from_u32(4);
 

@@ -21,6 +21,7 @@ mod record;
 mod recording_size;
 pub(crate) mod render;
 pub mod replay;
+mod scene_watch;
 mod serve;
 mod setup;
 mod signals;

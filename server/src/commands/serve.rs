@@ -1,19 +1,23 @@
 //! `taut serve`: the haptic PC, until its time is over, the user ends it, or something breaks.
 
 use std::path::Path;
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+use taut_bridge::ArmSwitch;
 use taut_bridge::signals::EndFlag;
 use taut_link::ClusterKey;
 use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
 
 use crate::cli::ServeArgs;
+use crate::commands::scene_watch::SceneWatch;
 use crate::commands::{key, recording_size};
 use crate::report::SessionReport;
 use crate::report::metrics::{self, MetricsLines};
 use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::admission::AdmissionWatch;
+use crate::session::setup::SessionSetup;
 use crate::session::setup::workbench::{Overrides, session_setup};
 use crate::shared::failure::Failure;
 
@@ -25,11 +29,10 @@ pub(super) fn run(
     args: &ServeArgs,
     terminal: &Terminal,
 ) -> Result<(SessionReport, Option<Failure>), Failure> {
-    let workbench = Workbench::load(&args.config)?;
+    let workbench = load_workbench(args)?;
     taut_log::use_directives(&directives(workbench.log));
     let mut metrics = MetricsOutlets::open(args)?;
-    let key = workbench_key(args.key.as_deref(), &workbench)?;
-    let overrides = Overrides {
+    let mut overrides = Overrides {
         scene: args.scene.clone(),
         allow_unstable: args.allow_unstable,
         quic: args.quic,
@@ -39,24 +42,95 @@ pub(super) fn run(
         input: None,
         recording: args.recording.clone(),
     };
-    let setup = session_setup(&workbench, key, &overrides)?;
+    let setup = load_session(args, &workbench, &overrides)?;
     let end = EndFlag::listen().map_err(Failure::failed)?;
-    let mut session = Session::start(setup)?;
-    session.end_with(&end);
-    taut_bridge::listen_at_console(session.arm_switch());
-    announce(&session, terminal);
-    if let Some(directory) = &args.recording {
-        terminal.say(&recording_size::sentence(directory));
+    let arm_switch = Arc::<ArmSwitch>::default();
+    taut_bridge::listen_at_console(&arm_switch);
+    let mut next = (workbench, setup);
+    let begun = Instant::now();
+    loop {
+        let (workbench, setup) = next;
+        let token = setup
+            .operator
+            .as_ref()
+            .map(|page| page.server.token.clone());
+        let scene = args
+            .follow_scene
+            .then(|| SceneWatch::new(&args.config, &workbench));
+        let mut scene = scene.transpose()?;
+        let mut session = Session::start_with(setup, arm_switch.clone())?;
+        session.end_with(&end);
+        // Whoever comes again comes to where he was.
+        (overrides.quic, overrides.udp) = (session.quic_address(), session.udp_address());
+        announce(&session, terminal);
+        if let Some(directory) = &args.recording {
+            terminal.say(&recording_size::sentence(directory));
+        }
+        let mut admission = AdmissionWatch::new(&args.config);
+        let left = args
+            .duration
+            .map(|s| (s - begun.elapsed().as_secs_f64()).max(0.0));
+        let mut other = None;
+        watch(&mut session, left, terminal, |session| {
+            admission.follow(session, terminal);
+            metrics.follow(session);
+            let load = || {
+                let workbench = load_workbench(args)?;
+                let mut setup = load_session(args, &workbench, &overrides)?;
+                keep_token(&mut setup, token.as_deref());
+                Ok((workbench, setup))
+            };
+            other = scene
+                .as_mut()
+                .and_then(|scene| scene.follow(terminal, load));
+            other.is_none()
+        });
+        terminal.end_status();
+        match other {
+            Some(changed) => {
+                let (report, failure) = session.make_way(terminal);
+                if let Some(failure) = failure {
+                    return Ok((report, Some(failure)));
+                }
+                terminal.say(&report.verdict());
+                metrics.begin_again();
+                next = changed;
+            }
+            None => {
+                let ended = session.stop(terminal);
+                end.let_signals_kill();
+                return Ok(ended);
+            }
+        }
     }
-    let mut admission = AdmissionWatch::new(&args.config);
-    watch(&mut session, args.duration, terminal, |session| {
-        admission.follow(session, terminal);
-        metrics.follow(session);
-    });
-    terminal.end_status();
-    let ended = session.stop(terminal);
-    end.let_signals_kill();
-    Ok(ended)
+}
+
+/// The workbench file, with the scene of the command line.
+fn load_workbench(args: &ServeArgs) -> Result<Workbench, Failure> {
+    let mut workbench = Workbench::load(&args.config)?;
+    if let Some(scene) = &args.scene {
+        workbench.scene.clone_from(scene);
+    }
+    Ok(workbench)
+}
+
+/// What a session of this workbench is made of.
+fn load_session(
+    args: &ServeArgs,
+    workbench: &Workbench,
+    overrides: &Overrides,
+) -> Result<SessionSetup, Failure> {
+    let key = workbench_key(args.key.as_deref(), workbench)?;
+    session_setup(workbench, key, overrides)
+}
+
+/// A page that was opened by a token that was made for this start goes on with it.
+fn keep_token(setup: &mut SessionSetup, token: Option<&str>) {
+    if let (Some(page), Some(token)) = (&mut setup.operator, token)
+        && page.token_file.is_none()
+    {
+        token.clone_into(&mut page.server.token);
+    }
 }
 
 /// What is logged, as `tracing` takes it.
@@ -95,6 +169,11 @@ impl MetricsOutlets {
             next: Duration::ZERO,
             next_line: Duration::ZERO,
         })
+    }
+
+    /// For a session whose age begins at zero.
+    fn begin_again(&mut self) {
+        (self.next, self.next_line) = (Duration::ZERO, Duration::ZERO);
     }
 
     fn follow(&mut self, session: &mut Session) {
@@ -154,12 +233,12 @@ pub(super) fn announce(session: &Session, terminal: &Terminal) {
     }
 }
 
-/// Lets the session run until `duration` is over or its end is asked for; `each` is called at every look.
+/// Lets the session run until `duration` is over, its end is asked for, or `each`, which is called at every look, says that it does not go on.
 pub(super) fn watch(
     session: &mut Session,
     duration: Option<f64>,
     terminal: &Terminal,
-    mut each: impl FnMut(&mut Session),
+    mut each: impl FnMut(&mut Session) -> bool,
 ) {
     let end = duration.map(Duration::from_secs_f64);
     loop {
@@ -173,8 +252,8 @@ pub(super) fn watch(
         session.follow_network(terminal);
         session.follow_operator();
         terminal.status(session.status_line());
-        each(session);
-        if end.is_some_and(|end| session.age() >= end) {
+        let goes_on = each(session);
+        if !goes_on || end.is_some_and(|end| session.age() >= end) {
             return;
         }
     }

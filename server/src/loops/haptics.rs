@@ -133,6 +133,13 @@ impl HapticsLoop {
         }
     }
 
+    /// The same, armed by another switch.
+    #[must_use]
+    pub fn with_switch(mut self, switch: Arc<ArmSwitch>) -> Self {
+        self.switch = switch;
+        self
+    }
+
     /// The same, with every tick recorded.
     #[must_use]
     pub fn with_recording(mut self, tap: Option<Tap<HapticsRecord>>) -> Self {

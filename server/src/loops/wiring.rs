@@ -141,6 +141,16 @@ impl WiredLoops {
         }
     }
 
+    /// The same with a switch that others hold already.
+    #[must_use]
+    pub fn with_arm_switch(self, arm_switch: Arc<ArmSwitch>) -> Self {
+        Self {
+            haptics: self.haptics.with_switch(arm_switch.clone()),
+            arm_switch,
+            ..self
+        }
+    }
+
     /// The same with obstacles that move.
     #[must_use]
     pub fn with_motions(self, motions: Vec<BuiltMotion>) -> Self {

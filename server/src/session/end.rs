@@ -9,8 +9,18 @@ use crate::shared::failure::Failure;
 use super::Session;
 
 impl Session {
-    /// Ends everything and says what was measured; the failure, if something broke.
-    pub fn stop(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+    /// Ends everything and says what was measured; the failure, if something broke. The force is led down first.
+    pub fn stop(self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+        self.conclude(terminal)
+    }
+
+    /// The same where another session begins at once: nodes, bridge and observers join that one.
+    pub fn make_way(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
+        self.makes_way = true;
+        self.conclude(terminal)
+    }
+
+    fn conclude(mut self, terminal: &Terminal) -> (SessionReport, Option<Failure>) {
         self.follow_network(terminal);
         self.audit.end();
         let mut report = self.report();
@@ -57,7 +67,11 @@ impl Session {
             page.end();
         }
         if let Some(link) = self.link.take() {
-            self.runtime.block_on(link.shutdown());
+            if self.makes_way {
+                self.runtime.block_on(link.make_way());
+            } else {
+                self.runtime.block_on(link.shutdown());
+            }
         }
         monitor.unwrap_or(Ok(0))
     }

@@ -10,6 +10,7 @@ pub mod broadcast;
 mod clients;
 pub mod edge_sets;
 mod end;
+pub(crate) mod file_watch;
 mod frames;
 pub mod head;
 pub(crate) mod monitor;
@@ -79,6 +80,8 @@ pub struct Session {
     observers: ObserverServices,
     operator: Option<OperatorPage>,
     link: Option<ServerLink>,
+    /// Another session begins when this one ends.
+    makes_way: bool,
     runtime: Runtime,
     /// While it is held, idle cores wait at work.
     _awake: Option<Awake>,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{keep_cores_awake, lock_memory};
-use taut_bridge::{ArmWish, Device, RemoteDevice};
+use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
@@ -37,13 +37,27 @@ const NETWORK_THREADS: usize = 2;
 impl Session {
     /// Builds and starts everything.
     pub fn start(setup: SessionSetup) -> Result<Self, Failure> {
-        // What the scene can be wrong in, before anything is opened.
+        Self::start_with(setup, Arc::default())
+    }
+
+    /// What the scene can be wrong in: what [`Session::start`] refuses before anything is opened.
+    pub(crate) fn begin(setup: &SessionSetup) -> Result<(GodObject, PenetrationChecker), Failure> {
         let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
         let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
             Failure::bad_input(
                 "a mesh of the scene cannot be checked for penetration: run `taut check` on it",
             )
         })?;
+        Ok((god_object, checker))
+    }
+
+    /// The same with a switch that outlives the session. A wish of before does not count.
+    pub(crate) fn start_with(
+        setup: SessionSetup,
+        arm_switch: Arc<ArmSwitch>,
+    ) -> Result<Self, Failure> {
+        let _ = arm_switch.take();
+        let (god_object, checker) = Self::begin(&setup)?;
 
         // The network, whose clock is everybody's; the device may be behind it.
         let clock = SessionClock::start();
@@ -118,7 +132,8 @@ impl Session {
             setup.safety,
             taps,
         )
-        .with_motions(setup.motions.clone());
+        .with_motions(setup.motions.clone())
+        .with_arm_switch(arm_switch);
         let switch = loops.arm_switch.clone();
         link.on_arm(move |arm| {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
@@ -161,6 +176,7 @@ impl Session {
             observers,
             operator,
             link: Some(link),
+            makes_way: false,
             runtime,
             _awake: awake,
         };

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     Counters, LinkError, STOP_REASON, SessionClock,
     counters::CounterCells,
-    framing::{CLOSE_REFUSED, CLOSE_STOPPING},
+    framing::{CLOSE_CHANGING, CLOSE_REFUSED, CLOSE_STOPPING},
     lock::{Mutex, lock},
     transport,
 };
@@ -44,6 +44,8 @@ use tokio::time::{sleep, timeout};
 const MAX_EVENTS: usize = 1024;
 /// Time for the clients to hear that the server stops.
 const STOP_TIMEOUT: Duration = Duration::from_millis(500);
+/// What clients are told where another session begins.
+const CHANGE_REASON: &str = "the server begins another session";
 /// How often a stopped server looks whether its port is free.
 const FREE_CHECK: Duration = Duration::from_millis(1);
 
@@ -280,11 +282,20 @@ impl ServerLink {
 
     /// Tells the clients that the server stops, and stops it. The control port is free again when this returns, unless a client
     /// could not be told in time; the port of the hot plane, when every [`Broadcaster`] is dropped, too.
-    pub async fn shutdown(mut self) {
+    pub async fn shutdown(self) {
+        self.close(CLOSE_STOPPING, STOP_REASON).await;
+    }
+
+    /// The same for a server that begins another session at once: no client takes it for an end, and all join that one.
+    pub async fn make_way(self) {
+        self.close(CLOSE_CHANGING, CHANGE_REASON).await;
+    }
+
+    async fn close(mut self, code: quinn::VarInt, reason: &str) {
         // Nothing may hold the sockets for the length of a look.
         self.eviction.abort();
         let _ = (&mut self.eviction).await; // it was cancelled: that is no news
-        self.endpoint.close(CLOSE_STOPPING, STOP_REASON.as_bytes());
+        self.endpoint.close(code, reason.as_bytes());
         if timeout(STOP_TIMEOUT, self.endpoint.wait_idle())
             .await
             .is_err()

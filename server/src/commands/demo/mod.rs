@@ -155,6 +155,7 @@ pub(super) fn run(
                 ));
             }
         }
+        true
     });
     terminal.end_status();
     // One that is still joining would complain.
