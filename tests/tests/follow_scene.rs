@@ -29,10 +29,7 @@ fn told(server: &mut Server, words: &str, count: usize) {
 }
 
 fn draws(workbench: &TestWorkbench) -> bool {
-    workbench
-        .adapter()
-        .map_err(|why| taut_test_kit::left_out(why))
-        .is_ok()
+    workbench.adapter().map_err(taut_test_kit::left_out).is_ok()
 }
 
 fn pictures(folder: &Path) -> usize {
