@@ -8,7 +8,7 @@
  *         these axes, angular velocity and torque too. Position, velocity and torque are those of the grip's reference point.
  * Thread  all functions are called from one thread that belongs to this device alone, one at a time, about once a millisecond: read, then write.
  *         taut_device_entry comes from the same thread. The library may have threads of its own.
- * Time    read and write return within a millisecond and wait for no device: nothing new is an answer. Open and close may take 5 s.
+ * Time    read and write return within a millisecond and wait for no device: nothing new is an answer. Open may take 5 s, close half a second.
  *         While a call hangs, taut takes the force command to zero (hold 20 ms, then fade), but cannot hand that to the library: it is the
  *         first command after the call returns. So the library or its hardware must let go by itself when 20 ms pass without a write.
  * Ends    close must take the force to zero first, even where the device is gone. It is called once for each open that succeeded, also after an

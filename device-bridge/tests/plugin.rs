@@ -198,10 +198,6 @@ fn goes_wrong(choice: &str, inside: &Inside, modes: &[(i64, &str)]) {
             inside.wait("it is closed", || inside.get("closes") > closes);
         }
         inside.set("mode", GOOD);
-        if mode == HANGS && inside.get("after") == -1 {
-            // The DHD stand-in does not watch the first force.
-            thread::sleep(ms(1));
-        }
         let back = stage.until_felt(inside);
         println!("{named}: felt again after {back} ms");
         assert!(inside.get("after") <= 0, "a hang kept a force");
@@ -236,6 +232,34 @@ fn a_hand_in_c_is_felt_lost_and_felt_again() {
         (NOT_CALIBRATED, "was lost"),
     ];
     goes_wrong(&choice, &inside, &modes);
+}
+
+#[test]
+fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    stage.until_felt(&inside);
+    inside.set("mode", HANGS);
+    inside.wait("it hangs", || inside.get("served") > 0);
+    drop(stage); // comes back, though the library does not
+    assert!(inside.get("force") > 0, "nobody can take it away");
+    inside.set("mode", GOOD);
+    inside.wait("it is closed", || inside.get("closes") == 1);
+    assert_eq!((inside.get("after"), inside.get("force")), (0, 0));
+}
+
+#[test]
+fn a_device_without_motors_is_read_and_never_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "NO_MOTORS");
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    assert_eq!(stage.port.info().actuated_degrees_of_freedom, 0);
+    let inside = |stage: &Stage| stage.time > 1100;
+    stage.until("it is read", |stage, fault, _| {
+        fault.is_none() && inside(stage)
+    });
 }
 
 #[test]

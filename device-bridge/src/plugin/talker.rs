@@ -26,7 +26,7 @@ const RETRY: Duration = Duration::from_millis(200);
 /// For the first one.
 const OPEN_WITHIN: Duration = Duration::from_secs(10);
 /// For the last calls. A library that hangs longer is left to itself.
-const CLOSE_WITHIN: Duration = Duration::from_secs(5);
+const CLOSE_WITHIN: Duration = Duration::from_secs(1);
 
 /// What the device's loop wants: force then torque.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,7 +1,11 @@
 /* A device that is a simulated hand on a grip; and, by macros, the ways in which a plug-in may not fit. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "plant.h"
+#ifdef NO_ENTRY
+#define taut_device_entry some_other_function
+#endif
 #include "taut_device.h"
 
 static const char *why = "";
@@ -26,6 +30,9 @@ static int32_t hand_info(void *device, taut_device_info *info)
     info->max_force = INFINITY;
 #else
     info->max_force = 12;
+#endif
+#ifdef NO_MOTORS
+    info->actuated_degrees_of_freedom = 0;
 #endif
     info->max_torque = 0.5;
     info->max_stiffness = 1500;
@@ -65,6 +72,9 @@ static int32_t hand_read(void *device, taut_device_sample *sample)
 static int32_t hand_write(void *device, const double wrench[6])
 {
     (void)device;
+#ifdef NO_MOTORS
+    abort();
+#endif
     render(wrench[2], wrench[3]);
     if (watch) {
         watch = 0;
@@ -87,7 +97,6 @@ static void hand_text(void *device, char *text, size_t size)
     snprintf(text, size, "%s", why);
 }
 
-#ifndef NO_ENTRY
 const taut_device_table *taut_device_entry(void)
 {
     static taut_device_table table = {TAUT_DEVICE_VERSION, sizeof table, hand_open, hand_info, hand_read, hand_write, hand_close, hand_text};
@@ -105,4 +114,3 @@ const taut_device_table *taut_device_entry(void)
 #endif
     return &table;
 }
-#endif
