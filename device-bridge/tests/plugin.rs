@@ -241,6 +241,7 @@ fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
     let inside = Inside::of(&library);
     let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
     stage.until_felt(&inside);
+    inside.set("after", -1);
     inside.set("mode", HANGS);
     inside.wait("it hangs", || inside.get("served") > 0);
     drop(stage); // comes back, though the library does not
@@ -248,6 +249,18 @@ fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
     inside.set("mode", GOOD);
     inside.wait("it is closed", || inside.get("closes") == 1);
     assert_eq!((inside.get("after"), inside.get("force")), (0, 0));
+}
+
+#[test]
+fn a_force_does_not_outlive_the_loop_that_wrote_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    stage.until_felt(&inside);
+    // Nobody ticks any more; the library is read and written on.
+    inside.wait("zero without a write", || inside.get("force") == 0);
+    stage.until_felt(&inside);
 }
 
 #[test]
