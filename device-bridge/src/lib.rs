@@ -6,6 +6,7 @@
 //! - [`SpidarDevice`]: strings; [`simulated_spidar`] puts one into a simulated hand.
 //! - [`ArmDevice`]: a force device that people own, with its service simulated in [`haply`].
 //! - [`spidar_uart`], [`polhem`], [`wooden`]: more of them, each with its simulation ([`execute_simulation`] plays one as a process).
+//! - [`plugin`]: devices in shared libraries, written in C.
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
@@ -28,6 +29,7 @@ pub mod haply;
 mod own_stamps;
 mod placement;
 mod plugged;
+pub mod plugin;
 #[cfg(unix)]
 pub mod polhem;
 mod port;
@@ -65,9 +67,9 @@ pub use devices::{
 pub use devices::{
     ArmDevice, ArmPort, ArmSettings, ArmState, AtEnd, DEFAULT_MAX_AGE, Encoder, Grip, Hand,
     HandPreset, HaplySettings, HeldStrings, MAX_EDGE_DELAY, MinJerkPath, Motors, PathError,
-    PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice, SpidarDevice,
-    SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError, TraceRow, Tremor,
-    TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
+    PluginSettings, PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
+    SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError,
+    TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
 };
 pub use placement::Placement;
 pub use plugged::{PluggedPort, plugged_ports};

@@ -10,6 +10,7 @@ mod held_strings;
 mod inputs_without_allocation;
 mod loopback;
 mod no_alloc;
+mod plugin;
 mod polhem;
 mod spidar;
 mod spidar_uart;

@@ -15,18 +15,20 @@ use option_text::nearest;
 #[cfg(unix)]
 use settings::wooden_settings;
 use settings::{
-    cap_settings, haply_settings, polhem_settings, spidar_settings, strings_option, vrpn_settings,
+    cap_settings, haply_settings, plugin_settings, polhem_settings, spidar_settings,
+    strings_option, vrpn_settings,
 };
 
 use crate::device::Device;
 #[cfg(unix)]
 use crate::devices::WoodenSettings;
 use crate::devices::{
-    ArmDevice, CapSettings, HaplySettings, HidPort, PolhemSettings, SourceError, SpaceMouse,
-    SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
+    ArmDevice, CapSettings, HaplySettings, HidPort, PluginSettings, PolhemSettings, SourceError,
+    SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
 use crate::haply::{HaplyAddressError, HaplyError};
 use crate::placement::Placement;
+use crate::plugin::PluginError;
 
 /// A driver, for lists that people read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +42,7 @@ pub struct Driver {
 }
 
 /// All drivers.
-pub const DRIVERS: [Driver; 9] = [
+pub const DRIVERS: [Driver; 10] = [
     Driver {
         name: "simulated",
         form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
@@ -70,6 +72,11 @@ pub const DRIVERS: [Driver; 9] = [
         name: "wooden",
         form: "wooden[=PATH][,model=NAME,axes=y -x z,scale=S,anchor=start|workbench]",
         what: "a WoodenHaptics arm, or a kin of it, on its HID board: force without torque",
+    },
+    Driver {
+        name: "plugin",
+        form: "plugin:LIBRARY[,axes=x y z,scale=S,anchor=start|workbench,...]",
+        what: "a force device in a shared library of your own (taut_device.h); other options go to the library",
     },
     Driver {
         name: "space-mouse",
@@ -117,6 +124,8 @@ pub enum InputChoice {
     Spidar(Box<SpidarUartSettings>),
     /// [`crate::ArmDevice`] on a serial port.
     Polhem(Box<PolhemSettings>),
+    /// [`crate::ArmDevice`] in a shared library.
+    Plugin(Box<PluginSettings>),
     /// [`crate::ArmDevice`] on a HID board.
     #[cfg(unix)]
     Wooden(Box<WoodenSettings>),
@@ -142,6 +151,9 @@ pub enum InputError {
     /// The motor boards.
     #[error(transparent)]
     Spidar(#[from] SpidarUartError),
+    /// The shared library.
+    #[error(transparent)]
+    Plugin(#[from] PluginError),
     /// The Polhem board.
     #[cfg(unix)]
     #[error(transparent)]
@@ -177,6 +189,7 @@ impl InputChoice {
             Self::Haply(settings) => Some(settings.force_device()),
             Self::Spidar(settings) => Some(settings.force_device()),
             Self::Polhem(settings) => Some(settings.force_device()),
+            Self::Plugin(settings) => Some(settings.force_device()),
             #[cfg(unix)]
             Self::Wooden(settings) => Some(settings.force_device()),
         }
@@ -193,6 +206,7 @@ impl InputChoice {
             }
             Self::Haply(settings) => Box::new(settings.open(placement, priority)?),
             Self::Spidar(settings) => settings.open(&placement, priority)?,
+            Self::Plugin(settings) => Box::new(settings.open(placement, priority)?),
             #[cfg(unix)]
             Self::Polhem(settings) => {
                 let board = crate::polhem::PolhemBoard::open(&settings.path, priority)?;
@@ -299,6 +313,9 @@ impl FromStr for DeviceChoice {
             ("polhem", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Polhem(
                 Box::new(polhem_settings(rest)?),
             ))),
+            ("plugin", Some(rest)) if !rest.is_empty() && !rest.starts_with(',') => Ok(
+                Self::Input(InputChoice::Plugin(Box::new(plugin_settings(rest)?))),
+            ),
             #[cfg(unix)]
             ("wooden", None) => Ok(Self::Input(InputChoice::Wooden(Box::new(wooden_settings(
                 rest,
@@ -420,12 +437,15 @@ mod tests {
             ("simulatd", "did you mean `simulated`?"),
             (
                 "phantom",
-                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, wooden, space-mouse",
+                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, wooden, plugin:LIBRARY, space-mouse",
             ),
             ("spidar", "write spidar:PORT"),
             ("spidar:", "write spidar:PORT"),
             ("wooden,model=phantom", "must be woodenhaptics-2019 or"),
             ("polhem", "write polhem:PORT"),
+            ("plugin", "write plugin:LIBRARY"),
+            ("plugin:", "write plugin:LIBRARY"),
+            ("plugin:/l.so,scale=0", "a number from 0.01 to 100"),
             ("polhem:/dev/x,scal=1", "did you mean `scale`?"),
             ("spidar:/dev/x,geometry=nothing", "g6x4r"),
             ("spidar:/dev/x,axes=y x z", "right-handed"),

@@ -9,7 +9,8 @@ use super::option_text::OptionText;
 #[cfg(unix)]
 use crate::devices::WoodenSettings;
 use crate::devices::{
-    Anchor, CapMode, CapSettings, HaplySettings, PolhemSettings, SpidarUartSettings, VrpnSettings,
+    Anchor, CapMode, CapSettings, HaplySettings, PluginSettings, PolhemSettings,
+    SpidarUartSettings, VrpnSettings,
 };
 use crate::simulated_strings::string_geometry;
 use crate::vrpn::{VrpnMode, VrpnSource};
@@ -116,6 +117,28 @@ pub(super) fn polhem_settings(text: &str) -> Result<PolhemSettings, UnknownDevic
         option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
         option.finish()?;
     }
+    Ok(settings)
+}
+
+pub(super) fn plugin_settings(text: &str) -> Result<PluginSettings, UnknownDevice> {
+    let (path, options) = text.split_once(',').unwrap_or((text, ""));
+    let mut settings = PluginSettings {
+        path: path.into(),
+        options: String::new(),
+        mapping: SensorMapping::identity(),
+        anchor: Anchor::default(),
+    };
+    let mut others = Vec::new();
+    for text in options.split(',').filter(|option| !option.is_empty()) {
+        let mut option = OptionText::new("plugin", text);
+        option.parsed("axes", "such as `x -z y`", &mut settings.mapping.axes)?;
+        option.number("scale", 1e-2, 1e2, &mut settings.mapping.scale)?;
+        option.choice("anchor", &Anchor::NAMED, &mut settings.anchor)?;
+        if !["axes", "scale", "anchor"].contains(&option.name) {
+            others.push(text);
+        }
+    }
+    settings.options = others.join(",");
     Ok(settings)
 }
 

@@ -1,4 +1,4 @@
-//! An arm that pushes and cannot turn: a cursor with three degrees of freedom of force, and an orientation that is measured or not.
+//! An arm: a cursor with three degrees of freedom of force, and an orientation that is measured or not; some can turn it, too.
 //!
 //! | frame     | meaning                                                                                       |
 //! |-----------|-----------------------------------------------------------------------------------------------|
@@ -6,8 +6,8 @@
 //! | workbench | what the user sees; `axes` and `scale` of [`SensorMapping`] lead to it, from the workspace's middle |
 //! | world     | the scene's ([`Placement`])                                                                   |
 //!
-//! The cursor, where the arm pushes, is at G, the body's reference point: so a force at G is a force at the cursor, and a torque about G is
-//! what such a device cannot render. It is dropped, never turned into force. The orientation turns the body about G.
+//! The cursor, where the arm pushes, is at G, the body's reference point: so a force at G is a force at the cursor. A torque about G is
+//! what an arm without motors for it cannot render. It is dropped, never turned into force. The orientation turns the body about G.
 
 use std::time::Duration;
 
@@ -38,6 +38,8 @@ pub struct ArmState {
     pub velocity: [f64; 3],
     /// Of the grip; `None` without one.
     pub orientation: Option<[f64; 4]>,
+    /// Angular velocity, rad/s; `None` where it is not measured: it is taken from the orientations then.
+    pub turning: Option<[f64; 3]>,
     /// One bit per button, bit 0 the first.
     pub buttons: u16,
 }
@@ -63,6 +65,9 @@ pub struct ArmSettings {
 pub trait ArmPort: Send {
     /// What the device said last; neither waits nor allocates.
     fn newest(&mut self) -> ArmState;
+
+    /// The torque that goes with the next [`Self::push`], N m, the device's axes; nothing for an arm that cannot turn a hand.
+    fn twist(&mut self, _torque: [f64; 3]) {}
 
     /// Wants a force, N, the device's axes; likewise.
     fn push(&mut self, force: [f64; 3]);
@@ -96,7 +101,7 @@ impl ArmDevice {
             info: DeviceInfo {
                 name: arm.name,
                 sensed_degrees_of_freedom: if arm.with_orientation { 6 } else { 3 },
-                actuated_degrees_of_freedom: 3,
+                actuated_degrees_of_freedom: actuated(&limits),
                 limits,
                 rate_hz: RATE_HZ,
             },
@@ -156,7 +161,11 @@ impl ArmDevice {
         let is_first = self.seen.0 == 0 || self.was_lost || passed > MAX_AGE.as_secs_f64();
         let turned = (next.rotation * self.at_g.rotation.inverse()).scaled_axis();
         let before: Vector3<f64> = self.velocity.fixed_rows::<3>(3).into();
-        let turning = if is_first || passed <= 0.0 {
+        let turning = if let Some(measured) = state.turning {
+            let turning = self.hand() * (self.mapping.axes.matrix() * Vector3::from(measured));
+            let turning = self.mapping.origin.rotation * turning;
+            self.placement.rotation_in_world(&turning)
+        } else if is_first || passed <= 0.0 {
             Vector3::zeros()
         } else {
             before + (turned / passed - before) * (passed / (passed + TURN_LAG_S))
@@ -168,6 +177,18 @@ impl ArmDevice {
         self.at_g = next;
         self.seen = (state.reports, now);
         Ok(())
+    }
+
+    /// -1 where the axes are a mirror image: what turns one way is seen to turn the other.
+    fn hand(&self) -> f64 {
+        self.mapping.axes.matrix().determinant().signum()
+    }
+
+    /// A vector of the world in the arm's axes; a force has a direction, and no scale.
+    fn in_arm(&self, in_world: Vector3<f64>) -> Vector3<f64> {
+        let on_workbench = self.placement.workbench_from_world.isometry.rotation * in_world;
+        let unturned = self.mapping.origin.rotation.inverse() * on_workbench;
+        self.mapping.axes.matrix().transpose() * unturned
     }
 
     fn lose(&mut self, fault: DeviceFault) -> DeviceFault {
@@ -210,13 +231,22 @@ impl Device for ArmDevice {
     }
 
     fn write(&mut self, _now: Duration, wrench: &Vector6<f64>) {
-        let force: Vector3<f64> = wrench.fixed_rows::<3>(0).into();
-        let is_finite = force.iter().all(|part| part.is_finite());
-        let force = if is_finite { force } else { Vector3::zeros() };
-        // A force has a direction in the world, and no scale.
-        let on_workbench = self.placement.workbench_from_world.isometry.rotation * force;
-        let unturned = self.mapping.origin.rotation.inverse() * on_workbench;
+        let is_finite = wrench.iter().all(|part| part.is_finite());
+        let wrench = if is_finite { *wrench } else { Vector6::zeros() };
+        if self.info.actuated_degrees_of_freedom == 6 {
+            let torque = self.hand() * self.in_arm(wrench.fixed_rows::<3>(3).into());
+            self.port.twist(torque.into());
+        }
         self.port
-            .push((self.mapping.axes.matrix().transpose() * unturned).into());
+            .push(self.in_arm(wrench.fixed_rows::<3>(0).into()).into());
+    }
+}
+
+/// Degrees of freedom of its motors.
+fn actuated(limits: &DeviceLimits) -> u8 {
+    match limits {
+        limits if *limits == DeviceLimits::UNLIMITED => 0, // no motors
+        limits if limits.max_torque > 0.0 => 6,
+        _ => 3,
     }
 }

@@ -182,6 +182,7 @@ impl Exchange {
             position: arm.position.ok_or(Unusable::NoPosition)?,
             velocity: arm.velocity.unwrap_or_default(),
             orientation: None,
+            turning: None,
             buttons: 0,
         };
         if let Some((kind, id)) = &self.grip {

@@ -265,6 +265,7 @@ impl Line {
             position: frame.position,
             velocity,
             orientation: Some([q.w, q.i, q.j, q.k]),
+            turning: None,
             buttons: 0,
         };
         self.out.write(self.state);

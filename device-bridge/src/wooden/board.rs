@@ -229,6 +229,7 @@ impl Talker {
                 .model
                 .orientation(&self.encoders)
                 .map(|q| [q.w, q.i, q.j, q.k]),
+            turning: None,
             buttons: 0,
         };
         self.out.write(self.state);

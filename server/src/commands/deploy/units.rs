@@ -184,6 +184,9 @@ pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<Stri
         DeviceChoice::Input(InputChoice::SpaceMouse(_)) => ON_HID,
         #[cfg(unix)]
         DeviceChoice::Input(InputChoice::Wooden(_)) => ON_HID,
+        DeviceChoice::Input(InputChoice::Plugin(_)) => {
+            return Err("what a plug-in opens is not known; run `taut bridge` there by hand, or write a unit that allows its device".into());
+        }
         DeviceChoice::Input(InputChoice::Vrpn(_) | InputChoice::Haply(_))
         | DeviceChoice::Simulated { .. }
         | DeviceChoice::Trace(_) => &[],

@@ -1,0 +1,288 @@
+/*
+ * Force Dimension's devices (omega, delta, sigma, lambda) as a plug-in of taut, by the vendor's own library, which is loaded at run time.
+ *
+ *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_dhd.so plugins/dhd.c -ldl -lm
+ *   taut bridge --device plugin:/path/taut_dhd.so,library=/path/libdhd.so,force=5,...
+ *
+ * Options: library (default libdhd.so), id (device number, default the first), force (N, 5), torque (N m, 0.1), stiffness (N/m, 1000),
+ * rotational-stiffness (N m/rad, 0.5): what the device renders, from its data sheet. The defaults are small on purpose.
+ *
+ * Names, order of arguments and units are those of the published header (dhdc.h 3.2 and later) and of public programs that use it: m, m/s, rad/s, N, N m;
+ * a device's number is a char; results below 0 are errors, 1 (DHD_TIMEGUARD) is the reading of before, 2 (DHD_MOTOR_SATURATED) a force that was
+ * cut. Axes there: x towards the user, y right, z up. Here: x right, y away, z up.
+ *
+ * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
+ */
+#include <dlfcn.h>
+#include <stdbool.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "taut_device.h"
+
+enum { DHD_TIMEGUARD = 1 };
+
+/* The functions of the vendor's library. The last three are younger than the rest and may be missing. */
+static struct {
+    void *library;
+    int (*Open)(void);
+    int (*OpenID)(char);
+    int (*Close)(char);
+    int (*EnableForce)(unsigned char, char);
+    int (*GetPosition)(double *, double *, double *, char);
+    int (*GetOrientationFrame)(double[3][3], char);
+    int (*GetLinearVelocity)(double *, double *, double *, char);
+    int (*SetForceAndTorqueAndGripperForce)(double, double, double, double, double, double, double, char);
+    const char *(*ErrorGetLastStr)(void);
+    const char *(*GetSystemName)(char);
+    bool (*HasWrist)(char);
+    bool (*HasActiveWrist)(char);
+    int (*GetAngularVelocityRad)(double *, double *, double *, char);
+    unsigned (*GetButtonMask)(char);
+} dhd;
+
+struct device {
+    char id;
+    bool has_wrist, turns;
+    double force, torque, stiffness, rotational_stiffness;
+};
+
+/* All calls come from one thread. */
+static char text[256];
+
+static int fail(int code, const char *what, const char *why)
+{
+    snprintf(text, sizeof text, "%s: %s", what, why ? why : "no reason given");
+    return code;
+}
+
+static const char *last(void) { return dhd.ErrorGetLastStr ? dhd.ErrorGetLastStr() : NULL; }
+
+static void *symbol(const char *name, const char **missing)
+{
+    void *found = dlsym(dhd.library, name);
+    if (!found && missing && !*missing)
+        *missing = name;
+    return found;
+}
+
+/* A pointer to a function from dlsym's pointer to data, as POSIX has it. */
+#define FIND(name, missing) (*(void **)&dhd.name = symbol("dhd" #name, missing))
+
+static int load(const char *path)
+{
+    const char *missing = NULL;
+    if (dhd.library)
+        return TAUT_DEVICE_OK;
+    dhd.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!dhd.library)
+        return fail(TAUT_DEVICE_FAILED, "Force Dimension's library cannot be loaded (option library=PATH)", dlerror());
+    FIND(OpenID, &missing);
+    FIND(Open, &missing);
+    FIND(Close, &missing);
+    FIND(EnableForce, &missing);
+    FIND(GetPosition, &missing);
+    FIND(GetOrientationFrame, &missing);
+    FIND(GetLinearVelocity, &missing);
+    FIND(SetForceAndTorqueAndGripperForce, &missing);
+    FIND(ErrorGetLastStr, &missing);
+    FIND(GetSystemName, NULL);
+    FIND(HasWrist, NULL);
+    FIND(HasActiveWrist, NULL);
+    FIND(GetAngularVelocityRad, NULL);
+    FIND(GetButtonMask, NULL);
+    if (missing) {
+        dlclose(dhd.library);
+        dhd.library = NULL;
+        return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
+    }
+    return TAUT_DEVICE_OK;
+}
+
+/* The number of `value`, which must be within. */
+static bool number(const char *value, double low, double high, double *target)
+{
+    char *end;
+    double read = strtod(value, &end);
+    if (end == value || *end || !(read >= low && read <= high))
+        return false;
+    *target = read;
+    return true;
+}
+
+static int32_t device_close(void *opened)
+{
+    struct device *device = opened;
+    int zero = dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id);
+    int off = dhd.EnableForce(0, device->id);
+    int closed = dhd.Close(device->id);
+    free(device);
+    return zero < 0 || off < 0 || closed < 0 ? fail(TAUT_DEVICE_FAILED, "dhdClose", last()) : TAUT_DEVICE_OK;
+}
+
+static int32_t device_open(const char *options, void **opened)
+{
+    struct device wanted = {-1, false, false, 5.0, 0.1, 1000.0, 0.5}, *device;
+    double wanted_id = -1;
+    char copy[1024], *library = "libdhd.so", *rest = NULL;
+    int id, code;
+
+    if (strlen(options) >= sizeof copy)
+        return fail(TAUT_DEVICE_FAILED, "options", "they are too long");
+    strcpy(copy, options);
+    for (char *option = strtok_r(copy, ",", &rest); option; option = strtok_r(NULL, ",", &rest)) {
+        char *value = strchr(option, '=');
+        bool good;
+        if (!value)
+            return fail(TAUT_DEVICE_FAILED, "write NAME=VALUE instead of", option);
+        *value++ = 0;
+        if (!strcmp(option, "library"))
+            good = *(library = value) != 0;
+        else if (!strcmp(option, "id"))
+            good = number(value, 0, 15, &wanted_id);
+        else if (!strcmp(option, "force"))
+            good = number(value, 0.1, 100, &wanted.force);
+        else if (!strcmp(option, "torque"))
+            good = number(value, 0.001, 10, &wanted.torque);
+        else if (!strcmp(option, "stiffness"))
+            good = number(value, 1, 1e5, &wanted.stiffness);
+        else if (!strcmp(option, "rotational-stiffness"))
+            good = number(value, 0.001, 1e3, &wanted.rotational_stiffness);
+        else
+            return fail(TAUT_DEVICE_FAILED, "no such option; there are library, id, force, torque, stiffness, rotational-stiffness", option);
+        if (!good)
+            return fail(TAUT_DEVICE_FAILED, "no value for this option, or out of range", option);
+    }
+    if ((code = load(library)) != TAUT_DEVICE_OK)
+        return code;
+    id = wanted_id < 0 ? dhd.Open() : dhd.OpenID((char)wanted_id);
+    if (id < 0)
+        return fail(TAUT_DEVICE_GONE, "no Force Dimension device can be opened", last());
+    wanted.id = (char)id;
+    wanted.has_wrist = dhd.HasWrist && dhd.HasWrist(wanted.id);
+    wanted.turns = wanted.has_wrist && dhd.HasActiveWrist && dhd.HasActiveWrist(wanted.id);
+    device = malloc(sizeof *device);
+    if (!device) {
+        dhd.Close(wanted.id);
+        return fail(TAUT_DEVICE_FAILED, "dhdOpen", "no memory");
+    }
+    *device = wanted;
+    if (dhd.SetForceAndTorqueAndGripperForce(0, 0, 0, 0, 0, 0, 0, device->id) < 0 || dhd.EnableForce(1, device->id) < 0) {
+        code = fail(TAUT_DEVICE_FAILED, "dhdEnableForce", last());
+        device_close(device);
+        return code;
+    }
+    *opened = device;
+    return TAUT_DEVICE_OK;
+}
+
+static int32_t device_info(void *opened, taut_device_info *info)
+{
+    const struct device *device = opened;
+    const char *name = dhd.GetSystemName ? dhd.GetSystemName(device->id) : NULL;
+    snprintf(info->name, sizeof info->name, "Force Dimension %s", name ? name : "device");
+    info->sensed_degrees_of_freedom = device->has_wrist ? 6 : 3;
+    info->actuated_degrees_of_freedom = device->turns ? 6 : 3;
+    info->max_force = device->force;
+    info->max_torque = device->torque;
+    info->max_stiffness = device->stiffness;
+    info->max_rotational_stiffness = device->rotational_stiffness;
+    info->rate = 1000;
+    return TAUT_DEVICE_OK;
+}
+
+/* From the vendor's axes to x right, y away from the user, z up. */
+static void turned(const double from[3], double to[3])
+{
+    to[0] = from[1];
+    to[1] = -from[0];
+    to[2] = from[2];
+}
+
+/* w x y z of a rotation matrix, by the largest of the four. NaN stays NaN. */
+static void quaternion(double m[3][3], double q[4])
+{
+    double trace = m[0][0] + m[1][1] + m[2][2], largest = trace, norm = 0;
+    int at = -1;
+    for (int i = 0; i < 3; i++)
+        if (m[i][i] > largest) {
+            largest = m[i][i];
+            at = i;
+        }
+    if (at < 0) {
+        q[0] = 1 + trace;
+        q[1] = m[2][1] - m[1][2];
+        q[2] = m[0][2] - m[2][0];
+        q[3] = m[1][0] - m[0][1];
+    } else {
+        int b = (at + 1) % 3, c = (at + 2) % 3;
+        q[0] = m[c][b] - m[b][c];
+        q[1 + at] = 1 + m[at][at] - m[b][b] - m[c][c];
+        q[1 + b] = m[b][at] + m[at][b];
+        q[1 + c] = m[c][at] + m[at][c];
+    }
+    for (int i = 0; i < 4; i++)
+        norm += q[i] * q[i];
+    for (int i = 0; i < 4; i++)
+        q[i] /= sqrt(norm);
+}
+
+static int32_t device_read(void *opened, taut_device_sample *sample)
+{
+    const struct device *device = opened;
+    double p[3], v[3], w[3], frame[3][3], columns[3][3], seen[3][3];
+    int result = dhd.GetPosition(&p[0], &p[1], &p[2], device->id);
+    if (result < 0)
+        return fail(TAUT_DEVICE_GONE, "dhdGetPosition", last());
+    if (result == DHD_TIMEGUARD)
+        return TAUT_DEVICE_NOTHING_NEW;
+    if (dhd.GetLinearVelocity(&v[0], &v[1], &v[2], device->id) < 0)
+        return fail(TAUT_DEVICE_GONE, "dhdGetLinearVelocity", last());
+    turned(p, sample->position);
+    turned(v, sample->velocity);
+    if (device->has_wrist) {
+        if (dhd.GetOrientationFrame(frame, device->id) < 0)
+            return fail(TAUT_DEVICE_GONE, "dhdGetOrientationFrame", last());
+        /* M R M^T: both indices go from the vendor's axes to ours. */
+        for (int row = 0; row < 3; row++)
+            turned(frame[row], columns[row]);
+        for (int column = 0; column < 3; column++) {
+            double from[3] = {columns[0][column], columns[1][column], columns[2][column]}, to[3];
+            turned(from, to);
+            for (int row = 0; row < 3; row++)
+                seen[row][column] = to[row];
+        }
+        quaternion(seen, sample->orientation);
+        if (dhd.GetAngularVelocityRad && dhd.GetAngularVelocityRad(&w[0], &w[1], &w[2], device->id) >= 0) {
+            turned(w, sample->angular_velocity);
+            sample->measured |= TAUT_DEVICE_HAS_ANGULAR_VELOCITY;
+        }
+    }
+    sample->buttons = dhd.GetButtonMask ? dhd.GetButtonMask(device->id) & 0xffffu : 0;
+    sample->age = 0;
+    return TAUT_DEVICE_OK;
+}
+
+static int32_t device_write(void *opened, const double wrench[6])
+{
+    const struct device *device = opened;
+    /* Back to x towards the user, y right, z up. */
+    int result = dhd.SetForceAndTorqueAndGripperForce(-wrench[1], wrench[0], wrench[2], -wrench[4], wrench[3], wrench[5], 0, device->id);
+    return result < 0 ? fail(TAUT_DEVICE_GONE, "dhdSetForceAndTorqueAndGripperForce", last()) : TAUT_DEVICE_OK;
+}
+
+static void device_error_text(void *opened, char *to, size_t size)
+{
+    (void)opened;
+    snprintf(to, size, "%s", text);
+}
+
+const taut_device_table *taut_device_entry(void)
+{
+    static const taut_device_table table = {
+        TAUT_DEVICE_VERSION, sizeof table, device_open, device_info, device_read, device_write, device_close, device_error_text,
+    };
+    return &table;
+}

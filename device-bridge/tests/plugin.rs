@@ -1,0 +1,452 @@
+//! Devices in shared libraries: the interface on a stand-in hand in C, and the DHD plug-in on a stand-in of the vendor's library. Both are built here by `cc`.
+#![cfg(unix)]
+#![allow(
+    unsafe_code,
+    reason = "the tests look into the libraries that they built"
+)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command as Process;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use libloading::Library;
+use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
+use taut_bridge::{
+    ArmingState, Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Placement,
+    Pose, Rearm, SafetySettings,
+};
+
+/// Only a hang takes this long.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+// Of tests/plugin_c/plant.h.
+const GOOD: i64 = 0;
+const HANGS: i64 = 1;
+const NOT_A_NUMBER: i64 = 2;
+const LONG_QUATERNION: i64 = 3;
+const TOO_HOT: i64 = 4;
+const UNPLUGGED: i64 = 5;
+const NOTHING_NEW: i64 = 6;
+const NOT_CALIBRATED: i64 = 7;
+
+fn here() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn document() -> String {
+    std::fs::read_to_string(here().join("../docs/devices.md")).expect("the document")
+}
+
+/// Builds `source` in `folder`, with everything that a compiler can find a fault.
+fn built(folder: &Path, source: &Path, name: &str, define: &str) -> PathBuf {
+    let library = folder.join(name);
+    let mut cc = Process::new("cc");
+    cc.args(["-Wall", "-Wextra", "-Werror", "-O1", "-shared", "-fPIC"])
+        .arg(format!("-D{define}"))
+        .arg("-I")
+        .arg(here().join("include"))
+        .arg(source)
+        .arg("-o")
+        .arg(&library)
+        .args(["-ldl", "-lm"]);
+    let out = cc.output().expect("cc, as of the package build-essential");
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    library
+}
+
+fn stand_in(folder: &Path, source: &str, define: &str) -> PathBuf {
+    let source = here().join("tests/plugin_c").join(source);
+    built(folder, &source, &format!("lib{define}.so"), define)
+}
+
+/// What the test sees of a library, loaded a second time: the same one.
+struct Inside(Library);
+
+impl Inside {
+    fn of(path: &Path) -> Self {
+        // SAFETY: it was built from a source of this folder.
+        Self(unsafe { Library::new(path) }.expect("it was built"))
+    }
+
+    fn number(&self, name: &str) -> &AtomicI64 {
+        let name = format!("taut_test_{name}");
+        // SAFETY: tests/plugin_c/plant.h defines it as an atomic of 64 bits, and the library stays loaded for as long as `self`.
+        unsafe {
+            let symbol = self
+                .0
+                .get::<*const AtomicI64>(name.as_bytes())
+                .expect("defined");
+            &**symbol
+        }
+    }
+
+    fn get(&self, name: &str) -> i64 {
+        self.number(name).load(Ordering::SeqCst)
+    }
+
+    fn set(&self, name: &str, value: i64) {
+        self.number(name).store(value, Ordering::SeqCst);
+    }
+
+    fn wait(&self, what: &str, done: impl Fn() -> bool) {
+        let begun = Instant::now();
+        while !done() {
+            assert!(begun.elapsed() < PATIENCE, "{what}");
+            thread::sleep(ms(1));
+        }
+    }
+}
+
+fn ms(time: u64) -> Duration {
+    Duration::from_millis(time)
+}
+
+fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
+    let DeviceChoice::Input(input) = choice.parse().map_err(|e| format!("{e}"))? else {
+        panic!("it is opened");
+    };
+    let placement = Placement::plain(Pose::identity(), Point3::origin());
+    input.open(placement, 0).map_err(|error| error.to_string())
+}
+
+/// A port around the device, on a clock that goes a millisecond by tick, however long that takes.
+struct Stage {
+    port: DevicePort,
+    time: u64,
+}
+
+impl Stage {
+    fn new(choice: &str, rearm: Rearm) -> Self {
+        let settings = SafetySettings {
+            rearm,
+            ..SafetySettings::default()
+        };
+        let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
+        let mut port = DevicePort::new(device, settings, Point3::origin(), &Pose::identity());
+        port.restart(CommandSource::Same);
+        Self { port, time: 1000 }
+    }
+
+    /// A floor 20 mm below the start, which also turns the hand.
+    fn tick(&mut self) -> (Option<DeviceFault>, f64) {
+        self.time += 1;
+        let now = ms(self.time);
+        let report = self.port.tick(now, |reading| {
+            let below = (-0.02 - reading.sample.pose.translation.vector.z).max(0.0);
+            let wrench = Vector6::new(0.0, 0.0, 200.0 * below, 20.0 * below, 0.0, 0.0);
+            Some(Command::fresh(now, wrench))
+        });
+        (report.reading.fault, report.wrench.norm())
+    }
+
+    /// Milliseconds of its clock that it took.
+    fn until(&mut self, what: &str, done: impl Fn(&Self, Option<DeviceFault>, f64) -> bool) -> u64 {
+        let (begun, from) = (Instant::now(), self.time);
+        loop {
+            let (fault, force) = self.tick();
+            if done(self, fault, force) {
+                return self.time - from;
+            }
+            assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
+            thread::sleep(ms(1));
+        }
+    }
+
+    fn until_felt(&mut self, inside: &Inside) -> u64 {
+        self.until("the floor", |_, fault, force| {
+            fault.is_none() && force > 0.3 && inside.get("force") > 300_000
+        })
+    }
+
+    /// 120 ms on its clock after the last good sample there is no force.
+    fn is_without_force_in_time(&mut self) -> Option<DeviceFault> {
+        let mut fault = None;
+        for _ in 0..119 {
+            fault = self.tick().0;
+        }
+        let (_, force) = self.tick();
+        assert_eq!(force, 0.0, "{fault:?}");
+        fault
+    }
+}
+
+/// Everything that goes wrong with a device that has been felt, and what the port calls it.
+fn goes_wrong(choice: &str, inside: &Inside, modes: &[(i64, &str)]) {
+    let mut stage = Stage::new(choice, Rearm::Automatic);
+    for &(mode, named) in modes {
+        stage.until_felt(inside);
+        assert!(inside.get("torque") > 0, "no torque");
+        inside.set("served", 0);
+        inside.set("after", -1);
+        let closes = inside.get("closes");
+        inside.set("mode", mode);
+        inside.wait("it goes wrong", || {
+            inside.get("served") > 0 || inside.get("closes") > closes
+        });
+        let fault = stage.is_without_force_in_time().expect(named);
+        assert!(fault.to_string().contains(named), "{named}: {fault}");
+        if mode != HANGS {
+            stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
+        }
+        if [TOO_HOT, UNPLUGGED].contains(&mode) {
+            inside.wait("it is closed", || inside.get("closes") > closes);
+        }
+        inside.set("mode", GOOD);
+        let back = stage.until_felt(inside);
+        println!("{named}: felt again after {back} ms");
+        assert!(inside.get("after") <= 0, "a hang kept a force");
+    }
+    drop(stage);
+    assert_eq!(inside.get("force"), 0, "a force stayed");
+}
+
+#[test]
+fn a_hand_in_c_is_felt_lost_and_felt_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let choice = format!("plugin:{},side=left,scale=1,firm", library.display());
+    let device = opened(&choice).unwrap_or_else(|error| panic!("{error}"));
+    let info = device.info().clone();
+    assert_eq!(info.name, "stand-in hand");
+    let freedoms = (
+        info.sensed_degrees_of_freedom,
+        info.actuated_degrees_of_freedom,
+    );
+    assert_eq!(freedoms, (6, 6));
+    assert_eq!((info.limits.max_force, info.limits.max_torque), (12.0, 0.5));
+    drop(device);
+    let modes = [
+        (HANGS, "was lost"),
+        (NOT_A_NUMBER, "not finite"),
+        (LONG_QUATERNION, "not finite"),
+        (TOO_HOT, "was lost"),
+        (UNPLUGGED, "was lost"),
+        (NOTHING_NEW, "was lost"),
+        (NOT_CALIBRATED, "was lost"),
+    ];
+    goes_wrong(&choice, &inside, &modes);
+}
+
+#[test]
+fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    stage.until_felt(&inside);
+    inside.set("after", -1);
+    inside.set("mode", HANGS);
+    inside.wait("it hangs", || inside.get("served") > 0);
+    drop(stage); // comes back, though the library does not
+    assert!(inside.get("force") > 0, "nobody can take it away");
+    inside.set("mode", GOOD);
+    inside.wait("it is closed", || inside.get("closes") == 1);
+    assert_eq!((inside.get("after"), inside.get("force")), (0, 0));
+}
+
+#[test]
+fn a_force_does_not_outlive_the_loop_that_wrote_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    stage.until_felt(&inside);
+    // Nobody ticks any more; the library is read and written on.
+    inside.wait("zero without a write", || inside.get("force") == 0);
+    stage.until_felt(&inside);
+}
+
+#[test]
+fn a_device_without_motors_is_read_and_never_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "NO_MOTORS");
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    assert_eq!(stage.port.info().actuated_degrees_of_freedom, 0);
+    let inside = |stage: &Stage| stage.time > 1100;
+    stage.until("it is read", |stage, fault, _| {
+        fault.is_none() && inside(stage)
+    });
+}
+
+#[test]
+fn a_person_arms_a_plug_in_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let library = stand_in(folder.path(), "hand.c", "HAND");
+    let inside = Inside::of(&library);
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Manual);
+    let in_order = |stage: &mut Stage| {
+        stage.until("it is there", |_, fault, _| fault.is_none());
+        for _ in 0..20 {
+            assert_eq!(stage.tick().1, 0.0, "a force that nobody armed");
+            thread::sleep(ms(1));
+        }
+        stage.port.ask_to_arm();
+    };
+    in_order(&mut stage);
+    stage.until_felt(&inside);
+    inside.set("mode", UNPLUGGED);
+    stage.until("it is gone", |_, fault, force| {
+        fault.is_some() && force == 0.0
+    });
+    inside.set("mode", GOOD);
+    in_order(&mut stage);
+    assert_ne!(stage.port.state(), ArmingState::Armed);
+    stage.until_felt(&inside);
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let error = |library: &Path| {
+        let choice = format!("plugin:{}", library.display());
+        opened(&choice).err().expect("it does not fit")
+    };
+    for (define, named) in [
+        (
+            "OTHER_VERSION",
+            "its table is of version 9, and 1 is understood; compile it with",
+        ),
+        ("OTHER_SIZE", "bytes, and version 1 has"),
+        ("HOLE", "no function `write`"),
+        ("NO_TABLE", "no table of functions"),
+        ("NO_ENTRY", "exports no function `taut_device_entry`"),
+        (
+            "INFINITE",
+            "max_force is inf, but must be from 0.001 to 1000",
+        ),
+    ] {
+        let said = error(&stand_in(folder.path(), "hand.c", define));
+        assert!(said.contains(named), "{define}: {said}");
+    }
+    let missing = error(Path::new("/no/such/lib.so"));
+    assert!(missing.contains("write its whole path"), "{missing}");
+    let text = folder.path().join("text.so");
+    std::fs::write(&text, "no library").expect("written");
+    let said = error(&text);
+    assert!(said.contains("cannot be loaded"), "{said}");
+    let hand = stand_in(folder.path(), "hand.c", "HAND");
+    let choice = format!("plugin:{},colour=red", hand.display());
+    let said = opened(&choice).err().expect("no such option");
+    assert!(said.contains("what options are these?"), "{said}");
+    Inside::of(&hand).set("mode", UNPLUGGED);
+    assert!(error(&hand).contains("no hand is plugged in"));
+}
+
+#[test]
+fn force_dimension_s_functions_are_called_as_published() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // The line of the document, as a user types it in the repository.
+    std::os::unix::fs::symlink(here(), folder.path().join("device-bridge")).expect("a link");
+    let document = document();
+    let line = document
+        .lines()
+        .find(|line| line.starts_with("cc ") && line.contains("plugins/dhd.c"))
+        .expect("how to build it");
+    let mut shell = Process::new("sh");
+    let status = shell.args(["-c", line]).current_dir(folder.path()).status();
+    assert!(status.expect("a shell").success(), "{line}");
+    let vendor = stand_in(folder.path(), "stand_in_dhd.c", "DHD");
+    let inside = Inside::of(&vendor);
+    let plugin = folder.path().join("taut_dhd.so");
+    // The same source with every warning an error.
+    built(
+        folder.path(),
+        &here().join("plugins/dhd.c"),
+        "strict.so",
+        "STRICT",
+    );
+
+    let bare = format!("plugin:{}", plugin.display());
+    for (options, named) in [
+        (
+            "library=/no/libdhd.so",
+            "cannot be loaded (option library=PATH)",
+        ),
+        ("force=1e9", "out of range: force"),
+        ("colour=red", "there are library, id, force"),
+        ("id", "write NAME=VALUE instead of: id"),
+        (
+            &format!("library={}/strict.so", folder.path().display()),
+            "it lacks: dhdOpenID",
+        ),
+    ] {
+        let said = opened(&format!("{bare},{options}")).err().expect(options);
+        assert!(said.contains(named), "{options}: {said}");
+    }
+    let choice = format!(
+        "{bare},library={},id=2,force=8,torque=0.3",
+        vendor.display()
+    );
+    inside.set("mode", UNPLUGGED);
+    let said = opened(&choice).err().expect("none is plugged in");
+    assert!(said.contains("no device found"), "{said}");
+    inside.set("mode", GOOD);
+
+    // Where the workbench has it: right, away from the user, up; and turned about the axis away from the user.
+    let mut device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
+    assert_eq!(device.info().name, "Force Dimension stand-in.6");
+    assert_eq!(
+        (
+            device.info().limits.max_force,
+            device.info().limits.max_torque
+        ),
+        (8.0, 0.3)
+    );
+    let begun = Instant::now();
+    let sample = loop {
+        match device.read(ms(1)) {
+            Ok(sample) => break sample,
+            Err(fault) => assert!(begun.elapsed() < PATIENCE, "{fault}"),
+        }
+    };
+    let at = sample.pose.translation.vector;
+    assert!(
+        (at.x - 0.03).abs() < 1e-12 && (at.y + 0.02).abs() < 1e-12,
+        "{at}"
+    );
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::y() * -2.5);
+    assert!(
+        sample.pose.rotation.angle_to(&turn) < 1e-9,
+        "{}",
+        sample.pose.rotation
+    );
+    assert_eq!(sample.buttons, 2);
+    drop(device);
+
+    let modes = [
+        (HANGS, "was lost"),
+        (NOT_A_NUMBER, "not finite"),
+        (TOO_HOT, "was lost"),
+        (UNPLUGGED, "was lost"),
+        (NOTHING_NEW, "was lost"),
+    ];
+    goes_wrong(&choice, &inside, &modes);
+    assert!(inside.get("closes") > 0);
+}
+
+#[test]
+fn the_example_of_the_document_is_a_device() {
+    let document = document();
+    let (_, section) = document
+        .split_once("## Write a device in C")
+        .expect("the section");
+    let (_, code) = section.split_once("```c\n").expect("the example");
+    let (code, _) = code.split_once("```").expect("its end");
+    assert!(code.lines().count() <= 45, "{} lines", code.lines().count());
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = folder.path().join("mine.c");
+    std::fs::write(&source, code).expect("written");
+    let library = built(folder.path(), &source, "libmine.so", "MINE");
+    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
+    assert_eq!(stage.port.info().actuated_degrees_of_freedom, 3);
+    stage.until("the floor", |_, fault, force| {
+        fault.is_none() && force > 0.3
+    });
+}
