@@ -20,6 +20,7 @@
 mod columns;
 mod device_trace;
 mod error;
+mod export;
 mod identity;
 mod manifest;
 mod reader;
@@ -32,6 +33,7 @@ pub use device_trace::{
     TraceSample, parse_trace, unit_quaternion,
 };
 pub use error::RecordingError;
+pub use export::{ExportReport, MovingObstacle, SceneFrames, export_mcap};
 pub use identity::identity_of;
 pub use manifest::{FORMAT, Lost, Manifest, SceneOrigin};
 pub use reader::{RecordReader, Recording};

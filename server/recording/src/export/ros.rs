@@ -50,7 +50,7 @@ const TRANSFORM_STAMPED: (&str, &str) = (
 );
 
 /// A message whose fields are serialised in the order of its definition.
-pub(super) trait Message: Serialize {
+pub(super) trait Message: Serialize + Sized {
     /// Its name in ROS 2.
     const NAME: &'static str;
     /// Its own definition.
@@ -231,8 +231,14 @@ pub(super) struct TfMessage<'a> {
 impl Message for TfMessage<'_> {
     const NAME: &'static str = "tf2_msgs/msg/TFMessage";
     const DEFINITION: &'static str = "geometry_msgs/TransformStamped[] transforms\n";
-    const NEEDS: &'static [(&'static str, &'static str)] =
-        &[TRANSFORM_STAMPED, HEADER, TIME, TRANSFORM, VECTOR3, QUATERNION];
+    const NEEDS: &'static [(&'static str, &'static str)] = &[
+        TRANSFORM_STAMPED,
+        HEADER,
+        TIME,
+        TRANSFORM,
+        VECTOR3,
+        QUATERNION,
+    ];
 }
 
 fn position(pose: &Pose) -> [f64; 3] {

@@ -67,16 +67,24 @@ pub fn export_mcap(
         if times[0] == Some(first) {
             ticks.take().map_or(Ok(()), |record| topics.tick(&record))?;
         } else if times[1] == Some(first) {
-            updates.take().map_or(Ok(()), |record| topics.update(&record))?;
+            updates
+                .take()
+                .map_or(Ok(()), |record| topics.update(&record))?;
         } else {
-            forces.take().map_or(Ok(()), |record| topics.force(&record))?;
+            forces
+                .take()
+                .map_or(Ok(()), |record| topics.force(&record))?;
         }
     }
     let mut left_out: Vec<String> = unfinished(manifest).into_iter().collect();
     left_out.extend(scene.err().map(|why| {
         format!("the transform of the reference point and the poses of obstacles that move: {why}")
     }));
-    left_out.extend([ticks.damage, updates.damage, forces.damage].into_iter().filter_map(Damage::sentence));
+    left_out.extend(
+        [ticks.damage, updates.damage, forces.damage]
+            .into_iter()
+            .filter_map(Damage::sentence),
+    );
     let report = ExportReport {
         scene: manifest.scene.clone(),
         messages: topics.messages(),
@@ -98,7 +106,10 @@ fn unfinished(manifest: &Manifest) -> Option<String> {
         true => String::new(),
         false => format!(" ({})", manifest.lost),
     };
-    let why = manifest.reason.as_deref().unwrap_or("the session did not come to its end");
+    let why = manifest
+        .reason
+        .as_deref()
+        .unwrap_or("the session did not come to its end");
     Some(format!("what was never written: {why}{lost}"))
 }
 
@@ -156,7 +167,11 @@ impl Damage {
             // One line of many.
             RecordingError::Form { path, line, text } if line > 1 => format!(
                 "{} of {}, the first is line {line}: {text}",
-                if self.lines == 1 { "1 line".to_owned() } else { format!("{} lines", self.lines) },
+                if self.lines == 1 {
+                    "1 line".to_owned()
+                } else {
+                    format!("{} lines", self.lines)
+                },
                 path.display()
             ),
             whole_file => format!("all or the rest of a file: {whole_file}"),

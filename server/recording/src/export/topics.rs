@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::time::Duration;
 
-use god_object::spatial::Pose;
 use god_object::nalgebra::{Point3, Translation3, UnitQuaternion};
+use god_object::spatial::Pose;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, McapResult, WriteOptions, Writer};
@@ -84,18 +84,42 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(()); // its reader leaves out such times
         };
         let wrench = WrenchStamped::new(at, &record.wrench);
-        put(&mut self.writer, &mut self.hand_wrench, &mut self.bytes, record.time, &wrench)?;
+        put(
+            &mut self.writer,
+            &mut self.hand_wrench,
+            &mut self.bytes,
+            record.time,
+            &wrench,
+        )?;
         if record.faulty {
             return Ok(()); // the pose is that of the tick before
         }
         let world = at.in_frame(WORLD);
         let pose = PoseStamped::new(world, &record.pose);
-        put(&mut self.writer, &mut self.device_pose, &mut self.bytes, record.time, &pose)?;
+        put(
+            &mut self.writer,
+            &mut self.device_pose,
+            &mut self.bytes,
+            record.time,
+            &pose,
+        )?;
         let twist = TwistStamped::new(at, &record.velocity);
-        put(&mut self.writer, &mut self.device_twist, &mut self.bytes, record.time, &twist)?;
+        put(
+            &mut self.writer,
+            &mut self.device_twist,
+            &mut self.bytes,
+            record.time,
+            &twist,
+        )?;
         if self.buttons.replace(record.buttons) != Some(record.buttons) {
             let joy = Joy::new(at.in_frame(DEVICE), record.buttons);
-            put(&mut self.writer, &mut self.device_buttons, &mut self.bytes, record.time, &joy)?;
+            put(
+                &mut self.writer,
+                &mut self.device_buttons,
+                &mut self.bytes,
+                record.time,
+                &joy,
+            )?;
         }
         let mut transforms = vec![TransformStamped::new(world, DEVICE, &record.pose)];
         if let Some(scene) = self.scene {
@@ -103,7 +127,13 @@ impl<'a, W: Write> Topics<'a, W> {
             transforms.push(TransformStamped::new(world, REFERENCE_POINT, &point));
         }
         let message = TfMessage { transforms };
-        put(&mut self.writer, &mut self.transforms, &mut self.bytes, record.time, &message)
+        put(
+            &mut self.writer,
+            &mut self.transforms,
+            &mut self.bytes,
+            record.time,
+            &message,
+        )
     }
 
     /// Where the god-object came to, and where obstacles were sent, at the time at which that was published.
@@ -113,7 +143,13 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(());
         };
         let pose = PoseStamped::new(world, &record.pose);
-        put(&mut self.writer, &mut self.god_object_pose, &mut self.bytes, time, &pose)?;
+        put(
+            &mut self.writer,
+            &mut self.god_object_pose,
+            &mut self.bytes,
+            time,
+            &pose,
+        )?;
         let mut transforms = vec![TransformStamped::new(world, GOD_OBJECT, &record.pose)];
         let moving = self.scene.map_or(&[][..], |scene| &scene.obstacles);
         for (obstacle, (frame, topic)) in moving.iter().zip(&mut self.obstacles) {
@@ -123,7 +159,13 @@ impl<'a, W: Write> Topics<'a, W> {
             transforms.push(TransformStamped::new(world, frame, &pose));
         }
         let message = TfMessage { transforms };
-        put(&mut self.writer, &mut self.transforms, &mut self.bytes, time, &message)
+        put(
+            &mut self.writer,
+            &mut self.transforms,
+            &mut self.bytes,
+            time,
+            &message,
+        )
     }
 
     /// What the coupling answered, before the safety stage.
@@ -132,7 +174,13 @@ impl<'a, W: Write> Topics<'a, W> {
             return Ok(());
         };
         let wrench = WrenchStamped::new(at, &record.wrench);
-        put(&mut self.writer, &mut self.coupling_wrench, &mut self.bytes, record.time, &wrench)
+        put(
+            &mut self.writer,
+            &mut self.coupling_wrench,
+            &mut self.bytes,
+            record.time,
+            &wrench,
+        )
     }
 
     /// How many messages there are.
@@ -157,7 +205,11 @@ impl<'a, W: Write> Topics<'a, W> {
     pub(super) fn finish(mut self, about: Metadata) -> McapResult<()> {
         self.writer.write_metadata(&about)?;
         self.writer.finish()?;
-        self.writer.into_inner().into_inner().flush().map_err(McapError::Io)
+        self.writer
+            .into_inner()
+            .into_inner()
+            .flush()
+            .map_err(McapError::Io)
     }
 }
 
@@ -192,7 +244,10 @@ fn put<W: Write, M: Message>(
 /// Such as `obstacle_2_upper_plate`: a name in ROS has letters, digits and underscores, and the index tells two apart that become the same.
 fn frame_of(index: usize, name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    format!("obstacle_{index}_{}", name.chars().map(plain).collect::<String>())
+    format!(
+        "obstacle_{index}_{}",
+        name.chars().map(plain).collect::<String>()
+    )
 }
 
 fn reference_frame(body: &Pose, reference_point: &Point3<f64>) -> Pose {

@@ -1,0 +1,10 @@
+//! The tests of this package in one binary: linked once, run side by side.
+
+use assert_no_alloc::AllocDisabler;
+
+mod export;
+mod round_trip;
+
+/// Counts by thread: a test that forbids allocation forbids its own.
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
