@@ -118,7 +118,7 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
         assert_eq!(export["updates"], report.updates);
         assert_eq!(export["forces"], report.forces);
         assert_eq!(export["left_out"], serde_json::json!([]));
-        // A pose, and a pose and a transform besides where an obstacle moves.
+        // What moves in this scene has a topic.
         let (plate, moves) = ("obstacle_1_plate", scene == "moving-plate");
         let bytes = std::fs::read(&mcap).unwrap_or_default();
         let found = bytes
