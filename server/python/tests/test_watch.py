@@ -50,7 +50,6 @@ class Session:
         for line in self.process.stderr:
             said.append(line)
             if found := re.search(r"observers: (http://[^/]+)/", line):
-                threading.Thread(target=self.process.stderr.read, daemon=True).start()
                 self.url = found.group(1)
                 return self
         raise AssertionError("".join(said))
@@ -58,6 +57,7 @@ class Session:
     def __exit__(self, *_):
         self.process.terminate()
         self.process.wait(PATIENCE)
+        self.process.stderr.close()
         self.directory.cleanup()
 
 
