@@ -19,7 +19,10 @@ try:
     import pyarrow.csv
     import pyarrow.parquet
 except ImportError as error:
-    raise TautError("taut.lerobot needs pyarrow: pip install pyarrow") from error
+    lacking = "taut.lerobot needs pyarrow: pip install pyarrow"
+    if __name__ == "__main__":
+        sys.exit(lacking)
+    raise TautError(lacking) from error
 
 POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 FEATURES = {
