@@ -2,6 +2,7 @@
 
 use assert_no_alloc::AllocDisabler;
 
+#[cfg(feature = "export")]
 mod export;
 mod round_trip;
 
