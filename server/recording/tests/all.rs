@@ -4,6 +4,8 @@ use assert_no_alloc::AllocDisabler;
 
 #[cfg(feature = "export")]
 mod export;
+#[cfg(feature = "export")]
+mod reading;
 mod round_trip;
 
 /// Counts by thread: a test that forbids allocation forbids its own.

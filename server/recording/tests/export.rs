@@ -1,104 +1,19 @@
-//! What `export_mcap` writes, read back by the crates `mcap` and `cdr-encoding`.
+//! What `export_mcap` writes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use byteorder::LittleEndian;
 use god_object::nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use god_object::{Pose, Vector6};
-use mcap::{MessageStream, Summary};
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use mcap::Summary;
 use taut_recording::{
-    ExportReport, ForceRecord, HapticsRecord, MovingObstacle, Recorder, Recording, RecordingError,
-    SceneFrames, export_mcap,
+    ForceRecord, HapticsRecord, MovingObstacle, Recorder, Recording, RecordingError, SceneFrames,
+    export_mcap,
 };
 
+use crate::reading::{Joy, PoseStamped, SixStamped, TfMessage, Transform, export};
 use crate::round_trip::{manifest, pose, update};
-
-#[derive(Debug, Deserialize)]
-struct Header {
-    sec: i32,
-    nanosec: u32,
-    frame: String,
-}
-
-/// Header, then position and orientation x y z w.
-#[derive(Debug, Deserialize)]
-struct PoseStamped(Header, [f64; 7]);
-/// Header, then six numbers: of a wrench or of a twist.
-#[derive(Debug, Deserialize)]
-struct SixStamped(Header, [f64; 6]);
-#[derive(Debug, Deserialize)]
-struct Joy(Header, Vec<f32>, Vec<i32>);
-#[derive(Debug, Deserialize)]
-struct Transform(Header, String, [f64; 7]);
-#[derive(Debug, Deserialize)]
-struct TfMessage(Vec<Transform>);
-
-/// Log time and bytes of each message, by topic; and all log times in the order of the file.
-struct Export {
-    report: ExportReport,
-    topics: BTreeMap<String, Vec<(u64, Vec<u8>)>>,
-    times: Vec<u64>,
-    bytes: Vec<u8>,
-}
-
-impl Export {
-    fn read<T: DeserializeOwned>(&self, topic: &str) -> Vec<(u64, T)> {
-        let Some(messages) = self.topics.get(topic) else {
-            panic!("{topic} is not among {:?}", self.topics.keys());
-        };
-        let read = |(time, bytes): &(u64, Vec<u8>)| {
-            assert_eq!(bytes[..4], [0, 1, 0, 0], "plain CDR, little-endian");
-            match cdr_encoding::from_bytes::<T, LittleEndian>(&bytes[4..]) {
-                Ok((message, length)) => {
-                    assert_eq!(length + 4, bytes.len(), "{topic} has bytes left");
-                    (*time, message)
-                }
-                Err(error) => panic!("{topic}: {error}"),
-            }
-        };
-        messages.iter().map(read).collect()
-    }
-
-    fn left_out(&self) -> String {
-        self.report.left_out.join("\n")
-    }
-}
-
-fn export(directory: &Path, scene: Result<&SceneFrames, String>) -> Export {
-    let recording = match Recording::open(directory) {
-        Ok(recording) => recording,
-        Err(error) => panic!("{error}"),
-    };
-    let mut bytes = Vec::new();
-    let report = match export_mcap(&recording, scene, &mut bytes, || false) {
-        Ok(report) => report,
-        Err(error) => panic!("{error}"),
-    };
-    let (mut topics, mut times) = (BTreeMap::<_, Vec<_>>::new(), Vec::new());
-    let Ok(stream) = MessageStream::new(&bytes) else {
-        panic!("no MCAP");
-    };
-    for message in stream {
-        let Ok(message) = message else {
-            panic!("a message that is none");
-        };
-        assert_eq!(message.channel.message_encoding, "cdr");
-        times.push(message.log_time);
-        let topic = topics.entry(message.channel.topic.clone()).or_default();
-        topic.push((message.log_time, message.data.into_owned()));
-    }
-    assert_eq!(times.len() as u64, report.messages);
-    Export {
-        report,
-        topics,
-        times,
-        bytes,
-    }
-}
 
 fn tick(sequence: u32, buttons: u16, faulty: bool) -> HapticsRecord {
     HapticsRecord {
