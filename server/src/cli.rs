@@ -102,6 +102,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Takes a live session's device trace, to be replayed
     Record(RecordArgs),
+    /// Writes a recorded session as an MCAP file, for Foxglove and the tools of ROS 2
+    Export(ExportArgs),
     /// Asks for force at the device of a session, or for none
     Arm(ArmArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
@@ -303,6 +305,23 @@ pub struct RecordArgs {
     /// Without a server
     #[command(flatten)]
     pub membership: MembershipArgs,
+}
+
+/// `taut export`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "What is damaged in the recording is left out, and said. An existing file is replaced.\n\nExample: taut demo --duration 20 --recording session && taut export session --out session.mcap"
+)]
+pub struct ExportArgs {
+    /// The directory of the recording
+    #[arg(value_name = "RECORDING")]
+    pub recording: PathBuf,
+    /// Where the messages go, an MCAP file
+    #[arg(long, value_name = "FILE.mcap")]
+    pub out: PathBuf,
+    /// Print the report as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What a client does without a server.

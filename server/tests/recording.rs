@@ -13,6 +13,8 @@ use taut::shared::shutdown::Shutdown;
 use taut_link::ClusterKey;
 use taut_scene::{SHIPPED_WORKBENCH, Workbench};
 
+use crate::support::taut;
+
 /// How long a session runs at least: the simulated hand touches before.
 const RUN: Duration = Duration::from_millis(2500);
 /// Only a hang takes this long.
@@ -65,6 +67,19 @@ fn again(directory: &Path) -> Result<RecordedReport, Failure> {
     recorded::run(directory, None, false, &Shutdown::default())
 }
 
+/// The report of `taut export` into this file.
+fn exported(recording: &Path, out: &Path) -> serde_json::Value {
+    let arguments = [Path::new("export"), recording, Path::new("--out"), out];
+    let arguments = arguments.map(Path::as_os_str);
+    let output = taut(&[&arguments[..], &["--json".as_ref()]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && out.is_file(), "{said}");
+    match serde_json::from_slice(&output.stdout) {
+        Ok(report) => report,
+        Err(error) => panic!("{error}"),
+    }
+}
+
 fn replaced(path: &Path, change: impl FnOnce(String) -> String) {
     let Ok(text) = std::fs::read_to_string(path) else {
         panic!("{} is not there", path.display());
@@ -83,11 +98,11 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
             let recording = directory.path().join(format!("{scene}-{attempt}"));
             record(scene, &recording);
             match recorded::run(&recording, Some(&out), false, &Shutdown::default()) {
-                Ok(report) => report,
+                Ok(report) => (report, recording),
                 Err(error) => panic!("{error}"),
             }
         });
-        let Some(report) = attempts.find(|report| report.complete) else {
+        let Some((report, recording)) = attempts.find(|(report, _)| report.complete) else {
             panic!("{scene}: no recording is whole");
         };
         assert!(
@@ -98,6 +113,18 @@ fn a_recorded_session_is_computed_again_bit_by_bit() {
         assert_eq!((report.different_updates, report.different_forces), (0, 0));
         let rows = std::fs::read_to_string(&out).map_or(0, |text| text.lines().count());
         assert_eq!(rows as u64, report.forces + 1);
+        let mcap = directory.path().join(format!("{scene}.mcap"));
+        let export = exported(&recording, &mcap);
+        assert_eq!(export["updates"], report.updates);
+        assert_eq!(export["forces"], report.forces);
+        assert_eq!(export["left_out"], serde_json::json!([]));
+        // What moves in this scene has a topic.
+        let (plate, moves) = ("obstacle_1_plate", scene == "moving-plate");
+        let bytes = std::fs::read(&mcap).unwrap_or_default();
+        let found = bytes
+            .windows(plate.len())
+            .any(|part| part == plate.as_bytes());
+        assert_eq!(found, moves, "{scene}");
     }
 }
 
@@ -156,6 +183,30 @@ fn a_recording_that_was_changed_is_found_out() {
         ),
         Ok(report) => panic!("{report}"),
     }
+
+    // What does not rest on the scene is exported all the same.
+    let export = exported(&path, &directory.path().join("changed.mcap"));
+    assert!(export["updates"].as_u64() > Some(UPDATES));
+    let left_out = export["left_out"].to_string();
+    assert!(left_out.contains("other bodies or settings"), "{left_out}");
+}
+
+#[test]
+fn an_export_needs_a_recording_and_leaves_nothing_without_one() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let out = directory.path().join("out.mcap");
+    let arguments = [
+        "export".as_ref(),
+        directory.path().as_os_str(),
+        "--out".as_ref(),
+    ];
+    let output = taut(&[&arguments[..], &[out.as_os_str()]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("name the directory of a recording"), "{said}");
+    assert!(std::fs::read_dir(directory.path()).is_ok_and(|mut left| left.next().is_none()));
 }
 
 #[test]

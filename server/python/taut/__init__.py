@@ -1,4 +1,4 @@
-"""The god-object method for Python: scenes, steps with numpy in and out, mesh checks, replay of traces.
+"""The god-object method for Python: scenes, steps with numpy in and out, mesh checks, replay of traces, states of a session that runs elsewhere.
 
 Poses are arrays of seven: x y z of the body's own origin in metres, and the unit quaternion qw qx qy qz, world from body.
 SI units and world axes throughout. Input that cannot be used raises TautError.
@@ -17,6 +17,7 @@ from ._taut import (
     read_trace,
     replay,
 )
+from ._watch import watch
 
 __all__ = [
     "COLUMNS",
@@ -30,4 +31,5 @@ __all__ = [
     "check",
     "read_trace",
     "replay",
+    "watch",
 ]

@@ -1,7 +1,8 @@
 """The god-object method for Python. Poses: x y z (m) qw qx qy qz, world from body; SI units, world axes."""
 
+from collections.abc import Iterator
 from os import PathLike
-from typing import final
+from typing import Any, Self, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,3 +111,24 @@ def replay(
     scene: str, trace: str | PathLike[str], out: str | PathLike[str] | None = None
 ) -> NDArray[np.float64]:
     """A trace through a scene: one row per sample, columns as in COLUMNS. `out` gets the bytes that `taut replay` writes."""
+
+class watch(Iterator[dict[str, Any]]):
+    """States of a session that runs elsewhere, one after the other as they come, until it ends: `for state in taut.watch(url)`.
+
+    `url` is http://HOST:PORT of the server's [observers]; `token` the text of its token file, where it has one. A state has the fields of
+    docs/interoperability.md, with arrays in them: a pose instead of `p` and `q` (`state["tools"][0]["god_object"]`; under `pose` where there are other fields
+    beside, as in `head`, `bodies`), and every other vector. Events are not told. Whoever is slow misses states, and is disconnected when it takes nothing for 5 s.
+    TautError: the address, the token or the answer is no good, nothing came for 10 s, or the connection broke.
+    """
+
+    url: str
+    hello: dict[str, Any]
+    """Scene, obstacles, screens, frames and rate of the session; poses are arrays here, too."""
+    def __init__(self, url: str, token: str | None = None) -> None: ...
+    def __iter__(self) -> Self: ...
+    def __next__(self) -> dict[str, Any]:
+        """The next state."""
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_: object) -> None: ...
+    def close(self) -> None:
+        """Leaves. Iterating ends."""

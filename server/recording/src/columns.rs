@@ -44,6 +44,20 @@ impl Line for HapticsRecord {
     }
 }
 
+impl Parse for HapticsRecord {
+    fn parse(fields: &mut Fields<'_>) -> Result<Self, String> {
+        Ok(Self {
+            sequence: fields.number()?,
+            time: fields.time()?,
+            pose: fields.pose()?,
+            velocity: fields.six()?,
+            buttons: fields.number()?,
+            faulty: fields.number::<u8>()? != 0,
+            wrench: fields.six()?,
+        })
+    }
+}
+
 impl Line for UpdateRecord {
     const FILE: &'static str = "updates.csv";
     const HEADER: &'static str = "update,published_ns,sample,hx,hy,hz,hqw,hqx,hqy,hqz,obstacles_ns,ahead,shaded_set,ax,ay,az,awx,awy,awz,sx,sy,sz,sqw,sqx,sqy,sqz,contacts,gap_min";

@@ -34,6 +34,16 @@ pub enum RecordingError {
         /// The program that wrote it.
         program: String,
     },
+    /// An export cannot be written.
+    #[cfg(feature = "export")]
+    #[error(
+        "the export cannot be written ({0}); check the path, its permissions and the free space"
+    )]
+    Export(#[from] mcap::McapError),
+    /// An export was asked to end.
+    #[cfg(feature = "export")]
+    #[error("the export was interrupted; nothing was written")]
+    Interrupted,
     /// A file that is not in the form it should have.
     #[error("{}, line {line}: {text}; the file was changed or cut off: use a copy that was not", path.display())]
     Form {

@@ -20,6 +20,8 @@
 mod columns;
 mod device_trace;
 mod error;
+#[cfg(feature = "export")]
+mod export;
 mod identity;
 mod manifest;
 mod reader;
@@ -32,6 +34,8 @@ pub use device_trace::{
     TraceSample, parse_trace, unit_quaternion,
 };
 pub use error::RecordingError;
+#[cfg(feature = "export")]
+pub use export::{ExportReport, MovingObstacle, SceneFrames, export_mcap};
 pub use identity::identity_of;
 pub use manifest::{FORMAT, Lost, Manifest, SceneOrigin};
 pub use reader::{RecordReader, Recording};

@@ -1,13 +1,14 @@
 //! A recording as it lies on disk.
 
 use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 use crate::columns::{Fields, Line, Parse};
 use crate::error::RecordingError;
 use crate::manifest::{FORMAT, Manifest};
-use crate::records::{ForceRecord, UpdateRecord};
+use crate::records::{ForceRecord, HapticsRecord, UpdateRecord};
 
 /// A recording that was found to be one; its records are read as they are asked for.
 #[derive(Clone, Debug)]
@@ -63,6 +64,14 @@ impl Recording {
         self.directory.join("scene.toml")
     }
 
+    /// The ticks of the haptics loop, in their order.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn haptics(&self) -> Result<RecordReader<HapticsRecord>, RecordingError> {
+        RecordReader::open(&self.directory)
+    }
+
     /// The updates of the god-object, in their order.
     ///
     /// # Errors
@@ -91,19 +100,24 @@ fn read(path: &Path) -> Result<String, RecordingError> {
 #[derive(Debug)]
 pub struct RecordReader<T> {
     path: PathBuf,
-    reader: csv::Reader<File>,
+    /// Up to where the file reached when it was opened: a session may still write to it.
+    reader: csv::Reader<io::Take<File>>,
     record: csv::StringRecord,
+    /// Where a line ends that has no end: its last number may have more digits. Beyond every file where all lines have one.
+    cut_off_at: u64,
     kind: PhantomData<T>,
 }
 
 impl<T: Line> RecordReader<T> {
     fn open(directory: &Path) -> Result<Self, RecordingError> {
         let path = directory.join(T::FILE);
-        let file = File::open(&path).map_err(|error| RecordingError::Read {
+        let (file, cut_off_at) = open_lines(&path).map_err(|error| RecordingError::Read {
             path: path.clone(),
             error,
         })?;
-        let mut reader = csv::Reader::from_reader(file);
+        let mut reader = csv::ReaderBuilder::new()
+            .quoting(false) // numbers only: a damaged byte must not join lines
+            .from_reader(file);
         let found = reader
             .headers()
             .map(|header| header.iter().collect::<Vec<_>>().join(","));
@@ -112,6 +126,7 @@ impl<T: Line> RecordReader<T> {
                 path,
                 reader,
                 record: csv::StringRecord::new(),
+                cut_off_at,
                 kind: PhantomData,
             }),
             Ok(header) => Err(RecordingError::Form {
@@ -129,27 +144,53 @@ impl<T: Line> RecordReader<T> {
 }
 
 impl<T: Parse> RecordReader<T> {
-    /// The next record; `None` at the end. The last line of a session that was killed may be cut off: that is an error like any other.
+    /// The next record; `None` at the end. The last line of a session that was killed may be cut off: that is an error like any other. After one,
+    /// the next line is next.
     ///
     /// # Errors
-    /// A line that is not in its form.
+    /// A line that is not in its form, or a file that can be read no further.
     pub fn next_record(&mut self) -> Result<Option<T>, RecordingError> {
-        let form = |path: &Path, line, text| RecordingError::Form {
-            path: path.to_path_buf(),
-            line,
-            text,
-        };
         match self.reader.read_record(&mut self.record) {
-            Ok(false) => return Ok(None),
-            Ok(true) => {}
-            Err(error) => {
-                let line = error.position().map_or(0, csv::Position::line);
-                return Err(form(&self.path, line, error.to_string()));
+            Ok(false) => Ok(None),
+            Ok(true) if self.reader.position().byte() >= self.cut_off_at => {
+                Err(self.form("the line has no end".to_owned()))
             }
+            Ok(true) => T::parse(&mut Fields::of::<T>(&self.record))
+                .map(Some)
+                .map_err(|text| self.form(text)),
+            Err(error) => Err(self.refused(error)),
         }
-        let line = self.record.position().map_or(0, csv::Position::line);
-        T::parse(&mut Fields::of::<T>(&self.record))
-            .map(Some)
-            .map_err(|text| form(&self.path, line, text))
     }
+
+    /// What is wrong with the line that was read last.
+    pub(crate) fn form(&self, text: String) -> RecordingError {
+        RecordingError::Form {
+            path: self.path.clone(),
+            line: self.record.position().map_or(0, csv::Position::line),
+            text,
+        }
+    }
+
+    fn refused(&self, error: csv::Error) -> RecordingError {
+        let line = error.position().map_or(0, csv::Position::line);
+        let (path, text) = (self.path.clone(), error.to_string());
+        match error.into_kind() {
+            csv::ErrorKind::Io(error) => RecordingError::Read { path, error },
+            _ => RecordingError::Form { path, line, text },
+        }
+    }
+}
+
+/// What the file holds now, and where a last line that has no end would end.
+fn open_lines(path: &Path) -> io::Result<(io::Take<File>, u64)> {
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut last = [b'\n'];
+    if length > 0 {
+        file.seek(SeekFrom::Start(length - 1))?;
+        file.read_exact(&mut last)?;
+        file.rewind()?;
+    }
+    let cut_off_at = if last == [b'\n'] { u64::MAX } else { length };
+    Ok((file.take(length), cut_off_at))
 }

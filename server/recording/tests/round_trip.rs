@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use assert_no_alloc::assert_no_alloc;
 use god_object::constraint::{Feature, FeaturePair, NonPenetrationConstraint, Separation};
 use god_object::nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use god_object::{ConstraintSet, Pose, ShadedAcceleration, Vector6};
@@ -12,10 +12,7 @@ use taut_recording::{
     RecordingError, SceneOrigin, UpdateRecord,
 };
 
-#[global_allocator]
-static ALLOCATOR: AllocDisabler = AllocDisabler;
-
-fn manifest() -> Manifest {
+pub(crate) fn manifest() -> Manifest {
     Manifest {
         format: FORMAT,
         program: "taut test".to_owned(),
@@ -30,7 +27,7 @@ fn manifest() -> Manifest {
 }
 
 /// Poses whose numbers have no short decimal form, and are not quite unit.
-fn pose(seed: u32) -> Pose {
+pub(crate) fn pose(seed: u32) -> Pose {
     let x = f64::from(seed) * std::f64::consts::PI;
     Pose::from_parts(
         Translation3::new(x.sin() * 1e-7, x.cos() / 3.0, -0.0),
@@ -43,7 +40,7 @@ fn pose(seed: u32) -> Pose {
     )
 }
 
-fn update(sequence: u32) -> UpdateRecord {
+pub(crate) fn update(sequence: u32) -> UpdateRecord {
     UpdateRecord {
         sequence: u64::from(sequence),
         published: Duration::from_nanos(1_000_001 * u64::from(sequence)),
@@ -232,4 +229,32 @@ fn a_line_that_was_cut_off_is_named() {
         Err(error) => assert!(error.to_string().contains("updates.csv, line 3"), "{error}"),
         other => panic!("{other:?}"),
     }
+}
+
+/// What is left of the last number is a number, too: another one.
+#[test]
+fn a_line_that_was_cut_off_in_its_last_number_is_no_line() {
+    let Ok(directory) = tempfile::tempdir() else {
+        panic!("no temporary directory");
+    };
+    let Ok((mut taps, recorder)) = Recorder::start(directory.path(), manifest(), "") else {
+        panic!("cannot record");
+    };
+    taps.updates.push(update(1));
+    assert!(recorder.finish().failure.is_none());
+    let path = directory.path().join("updates.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        panic!("no updates");
+    };
+    assert!(text.ends_with(",0.1\n"));
+    assert!(std::fs::write(&path, &text[..text.len() - 2]).is_ok()); // ",0."
+    let Ok(mut updates) = Recording::open(directory.path()).and_then(|opened| opened.updates())
+    else {
+        panic!("no updates");
+    };
+    match updates.next_record() {
+        Err(error) => assert!(error.to_string().contains("no end"), "{error}"),
+        other => panic!("{other:?}"),
+    }
+    assert!(matches!(updates.next_record(), Ok(None)));
 }

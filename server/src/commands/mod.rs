@@ -7,6 +7,7 @@ pub mod arm;
 mod demo;
 mod deploy;
 mod doctor;
+mod export;
 mod finished_file;
 mod import;
 mod key;
@@ -36,8 +37,8 @@ use serde::Serialize;
 use taut_bridge::console;
 
 use crate::cli::{
-    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, FIRST_STEPS, ImportArgs, KeysArgs, RecordArgs,
-    ReplayArgs, TrackArgs,
+    ArmArgs, CheckArgs, Cli, Command, DoctorArgs, ExportArgs, FIRST_STEPS, ImportArgs, KeysArgs,
+    RecordArgs, ReplayArgs, TrackArgs,
 };
 use crate::report::terminal::Terminal;
 use crate::report::{ReplayReport, SessionReport};
@@ -91,6 +92,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::SimulateDevice(args) => Ok(taut_bridge::execute_simulation(&args)),
         Command::Replay(args) => replay_command(&args),
         Command::Record(args) => record_command(&args),
+        Command::Export(args) => export_command(&args),
         Command::Arm(args) => arm_command(&args),
         Command::Check(args) => check_command(&args),
         Command::Import(args) => import_command(&args),
@@ -165,6 +167,16 @@ fn record_command(args: &RecordArgs) -> Result<ExitCode> {
         .context("the network's threads cannot be started")?;
     let rows = runtime.block_on(record::run(args))?;
     print(format!("{}: {rows} samples", args.out.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn export_command(args: &ExportArgs) -> Result<ExitCode> {
+    let report = export::run(args)?;
+    if args.json {
+        print_json(&report)?;
+    } else {
+        print(report.to_string())?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

@@ -12,7 +12,7 @@ use god_object::{Coupling, GodObject};
 use taut_recording::{
     ForceRecord, RecordReader, Recording, SceneOrigin, UpdateRecord, identity_of,
 };
-use taut_scene::{BuiltMotion, ReplayRow, ReplayWriter, Scene, SceneSource};
+use taut_scene::{BuiltMotion, BuiltScene, ReplayRow, ReplayWriter, Scene, SceneSource};
 
 use crate::commands::finished_file::FinishedFile;
 use crate::loops::realtime::thread_cpu_time;
@@ -69,6 +69,28 @@ pub fn run(
     Ok(session.report(&recording))
 }
 
+/// The scene of the recording, with the bodies and settings that it had then.
+pub(in crate::commands) fn scene_of(recording: &Recording) -> Result<BuiltScene, Failure> {
+    let manifest = recording.manifest();
+    let source = SceneSource {
+        text: recording.scene().into(),
+        directory: match &manifest.origin {
+            SceneOrigin::Shipped => None,
+            SceneOrigin::Directory(directory) => Some(directory.clone()),
+        },
+        overrides: manifest.overrides.clone(),
+    };
+    let file = recording.scene_path().display().to_string();
+    let built = Scene::from_source(&file, &source)?.build()?;
+    if identity_of(&built.world, &built.settings, &built.start) != manifest.identity {
+        return Err(Failure::BadInput(format!(
+            "{file}: gives other bodies or settings than those of the session ({}): a mesh has changed since, or this program has other defaults; use the files and the program of then",
+            manifest.program
+        )));
+    }
+    Ok(built)
+}
+
 /// The two loops of the method, fed with what they were fed with then.
 struct RecordedSession {
     god_object: GodObject,
@@ -95,23 +117,7 @@ struct Measured {
 
 impl RecordedSession {
     fn open(recording: &Recording) -> Result<Self, Failure> {
-        let manifest = recording.manifest();
-        let source = SceneSource {
-            text: recording.scene().into(),
-            directory: match &manifest.origin {
-                SceneOrigin::Shipped => None,
-                SceneOrigin::Directory(directory) => Some(directory.clone()),
-            },
-            overrides: manifest.overrides.clone(),
-        };
-        let file = recording.scene_path().display().to_string();
-        let built = Scene::from_source(&file, &source)?.build()?;
-        if identity_of(&built.world, &built.settings, &built.start) != manifest.identity {
-            return Err(Failure::BadInput(format!(
-                "{file}: gives other bodies or settings than those of the session ({}): a mesh has changed since, or this program has other defaults; use the files and the program of then",
-                manifest.program
-            )));
-        }
+        let built = scene_of(recording)?;
         let world = Arc::new(built.world);
         let reader = |error| Failure::bad_input(error);
         Ok(Self {

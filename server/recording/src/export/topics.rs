@@ -1,0 +1,266 @@
+//! The topics of an export, and how a record becomes messages on them.
+
+use std::io::Write;
+use std::time::Duration;
+
+use god_object::nalgebra::{Point3, Translation3, UnitQuaternion};
+use god_object::spatial::Pose;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{McapError, McapResult, WriteOptions, Writer};
+
+use super::ros::{
+    Header, Joy, Message, PoseStamped, TfMessage, TransformStamped, TwistStamped, WrenchStamped,
+};
+use super::run::SceneFrames;
+use crate::records::{ForceRecord, HapticsRecord, UpdateRecord};
+
+const WORLD: &str = "world";
+const DEVICE: &str = "device";
+const GOD_OBJECT: &str = "god_object";
+/// At the reference point of the body where the device is, with the axes of the world: where wrenches and twists stand.
+const REFERENCE_POINT: &str = "reference_point";
+
+/// One topic.
+#[derive(Clone, Copy)]
+struct Topic {
+    channel: u16,
+    messages: u32,
+}
+
+/// The file that grows.
+pub(super) struct Topics<'a, W: Write> {
+    writer: Writer<NoSeek<W>>,
+    scene: Option<&'a SceneFrames>,
+    device_pose: Topic,
+    device_twist: Topic,
+    device_buttons: Topic,
+    hand_wrench: Topic,
+    god_object_pose: Topic,
+    coupling_wrench: Topic,
+    transforms: Topic,
+    /// Name of its frame, and its topic.
+    obstacles: Vec<(String, Topic)>,
+    buttons: Option<u16>,
+    bytes: Vec<u8>,
+}
+
+impl<'a, W: Write> Topics<'a, W> {
+    pub(super) fn create(out: W, scene: Option<&'a SceneFrames>) -> McapResult<Self> {
+        let mut writer = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("taut ", env!("CARGO_PKG_VERSION")))
+            .compression(None)
+            .disable_seeking(true)
+            .create(NoSeek::new(out))?;
+        let w = &mut writer;
+        let obstacles = scene.map_or(&[][..], |scene| &scene.obstacles);
+        Ok(Self {
+            device_pose: topic::<PoseStamped<'_>, W>(w, "/device/pose")?,
+            device_twist: topic::<TwistStamped<'_>, W>(w, "/device/twist")?,
+            device_buttons: topic::<Joy<'_>, W>(w, "/device/buttons")?,
+            hand_wrench: topic::<WrenchStamped<'_>, W>(w, "/hand/wrench")?,
+            god_object_pose: topic::<PoseStamped<'_>, W>(w, "/god_object/pose")?,
+            coupling_wrench: topic::<WrenchStamped<'_>, W>(w, "/coupling/wrench")?,
+            transforms: topic::<TfMessage<'_>, W>(w, "/tf")?,
+            obstacles: obstacles
+                .iter()
+                .map(|obstacle| {
+                    let frame = frame_of(obstacle.index, &obstacle.name);
+                    let topic = topic::<PoseStamped<'_>, W>(w, &format!("/{frame}/pose"))?;
+                    Ok((frame, topic))
+                })
+                .collect::<McapResult<_>>()?,
+            writer,
+            scene,
+            buttons: None,
+            bytes: Vec::new(),
+        })
+    }
+
+    /// Where the device was, what it did, and what the hand felt.
+    pub(super) fn tick(&mut self, record: &HapticsRecord) -> McapResult<()> {
+        let Some(at) = Header::new(record.time, REFERENCE_POINT) else {
+            return Ok(()); // its reader leaves out such times
+        };
+        let wrench = WrenchStamped::new(at, &record.wrench);
+        put(
+            &mut self.writer,
+            &mut self.hand_wrench,
+            &mut self.bytes,
+            record.time,
+            &wrench,
+        )?;
+        if record.faulty {
+            return Ok(()); // the pose is that of the tick before
+        }
+        let world = at.in_frame(WORLD);
+        let pose = PoseStamped::new(world, &record.pose);
+        put(
+            &mut self.writer,
+            &mut self.device_pose,
+            &mut self.bytes,
+            record.time,
+            &pose,
+        )?;
+        let twist = TwistStamped::new(at, &record.velocity);
+        put(
+            &mut self.writer,
+            &mut self.device_twist,
+            &mut self.bytes,
+            record.time,
+            &twist,
+        )?;
+        if self.buttons.replace(record.buttons) != Some(record.buttons) {
+            let joy = Joy::new(at.in_frame(DEVICE), record.buttons);
+            put(
+                &mut self.writer,
+                &mut self.device_buttons,
+                &mut self.bytes,
+                record.time,
+                &joy,
+            )?;
+        }
+        let mut transforms = vec![TransformStamped::new(world, DEVICE, &record.pose)];
+        if let Some(scene) = self.scene {
+            let point = reference_frame(&record.pose, &scene.reference_point);
+            transforms.push(TransformStamped::new(world, REFERENCE_POINT, &point));
+        }
+        let message = TfMessage { transforms };
+        put(
+            &mut self.writer,
+            &mut self.transforms,
+            &mut self.bytes,
+            record.time,
+            &message,
+        )
+    }
+
+    /// Where the god-object came to, and where obstacles were sent, at the time at which that was published.
+    pub(super) fn update(&mut self, record: &UpdateRecord) -> McapResult<()> {
+        let time = record.published;
+        let Some(world) = Header::new(time, WORLD) else {
+            return Ok(());
+        };
+        let pose = PoseStamped::new(world, &record.pose);
+        put(
+            &mut self.writer,
+            &mut self.god_object_pose,
+            &mut self.bytes,
+            time,
+            &pose,
+        )?;
+        let mut transforms = vec![TransformStamped::new(world, GOD_OBJECT, &record.pose)];
+        let moving = self.scene.map_or(&[][..], |scene| &scene.obstacles);
+        for (obstacle, (frame, topic)) in moving.iter().zip(&mut self.obstacles) {
+            let pose = (obstacle.pose_at)(record.obstacle_time.as_secs_f64());
+            let message = PoseStamped::new(world, &pose);
+            put(&mut self.writer, topic, &mut self.bytes, time, &message)?;
+            transforms.push(TransformStamped::new(world, frame, &pose));
+        }
+        let message = TfMessage { transforms };
+        put(
+            &mut self.writer,
+            &mut self.transforms,
+            &mut self.bytes,
+            time,
+            &message,
+        )
+    }
+
+    /// What the coupling answered, before the safety stage.
+    pub(super) fn force(&mut self, record: &ForceRecord) -> McapResult<()> {
+        let Some(at) = Header::new(record.time, REFERENCE_POINT) else {
+            return Ok(());
+        };
+        let wrench = WrenchStamped::new(at, &record.wrench);
+        put(
+            &mut self.writer,
+            &mut self.coupling_wrench,
+            &mut self.bytes,
+            record.time,
+            &wrench,
+        )
+    }
+
+    /// How many messages there are.
+    pub(super) fn messages(&self) -> u64 {
+        let own = [
+            self.device_pose,
+            self.device_twist,
+            self.device_buttons,
+            self.hand_wrench,
+            self.god_object_pose,
+            self.coupling_wrench,
+            self.transforms,
+        ];
+        let obstacles = self.obstacles.iter().map(|(_, topic)| *topic);
+        own.into_iter()
+            .chain(obstacles)
+            .map(|topic| u64::from(topic.messages))
+            .sum()
+    }
+
+    /// Says in the file what it is, and ends it.
+    pub(super) fn finish(mut self, about: Metadata) -> McapResult<()> {
+        self.writer.write_metadata(&about)?;
+        self.writer.finish()?;
+        self.writer
+            .into_inner()
+            .into_inner()
+            .flush()
+            .map_err(McapError::Io)
+    }
+}
+
+fn topic<M: Message, W: Write>(writer: &mut Writer<NoSeek<W>>, name: &str) -> McapResult<Topic> {
+    let schema = writer.add_schema(M::NAME, "ros2msg", M::schema().as_bytes())?;
+    let channel = writer.add_channel(schema, name, "cdr", &Default::default())?;
+    Ok(Topic {
+        channel,
+        messages: 0,
+    })
+}
+
+fn put<W: Write, M: Message>(
+    writer: &mut Writer<NoSeek<W>>,
+    topic: &mut Topic,
+    bytes: &mut Vec<u8>,
+    time: Duration,
+    message: &M,
+) -> McapResult<()> {
+    message.encode(bytes)?;
+    let nanoseconds = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+    let header = MessageHeader {
+        channel_id: topic.channel,
+        sequence: topic.messages,
+        log_time: nanoseconds,
+        publish_time: nanoseconds,
+    };
+    topic.messages = topic.messages.wrapping_add(1);
+    writer.write_to_known_channel(&header, bytes)
+}
+
+/// Such as `obstacle_2_upper_plate`: a name in ROS has letters, digits and underscores, and the index tells two apart that become the same.
+fn frame_of(index: usize, name: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    format!(
+        "obstacle_{index}_{}",
+        name.chars().map(plain).collect::<String>()
+    )
+}
+
+fn reference_frame(body: &Pose, reference_point: &Point3<f64>) -> Pose {
+    let at = body * reference_point;
+    Pose::from_parts(Translation3::from(at.coords), UnitQuaternion::identity())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_obstacles_become_names_of_ros() {
+        assert_eq!(frame_of(2, "upper plate/é"), "obstacle_2_upper_plate__");
+    }
+}
