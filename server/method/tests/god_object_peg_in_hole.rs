@@ -140,3 +140,39 @@ fn a_peg_whose_ends_are_at_the_rims_is_not_left_turned() {
     };
     check(&draw).expect("neither axial force nor torque");
 }
+
+/// Pegs that turned to and fro for ever between two sides of the rim, because in each position the rows of one side alone were known: those of the other
+/// were lost one rounding error over the ring's upper face, or as soon as the peg turned out of their normal cones.
+#[test]
+fn a_peg_that_leaves_over_the_rim_comes_to_rest() {
+    let found = [
+        (
+            [-1.819913129074184, -1.2677684921864545, 1.2588662691153256],
+            -0.007595071290302717,
+            38,
+            0.010631651329998618,
+        ),
+        (
+            [2.6282602178475063, 1.9081642850004998, 1.1880683521534925],
+            0.031198161287099013,
+            18,
+            0.010953732387328871,
+        ),
+        (
+            [2.855501149195563, 2.1354052163485555, 1.415309283501549],
+            0.0463475567103028,
+            86,
+            0.01144608773858299,
+        ),
+    ];
+    for (rotation, x, half_sides, pull) in found {
+        let draw = Draw {
+            rotation,
+            position: [x, 0.0, 0.0],
+            half_sides,
+            pull,
+            clearance: 1e-4,
+        };
+        check(&draw).unwrap();
+    }
+}

@@ -24,7 +24,7 @@ use crate::geometry::distance::barycentric;
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
 pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
 /// The same for a corner over a face, rad. The normal is the face's whatever the corner does, so the row is true; it is there
-/// before the body tilts onto the corner.
+/// before the body tilts onto the corner. And for two edges that are known to face each other beyond a turn.
 pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
 /// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
 const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;
@@ -145,18 +145,24 @@ impl Facing<'_> {
         let (x, y) = (p + u * s, q + v * t);
         let gap = normal.dot(&(x - y));
         let into_body = -self.placement.rotation.tr_mul(&normal);
+        // Edges cannot pass each other without meeting, so a row that is known stays true outside the cones; it is there before the body turns back.
+        let tolerance = if self.past_reentrant_edges {
+            LOOK_AHEAD_TILT
+        } else {
+            NORMAL_CONE_TOLERANCE
+        };
         let facing = self.is_near(gap)
-            && is_in_edge_cone(self.obstacle, edge_b, &normal)
-            && is_in_edge_cone(self.body, edge_a, &into_body)
+            && is_in_edge_cone(self.obstacle, edge_b, &normal, tolerance)
+            && is_in_edge_cone(self.body, edge_a, &into_body, tolerance)
             && (inside[0] || {
                 let end = self.body.triangles()[pair.a as usize][(i + usize::from(s > 0.5)) % 3];
                 let way = self.placement.rotation.tr_mul(&(u * past_end(s)));
-                reentrant::covers_way(self.body, end, &way, &into_body)
+                reentrant::covers_way(self.body, end, &way)
             })
             && (inside[1] || {
                 let end =
                     self.obstacle.triangles()[pair.b as usize][(j + usize::from(t > 0.5)) % 3];
-                reentrant::covers_way(self.obstacle, end, &(v * past_end(t)), &normal)
+                reentrant::covers_way(self.obstacle, end, &(v * past_end(t)))
             });
         facing.then(|| {
             self.contact(
@@ -177,7 +183,7 @@ impl Facing<'_> {
         let (normal, gap) =
             self.direction(&(pair.x[i] - foot), &outward_of_edge(self.obstacle, edge))?;
         let v = self.body.triangles()[pair.a as usize][i];
-        let facing = is_in_edge_cone(self.obstacle, edge, &normal)
+        let facing = is_in_edge_cone(self.obstacle, edge, &normal, NORMAL_CONE_TOLERANCE)
             && is_in_vertex_cone(
                 self.body,
                 v,
@@ -204,7 +210,12 @@ impl Facing<'_> {
         let (normal, gap) = self.direction(&(foot - pair.y[j]), &into_body)?;
         let v = self.obstacle.triangles()[pair.b as usize][j];
         let facing = is_in_vertex_cone(self.obstacle, v, &normal, NORMAL_CONE_TOLERANCE)
-            && is_in_edge_cone(self.body, edge, &-self.placement.rotation.tr_mul(&normal));
+            && is_in_edge_cone(
+                self.body,
+                edge,
+                &-self.placement.rotation.tr_mul(&normal),
+                NORMAL_CONE_TOLERANCE,
+            );
         facing.then(|| {
             self.contact(
                 Feature::Edge(edge),
@@ -392,11 +403,16 @@ pub(crate) fn is_in_vertex_cone(
 }
 
 /// Neither face at the edge rises in `direction`.
-pub(crate) fn is_in_edge_cone(mesh: &Mesh, edge: u32, direction: &Vector3<f64>) -> bool {
+pub(crate) fn is_in_edge_cone(
+    mesh: &Mesh,
+    edge: u32,
+    direction: &Vector3<f64>,
+    tolerance: f64,
+) -> bool {
     let edge = &mesh.edges()[edge as usize];
     let along =
         mesh.vertices()[edge.vertices[1] as usize] - mesh.vertices()[edge.vertices[0] as usize];
-    let limit = NORMAL_CONE_TOLERANCE * NORMAL_CONE_TOLERANCE * along.norm_squared();
+    let limit = tolerance * tolerance * along.norm_squared();
     // `normal x along` points into the left face; into the right one it is the other way.
     [(edge.faces[0], 1.0), (edge.faces[1], -1.0)]
         .iter()

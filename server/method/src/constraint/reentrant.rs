@@ -8,7 +8,7 @@
 //! | symbol | name in code | unit | meaning                                              |
 //! |--------|--------------|------|------------------------------------------------------|
 //! | w      | `way`        | m    | from the end of the feature on, tangential           |
-//! | o      | `outward`    | –    | unit, towards the other body                         |
+//! | o      | `outward`    | –    | unit, out of the solid                               |
 
 use nalgebra::{Point3, Vector3};
 
@@ -20,33 +20,56 @@ const MAX_FACES: usize = 32;
 const MAX_STEPS: usize = 4;
 /// A face seen at a flatter angle than that of this sine does not lie over anything.
 const GRAZING: f64 = 0.05;
+/// Share of a way by which it may rise out of a surface that it lies in.
+const ROUNDING: f64 = 1e-9;
 
-/// Whether the surface at vertex `v` lies above the straight way that goes on from there, all the way: `way` ends within the faces at `v`, and the one
-/// that it goes under rises from it towards `outward`. Both in the mesh's frame.
-pub(super) fn covers_way(mesh: &Mesh, v: u32, way: &Vector3<f64>, outward: &Vector3<f64>) -> bool {
-    let Some(first) = mesh.vertex_owner(v) else {
+/// Whether the straight way that goes on from vertex `v` does so in the solid or on its surface: `way` ends within the faces at `v`, and the one that
+/// it goes under rises from it, or holds it. Mesh's frame.
+///
+/// Seen along the mean normal of those faces and not along the row's: at the rim of a hole the way lies in the upper face, and a row's normal that leans
+/// out of the hole by a rounding error would find no surface over it.
+pub(super) fn covers_way(mesh: &Mesh, v: u32, way: &Vector3<f64>) -> bool {
+    let apex = mesh.vertices()[v as usize];
+    let mut outward = Vector3::zeros();
+    for_faces(mesh, v, |face, _| {
+        outward += mesh.face_normal(face);
+        None::<()>
+    });
+    let Some(outward) = outward.try_normalize(GRAZING) else {
         return false;
     };
-    let apex = mesh.vertices()[v as usize];
+    let height = for_faces(mesh, v, |face, k| {
+        let corners = mesh.corners(face);
+        let [a, b] = [1, 2].map(|i| corners[(k + i) % 3] - apex);
+        height_over(&a, &b, way, &outward)
+    });
+    height.is_some_and(|height| height >= -ROUNDING * way.norm())
+}
+
+/// The first that `each` finds at a face at vertex `v`, by the face and which of its corners that is; the side from the corner before leads on.
+pub(super) fn for_faces<T>(
+    mesh: &Mesh,
+    v: u32,
+    mut each: impl FnMut(u32, usize) -> Option<T>,
+) -> Option<T> {
+    let first = mesh.vertex_owner(v)?;
     let mut face = first;
     for _ in 0..MAX_FACES {
         let corners = mesh.triangles()[face as usize];
-        let Some(k) = corners.iter().position(|w| *w == v) else {
-            return false;
-        };
-        let [a, b] = [1, 2].map(|i| mesh.vertices()[corners[(k + i) % 3] as usize] - apex);
-        if let Some(height) = height_over(&a, &b, way, outward) {
-            return height >= 0.0;
+        let k = corners.iter().position(|w| *w == v)?;
+        let found = each(face, k);
+        if found.is_some() {
+            return found;
         }
         // On round the vertex: across the side that leads back to it.
         let side = mesh.triangle_edges(face)[(k + 2) % 3];
         let [left, right] = mesh.edges()[side as usize].faces;
         face = if left == face { right } else { left };
         if face == first {
-            return false;
+            break;
         }
     }
-    false
+    None
 }
 
 /// Height of the triangle 0, a, b above the end of `way` along `outward`, m; `None` where it is not over it.
@@ -69,7 +92,7 @@ fn height_over(
         over.cross(b).dot(&normal) / squared,
         a.cross(&over).dot(&normal) / squared,
     ];
-    let inside = shares.iter().all(|share| *share >= 0.0) && shares[0] + shares[1] <= 1.0;
+    let inside = shares.iter().all(|share| *share >= -ROUNDING) && shares[0] + shares[1] <= 1.0;
     inside.then_some(height)
 }
 
@@ -108,6 +131,7 @@ pub(super) fn covers_foot(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use nalgebra::UnitQuaternion;
 
     /// A block whose upper edge has a notch in its middle: two gables that lean on each other.
     pub(in crate::constraint) fn notched(depth: f64) -> Mesh {
@@ -134,26 +158,63 @@ pub(super) mod tests {
         })
     }
 
+    /// A square frame, 2 m wide inside and 6 m outside, its upper face at z = 0, turned about the origin. Vertex 0 is at (1, 1, 0) before.
+    fn frame(turn: &UnitQuaternion<f64>) -> Mesh {
+        let mut vertices = Vec::new();
+        for (size, z) in [(1.0, 0.0), (3.0, 0.0), (3.0, -1.0), (1.0, -1.0)] {
+            for [x, y] in [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]] {
+                vertices.push(turn * Point3::new(size * x, size * y, z));
+            }
+        }
+        let mut triangles = Vec::new();
+        for ring in 0..4 {
+            for k in 0..4 {
+                let at = |ring: u32, k: u32| 4 * (ring % 4) + k % 4;
+                let [a, b, c, d] = [
+                    at(ring, k),
+                    at(ring + 1, k),
+                    at(ring + 1, k + 1),
+                    at(ring, k + 1),
+                ];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        Mesh::new(vertices, triangles).expect("a closed frame")
+    }
+
     #[test]
     fn a_way_over_a_notch_goes_on_beneath_the_surface_and_one_over_a_peak_does_not() {
         let ridge = |depth: f64| {
             let mesh = notched(depth);
             // From the left half of the ridge on, over its middle.
             let way = Vector3::new(0.1, 0.0, -0.1 * depth);
-            let outward = Vector3::new(depth, 0.0, 1.0).normalize();
-            covers_way(&mesh, 5, &way, &outward)
+            covers_way(&mesh, 5, &way)
         };
         assert!(ridge(0.1), "notch");
         assert!(!ridge(-0.1), "peak");
         let long = Vector3::new(1.5, 0.0, -0.15);
-        let outward = Vector3::new(0.1, 0.0, 1.0).normalize();
-        assert!(!covers_way(&notched(0.1), 5, &long, &outward), "too far");
-        assert!(!covers_way(
-            &notched(0.1),
-            5,
-            &Vector3::repeat(f64::NAN),
-            &outward
-        ));
+        assert!(!covers_way(&notched(0.1), 5, &long), "too far");
+        assert!(!covers_way(&notched(0.1), 5, &Vector3::repeat(f64::NAN)));
+    }
+
+    /// An edge that bounds a flat top goes on in that top, which neither rises nor falls.
+    #[test]
+    fn a_way_that_goes_on_in_a_face_is_covered_whatever_its_rounding() {
+        for angle in 0..100 {
+            let turn = UnitQuaternion::from_scaled_axis(
+                Vector3::new(0.3, -1.1, 0.7) * (0.1 * f64::from(angle)),
+            );
+            let mesh = frame(&turn);
+            // From the upper inner corner at (1, 1, 0) on along either side, and over the opening.
+            for (way, expected) in [
+                ([0.3, 0.0], true),
+                ([0.0, 0.3], true),
+                ([-0.1, -0.2], false),
+            ] {
+                let way = turn * Vector3::new(way[0], way[1], 0.0);
+                assert_eq!(covers_way(&mesh, 0, &way), expected, "{angle} {way}");
+            }
+        }
     }
 
     #[test]

@@ -41,7 +41,7 @@ impl Cone<'_> {
             Self::Any => true,
             Self::End(outward) => outward.dot(direction) >= -tolerance,
             Self::Vertex(mesh, v) => is_in_vertex_cone(mesh, *v, direction, tolerance),
-            Self::Edge(mesh, e) => is_in_edge_cone(mesh, *e, direction),
+            Self::Edge(mesh, e) => is_in_edge_cone(mesh, *e, direction, NORMAL_CONE_TOLERANCE),
         }
     }
 }

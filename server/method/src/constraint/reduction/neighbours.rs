@@ -5,13 +5,12 @@
 
 use arrayvec::ArrayVec;
 
+use crate::constraint::reentrant::for_faces;
 use crate::constraint::{Feature, FeaturePair};
 use crate::geometry::Mesh;
 
 /// Most neighbours of one feature: faces across the sides of a face and across theirs, or edges that go on at either end of an edge.
 const MAX_NEIGHBOURS: usize = 9;
-/// Most faces at a vertex that are looked at.
-const MAX_FACES: usize = 32;
 /// An edge goes on in another one that turns by less than the angle of this cosine.
 const GOES_ON: f64 = 0.5;
 
@@ -84,30 +83,14 @@ fn go_on(mesh: &Mesh, e: u32, end: usize, found: &mut ArrayVec<Feature, MAX_NEIG
     let (v, from) = (vertices[end], vertices[1 - end]);
     let apex = mesh.vertices()[v as usize];
     let way = apex - mesh.vertices()[from as usize];
-    let Some(first) = mesh.vertex_owner(v) else {
-        return;
-    };
-    let mut face = first;
-    for _ in 0..MAX_FACES {
-        let corners = mesh.triangles()[face as usize];
-        let Some(k) = corners.iter().position(|w| *w == v) else {
-            return;
-        };
-        // Round the vertex: across the side that leads back to it.
-        let side = mesh.triangle_edges(face)[(k + 2) % 3];
-        let edge = &mesh.edges()[side as usize];
-        let on = mesh.vertices()[corners[(k + 2) % 3] as usize] - apex;
+    for_faces(mesh, v, |face, k| {
+        let before = (k + 2) % 3;
+        let side = mesh.triangle_edges(face)[before];
+        let on = mesh.corners(face)[before] - apex;
         let straight = way.dot(&on) > GOES_ON * way.norm() * on.norm();
-        if side != e && edge.is_convex() && straight && found.try_push(Feature::Edge(side)).is_err()
-        {
-            return;
-        }
-        let [left, right] = edge.faces;
-        face = if left == face { right } else { left };
-        if face == first {
-            return;
-        }
-    }
+        let goes_on = side != e && mesh.edges()[side as usize].is_convex() && straight;
+        (goes_on && found.try_push(Feature::Edge(side)).is_err()).then_some(())
+    });
 }
 
 #[cfg(test)]
