@@ -325,3 +325,16 @@ fn zero_motion_is_free_of_contacts_that_are_apart() {
         &Pose::identity()
     ));
 }
+
+#[test]
+fn a_body_inside_an_obstacle_shares_its_inside_and_not_its_surface() {
+    let body = Form::Cube(0.01).body();
+    let obstacle = Form::Cube(0.1).obstacle("block", Pose::identity());
+    let identity = Pose::identity();
+    for (x, surfaces, shared) in [(0.0, false, true), (0.1, true, true), (0.2, false, false)] {
+        let pose = Pose::translation(x, 0.0, 0.0);
+        let found = [shape::shape_surfaces_intersect, shape::shapes_intersect]
+            .map(|intersect| intersect(&body, &pose, &obstacle, &identity));
+        assert_eq!(found, [surfaces, shared], "{x}");
+    }
+}

@@ -86,8 +86,9 @@ fn measured(path: Option<String>) -> Result<ExitCode, Box<dyn Error>> {
     );
     let mut all = Vec::new();
     for method in Method::SIX_DEGREES {
+        let choice = replay::choose(method)?;
         for trial in replay::TRIALS {
-            all.push(replay::replay(trial, method)?);
+            all.push(replay::replay(trial, method, choice)?);
             eprintln!("{trial}, {}", method.name());
         }
     }

@@ -168,12 +168,10 @@ impl Method {
     #[must_use]
     pub fn tunings(self) -> Vec<Tuning> {
         match self {
-            Self::Ours
-            | Self::OursByDefault
-            | Self::Discrete
-            | Self::DoesNothing
-            | Self::RandomForce => vec![Tuning::Default],
-            Self::Paper | Self::PaperAdapted => {
+            Self::Ours | Self::OursByDefault | Self::DoesNothing | Self::RandomForce => {
+                vec![Tuning::Default]
+            }
+            Self::Paper | Self::PaperAdapted | Self::Discrete => {
                 let touching = TOUCHING.map(Tuning::Touching);
                 [Tuning::Default].into_iter().chain(touching).collect()
             }
@@ -206,23 +204,27 @@ impl Method {
     /// Where the scene cannot be started: recipes are made in code.
     #[must_use]
     pub fn start(self, scene: &Scene, period: f64, tuning: Tuning) -> Box<dyn HapticMethod> {
-        let by_default = scene.settings;
-        let mut paper = Settings {
+        let mut by_default = scene.settings;
+        if let Tuning::Touching(share) = tuning {
+            by_default.rest_distance *= share;
+            let least = 2.0 * by_default.rest_distance;
+            by_default.activation_distance = by_default.activation_distance.max(least);
+        }
+        let paper = Settings {
             look_ahead: false,
             max_substeps: 1,
             implicit_rounds: 0,
             ..by_default
         };
-        if let Tuning::Touching(share) = tuning {
-            paper.rest_distance *= share;
-            paper.activation_distance = paper.activation_distance.max(2.0 * paper.rest_distance);
-        }
         match self {
             Self::Ours => Box::new(GodObjectMethod::new(scene, &scene.fitted(period))),
             Self::OursByDefault => Box::new(GodObjectMethod::new(scene, &by_default)),
             Self::PaperAdapted => Box::new(GodObjectMethod::new(scene, &paper)),
             Self::Paper => {
-                paper.adaptation = None;
+                let paper = Settings {
+                    adaptation: None,
+                    ..paper
+                };
                 Box::new(GodObjectMethod::new(scene, &paper))
             }
             Self::VirtualCoupling => {
@@ -235,7 +237,7 @@ impl Method {
                 };
                 Box::new(VirtualCoupling::new(scene, period, share, damping_ratio))
             }
-            Self::Discrete => Box::new(Discrete::new(scene)),
+            Self::Discrete => Box::new(Discrete::new(scene, &by_default)),
             Self::DoesNothing => Box::new(Control::does_nothing(scene)),
             Self::RandomForce => Box::new(Control::random_force(scene)),
             Self::Penalty => {

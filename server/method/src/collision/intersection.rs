@@ -12,8 +12,28 @@ use crate::spatial::Pose;
 /// A point has winding number 1 inside a solid and 0 outside; rounding is far below this.
 const INSIDE: f64 = 0.5;
 
-/// Whether the body and the obstacle share a point, surfaces or insides. For set-up: it allocates.
+/// Whether the body and the obstacle share a point, surfaces or insides. For set-up: it allocates, and looks at every triangle.
 pub fn meshes_intersect(
+    body: &Mesh,
+    body_pose: &Pose,
+    obstacle: &Mesh,
+    obstacle_pose: &Pose,
+) -> bool {
+    if surfaces_intersect(body, body_pose, obstacle, obstacle_pose) {
+        return true;
+    }
+    // Surfaces that do not meet leave each part wholly inside or wholly outside.
+    let placement = Placement::of(body_pose, obstacle_pose);
+    part_vertices(body)
+        .iter()
+        .any(|v| winding_number(obstacle, &placement.point(v)) > INSIDE)
+        || part_vertices(obstacle)
+            .iter()
+            .any(|v| winding_number(body, &placement.back(v)) > INSIDE)
+}
+
+/// Whether the surfaces of body and obstacle share a point: a body that is wholly inside the obstacle does not count.
+pub(crate) fn surfaces_intersect(
     body: &Mesh,
     body_pose: &Pose,
     obstacle: &Mesh,
@@ -39,14 +59,7 @@ pub fn meshes_intersect(
             !intersect
         },
     );
-    // Surfaces that do not meet leave each part wholly inside or wholly outside.
     intersect
-        || part_vertices(body)
-            .iter()
-            .any(|v| winding_number(obstacle, &placement.point(v)) > INSIDE)
-        || part_vertices(obstacle)
-            .iter()
-            .any(|v| winding_number(body, &placement.back(v)) > INSIDE)
 }
 
 impl Placement {

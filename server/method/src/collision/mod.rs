@@ -26,6 +26,7 @@ mod workspace;
 
 pub use distance::distance;
 pub use intersection::meshes_intersect;
+pub(crate) use intersection::surfaces_intersect;
 pub use linear::{edge_edge_time_of_impact, vertex_face_time_of_impact};
 pub use motion::Motion;
 pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};

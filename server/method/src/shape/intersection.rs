@@ -4,28 +4,52 @@ use super::Primitive;
 use super::bound::{Bound, for_triangles};
 use super::closest;
 use super::piece::Piece;
-use crate::collision::{Placement, meshes_intersect};
+use crate::collision::{Placement, meshes_intersect, surfaces_intersect};
 use crate::geometry::{MAX_DEPTH, Mesh};
 use crate::spatial::Pose;
 use crate::world::{Body, Obstacle};
 
 /// Whether the body at `body_pose` and the obstacle at `obstacle_pose` share a point, surfaces or insides; what is not proved apart counts as
-/// shared. For set-up: it allocates.
+/// shared. For set-up: it allocates, and looks at every triangle.
 pub fn shapes_intersect(
     body: &Body,
     body_pose: &Pose,
     obstacle: &Obstacle,
     obstacle_pose: &Pose,
 ) -> bool {
+    // The meshes lie within their primitives: what is wholly inside the other is so with its mesh.
+    primitives_intersect(body, body_pose, obstacle, obstacle_pose)
+        || meshes_intersect(&body.mesh, body_pose, &obstacle.mesh, obstacle_pose)
+}
+
+/// As [`shapes_intersect`], but a mesh that is wholly inside another does not count: for a body that was outside before a step that is shorter than it is
+/// thick, in the time that trees of boxes take. It allocates.
+pub fn shape_surfaces_intersect(
+    body: &Body,
+    body_pose: &Pose,
+    obstacle: &Obstacle,
+    obstacle_pose: &Pose,
+) -> bool {
+    if body.primitive.is_some() || obstacle.primitive.is_some() {
+        return primitives_intersect(body, body_pose, obstacle, obstacle_pose);
+    }
+    surfaces_intersect(&body.mesh, body_pose, &obstacle.mesh, obstacle_pose)
+}
+
+/// Whether a primitive of either is not proved apart from the other shape; false for two meshes.
+fn primitives_intersect(
+    body: &Body,
+    body_pose: &Pose,
+    obstacle: &Obstacle,
+    obstacle_pose: &Pose,
+) -> bool {
     let placement = Placement::of(body_pose, obstacle_pose);
-    let surfaces = match (&body.primitive, &obstacle.primitive) {
+    match (&body.primitive, &obstacle.primitive) {
         (None, None) => false,
         (Some(a), Some(b)) => !primitives_apart(a, b, &placement),
         (Some(a), None) => !mesh_apart(&obstacle.mesh, a, false, &placement),
         (None, Some(b)) => !mesh_apart(&body.mesh, b, true, &placement),
-    };
-    // The meshes lie within their primitives: what is wholly inside the other is so with its mesh.
-    surfaces || meshes_intersect(&body.mesh, body_pose, &obstacle.mesh, obstacle_pose)
+    }
 }
 
 fn primitives_apart(body: &Primitive, obstacle: &Primitive, placement: &Placement) -> bool {

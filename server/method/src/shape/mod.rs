@@ -18,7 +18,7 @@ mod rim;
 mod separation;
 mod time_of_impact;
 
-pub use intersection::shapes_intersect;
+pub use intersection::{shape_surfaces_intersect, shapes_intersect};
 pub use primitive::{Nearest, Primitive, PrimitiveError};
 pub(crate) use separation::separation;
 

@@ -2,11 +2,14 @@
 
 use god_object::collision::{CollisionWorkspace, Work};
 use god_object::constraint::{Contact, Separation};
-use god_object::quasi_statics::HalfSpace;
-use god_object::shape::{collect, shapes_intersect};
+use god_object::quasi_statics::{HalfSpace, Metric, ProjectionStatus, Projector};
+use god_object::shape::{collect, shape_surfaces_intersect, shapes_intersect};
 use god_object::spatial::{angular, linear, six};
 use god_object::{ConstraintSet, NonPenetrationConstraint, Pose, Settings, Vector6, World};
 use nalgebra::Point3;
+
+/// Bisections of a step that ends in an obstacle: a millimetre is cut down to a nanometre.
+const BISECTIONS: u32 = 20;
 
 /// Finds contacts.
 #[derive(Debug)]
@@ -43,21 +46,60 @@ impl ContactFinder {
     }
 }
 
-/// Whether the body at `pose` shares a point with any obstacle.
-pub(super) fn intersects(world: &World, pose: &Pose) -> bool {
-    world
-        .obstacles
-        .iter()
-        .any(|obstacle| shapes_intersect(&world.body, pose, obstacle, &obstacle.pose))
+/// Share of a motion of the body, m long at its farthest point, that ends free of the obstacles: all of it, or as much as bisection finds. What lies on the
+/// way is not looked at; nor whether a mesh is wholly inside another, where the motion is shorter than the body is thick.
+pub(super) fn free_share(world: &World, length: f64, at: impl Fn(f64) -> Pose) -> f64 {
+    let [low, high] = world.body.mesh.bounding_box();
+    let overlaps = if length < (high - low).amin() {
+        shape_surfaces_intersect
+    } else {
+        shapes_intersect
+    };
+    let intersects = |share: f64| {
+        let pose = at(share);
+        let obstacles = world.obstacles.iter();
+        let mut all = obstacles.map(|o| overlaps(&world.body, &pose, o, &o.pose));
+        all.any(|overlap| overlap)
+    };
+    if !intersects(1.0) {
+        return 1.0;
+    }
+    let (mut free, mut blocked) = (0.0, 1.0);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (free + blocked);
+        if intersects(middle) {
+            blocked = middle;
+        } else {
+            free = middle;
+        }
+    }
+    free
 }
 
-/// The row of a contact for a motion of the reference point at `centre`: up to the rest distance, and no farther.
-pub(super) fn row(contact: &Contact, centre: &Point3<f64>, rest_distance: f64) -> HalfSpace {
-    let arm = contact.point_on_obstacle - centre;
-    HalfSpace {
-        jacobian: six(&contact.normal, &arm.cross(&contact.normal)),
-        bound: (rest_distance - contact.gap).min(0.0),
+/// The motion of the reference point at `centre` nearest to a wish that ends at the rest distance from every contact or farther, so that a body which
+/// has come nearer is eased out; where there is none, one that comes no nearer. `None` where neither can be found.
+pub(super) fn project(
+    (projector, rows): (&mut Projector, &mut Vec<HalfSpace>),
+    metric: &Metric,
+    wish: &Vector6,
+    (contacts, centre): (&[Contact], &Point3<f64>),
+    rest_distance: f64,
+) -> Option<Vector6> {
+    for most in [f64::INFINITY, 0.0] {
+        rows.clear();
+        rows.extend(contacts.iter().map(|contact| {
+            let arm = contact.point_on_obstacle - centre;
+            HalfSpace {
+                jacobian: six(&contact.normal, &arm.cross(&contact.normal)),
+                bound: (rest_distance - contact.gap).min(most),
+            }
+        }));
+        let answer = projector.project(metric, wish, rows, &[]);
+        if answer.status == ProjectionStatus::Solved {
+            return Some(answer.acceleration);
+        }
     }
+    None
 }
 
 /// A constraint set of these contacts, for the coupling.

@@ -6,27 +6,28 @@
 
 use std::sync::Arc;
 
-use god_object::quasi_statics::{HalfSpace, ProjectionStatus, Projector};
+use god_object::constraint::Contact;
+use god_object::quasi_statics::{HalfSpace, Projector};
 use god_object::spatial::{
-    advance_pose, angular, at_reference_point, from_reference_point, pose_difference,
+    advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
 };
 use god_object::{ConstraintSet, Coupling, Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::{ContactFinder, constraint_set, intersects, row};
+use super::contacts::{ContactFinder, constraint_set, free_share, project};
 use crate::method::{HapticMethod, Scene};
-
-/// Bisections of a step that ends in an obstacle: a millimetre is cut down to a nanometre.
-const BISECTIONS: u32 = 20;
 
 /// The method's state.
 #[derive(Debug)]
 pub struct Discrete {
     world: Arc<World>,
     settings: Settings,
+    /// Of the body about its reference point, m.
+    radius: f64,
     pose: Pose,
     turn: Vector3<f64>,
     finder: ContactFinder,
+    contacts: Vec<Contact>,
     rows: Vec<HalfSpace>,
     projector: Projector,
     coupling: Coupling,
@@ -35,20 +36,23 @@ pub struct Discrete {
 }
 
 impl Discrete {
-    /// At the scene's start.
+    /// At the scene's start, with these settings but for the adaptation of constraints.
     #[must_use]
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene, settings: &Settings) -> Self {
         let settings = Settings {
             adaptation: None,
-            ..scene.settings
+            ..*settings
         };
         let capacity = settings.max_constraints;
+        let body = &scene.world.body;
         let mut method = Self {
             world: scene.world.clone(),
             settings,
+            radius: body.mesh.radius_about(&body.reference_point),
             pose: scene.start,
             turn: Vector3::zeros(),
             finder: ContactFinder::new(&settings),
+            contacts: Vec::with_capacity(capacity),
             rows: Vec::with_capacity(capacity),
             projector: Projector::new(SolverKind::ActiveSet, capacity),
             coupling: Coupling::new(&scene.world, &settings),
@@ -62,21 +66,10 @@ impl Discrete {
 
     fn collect(&mut self, sequence: u64) {
         let (world, settings) = (&self.world, &self.settings);
-        let centre = Point3::from(
-            at_reference_point(&self.pose, &world.body.reference_point)
-                .translation
-                .vector,
-        );
-        let contacts = self
-            .finder
-            .find(world, &self.pose, settings.activation_distance);
-        self.rows.clear();
-        self.rows.extend(
-            contacts
-                .iter()
-                .map(|contact| row(contact, &centre, settings.rest_distance)),
-        );
-        self.set = constraint_set(sequence, &self.pose, contacts, settings.max_constraints);
+        let found = (self.finder).find(world, &self.pose, settings.activation_distance);
+        self.contacts.clear();
+        self.contacts.extend_from_slice(found);
+        self.set = constraint_set(sequence, &self.pose, found, settings.max_constraints);
     }
 }
 
@@ -91,25 +84,17 @@ impl HapticMethod for Discrete {
             return;
         };
         let wish = difference * self.settings.k_s;
-        let answer = self.projector.project(&metric, &wish, &self.rows, &[]);
-        if answer.status == ProjectionStatus::Solved {
+        let centre = Point3::from(start.translation.vector);
+        let rows = (&mut self.projector, &mut self.rows);
+        let contacts = (self.contacts.as_slice(), &centre);
+        let step = project(rows, &metric, &wish, contacts, self.settings.rest_distance);
+        if let Some(step) = step {
             let at = |share: f64| {
-                let pose = advance_pose(&start, &answer.acceleration, share);
+                let pose = advance_pose(&start, &step, share);
                 from_reference_point(&pose, &body.reference_point)
             };
-            let mut free = 1.0;
-            if intersects(&self.world, &at(1.0)) {
-                let mut blocked = 1.0;
-                free = 0.0;
-                for _ in 0..BISECTIONS {
-                    let middle = 0.5 * (free + blocked);
-                    if intersects(&self.world, &at(middle)) {
-                        blocked = middle;
-                    } else {
-                        free = middle;
-                    }
-                }
-            }
+            let length = linear(&step).norm() + self.radius * angular(&step).norm();
+            let free = free_share(&self.world, length, at);
             if free > 0.0 {
                 self.pose = at(free);
             }

@@ -9,19 +9,19 @@
 //!
 //! One update solves `(mu + h beta + h^2 kappa) v' = mu v + h beta v_h + h kappa (x_h - x)`, which is stable for any period, and
 //! projects the step `h v'` on the contacts that it can reach, with their gaps, so that it meets them without penetration and without a
-//! step. The spring pulls while the proxy is behind the device, also where nothing is touched. Source: Colgate et al. 1995 and Adams
+//! step; one that ends in an obstacle all the same is cut by bisection. The spring pulls while the proxy is behind the device, also where nothing is touched. Source: Colgate et al. 1995 and Adams
 //! and Hannaford 1999 for the coupling; the proxy here has no damping against the world, which would drag.
 
 use std::sync::Arc;
 
-use god_object::quasi_statics::{HalfSpace, ProjectionStatus, Projector};
+use god_object::quasi_statics::{HalfSpace, Projector};
 use god_object::spatial::{
     advance_pose, angular, at_reference_point, from_reference_point, linear, pose_difference,
 };
 use god_object::{Pose, Settings, SolverKind, Vector6, World};
 use nalgebra::{Point3, Vector3};
 
-use super::contacts::{ContactFinder, limited, row};
+use super::contacts::{ContactFinder, free_share, limited, project};
 use crate::method::{HapticMethod, Scene};
 
 /// What the force needs of an update.
@@ -117,24 +117,26 @@ impl HapticMethod for VirtualCoupling {
             &self.proxy.pose,
             self.settings.activation_distance + 2.0 * reach,
         );
-        self.rows.clear();
-        self.rows.extend(
-            contacts
-                .iter()
-                .map(|contact| row(contact, &centre, self.settings.rest_distance)),
-        );
         let metric = body.metric(self.settings.rotation_metric, &self.proxy.pose);
         let Some(metric) = metric else {
             return;
         };
-        let answer = self.projector.project(&metric, &step, &self.rows, &[]);
-        if answer.status != ProjectionStatus::Solved {
+        let rows = (&mut self.projector, &mut self.rows);
+        let rest = self.settings.rest_distance;
+        let Some(step) = project(rows, &metric, &step, (contacts, &centre), rest) else {
             self.proxy.velocity = Vector6::zeros();
             return;
+        };
+        let at = |share: f64| {
+            let pose = advance_pose(&start, &step, share);
+            from_reference_point(&pose, &body.reference_point)
+        };
+        let length = linear(&step).norm() + self.radius * angular(&step).norm();
+        let free = free_share(&self.world, length, at);
+        self.proxy.velocity = step * (free / h);
+        if free > 0.0 {
+            self.proxy.pose = at(free);
         }
-        self.proxy.velocity = answer.acceleration / h;
-        let pose = advance_pose(&start, &answer.acceleration, 1.0);
-        self.proxy.pose = from_reference_point(&pose, &body.reference_point);
     }
 
     fn publish(&mut self, _time: f64) {
