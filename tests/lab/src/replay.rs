@@ -95,18 +95,11 @@ pub fn directory() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../data/measured")
 }
 
-/// The choice with the least 90th percentile of the angle in the trial that is not judged, then the least median. Methods with a memory have the softest
-/// spring: stiffer ones were tried and serve none of them better. The files of that trial are read.
+/// The choice with the least 90th percentile of the angle in the trial that is not judged, then the least median: of every tuning with every stiffness.
 pub fn choose(method: Method) -> Result<Choice, Box<dyn Error>> {
-    let stiffnesses = if method == Method::Penalty {
-        STIFFNESSES.as_slice()
-    } else {
-        &STIFFNESSES[..1]
-    };
     let mut best: Option<([f64; 2], Choice)> = None;
     for tuning in method.tunings() {
-        for stiffness in stiffnesses {
-            let stiffness = *stiffness;
+        for stiffness in STIFFNESSES {
             let choice = Choice { stiffness, tuning };
             let replayed = replay(TRIAL_FOR_CHOICE, method, choice)?;
             let found = [0.9, 0.5].map(|share| quantile(&replayed.angles, share));

@@ -24,7 +24,7 @@ use crate::geometry::distance::barycentric;
 /// micrometre over their size. A ghost slope of 1e-4 is below anything felt.
 pub(crate) const NORMAL_CONE_TOLERANCE: f64 = 1e-4;
 /// The same for a corner over a face, rad. The normal is the face's whatever the corner does, so the row is true; it is there
-/// before the body tilts onto the corner. And for two edges that are known to face each other beyond a turn.
+/// before the body tilts onto the corner. And for two edges whose row is known from where they faced each other.
 pub(crate) const LOOK_AHEAD_TILT: f64 = 0.02;
 /// How far outside a face a foot may lie: per gap (rad), it covers the wedges over flat edges and then some; per side, rounding.
 const FOOT_TOLERANCE_PER_GAP: f64 = NORMAL_CONE_TOLERANCE;

@@ -9,8 +9,9 @@
 //!
 //! One update solves `(mu + h beta + h^2 kappa) v' = mu v + h beta v_h + h kappa (x_h - x)`, which is stable for any period, and
 //! projects the step `h v'` on the contacts that it can reach, with their gaps, so that it meets them without penetration and without a
-//! step; one that ends in an obstacle all the same is cut by bisection. The spring pulls while the proxy is behind the device, also where nothing is touched. Source: Colgate et al. 1995 and Adams
-//! and Hannaford 1999 for the coupling; the proxy here has no damping against the world, which would drag.
+//! step; one that ends in an obstacle all the same is cut by bisection. The spring pulls while the proxy is behind the device, also where
+//! nothing is touched. Source: Colgate et al. 1995 and Adams and Hannaford 1999 for the coupling; the proxy here has no damping against
+//! the world, which would drag.
 
 use std::sync::Arc;
 
