@@ -184,6 +184,7 @@ impl GodObject {
         let all_moved = device_moved + obstacles_moved;
         let mut update = Update {
             all_moved,
+            moved: all_moved - self.device_ahead,
             look_ahead: all_moved,
             made: 0.0,
             step_memory: if all_moved <= self.settings.rest_distance {

@@ -11,10 +11,11 @@ use crate::collision::Motion;
 use crate::spatial::{
     Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
 };
+use crate::surface::Friction;
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
-/// A motion that is a smaller share of the way that the update has made is left to the next update.
+/// A motion that is a smaller share of the way that the update has made, or of the one that the device went meanwhile, is left to the next update.
 const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
 const TIGHT_GAP_SHARE: f64 = 0.5;
@@ -22,6 +23,8 @@ const TIGHT_GAP_SHARE: f64 = 0.5;
 const MAX_REVERSALS: u32 = 2;
 /// Most by which motions become shorter when one turns back on the last.
 const LARGEST_DAMPING: f64 = 16.0;
+/// Damping is taken back by this factor at least in each motion that goes on like the last.
+const LEAST_RECOVERY: f64 = 0.5;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
 const LOST_GAP_SHARE: f64 = 0.5;
 /// One that loses less than this was as the rows predicted.
@@ -36,7 +39,9 @@ const FAST_GROWTH: f64 = 8.0;
 pub(super) struct Update {
     /// Path of the device and of the fastest obstacle since the last update, m: they may move as far again until the next.
     pub(super) all_moved: f64,
-    /// That, and what the body may still cover, m: so far the published set must look ahead.
+    /// Of that, what is known by its pose; not how much farther than that the device may be.
+    pub(super) moved: f64,
+    /// `all_moved`, and what the body may still cover, m: so far the published set must look ahead.
     pub(super) look_ahead: f64,
     /// Way made by the sub-steps so far, m.
     pub(super) made: f64,
@@ -89,24 +94,31 @@ impl GodObject {
             update.look_ahead =
                 update.all_moved + covered * (1.0 - self.settings.k_s) / self.settings.k_s;
         }
-        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
-        // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
-        // little that was cut to what is trusted, or that begins a fall.
+        // Projections are non-expansive: of motions up to the device's own, the last one is no cause.
+        let follows = update.made == 0.0 && covered <= update.moved;
+        if follows {
+            update.step_memory = StepMemory::default();
+        }
         if update
             .step_memory
             .relax(&projected.acceleration, self.radius)
         {
             update.reversals += 1;
         }
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway, and so is
+        // what is little beside the way that the device has gone: the answer is as old. But not easing out, which is little always: a body
+        // left far below the rest distance stops at every motion. Nor is a motion little that was cut to what is trusted, or that begins a fall.
         let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
         let little = if tight || cut {
             0.0
         } else {
-            LEAST_STEP_SHARE * update.made
+            LEAST_STEP_SHARE * update.made.max(update.moved)
         };
+        // What sticks creeps by as much as friction's answer is in error: that is no motion.
+        let error = self.friction.as_ref().map_or(0.0, Friction::error) * length;
         let settling = update.reversals > MAX_REVERSALS && !tight && !cut;
         let long_enough = !settling
-            && covered > self.settings.motion_tolerance
+            && covered > self.settings.motion_tolerance.max(error)
             && (covered * update.step_memory.damping > little // false for NaN
                 || self.tips_over(&projected.acceleration, left, report));
         if !long_enough {
@@ -239,12 +251,12 @@ impl StepMemory {
         };
         let along = weighed(motion, &self.last_motion);
         let turns_back = along < 0.0;
+        // Aitken's extrapolation: motions in proportion to the way that is left would end here.
+        let ratio = along / weighed(&self.last_motion, &self.last_motion);
         if turns_back {
-            // Aitken's extrapolation: motions in proportion to the way that is left would end here.
-            let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
         } else if along > 0.0 {
-            self.damping = (2.0 * self.damping).min(1.0);
+            self.damping = (self.damping / (1.0 - ratio).clamp(0.0, LEAST_RECOVERY)).min(1.0);
         }
         self.last_motion = *motion;
         turns_back

@@ -4,16 +4,18 @@
 //! old normal pushes by `w a / R` along the surface. Less deep than the radius R that is less than `a`, and motions come to an end; deeper
 //! it is more, and the body tips over, however little the first motion was: a ball that has just passed the edge of a plate.
 
+use arrayvec::ArrayVec;
 use nalgebra::Point3;
 
 use super::{GodObject, StepReport};
-use crate::constraint::contact_jacobian;
-use crate::quasi_statics::{HalfSpace, ProjectionStatus};
+use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
+use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, ProjectionStatus};
 use crate::spatial::{Vector6, advance_pose};
+use crate::surface::FrictionProblem;
 
 impl GodObject {
     /// Whether the projected motion `first` of the wish `left` would be followed by one that is no shorter, by the rows that held the body,
-    /// as they are where it leads to. One projection on at most six rows, and no search.
+    /// as they are where it leads to, and friction there. One projection on at most six rows, and no search.
     pub(super) fn tips_over(
         &mut self,
         first: &Vector6,
@@ -30,24 +32,38 @@ impl GodObject {
             return false;
         };
         let center = Point3::from(reached.translation.vector);
+        let active = self.warm_start.iter();
+        let held: ArrayVec<NonPenetrationConstraint, MAX_ACTIVE> = active
+            .filter_map(|row| self.set.constraints.get(*row as usize).copied())
+            .collect();
         self.rows.clear();
-        for row in &self.warm_start {
-            let Some(constraint) = self.set.constraints.get(*row as usize) else {
-                continue;
-            };
+        self.rows.extend(held.iter().map(|constraint| {
             let moved = constraint.moved(&start, &reached, false);
-            self.rows.push(HalfSpace {
+            HalfSpace {
                 jacobian: contact_jacobian(&moved.normal, &moved.point, &center),
                 bound: self.settings.motion_bound(moved.gap),
-            });
-        }
+            }
+        }));
         if self.rows.is_empty() {
             return false;
         }
         report.work.projections += 1;
-        let second = self
-            .projector
-            .project(&metric, &(left - first), &self.rows, &[]);
+        let wish = left - first;
+        let mut project =
+            |a_u: &Vector6, warm: &[u32]| self.projector.project(&metric, a_u, &self.rows, warm);
+        let mut second = project(&wish, &[]);
+        if let Some(friction) = &mut self.friction {
+            let problem = FrictionProblem {
+                metric: &metric,
+                unconstrained: &wish,
+                stuck_at: &Vector6::zeros(),
+                reference_point: &center,
+                rows: &self.rows,
+                constraints: &held,
+                moved: Some((&start, &reached, false)),
+            };
+            second = friction.hold(&problem, project, second);
+        }
         second.status == ProjectionStatus::Solved
             && self.motion_length(&second.acceleration) >= self.motion_length(first) // false for NaN
     }

@@ -105,6 +105,15 @@ impl Friction {
         self.residual
     }
 
+    /// By how much the last answer may be off, relative to a_u: [`Self::residual`], or zero where the frictionless answer stands for one that was not found.
+    pub(crate) fn error(&self) -> f64 {
+        if self.residual.is_finite() {
+            self.residual
+        } else {
+            0.0
+        }
+    }
+
     /// Whether a loaded contact has slipped in the last answer, or none was loaded: then sticking starts anew there.
     pub fn slid(&self) -> bool {
         self.slid
