@@ -123,7 +123,10 @@ impl Pressing {
             .set_read_timeout(Some(Duration::from_millis(20)))
             .expect("a timeout");
         let args = workbench.args(&[]);
-        let mut command = Command::new(std::env::current_exe().expect("this program"));
+        // Whoever runs the tests may ignore SIGHUP (nohup), and children inherit that.
+        let mut command = Command::new("env");
+        command.arg("--default-signal=HUP");
+        command.arg(std::env::current_exe().expect("this program"));
         command
             .args(["--exact", "ends::is_the_bridge", "--ignored", "--nocapture"])
             .env(SERVER, &args.server)

@@ -37,7 +37,9 @@ impl Server {
         std::fs::write(&config, SHIPPED_WORKBENCH).expect("written");
         let (reader, writer) = pipe().expect("a pipe");
         let output = || Stdio::from(writer.try_clone().expect("a handle"));
-        let process = Command::new(env!("CARGO_BIN_EXE_taut"))
+        // Whoever runs the tests may ignore SIGHUP (nohup), and children inherit that.
+        let process = Command::new("env")
+            .args(["--default-signal=HUP", env!("CARGO_BIN_EXE_taut")])
             .arg("serve")
             .args(["--scene", "sphere-on-plane", "--no-monitor"])
             .args(["--quic", "127.0.0.1:0", "--udp", "127.0.0.1:0"])
