@@ -48,6 +48,29 @@ fn peg(name: &str) -> Variant {
     }
 }
 
+/// Each sub-step that moves the body collects its contacts anew, which is what an update costs; one more says that nothing is left to do.
+#[test]
+fn an_update_of_a_peg_that_follows_the_hand_takes_few_substeps() {
+    let mut oracle = Oracle::default();
+    let course = Course {
+        steps: 400,
+        stride: 0,
+    };
+    for feel in [Feel::Plain, Feel::Friction] {
+        for clearance in [2e-5, 1e-4] {
+            let variant = Variant {
+                feel,
+                clearance,
+                ..peg("follows")
+            };
+            let substeps = run(&variant, &course, &mut oracle, || 0.0).substeps;
+            let mean = substeps.iter().sum::<f64>() / substeps.len() as f64;
+            println!("{feel:?} {clearance}: {mean} sub-steps");
+            assert!(mean <= 2.5, "{feel:?} {clearance}: {mean}");
+        }
+    }
+}
+
 /// Poses of the body along the path of a variant, in a world whose obstacles are put in order first.
 fn poses(variant: &Variant, order: impl Fn(&mut Vec<Obstacle>)) -> Vec<Pose> {
     let scene = VariantScene::new(variant);

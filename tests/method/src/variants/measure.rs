@@ -28,6 +28,8 @@ pub struct Outcome {
     pub update: Vec<f64>,
     /// Of the forces, in the unit of the clock.
     pub force: Vec<f64>,
+    /// Sub-steps of the updates.
+    pub substeps: Vec<f64>,
     /// Rows of the sets.
     pub rows: Vec<f64>,
     /// Relative differences from the oracle, see [`Difference`](super::oracle::Difference).
@@ -98,6 +100,7 @@ pub fn run(
         shaded = felt.shaded;
         outcome.rows.push(set.constraints.len() as f64);
         outcome.truncated += u32::from(set.truncated);
+        outcome.substeps.push(f64::from(report.substeps));
         outcome.unfinished += u32::from(report.unfinished);
         outcome.failures += report.solver_failures;
         if course.stride > 0 && k % course.stride == course.stride - 1 {
