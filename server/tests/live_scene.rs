@@ -268,7 +268,7 @@ fn what_cannot_be_taken_changes_nothing_and_says_why() {
         ("plaet.color=\"#ffffff\"", "did you mean `plate`"),
         ("plate.surface.friction=nan", "NaN"),
         ("plate.surface.friction=-1", text),
-        ("plate.pose.position=[0, 0, 1e999]", "finite"),
+        ("plate.pose.position=[0, 0, inf]", "finite"),
         // The ball would start within it; out of what travels; stiffer than the device bears.
         ("plate.pose.position=[0, 0, 0.02]", "start"),
         ("plate.pose.position=[2e6, 0, 0]", "1000 km"),
@@ -550,7 +550,7 @@ fn another_scene_is_chosen_of_those_that_the_workbench_file_names() {
     let begun = Instant::now();
     served.place.write(
         "workbench.toml",
-        &text.replacen("bench.toml", "sphere-on-plane", 1),
+        &text.replacen("scene = \"bench.toml\"", "scene = \"sphere-on-plane\"", 1),
     );
     wait_until("the named one", || session("scene") == "sphere-on-plane");
     assert!(begun.elapsed() < PATIENCE);

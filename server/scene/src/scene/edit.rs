@@ -111,7 +111,11 @@ impl Scene {
         for edit in edits {
             keys.push(self.apply(&mut document, edit.as_ref())?);
         }
-        let text = document.to_string();
+        let mut text = document.to_string();
+        if self.text().contains("\r\n") {
+            // The editor of documents ends every line by itself.
+            text = text.replace("\r\n", "\n").replace('\n', "\r\n");
+        }
         if text.len() as u64 > MAX_TOML_BYTES {
             let why = format!("would be larger than {MAX_TOML_BYTES} bytes");
             return Err(Problem::of_file(self.name(), why).into());
@@ -241,18 +245,37 @@ fn set_in(
                 Ok(Some(before))
             }
             None | Some(Item::None) => {
-                table.insert(key, Item::Value(value));
+                insert(table, key, value);
                 Ok(None)
             }
             Some(_) => Err(format!("finds a table at `{key}`; edit the file")),
         };
     }
     if !table.contains_key(key) {
-        table.insert(key, Item::Value(InlineTable::new().into()));
+        insert(table, key, InlineTable::new().into());
     }
     let inner = table.get_mut(key).and_then(Item::as_table_like_mut);
     let inner = inner.ok_or_else(|| format!("finds no table at `{key}`; edit the file"))?;
     set_in(inner, below, value)
+}
+
+/// Adds a key after the others; the space before the end of a line or of a bracket goes there with it.
+fn insert(table: &mut dyn TableLike, key: &str, mut value: Value) {
+    let last = table
+        .iter_mut()
+        .last()
+        .and_then(|(_, item)| item.as_value_mut());
+    if let Some(last) = last {
+        let suffix = last.decor().suffix().and_then(|text| text.as_str());
+        let space = suffix
+            .filter(|text| text.chars().all(|c| c == ' '))
+            .map(str::to_owned);
+        if let Some(space) = space {
+            last.decor_mut().set_suffix("");
+            *value.decor_mut() = toml_edit::Decor::new(" ", space);
+        }
+    }
+    table.insert(key, Item::Value(value));
 }
 
 /// Puts a value in the place of another; what stands around it stays, and around the items of a list of the same length.

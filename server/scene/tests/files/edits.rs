@@ -92,6 +92,7 @@ fn what_is_set_is_read_and_all_else_stays_as_it_was_written() {
             "color = \"#c03030\" # a red",
             "surface = { friction = 0.2, shading = { crease_angle = 0.6 } }",
             "  0.0, # x",
+            "  0.0, # y",
             "  -0.1, # z, below",
             "position = [0, 0, -1] # m",
         ]
@@ -100,8 +101,9 @@ fn what_is_set_is_read_and_all_else_stays_as_it_was_written() {
         "color = \"#30c030\" # a red",
         "surface = { friction = 0.5, shading = { crease_angle = 0.6 } }",
         "  0.01, # x",
+        "  0, # y",
         "  -0.2, # z, below",
-        "position = [0,0,-2] # m",
+        "position = [0, 0, -2] # m",
         "surface = { friction = 0.7 }",
         "[coupling]",
         "k_h = 1500",
@@ -138,7 +140,7 @@ fn what_cannot_be_taken_is_refused_by_name_and_changes_nothing() {
         ),
         ("plate.surface.friction=nan", &["NaN", "finite"]),
         ("plate.pose.position=[0,0,inf]", &["inf", "finite"]),
-        ("plate.pose.position=[0,0]", &["has 2 numbers"]),
+        ("plate.far.pose.position=[0,0]", &["has 2 numbers"]),
         ("plate.pose.rotation=[2,0,0,0]", &["rotation"]),
         ("plate.color=red", &["color"]),
         (
@@ -198,6 +200,18 @@ fn lines_end_as_they_did_and_lists_in_one_line_are_reached() {
         .edited(&["b.surface.friction=1", "god_object.color=\"#000000\""])
         .expect("taken");
     assert_eq!(edited.obstacles()[0].surface.friction, 1.0);
+    assert!(
+        edited
+            .text()
+            .contains("mass = 1, color = \"#000000\" } # held\r\n"),
+        "{:?}",
+        edited.text()
+    );
+    assert!(
+        edited
+            .text()
+            .contains("plane = {} }, surface = { friction = 1 } }]")
+    );
     assert!(edited.text().contains("# held\r\n"), "{:?}", edited.text());
     assert_eq!(edited.text().matches('\n').count(), 3);
     assert_eq!(edited.text().matches("\r\n").count(), 3);

@@ -87,7 +87,6 @@ impl OperatorDesk {
     /// The session is over: nothing is armed until the next.
     pub(super) fn end(&self) {
         self.watched().seen = None;
-        self.audit.look(Duration::MAX);
     }
 
     /// Takes who may join: where no operator may, nobody arms from here.
@@ -192,6 +191,13 @@ impl OperatorDesk {
         let settled = |run| (run == RunState::Paused).then_some(Ok("disarmed already"));
         let over = Ok("disarmed: the session ended, and the next begins without force");
         self.ask(ArmWish::Disarm, answers, settled, over)
+    }
+}
+
+impl Drop for OperatorDesk {
+    /// Writes what the audit trail has left.
+    fn drop(&mut self) {
+        self.audit.look(Duration::MAX);
     }
 }
 
