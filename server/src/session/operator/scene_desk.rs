@@ -218,7 +218,7 @@ mod tests {
         let desk = open();
         for bad in [
             "",
-            "[]",
+            "[\"x\"]",
             "{\"edit\": []}",
             "{\"edits\": [1]}",
             "{\"revision\": -1}",
