@@ -5,7 +5,7 @@
 
 use std::io::{BufRead, IsTerminal};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// What an operator wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +22,11 @@ const DISARM: u8 = 2;
 
 /// Carries the newest wish. Wait-free; share it by `Arc`.
 #[derive(Debug, Default)]
-pub struct ArmSwitch(AtomicU8);
+pub struct ArmSwitch {
+    wish: AtomicU8,
+    /// The last wish was for no force.
+    off: AtomicBool,
+}
 
 impl ArmSwitch {
     /// Makes a wish. A wish for no force that was not yet taken is not undone by one for force.
@@ -30,17 +34,31 @@ impl ArmSwitch {
         match wish {
             ArmWish::Arm => {
                 // Fails where another wish waits: that one stands.
-                let _ = self
-                    .0
-                    .compare_exchange(NOTHING, ARM, Ordering::Relaxed, Ordering::Relaxed);
+                let made =
+                    self.wish
+                        .compare_exchange(NOTHING, ARM, Ordering::Relaxed, Ordering::Relaxed);
+                if made.is_ok() {
+                    self.off.store(false, Ordering::Relaxed);
+                }
             }
-            ArmWish::Disarm => self.0.store(DISARM, Ordering::Relaxed),
+            ArmWish::Disarm => {
+                self.off.store(true, Ordering::Relaxed);
+                self.wish.store(DISARM, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// For the next session of the same process: a wish for force of before does not count, and where the last one was for no force it stands.
+    pub fn begin_again(&self) {
+        let _ = self.take();
+        if self.off.load(Ordering::Relaxed) {
+            self.wish(ArmWish::Disarm);
         }
     }
 
     /// Takes the wish, if there is one.
     pub fn take(&self) -> Option<ArmWish> {
-        match self.0.swap(NOTHING, Ordering::Relaxed) {
+        match self.wish.swap(NOTHING, Ordering::Relaxed) {
             ARM => Some(ArmWish::Arm),
             DISARM => Some(ArmWish::Disarm),
             _ => None,
@@ -95,6 +113,26 @@ mod tests {
         other.wish(ArmWish::Disarm);
         other.wish(ArmWish::Arm);
         assert_eq!(switch.take(), Some(ArmWish::Disarm));
+    }
+
+    #[test]
+    fn no_force_lasts_into_the_next_session_and_force_does_not() {
+        let switch = ArmSwitch::default();
+        switch.begin_again();
+        assert_eq!(switch.take(), None);
+        switch.wish(ArmWish::Arm);
+        switch.begin_again();
+        assert_eq!(switch.take(), None);
+        switch.wish(ArmWish::Disarm);
+        assert_eq!(switch.take(), Some(ArmWish::Disarm));
+        for _ in 0..2 {
+            switch.begin_again();
+            assert_eq!(switch.take(), Some(ArmWish::Disarm), "also of long ago");
+        }
+        switch.wish(ArmWish::Arm);
+        assert_eq!(switch.take(), Some(ArmWish::Arm));
+        switch.begin_again();
+        assert_eq!(switch.take(), None);
     }
 
     #[test]

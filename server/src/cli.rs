@@ -106,6 +106,8 @@ pub enum Command {
     Export(ExportArgs),
     /// Asks for force at the device of a session, or for none
     Arm(ArmArgs),
+    /// Changes the scene of a running session, or says what of it can be changed
+    Edit(crate::commands::edit::EditArgs),
     /// Says everything that is wrong with configurations, scenes, meshes and traces
     Check(CheckArgs),
     /// Makes a scene of parts from CAD programs, and mends their meshes within stated bounds

@@ -8,6 +8,8 @@ mod cli;
 #[cfg(unix)]
 mod deploy;
 mod edge_coupling;
+#[cfg(unix)]
+mod live_scene;
 mod loops;
 mod moving_obstacle;
 mod no_allocation;

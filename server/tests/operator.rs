@@ -13,12 +13,12 @@ use serde_json::Value;
 use crate::support::{Workplace, start, taut, workbench};
 
 /// Longer than anything takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
-const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
+pub(crate) const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// A force that is one, N.
 const FELT: f64 = 0.2;
 
-fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
+pub(crate) fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !holds() {
         assert!(begun.elapsed() < PATIENCE, "{what}");
@@ -41,7 +41,7 @@ fn workbench_with_manual_arming() -> (String, String) {
     (before.to_owned(), page.to_owned())
 }
 
-fn with_token_file() -> String {
+pub(crate) fn with_token_file() -> String {
     let text = with_page();
     let named = text.replacen("# token_file = \"operator", "token_file = \"operator", 1);
     assert_ne!(text, named);
@@ -55,20 +55,24 @@ fn write_token(place: &Workplace, token: &str, mode: u32) {
 }
 
 /// A running server with a page.
-struct Served {
+pub(crate) struct Served {
     process: Child,
     said: Arc<Mutex<String>>,
-    address: String,
-    place: Workplace,
+    pub(crate) address: String,
+    pub(crate) place: Workplace,
 }
 
 impl Served {
     fn start(text: &str) -> Self {
-        let place = Workplace::new();
+        Self::start_in(Workplace::new(), text, &[])
+    }
+
+    /// In a directory with files of its own, with more arguments.
+    pub(crate) fn start_in(place: Workplace, text: &str, more: &[&str]) -> Self {
         place.write("workbench.toml", text);
         write_token(&place, TOKEN, 0o600);
         let mut process = Command::new(env!("CARGO_BIN_EXE_taut"))
-            .args(place.serve("workbench.toml", "300", &[]))
+            .args(place.serve("workbench.toml", "300", more))
             .env_remove("TAUT_KEY_FILE")
             .env_remove("TAUT_LOG")
             .env_remove("RUST_LOG")
@@ -102,22 +106,22 @@ impl Served {
         served
     }
 
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         self.said.lock().expect("no panic").clone()
     }
 
     /// Whether there is a line with all of these.
-    fn says(&self, parts: &[&str]) -> bool {
+    pub(crate) fn says(&self, parts: &[&str]) -> bool {
         self.lines_with(parts) > 0
     }
 
-    fn lines_with(&self, parts: &[&str]) -> usize {
+    pub(crate) fn lines_with(&self, parts: &[&str]) -> usize {
         let is_it = |line: &&str| parts.iter().all(|part| line.contains(part));
         self.text().lines().filter(is_it).count()
     }
 
     /// Sends a request; status and body of the answer.
-    fn ask(&self, line: &str, headers: &str) -> (u16, String) {
+    pub(crate) fn ask(&self, line: &str, headers: &str) -> (u16, String) {
         let mut stream = self.send(line, headers);
         let mut answer = String::new();
         stream.read_to_string(&mut answer).expect("an answer");
@@ -126,14 +130,14 @@ impl Served {
         (status.expect("a number"), body.trim().to_owned())
     }
 
-    fn send(&self, line: &str, headers: &str) -> TcpStream {
+    pub(crate) fn send(&self, line: &str, headers: &str) -> TcpStream {
         let mut stream = TcpStream::connect(&self.address).expect("the page's port");
         stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
         write!(stream, "{line} HTTP/1.1\r\n{headers}\r\n").expect("sent");
         stream
     }
 
-    fn host(&self) -> String {
+    pub(crate) fn host(&self) -> String {
         format!("Host: {}\r\n", self.address)
     }
 
@@ -146,17 +150,17 @@ impl Served {
         )
     }
 
-    fn status(&self) -> Option<Value> {
+    pub(crate) fn status(&self) -> Option<Value> {
         let (status, body) = self.ask("GET /status", &self.host());
         (status == 200).then(|| serde_json::from_str(&body).expect("JSON"))
     }
 
-    fn now(&self, key: &str) -> Value {
+    pub(crate) fn now(&self, key: &str) -> Value {
         self.status()
             .map_or(Value::Null, |status| status["now"][key].clone())
     }
 
-    fn wait_for_run(&self, run: &str) {
+    pub(crate) fn wait_for_run(&self, run: &str) {
         wait_until(run, || self.now("run") == run);
     }
 

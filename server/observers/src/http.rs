@@ -38,23 +38,36 @@ impl From<io::Error> for End {
     }
 }
 
-/// What `read` makes of a request's head; `None` if the head is longer than [`MAX_REQUEST_BYTES`].
+/// What `read` makes of a request's head, with all bytes that came; `None` if the head is longer than [`MAX_REQUEST_BYTES`].
 pub(crate) async fn request<T>(
     stream: &mut TcpStream,
     read: impl Fn(&[u8]) -> Option<T>,
-) -> io::Result<Option<T>> {
+) -> io::Result<Option<(T, Vec<u8>)>> {
     let mut head = Vec::with_capacity(1024);
     loop {
         if stream.read_buf(&mut head).await? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
         if let Some(wish) = read(&head) {
-            return Ok(Some(wish));
+            return Ok(Some((wish, head)));
         }
         if head.len() > MAX_REQUEST_BYTES {
             return Ok(None);
         }
     }
+}
+
+/// The `length` bytes of a request's body; `came` is what came of it with the head.
+pub(crate) async fn body(
+    stream: &mut TcpStream,
+    came: &[u8],
+    length: usize,
+) -> io::Result<Vec<u8>> {
+    let mut body = vec![0; length];
+    let known = came.len().min(length);
+    body[..known].copy_from_slice(&came[..known]);
+    stream.read_exact(&mut body[known..]).await?;
+    Ok(body)
 }
 
 /// The head of an answer.

@@ -7,6 +7,9 @@ use taut_proto::web::is_from_here;
 
 use crate::request::{header, is_same, parsed};
 
+/// Most bytes of a request's body.
+const MAX_BODY_BYTES: usize = 65_536;
+
 /// What an operator does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deed {
@@ -25,10 +28,23 @@ pub(crate) enum Call {
     Status,
     /// Every status line.
     Lines,
+    /// The scene that runs.
+    Scene,
     /// Whether the token is right.
     Token,
+    /// The scene changed, as the body says.
+    Edit(Body),
     /// Something done.
     Act(Deed),
+}
+
+/// Where the body of a request is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Body {
+    /// First byte after the head.
+    pub(crate) begins: usize,
+    /// Bytes, at most [`MAX_BODY_BYTES`].
+    pub(crate) length: usize,
 }
 
 /// Why it is refused.
@@ -48,6 +64,10 @@ pub(crate) enum Refusal {
     NoToken,
     /// The token is wrong.
     WrongToken,
+    /// The length of its body is not said, or is no number.
+    NoLength,
+    /// Its body is longer than [`MAX_BODY_BYTES`].
+    TooLong,
     /// As many pages are open as may be.
     Full,
 }
@@ -65,7 +85,7 @@ impl Refusal {
             ),
             Self::NotFound => (
                 "404 Not Found",
-                "there are /, /status and /stream to look, /arm, /disarm and /token to act",
+                "there are /, /status, /stream and /scene to look, /arm, /disarm, /edit and /token to act",
             ),
             Self::LookByGet => (NOT_ALLOWED, "looking is by GET"),
             Self::ActByPost => (NOT_ALLOWED, "acting is by POST"),
@@ -77,6 +97,14 @@ impl Refusal {
                 UNAUTHORIZED,
                 "the token is not this server's: open the address that `taut serve` printed last, or the one with the line of [operator] token_file",
             ),
+            Self::NoLength => (
+                "411 Length Required",
+                "an edit has a body, whose length is said in the header `Content-Length`",
+            ),
+            Self::TooLong => (
+                "413 Content Too Large",
+                "an edit has at most 65536 bytes: put larger changes into the scene file",
+            ),
             Self::Full => (
                 "503 Service Unavailable",
                 "as many operator's pages are open as may be: close one",
@@ -87,7 +115,8 @@ impl Refusal {
     /// Why, for the audit trail; `None` for what harms nobody.
     pub(crate) fn audited(self) -> Option<&'static str> {
         match self {
-            Self::NotFound | Self::LookByGet | Self::Full => None,
+            Self::NotFound | Self::LookByGet | Self::NoLength | Self::Full => None,
+            Self::TooLong => Some("a body that is too long"),
             Self::NotHttp => Some("no HTTP"),
             Self::Foreign => Some("a page from elsewhere, or a name that may be anybody's"),
             Self::ActByPost => Some("acting, but not by POST"),
@@ -100,12 +129,12 @@ impl Refusal {
 /// Reads a request's head; `None` while it is not whole.
 pub(crate) fn read(head: &[u8], token: &str) -> Option<Result<Call, Refusal>> {
     parsed(head, |request| match request {
-        Some(request) => judge(request, token),
+        Some((request, length)) => judge(request, length, token),
         None => Err(Refusal::NotHttp),
     })
 }
 
-fn judge(request: &httparse::Request<'_, '_>, token: &str) -> Result<Call, Refusal> {
+fn judge(request: &httparse::Request<'_, '_>, begins: usize, token: &str) -> Result<Call, Refusal> {
     if !is_from_here(header(request, "Host"), header(request, "Origin"), None) {
         return Err(Refusal::Foreign);
     }
@@ -115,29 +144,51 @@ fn judge(request: &httparse::Request<'_, '_>, token: &str) -> Result<Call, Refus
         "/" => Call::Page,
         "/status" => Call::Status,
         "/stream" => Call::Lines,
+        "/scene" => Call::Scene,
         "/token" => Call::Token,
+        "/edit" => Call::Edit(Body { begins, length: 0 }),
         "/arm" => Call::Act(Deed::Arm),
         "/disarm" => Call::Act(Deed::Disarm),
         _ => return Err(Refusal::NotFound),
     };
     match call {
-        Call::Page | Call::Status | Call::Lines => match request.method {
+        Call::Page | Call::Status | Call::Lines | Call::Scene => match request.method {
             Some("GET") => Ok(call),
             _ => Err(Refusal::LookByGet),
         },
-        Call::Token | Call::Act(_) => {
+        Call::Token | Call::Act(_) | Call::Edit(_) => {
             if request.method != Some("POST") {
                 return Err(Refusal::ActByPost);
             }
             let given = header(request, "Authorization")
                 .and_then(|value| value.strip_prefix("Bearer "))
                 .ok_or(Refusal::NoToken)?;
-            match is_same(given.trim(), token) {
-                true => Ok(call),
-                false => Err(Refusal::WrongToken),
+            if !is_same(given.trim(), token) {
+                return Err(Refusal::WrongToken);
+            }
+            match call {
+                Call::Edit(_) => Ok(Call::Edit(Body {
+                    begins,
+                    length: body_length(request)?,
+                })),
+                call => Ok(call),
             }
         }
     }
+}
+
+fn body_length(request: &httparse::Request<'_, '_>) -> Result<usize, Refusal> {
+    let said = header(request, "Content-Length").map(str::trim);
+    let digits = said.filter(|text| text.bytes().all(|byte| byte.is_ascii_digit()));
+    let length = match digits {
+        None | Some("") => return Err(Refusal::NoLength),
+        // A number that is too large for one is too long, too.
+        Some(digits) => digits.parse().unwrap_or(usize::MAX),
+    };
+    if length > MAX_BODY_BYTES {
+        return Err(Refusal::TooLong);
+    }
+    Ok(length)
 }
 
 #[cfg(test)]
@@ -200,6 +251,40 @@ mod tests {
                 assert_eq!(ask(line, &headers), Err(Refusal::Foreign), "{headers}");
             }
         }
+    }
+
+    #[test]
+    fn an_edit_needs_the_token_first_and_then_a_body_of_a_length_that_is_said() {
+        let shown = format!("{HERE}{SHOWN}");
+        let sized = |length: &str| format!("{shown}Content-Length: {length}\r\n");
+        let length = |headers: &str| match ask("POST /edit", headers) {
+            Ok(Call::Edit(body)) => Ok(body.length),
+            Ok(call) => panic!("{call:?}"),
+            Err(refusal) => Err(refusal),
+        };
+        assert_eq!(length(&sized("65536")), Ok(65_536));
+        for (said, refusal) in [
+            ("65537", Refusal::TooLong),
+            ("99999999999999999999999999", Refusal::TooLong),
+            ("-1", Refusal::NoLength),
+            ("", Refusal::NoLength),
+            ("1e3", Refusal::NoLength),
+        ] {
+            assert_eq!(length(&sized(said)), Err(refusal), "{said}");
+        }
+        let chunked = format!("{shown}Transfer-Encoding: chunked\r\n");
+        assert_eq!(length(&chunked), Err(Refusal::NoLength));
+        // Nothing is read of the body of somebody without the token.
+        let none = format!("{HERE}Content-Length: 10\r\n");
+        assert_eq!(length(&none), Err(Refusal::NoToken));
+        assert_eq!(ask("GET /edit", &sized("3")), Err(Refusal::ActByPost));
+        assert_eq!(ask("GET /scene", HERE), Ok(Call::Scene));
+        assert_eq!(ask("POST /scene", &shown), Err(Refusal::LookByGet));
+        let whole = b"POST /edit HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer 0123456789abcdef\r\nContent-Length: 2\r\n\r\n{}";
+        let Some(Ok(Call::Edit(body))) = read(whole, TOKEN) else {
+            panic!("whole")
+        };
+        assert_eq!(&whole[body.begins..][..body.length], b"{}");
     }
 
     proptest! {

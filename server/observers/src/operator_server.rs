@@ -6,6 +6,8 @@
 //! | `/status` | GET | the newest status line | the same |
 //! | `/stream` | GET | each status line, as it comes | the same |
 //! | `/arm`, `/disarm` | POST | asks for force, or for none; answered when the device port has | the guard and the token |
+//! | `/scene` | GET | the scene that runs | the guard |
+//! | `/edit` | POST | changes the scene as the body says; answered when that is taken or refused | the guard and the token |
 //! | `/token` | POST | says whether the token is right | the same |
 //!
 //! A deed is done by this thread as soon as its request is whole: no queue and no other thread is between it and the [`Desk`].
@@ -23,7 +25,9 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::{Instant, sleep, timeout};
 
 use crate::asking::{Asking, Entrance};
-use crate::http::{End, HTML, JSON_LINES, Lines, REQUEST_TIME, TEXT, answer, head, request, send};
+use crate::http::{
+    End, HTML, JSON_LINES, Lines, REQUEST_TIME, TEXT, answer, body, head, request, send,
+};
 use crate::operator_request::{Call, Deed, Refusal, read};
 use crate::service::{ACCEPT_PAUSE, Service, listen, runtime};
 
@@ -33,6 +37,8 @@ const PAGE: &str = include_str!("operator.html");
 const MAX_VIEWERS: usize = 16;
 /// Longest that the device port is waited for.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest that a changed scene is waited for: its meshes are read and checked.
+const EDIT_PATIENCE: Duration = Duration::from_secs(120);
 /// Time between two looks at what it did.
 const LOOK_PERIOD: Duration = Duration::from_millis(5);
 /// A deed was not done.
@@ -41,6 +47,11 @@ const NOT_DONE: &str = "409 Conflict";
 const NO_ANSWER: (&str, &str) = (
     "504 Gateway Timeout",
     "asked, but the device port has not answered; look at the device and at the server's log",
+);
+/// The same of a scene.
+const NOT_YET_TAKEN: (&str, &str) = (
+    "504 Gateway Timeout",
+    "the scene is being read still; look at the server's log for what comes of it",
 );
 /// Before the first status line.
 const NOTHING_MEASURED: (&str, &str) = (
@@ -51,7 +62,7 @@ const NOTHING_MEASURED: (&str, &str) = (
 const TOKEN_BYTES: usize = 32;
 
 /// What came of a deed: a sentence either way.
-pub type Answer = Result<&'static str, &'static str>;
+pub type Answer = Result<String, String>;
 
 /// Looked at until it says what came of a deed.
 pub type Outcome = Box<dyn FnMut() -> Option<Answer> + Send>;
@@ -63,6 +74,15 @@ pub trait Desk: Send + Sync + 'static {
     /// # Errors
     /// A sentence: why it was not done.
     fn act(&self, deed: Deed, peer: SocketAddr) -> Result<Outcome, String>;
+
+    /// Changes the scene as the body of a request says, for whoever has shown the token from `peer`.
+    ///
+    /// # Errors
+    /// A sentence: why it is not even tried.
+    fn edit(&self, body: &[u8], peer: SocketAddr) -> Result<Outcome, String>;
+
+    /// The scene that runs, a JSON object.
+    fn scene(&self) -> Arc<str>;
 
     /// Hears that a request of `peer` was refused, and why.
     fn refused(&self, peer: SocketAddr, why: &'static str);
@@ -172,6 +192,8 @@ enum Heard {
     Look(Call),
     /// A deed was done; what to look at for its answer.
     Done(Outcome),
+    /// The same of a change of the scene.
+    Edited(Outcome),
     /// A deed was not done.
     NotDone(String),
     /// Nothing is given.
@@ -200,6 +222,12 @@ async fn serve(
             }
             Err(_) => Heard::Refused(Refusal::Full),
         },
+        // It may take long, and who has shown the token is not crowded out by others; the desk bounds their number.
+        Heard::Edited(outcome) => {
+            drop(asking);
+            let (status, text) = told(come_of(outcome, EDIT_PATIENCE).await, NOT_YET_TAKEN);
+            return answer(&mut stream, status, TEXT, &format!("{text}\n")).await;
+        }
         heard => heard,
     };
     tokio::select! {
@@ -213,8 +241,20 @@ async fn serve(
 async fn hear(stream: &mut TcpStream, peer: SocketAddr, shared: &Shared) -> Result<Heard, End> {
     let understood = |head: &[u8]| read(head, &shared.token);
     let asked = timeout(REQUEST_TIME, request(stream, understood)).await;
-    let call = asked.map_err(|_| End::Gone)??;
-    Ok(match call.unwrap_or(Err(Refusal::NotHttp)) {
+    let (call, came) = match asked.map_err(|_| End::Gone)?? {
+        Some((call, came)) => (call, came),
+        None => (Err(Refusal::NotHttp), Vec::new()),
+    };
+    Ok(match call {
+        Ok(Call::Edit(place)) => {
+            let came = came.get(place.begins..).unwrap_or_default();
+            let reading = timeout(REQUEST_TIME, body(stream, came, place.length)).await;
+            let body = reading.map_err(|_| End::Gone)??;
+            match shared.desk.edit(&body, peer) {
+                Ok(outcome) => Heard::Edited(outcome),
+                Err(why) => Heard::NotDone(why),
+            }
+        }
         Ok(Call::Act(deed)) => match shared.desk.act(deed, peer) {
             Ok(outcome) => Heard::Done(outcome),
             Err(why) => Heard::NotDone(why),
@@ -240,13 +280,16 @@ async fn answer_once(stream: &mut TcpStream, heard: Heard, shared: &Shared) -> R
                 None => NOTHING_MEASURED,
             }
         }
+        Heard::Look(Call::Scene) => {
+            let scene = shared.desk.scene();
+            return answer(stream, "200 OK", JSON_LINES, &format!("{scene}\n")).await;
+        }
         Heard::Look(Call::Token) => ("200 OK", "the token is right"),
         Heard::Look(_) => return answer(stream, "200 OK", HTML, PAGE).await,
-        Heard::Done(outcome) => match come_of(outcome).await {
-            Some(Ok(text)) => ("200 OK", text),
-            Some(Err(text)) => (NOT_DONE, text),
-            None => NO_ANSWER,
-        },
+        Heard::Done(outcome) | Heard::Edited(outcome) => {
+            let (status, text) = told(come_of(outcome, PATIENCE).await, NO_ANSWER);
+            return answer(stream, status, TEXT, &format!("{text}\n")).await;
+        }
         Heard::NotDone(why) => {
             return answer(stream, NOT_DONE, TEXT, &format!("{why}\n")).await;
         }
@@ -255,9 +298,18 @@ async fn answer_once(stream: &mut TcpStream, heard: Heard, shared: &Shared) -> R
     answer(stream, status, TEXT, &format!("{text}\n")).await
 }
 
-/// What came of a deed, if the device port says so in time.
-async fn come_of(mut outcome: Outcome) -> Option<Answer> {
-    let deadline = Instant::now() + PATIENCE;
+/// Status and text of what came of a deed; `silent` where nothing did in time.
+fn told(answer: Option<Answer>, silent: (&'static str, &'static str)) -> (&'static str, String) {
+    match answer {
+        Some(Ok(text)) => ("200 OK", text),
+        Some(Err(text)) => (NOT_DONE, text),
+        None => (silent.0, silent.1.to_owned()),
+    }
+}
+
+/// What came of a deed, if that is told within `patience`.
+async fn come_of(mut outcome: Outcome, patience: Duration) -> Option<Answer> {
+    let deadline = Instant::now() + patience;
     loop {
         if let Some(answer) = outcome() {
             return Some(answer);

@@ -71,21 +71,21 @@ impl Refusal {
 /// Reads a request's head; `None` while it is not whole.
 pub(crate) fn read(head: &[u8], token: Option<&str>) -> Option<Result<Wish, Refusal>> {
     parsed(head, |request| match request {
-        Some(request) => judge(request, token),
+        Some((request, _)) => judge(request, token),
         None => Err(Refusal::NotHttp),
     })
 }
 
-/// What `judge` makes of a head that is whole: of a request, or of `None` where it is none.
+/// What `judge` makes of a head that is whole: of a request and the length of its head, bytes, or of `None` where it is none.
 pub(crate) fn parsed<T>(
     head: &[u8],
-    judge: impl FnOnce(Option<&httparse::Request<'_, '_>>) -> T,
+    judge: impl FnOnce(Option<(&httparse::Request<'_, '_>, usize)>) -> T,
 ) -> Option<T> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
     match request.parse(head) {
         Ok(httparse::Status::Partial) => None,
-        Ok(httparse::Status::Complete(_)) => Some(judge(Some(&request))),
+        Ok(httparse::Status::Complete(length)) => Some(judge(Some((&request, length)))),
         Err(_) => Some(judge(None)),
     }
 }

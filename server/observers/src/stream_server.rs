@@ -212,7 +212,7 @@ async fn observer(mut stream: TcpStream, shared: &Shared, mut asking: Asking) ->
     let asked = timeout(REQUEST_TIME, request(&mut stream, understood));
     let wish = tokio::select! {
         biased;
-        asked = asked => asked.map_err(|_| End::Gone)??.unwrap_or(Err(Refusal::NotHttp)),
+        asked = asked => asked.map_err(|_| End::Gone)??.map_or(Err(Refusal::NotHttp), |(wish, _)| wish),
         _ = &mut asking.lost => return Err(End::Gone),
     };
     // Those who stay have a place of their own; a page or a line is sent to where it was asked from.

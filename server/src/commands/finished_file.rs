@@ -44,6 +44,16 @@ impl FinishedFile {
     }
 }
 
+/// Puts a text in the place of what a file holds, with its permissions; whoever reads it finds the one or the other. A link stays one.
+pub(super) fn replace(path: &Path, text: &str) -> io::Result<()> {
+    let path = fs::canonicalize(path)?;
+    let permissions = fs::metadata(&path)?.permissions();
+    let mut file = FinishedFile::create(&path)?;
+    file.write_all(text.as_bytes())?;
+    fs::set_permissions(&file.partial, permissions)?;
+    file.finish()
+}
+
 impl Write for FinishedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.writer {
@@ -72,6 +82,29 @@ mod tests {
     fn a_dash_is_refused_by_name() {
         let error = FinishedFile::create(Path::new("-")).map_err(|error| error.to_string());
         assert!(error.is_err_and(|error| error.contains("name a file")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_replaced_keeps_its_permissions_and_its_link() {
+        use std::os::unix::fs::PermissionsExt;
+        let Ok(directory) = tempfile::tempdir() else {
+            panic!("no temporary directory");
+        };
+        let [path, link] = ["scene.toml", "link.toml"].map(|name| directory.path().join(name));
+        assert!(
+            replace(&path, "new").is_err(),
+            "there is nothing to replace"
+        );
+        assert!(fs::write(&path, "old").is_ok());
+        assert!(fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).is_ok());
+        assert!(std::os::unix::fs::symlink(&path, &link).is_ok());
+        assert!(replace(&link, "new").is_ok());
+        assert!(fs::read(&path).is_ok_and(|bytes| bytes == b"new"));
+        assert!(fs::symlink_metadata(&link).is_ok_and(|link| link.is_symlink()));
+        let mode = fs::metadata(&path).map(|about| about.permissions().mode() & 0o777);
+        assert_eq!(mode.ok(), Some(0o640));
+        assert_eq!(fs::read_dir(directory.path()).map_or(0, Iterator::count), 2);
     }
 
     #[test]

@@ -7,11 +7,13 @@ pub mod arm;
 mod demo;
 mod deploy;
 mod doctor;
+pub mod edit;
 mod export;
 mod finished_file;
 mod import;
 mod key;
 mod keys;
+mod live_scene;
 mod manual;
 #[cfg(feature = "render")]
 mod preview;
@@ -22,7 +24,6 @@ mod record;
 mod recording_size;
 pub(crate) mod render;
 pub mod replay;
-mod scene_watch;
 mod serve;
 mod setup;
 mod signals;
@@ -94,6 +95,7 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Record(args) => record_command(&args),
         Command::Export(args) => export_command(&args),
         Command::Arm(args) => arm_command(&args),
+        Command::Edit(args) => print(edit::run(&args)?).map(|()| ExitCode::SUCCESS),
         Command::Check(args) => check_command(&args),
         Command::Import(args) => import_command(&args),
         Command::Preview(args) => {

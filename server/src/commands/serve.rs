@@ -1,24 +1,20 @@
 //! `taut serve`: the haptic PC, until its time is over, the user ends it, or something breaks.
 
-use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use taut_bridge::ArmSwitch;
 use taut_bridge::signals::EndFlag;
-use taut_link::ClusterKey;
-use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
+use taut_scene::{FidelityPlan, Log, LogLevel};
 
 use crate::cli::ServeArgs;
-use crate::commands::scene_watch::SceneWatch;
-use crate::commands::{key, recording_size};
+use crate::commands::live_scene::{LiveScene, load_workbench};
+use crate::commands::recording_size;
 use crate::report::SessionReport;
 use crate::report::metrics::{self, MetricsLines};
 use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::admission::AdmissionWatch;
-use crate::session::setup::SessionSetup;
-use crate::session::setup::workbench::{Overrides, session_setup};
+use crate::session::operator::Continuity;
+use crate::session::setup::workbench::Overrides;
 use crate::shared::failure::Failure;
 
 /// Time between two looks at network, children and clock; also of the status line.
@@ -32,36 +28,27 @@ pub(super) fn run(
     let workbench = load_workbench(args)?;
     taut_log::use_directives(&directives(workbench.log));
     let mut metrics = MetricsOutlets::open(args)?;
-    let mut overrides = Overrides {
+    let overrides = Overrides {
         scene: args.scene.clone(),
         allow_unstable: args.allow_unstable,
         quic: args.quic,
         udp: args.udp,
         no_monitor: args.no_monitor,
         record: args.record.clone(),
-        input: None,
         recording: args.recording.clone(),
+        ..Overrides::default()
     };
-    let setup = load_session(args, &workbench, &overrides)?;
+    let mut kept = Continuity::default();
+    let mut scene = LiveScene::new(args, overrides, kept.scenes.clone());
+    let mut next = scene.first()?;
     let end = EndFlag::listen().map_err(Failure::failed)?;
-    let arm_switch = Arc::<ArmSwitch>::default();
-    taut_bridge::listen_at_console(&arm_switch);
-    let mut next = (workbench, setup);
+    taut_bridge::listen_at_console(&kept.switch);
     let begun = Instant::now();
     loop {
-        let (workbench, setup) = next;
-        let token = setup
-            .operator
-            .as_ref()
-            .map(|page| page.server.token.clone());
-        let scene = args
-            .follow_scene
-            .then(|| SceneWatch::new(&args.config, &workbench));
-        let mut scene = scene.transpose()?;
-        let mut session = Session::start_with(setup, arm_switch.clone())?;
+        scene.begin(&mut next);
+        let mut session = Session::start_with(next.setup, &mut kept)?;
         session.end_with(&end);
-        // Whoever comes again comes to where he was.
-        (overrides.quic, overrides.udp) = (session.quic_address(), session.udp_address());
+        scene.began(&session);
         announce(&session, terminal);
         if let Some(directory) = &args.recording {
             terminal.say(&recording_size::sentence(directory));
@@ -74,15 +61,7 @@ pub(super) fn run(
         watch(&mut session, left, terminal, |session| {
             admission.follow(session, terminal);
             metrics.follow(session);
-            let load = || {
-                let workbench = load_workbench(args)?;
-                let mut setup = load_session(args, &workbench, &overrides)?;
-                keep_token(&mut setup, token.as_deref());
-                Ok((workbench, setup))
-            };
-            other = scene
-                .as_mut()
-                .and_then(|scene| scene.follow(terminal, load));
+            other = scene.follow(session, terminal);
             other.is_none()
         });
         terminal.end_status();
@@ -102,34 +81,6 @@ pub(super) fn run(
                 return Ok(ended);
             }
         }
-    }
-}
-
-/// The workbench file, with the scene of the command line.
-fn load_workbench(args: &ServeArgs) -> Result<Workbench, Failure> {
-    let mut workbench = Workbench::load(&args.config)?;
-    if let Some(scene) = &args.scene {
-        workbench.scene.clone_from(scene);
-    }
-    Ok(workbench)
-}
-
-/// What a session of this workbench is made of.
-fn load_session(
-    args: &ServeArgs,
-    workbench: &Workbench,
-    overrides: &Overrides,
-) -> Result<SessionSetup, Failure> {
-    let key = workbench_key(args.key.as_deref(), workbench)?;
-    session_setup(workbench, key, overrides)
-}
-
-/// A page that was opened by a token that was made for this start goes on with it.
-fn keep_token(setup: &mut SessionSetup, token: Option<&str>) {
-    if let (Some(page), Some(token)) = (&mut setup.operator, token)
-        && page.token_file.is_none()
-    {
-        token.clone_into(&mut page.server.token);
     }
 }
 
@@ -196,11 +147,6 @@ impl MetricsOutlets {
             lines.write(&metrics);
         }
     }
-}
-
-/// The key of the command line, else of the workbench file, else of the environment.
-fn workbench_key(named: Option<&Path>, workbench: &Workbench) -> Result<ClusterKey, Failure> {
-    key::read(named.or(workbench.network.key_file.as_deref()))
 }
 
 /// Says where the session can be reached, and what of real time is not in force.

@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use taut_link::proto::proof::Grant;
+use taut_link::proto::text::Printable;
 use taut_link::{Act, ClientStatus, Counters, LinkEvent, Role, Untrusted};
 
 use super::refusals::{Refusals, SUM_PERIOD};
@@ -244,6 +245,12 @@ impl PageAudit {
     pub(crate) fn acted(&self, arm: bool, address: SocketAddr) {
         let (event_is, node) = (if arm { "arm" } else { "disarm" }, self.node);
         tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node, role = %Role::Operator, credential = "the page's token", %address);
+    }
+
+    /// Somebody who has shown the token changed the scene.
+    pub(crate) fn edited(address: SocketAddr, revision: u64, what: &str) {
+        let node = super::operator::NODE;
+        tracing::info!(target: taut_log::AUDIT_TARGET, event = "edit", node, role = %Role::Operator, credential = "the page's token", %address, revision, what = %Printable(what));
     }
 
     /// Somebody was refused. Of one address and reason the first is told at once, further ones as a sum.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use god_object::{GodObject, Pose, Settings};
 use taut_bridge::edge::offer_of;
 use taut_bridge::realtime::{keep_cores_awake, lock_memory};
-use taut_bridge::{ArmSwitch, ArmWish, Device, RemoteDevice};
+use taut_bridge::{ArmWish, Device, RemoteDevice};
 use taut_link::proto::CouplingOffer;
 use taut_link::{ServerLink, ServerOptions, proto};
 use taut_recording::Recorder;
@@ -22,7 +22,7 @@ use crate::session::clients::ClientLedger;
 use crate::session::edge_sets::EdgeSets;
 use crate::session::monitor::{MonitorFeed, MonitorPicture, MonitorSources, Severity};
 use crate::session::observers::ObserverServices;
-use crate::session::operator::{Facts, OperatorPage};
+use crate::session::operator::{Continuity, Facts, OperatorPage};
 use crate::session::setup::content::own_colours;
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::clock::SessionClock;
@@ -37,11 +37,12 @@ const NETWORK_THREADS: usize = 2;
 impl Session {
     /// Builds and starts everything.
     pub fn start(setup: SessionSetup) -> Result<Self, Failure> {
-        Self::start_with(setup, Arc::default())
+        Self::start_with(setup, &mut Continuity::default())
     }
 
     /// What the scene can be wrong in: what [`Session::start`] refuses before anything is opened.
     pub(crate) fn begin(setup: &SessionSetup) -> Result<(GodObject, PenetrationChecker), Failure> {
+        setup.content.check()?;
         let god_object = GodObject::new(setup.world.clone(), setup.settings, setup.start)?;
         let checker = PenetrationChecker::new(&setup.world).ok_or_else(|| {
             Failure::bad_input(
@@ -51,12 +52,9 @@ impl Session {
         Ok((god_object, checker))
     }
 
-    /// The same with a switch that outlives the session. A wish of before does not count.
-    pub(crate) fn start_with(
-        setup: SessionSetup,
-        arm_switch: Arc<ArmSwitch>,
-    ) -> Result<Self, Failure> {
-        let _ = arm_switch.take();
+    /// The same with what outlives the session. A wish for force of before does not count; one for no force does.
+    pub(crate) fn start_with(setup: SessionSetup, kept: &mut Continuity) -> Result<Self, Failure> {
+        kept.switch.begin_again();
         let (god_object, checker) = Self::begin(&setup)?;
 
         // The network, whose clock is everybody's; the device may be behind it.
@@ -65,7 +63,7 @@ impl Session {
         let runtime = network_runtime(&ledger)?;
         let picture = picture(&setup);
         let opening = opening(&setup);
-        let facts = facts(&setup)?;
+        let facts = setup.operator.as_ref().map(|page| Facts::of(&setup, page));
         let scene_revision = setup.content.description.revision;
         let coupling = match &setup.device {
             DeviceSource::Remote { .. } => offer_of(
@@ -133,26 +131,28 @@ impl Session {
             taps,
         )
         .with_motions(setup.motions.clone())
-        .with_arm_switch(arm_switch);
+        .with_arm_switch(kept.switch.clone());
         let switch = loops.arm_switch.clone();
         link.on_arm(move |arm| {
             switch.wish(if arm { ArmWish::Arm } else { ArmWish::Disarm });
         });
-        let operator = match (&setup.operator, &facts) {
+        let operator = match (&setup.operator, facts) {
             (Some(wanted), Some(facts)) => {
-                let (switch, feed) = (loops.arm_switch.clone(), outlets.add());
                 let page = OperatorPage::start(
                     wanted,
                     facts,
-                    feed,
-                    switch,
+                    outlets.add(),
+                    kept,
                     &loops.statistics,
                     clock,
                     &setup.link.policy,
                 );
                 Some(page?)
             }
-            _ => None,
+            _ => {
+                kept.close();
+                None
+            }
         };
         let broadcaster = link.broadcaster();
         let (grant, awake) = keep_cores_awake();
@@ -288,16 +288,6 @@ fn connect_device(
             Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
         }
     }
-}
-
-/// What the operator's page says of the session, if there is one.
-fn facts(setup: &SessionSetup) -> Result<Option<Facts>, Failure> {
-    let Some(wanted) = &setup.operator else {
-        return Ok(None);
-    };
-    let facts = Facts::of(setup, wanted)
-        .ok_or_else(|| Failure::failed("the system has no random numbers"))?;
-    Ok(Some(facts))
 }
 
 /// What the monitor's log begins with.

@@ -25,6 +25,17 @@ pub(crate) struct EncodedContent {
 }
 
 impl Content {
+    /// Refuses a description that cannot be sent: what [`serve`](crate::serve) would refuse.
+    ///
+    /// # Errors
+    /// A number out of its range, a text that is too long, more than a message holds.
+    pub fn check(&self) -> Result<(), LinkError> {
+        let sent = ControlMessage::Scene(self.description.clone()).to_frame();
+        sent.map(drop).map_err(|error| LinkError::Content {
+            reason: error.to_string(),
+        })
+    }
+
     /// Encodes everything; an error if the description names a mesh that is not there.
     pub(crate) fn encode(self, coupling: CouplingOffer) -> Result<EncodedContent, LinkError> {
         let refuse = |reason: String| LinkError::Content { reason };

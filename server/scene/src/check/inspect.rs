@@ -153,6 +153,9 @@ fn check_toml(path: &Path) -> FileReport {
         let workbench = Workbench::load(path).and_then(|workbench| {
             notes = workbench.notes();
             let scene = workbench.load_scene()?;
+            for other in workbench.scenes() {
+                Scene::named_or_file(other)?;
+            }
             let (inner, fidelity) = summarise_scene(&scene, &mut notes)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());
             let summary = format!(

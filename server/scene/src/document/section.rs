@@ -405,7 +405,7 @@ fn as_number(node: &Node) -> Option<f64> {
 }
 
 /// `; did you mean ...?`, or nothing if no name is near.
-fn nearest<'n>(wrong: &str, names: impl Iterator<Item = &'n str>) -> String {
+pub(crate) fn nearest<'n>(wrong: &str, names: impl Iterator<Item = &'n str>) -> String {
     let best = names
         .map(|name| (strsim::jaro_winkler(wrong, name), name))
         .filter(|(similarity, _)| *similarity >= SUGGESTION_SIMILARITY)

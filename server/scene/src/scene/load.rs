@@ -153,6 +153,17 @@ impl Scene {
         })
     }
 
+    /// The same scene with another text, under the same name and with the same overrides.
+    pub(super) fn with_text(&self, text: &str) -> Result<Self, FileError> {
+        let file = &self.document.root.at.file;
+        Self::from_text(file, text, self.origin.clone())?.with_overrides(&self.overrides)
+    }
+
+    /// Its text as it stands now.
+    pub fn text(&self) -> &Arc<str> {
+        &self.text
+    }
+
     /// The scene's name.
     pub fn name(&self) -> &str {
         &self.spec.name

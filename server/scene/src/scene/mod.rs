@@ -2,6 +2,7 @@
 
 mod auto_fidelity;
 mod build;
+mod edit;
 mod load;
 mod parse;
 mod parse_look;
@@ -10,6 +11,7 @@ mod shipped;
 mod spec;
 
 pub use build::{BuiltBody, BuiltHand, BuiltMotion, BuiltScene, GOD_OBJECT_NAME};
+pub use edit::EditedKey;
 pub(crate) use load::mesh_faults;
 pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};

@@ -16,6 +16,8 @@ pub enum NeededFile {
     Secret(PathBuf),
     /// Of a scene: its name as the scene has it, and where it was found.
     OfScene {
+        /// The scene, as [`Workbench::scene`].
+        scene: String,
         /// Relative to the scene file, else to a data directory.
         name: String,
         /// The file.
@@ -24,14 +26,34 @@ pub enum NeededFile {
 }
 
 impl Workbench {
+    /// The scene, and those that may be chosen from the operator's page; each once.
+    pub fn scenes(&self) -> Vec<&str> {
+        let mut scenes = vec![self.scene.as_str()];
+        for scene in self
+            .operator
+            .scenes
+            .iter()
+            .filter(|_| self.operator.enabled)
+        {
+            if !scenes.contains(&scene.as_str()) {
+                scenes.push(scene);
+            }
+        }
+        scenes
+    }
+
     /// Every file that `taut serve` reads beside the workbench file and the cluster key.
     pub fn needed_files(&self) -> Result<Vec<NeededFile>, FileError> {
         let mut files = Vec::new();
-        if shipped_scene_text(&self.scene).is_none() {
-            files.push(NeededFile::Named(PathBuf::from(&self.scene)));
-        }
-        for (name, found) in self.load_scene()?.files()? {
-            files.push(NeededFile::OfScene { name, found });
+        self.load_scene()?;
+        for scene in self.scenes() {
+            if shipped_scene_text(scene).is_none() {
+                files.push(NeededFile::Named(PathBuf::from(scene)));
+            }
+            for (name, found) in Scene::named_or_file(scene)?.files()? {
+                let scene = scene.to_owned();
+                files.push(NeededFile::OfScene { scene, name, found });
+            }
         }
         match &self.device {
             Device::Simulated { path, strings, .. } => {

@@ -7,6 +7,9 @@ use super::parts::{Files, port};
 use super::token::read_token;
 use crate::document::Section;
 
+/// Most scenes to choose from.
+const MAX_SCENES: usize = 100;
+
 /// The operator's page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Operator {
@@ -16,6 +19,8 @@ pub struct Operator {
     pub port: u16,
     /// File with the token that those who act must show; without it each start has a token of its own.
     pub token_file: Option<PathBuf>,
+    /// Scenes that may be chosen from the page: shipped ones by name, else files.
+    pub scenes: Vec<String>,
 }
 
 impl Default for Operator {
@@ -24,6 +29,7 @@ impl Default for Operator {
             enabled: false,
             port: 4861,
             token_file: None,
+            scenes: Vec::new(),
         }
     }
 }
@@ -45,5 +51,27 @@ pub(super) fn operator(section: &Section<'_>, files: &Files<'_>) -> Operator {
         enabled: section.boolean("enabled").unwrap_or(false),
         port: port(section, "port", default.port),
         token_file: files.path(section, "token_file"),
+        scenes: scenes(section, files),
     }
+}
+
+fn scenes(section: &Section<'_>, files: &Files<'_>) -> Vec<String> {
+    let named = section.texts("scenes").unwrap_or_default();
+    if let Some((_, at)) = named.get(MAX_SCENES) {
+        let text = format!("`scenes` in [operator] names more than {MAX_SCENES}; leave some out");
+        section.complain(at, text);
+    }
+    named
+        .into_iter()
+        .take(MAX_SCENES)
+        .map(|(name, at)| {
+            if name.is_empty() {
+                section.complain(
+                    at,
+                    "a scene in [operator] has no name; write a shipped one's, or a file",
+                );
+            }
+            files.scene(name)
+        })
+        .collect()
 }

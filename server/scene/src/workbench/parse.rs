@@ -23,23 +23,18 @@ use super::spec::Device;
 use super::viewer::{show, viewer};
 use crate::document::{Document, Section};
 use crate::problem::FileError;
-use crate::scene::{pose_of, shipped_scene_text};
+use crate::scene::pose_of;
 
 pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, FileError> {
     let problems = RefCell::new(Vec::new());
     let root = Section::root(&document.root, &problems);
+    let files = Files { directory };
     let name = root
         .required_text("name", "name = \"workbench\"")
         .map(str::to_owned);
     let scene = root
         .required_text("scene", "scene = \"peg-in-a-hole\"")
-        .map(|scene| {
-            if shipped_scene_text(scene).is_some() {
-                scene.to_owned()
-            } else {
-                directory.join(scene).display().to_string()
-            }
-        });
+        .map(|scene| files.scene(scene));
     let scene_at = root.get("scene").map_or(root.at(), |node| &node.at).clone();
     let scene_origin = table(&root, "scene_origin", pose_of)
         .flatten()
@@ -55,7 +50,6 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
             None
         }
     };
-    let files = Files { directory };
     let simulated = Device::Simulated {
         hand: None,
         path: None,

@@ -4,6 +4,7 @@ use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use crate::document::Section;
+use crate::scene::shipped_scene_text;
 
 /// Fastest stream or loop, 1/s.
 pub(super) const MAX_RATE: f64 = 10_000.0;
@@ -16,6 +17,15 @@ pub(super) struct Files<'d> {
 impl Files<'_> {
     pub(super) fn path(&self, section: &Section<'_>, key: &'static str) -> Option<PathBuf> {
         section.text(key).map(|text| self.directory.join(text))
+    }
+
+    /// A shipped scene's name as it is, else a file relative to the workbench's.
+    pub(super) fn scene(&self, text: &str) -> String {
+        if shipped_scene_text(text).is_some() {
+            text.to_owned()
+        } else {
+            self.directory.join(text).display().to_string()
+        }
     }
 
     /// A name of something shipped as it is, a file relative to the workbench's: one that has an ending or a folder.

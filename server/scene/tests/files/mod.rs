@@ -1,6 +1,7 @@
 //! Scenes, workbenches, shapes and checks from outside the crate.
 
 mod checks;
+mod edits;
 mod exact_shapes;
 mod fidelity;
 mod generated_shapes;

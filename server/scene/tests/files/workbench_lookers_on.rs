@@ -3,7 +3,7 @@
 use std::net::Ipv4Addr;
 use std::path::Path;
 
-use taut_scene::{SHIPPED_WORKBENCH, Workbench};
+use taut_scene::{NeededFile, SHIPPED_WORKBENCH, Workbench};
 
 fn with(assignments: &[&str]) -> Result<Workbench, String> {
     Workbench::parse_with_overrides("w.toml", SHIPPED_WORKBENCH, Path::new(""), assignments)
@@ -110,4 +110,63 @@ fn a_token_is_read_from_its_file_and_a_poor_one_is_refused() {
     std::fs::write(&path, "short\n").expect("written");
     let refused = operator.token().expect_err("short");
     assert!(refused.contains("[operator]"), "{refused}");
+}
+
+#[test]
+fn scenes_to_choose_from_are_needed_with_their_own_files_where_there_is_a_page() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let scene = "name = \"a\"\ngod_object = { shape = { sphere = { radius = 0.01 } }, mass = 1 }\nhand = { path = \"hand.csv\" }\n";
+    for (file, text) in [
+        ("a.toml", scene),
+        ("b.toml", scene),
+        ("hand.csv", "t,x,y,z,qw,qx,qy,qz\n"),
+    ] {
+        std::fs::write(directory.path().join(file), text).expect("written");
+    }
+    let parse = |assignments: &[&str]| {
+        let parsed = Workbench::parse_with_overrides(
+            "workbench.toml",
+            SHIPPED_WORKBENCH,
+            directory.path(),
+            assignments,
+        );
+        parsed.map_err(|error| error.to_string())
+    };
+    let named = "operator.scenes=[\"b.toml\", \"two-bunnies\", \"a.toml\"]";
+    let workbench = parse(&["scene=a.toml", named]).expect("valid");
+    assert_eq!(workbench.scenes().len(), 1, "there is no page");
+    let on = "operator.enabled=true";
+    let workbench = parse(&[
+        "scene=a.toml",
+        on,
+        "operator.scenes=[\"b.toml\", \"a.toml\"]",
+    ]);
+    let workbench = workbench.expect("valid");
+    let [a, b] = ["a.toml", "b.toml"].map(|file| directory.path().join(file).display().to_string());
+    assert_eq!(
+        workbench.scenes(),
+        [&a, &b],
+        "each once, the served one first"
+    );
+    let needed = workbench.needed_files().expect("all there");
+    for scene in [a, b] {
+        assert!(needed.contains(&NeededFile::Named(scene.clone().into())));
+        let hand = NeededFile::OfScene {
+            scene,
+            name: "hand.csv".to_owned(),
+            found: directory.path().join("hand.csv"),
+        };
+        assert!(needed.contains(&hand), "{needed:?}");
+    }
+    let many = format!("operator.scenes=[{}]", "\"b.toml\", ".repeat(101));
+    assert!(
+        parse(&[&many])
+            .expect_err("too many")
+            .contains("more than 100")
+    );
+    assert!(
+        parse(&["operator.scenes=[\"\"]"])
+            .expect_err("no name")
+            .contains("no name")
+    );
 }

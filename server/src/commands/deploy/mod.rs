@@ -158,7 +158,6 @@ impl Plan<'_> {
             Mode::Plain,
             read(self.config)?,
         )];
-        let scene = Path::new(&self.workbench.scene);
         for needed in self.workbench.needed_files()? {
             let (place, found, mode) = match needed {
                 NeededFile::Named(path) => (below(folder, &path)?, path, Mode::Plain),
@@ -167,7 +166,8 @@ impl Plan<'_> {
                         .map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
                     (below(folder, &path)?, path, Mode::Secret)
                 }
-                NeededFile::OfScene { name, found } => {
+                NeededFile::OfScene { scene, name, found } => {
+                    let scene = Path::new(&scene);
                     let beside = match scene.is_file() {
                         true => scene.parent().unwrap_or(Path::new("")).join(name),
                         false => folder.join("data").join(name),

@@ -1,11 +1,11 @@
-//! What an operator's page does: the same wish that `taut arm` makes, to the same switch, and the port's own answer.
+//! What an operator's page does: the same wish that `taut arm` makes, to the same switch, and the port's own answer; and changes of the scene.
 //!
-//! Called on the page's thread. Arming is refused where `taut arm` would be refused: no state of the device, or a workbench that lets in no operator;
-//! what the port thinks of it is the port's matter. Nothing but the token stands before disarming.
+//! Called on the page's thread. It outlives a session that makes way for another. Arming is refused where `taut arm` would be refused: no state of the
+//! device, or a workbench that lets in no operator; what the port thinks of it is the port's matter. Nothing but the token stands before disarming.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use taut_bridge::{ArmSwitch, ArmWish, EventKind};
 use taut_link::proto::proof::{Claim, Grant};
@@ -13,6 +13,7 @@ use taut_link::{JoinPolicy, Role};
 use taut_observers::{Answer, Deed, Desk, Outcome};
 use taut_proto::state::RunState;
 
+use super::scene_desk::SceneDesk;
 use crate::loops::haptics::HapticsStatistics;
 use crate::session::audit::PageAudit;
 use crate::shared::clock::SessionClock;
@@ -22,44 +23,70 @@ const STATE_PATIENCE: Duration = Duration::from_secs(2);
 /// A force that is asked away is gone by then.
 const FADE: Duration = Duration::from_millis(250);
 /// By what name the audit trail and `[network] revoked` know the page.
-pub(super) const NODE: &str = "operator-page";
+pub(crate) const NODE: &str = "operator-page";
+/// Told while one session makes way for the next.
+const BETWEEN: &str = "not armed: the scene is being changed; look, and ask again";
+
+type Told = (EventKind, Result<&'static str, &'static str>);
 
 /// What the desk knows of the session, from the thread that looks after it.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Seen {
+    haptics: Arc<HapticsStatistics>,
+    clock: SessionClock,
     run: RunState,
     /// Session time at which that was told.
     told: Option<Duration>,
-    /// Why nobody arms from here, if that is so.
+}
+
+/// The session that runs, if one does.
+#[derive(Debug, Default)]
+struct Watched {
+    seen: Option<Seen>,
+    /// Why nobody acts from here, if that is so.
     closed: Option<String>,
 }
 
-/// Arms and disarms for the page.
+/// Arms, disarms and changes the scene for the page.
 #[derive(Debug)]
 pub(super) struct OperatorDesk {
     switch: Arc<ArmSwitch>,
-    haptics: Arc<HapticsStatistics>,
-    clock: SessionClock,
-    seen: Arc<Mutex<Seen>>,
+    scenes: Arc<SceneDesk>,
+    watched: Arc<Mutex<Watched>>,
     audit: PageAudit,
+    begun: Instant,
 }
 
 impl OperatorDesk {
-    pub(super) fn new(
-        switch: Arc<ArmSwitch>,
+    pub(super) fn new(switch: Arc<ArmSwitch>, scenes: Arc<SceneDesk>) -> Self {
+        Self {
+            switch,
+            scenes,
+            watched: Arc::default(),
+            audit: PageAudit::new(NODE),
+            begun: Instant::now(),
+        }
+    }
+
+    /// Acts on this session from now on.
+    pub(super) fn begin(
+        &self,
         haptics: Arc<HapticsStatistics>,
         clock: SessionClock,
         policy: &JoinPolicy,
-    ) -> Self {
-        let desk = Self {
-            switch,
+    ) {
+        self.follow_policy(policy);
+        self.watched().seen = Some(Seen {
             haptics,
             clock,
-            seen: Arc::default(),
-            audit: PageAudit::new(NODE),
-        };
-        desk.follow_policy(policy);
-        desk
+            run: RunState::Waiting,
+            told: None,
+        });
+    }
+
+    /// The session is over: nothing is armed until the next.
+    pub(super) fn end(&self) {
+        self.watched().seen = None;
     }
 
     /// Takes who may join: where no operator may, nobody arms from here.
@@ -70,89 +97,112 @@ impl OperatorDesk {
             grant: Grant::Master,
         };
         let closed = policy.check(claim).err();
-        self.seen().closed = closed.map(|shut_out| shut_out.to_string());
+        self.watched().closed = closed.map(|shut_out| shut_out.to_string());
     }
 
     /// Takes what a state says that came at session time `now`.
     pub(super) fn follow_state(&self, run: RunState, now: Duration) {
-        let mut seen = self.seen();
-        (seen.run, seen.told) = (run, Some(now));
+        if let Some(seen) = &mut self.watched().seen {
+            (seen.run, seen.told) = (run, Some(now));
+        }
     }
 
     /// Writes the sums of the audit trail that are due.
-    pub(super) fn look(&self, now: Duration) {
-        self.audit.look(now);
+    pub(super) fn look(&self) {
+        self.audit.look(self.begun.elapsed());
+    }
+
+    pub(super) fn scenes(&self) -> &Arc<SceneDesk> {
+        &self.scenes
     }
 
     /// Why arming is not even asked for, if that is so.
     pub(super) fn why_not(&self) -> Option<String> {
-        let seen = self.seen();
-        let now = self.clock.now();
-        if let Some(closed) = &seen.closed {
+        let watched = self.watched();
+        if let Some(closed) = &watched.closed {
             return Some(format!("not armed: {closed}"));
         }
+        let Some(seen) = &watched.seen else {
+            return Some(BETWEEN.to_owned());
+        };
+        let now = seen.clock.now();
         match seen.told {
             Some(told) if now.saturating_sub(told) < STATE_PATIENCE => None,
             _ => Some("not armed: no device sample comes; check that the device runs".to_owned()),
         }
     }
 
-    fn seen(&self) -> MutexGuard<'_, Seen> {
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    fn watched(&self) -> MutexGuard<'_, Watched> {
+        self.watched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Looks for an event of one of these kinds from now on.
-    fn watch<const N: usize>(
+    /// Makes the wish, and waits for an event of one of these kinds, or for a state of after the fade that `settled` makes something of. A session
+    /// that ends before that ends the waiting with `over`.
+    fn ask<const N: usize>(
         &self,
-        answers: [(EventKind, Answer); N],
-    ) -> impl FnMut() -> Option<Answer> + use<N> {
-        let haptics = self.haptics.clone();
-        let before = answers.map(|(kind, _)| haptics.incidents.of(kind));
-        move || {
-            let mut fresh = answers.iter().zip(&before);
-            fresh
+        wish: ArmWish,
+        answers: [Told; N],
+        settled: impl Fn(RunState) -> Option<Result<&'static str, &'static str>> + Send + 'static,
+        over: Result<&'static str, &'static str>,
+    ) -> Outcome {
+        let before = self.watched().seen.as_ref().map(|seen| {
+            let counted = answers.map(|(kind, _)| seen.haptics.incidents.of(kind));
+            (seen.haptics.clone(), counted, seen.clock.now() + FADE)
+        });
+        self.switch.wish(wish);
+        let watched = self.watched.clone();
+        Box::new(move || {
+            let watched = watched.lock().unwrap_or_else(PoisonError::into_inner);
+            let running = before.as_ref().zip(watched.seen.as_ref());
+            let running =
+                running.filter(|((haptics, ..), seen)| Arc::ptr_eq(haptics, &seen.haptics));
+            let Some(((haptics, before, fade), seen)) = running else {
+                return Some(owned(over));
+            };
+            let mut fresh = answers.iter().zip(before);
+            let told = fresh
                 .find(|((kind, _), before)| haptics.incidents.of(*kind) > **before)
-                .map(|((_, answer), _)| *answer)
-        }
+                .map(|((_, answer), _)| *answer);
+            let is_after = seen.told.is_some_and(|told| told > *fade);
+            let state = || is_after.then(|| settled(seen.run)).flatten();
+            told.or_else(state).map(owned)
+        })
     }
 
     /// Asks for force. A port that gives it already says nothing, and neither does one whose force is just going: the state tells.
     fn arm(&self) -> Outcome {
-        let mut told = self.watch([
+        let answers = [
             (EventKind::Arming, Ok("armed: the force ramps in")),
             (
                 EventKind::ArmRefused,
                 Err("not armed: the device or the forces are not in order; see what happened last"),
             ),
-        ]);
-        self.switch.wish(ArmWish::Arm);
-        let (settled, seen) = (self.clock.now() + FADE, self.seen.clone());
-        Box::new(move || {
-            told().or_else(|| match run_after(&seen, settled)? {
-                RunState::Running => Some(Ok("armed already")),
-                RunState::Paused => Some(Err("not armed: the force was still fading; ask again")),
-                RunState::Waiting | RunState::Fault => None,
-            })
-        })
+        ];
+        let settled = |run| match run {
+            RunState::Running => Some(Ok("armed already")),
+            RunState::Paused => Some(Err("not armed: the force was still fading; ask again")),
+            RunState::Waiting | RunState::Fault => None,
+        };
+        self.ask(ArmWish::Arm, answers, settled, Err(BETWEEN))
     }
 
     fn disarm(&self) -> Outcome {
-        let mut told = self.watch([(EventKind::Disarmed, Ok("disarmed: the force fades"))]);
-        self.switch.wish(ArmWish::Disarm);
-        let (settled, seen) = (self.clock.now() + FADE, self.seen.clone());
-        Box::new(move || {
-            told().or_else(|| {
-                let is_off = run_after(&seen, settled)? == RunState::Paused;
-                is_off.then_some(Ok("disarmed already"))
-            })
-        })
+        let answers = [(EventKind::Disarmed, Ok("disarmed: the force fades"))];
+        let settled = |run| (run == RunState::Paused).then_some(Ok("disarmed already"));
+        let over = Ok("disarmed: the session ended, and the next begins without force");
+        self.ask(ArmWish::Disarm, answers, settled, over)
     }
 }
 
-/// What the device does, if that was told after `moment`.
-fn run_after(seen: &Mutex<Seen>, moment: Duration) -> Option<RunState> {
-    let seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    (seen.told? > moment).then_some(seen.run)
+impl Drop for OperatorDesk {
+    /// Writes what the audit trail has left.
+    fn drop(&mut self) {
+        self.audit.look(Duration::MAX);
+    }
+}
+
+fn owned(answer: Result<&'static str, &'static str>) -> Answer {
+    answer.map(str::to_owned).map_err(str::to_owned)
 }
 
 impl Desk for OperatorDesk {
@@ -165,8 +215,7 @@ impl Desk for OperatorDesk {
             }
             Deed::Arm => {
                 if let Some(why) = self.why_not() {
-                    let now = self.clock.now();
-                    self.audit.refused(peer, "arming where nobody can arm", now);
+                    self.refused(peer, "arming where nobody can arm");
                     return Err(why);
                 }
                 self.audit.acted(true, peer);
@@ -175,7 +224,20 @@ impl Desk for OperatorDesk {
         }
     }
 
+    fn edit(&self, body: &[u8], peer: SocketAddr) -> Result<Outcome, String> {
+        let closed = self.watched().closed.clone();
+        let asked = match closed {
+            Some(closed) => Err(format!("not taken: {closed}")),
+            None => self.scenes.ask(body, peer),
+        };
+        asked.inspect_err(|_| self.refused(peer, "a change of the scene that is not taken"))
+    }
+
+    fn scene(&self) -> Arc<str> {
+        self.scenes.shown()
+    }
+
     fn refused(&self, peer: SocketAddr, why: &'static str) {
-        self.audit.refused(peer, why, self.clock.now());
+        self.audit.refused(peer, why, self.begun.elapsed());
     }
 }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
-use taut_bridge::{ArmSwitch, Rearm, SafetyEvent, SafetySettings};
+use taut_bridge::{Rearm, SafetyEvent, SafetySettings};
 use taut_link::JoinPolicy;
+use taut_observers::StateFeed;
 use taut_observers::lines::run_name;
-use taut_observers::{OperatorServer, StateFeed, fresh_token};
 use taut_proto::HotState;
 use taut_proto::state::{RunState, TOOL_DEVICE_SILENT, TOOL_FORCE_LIMITED};
 
-use super::desk::OperatorDesk;
+use super::door::{Continuity, OperatorDoor};
 use super::recent::Recent;
 use super::settings::OperatorSetup;
 use crate::loops::statistics::Statistics;
@@ -34,6 +34,8 @@ pub(crate) struct Facts {
     scene: String,
     /// Another one at each start of the server.
     instance: String,
+    /// Which scene of this server it is: `/scene` has it.
+    scene_revision: u64,
     /// Whether a device behind a bridge is commanded, which is armed at the bridge as well.
     device_behind_bridge: bool,
     /// Whether a person arms.
@@ -82,8 +84,7 @@ struct Now {
 /// A running page. Dropped, it ends.
 #[derive(Debug)]
 pub(crate) struct OperatorPage {
-    server: OperatorServer,
-    desk: Arc<OperatorDesk>,
+    door: Arc<OperatorDoor>,
     token: Shown,
     feed: StateFeed,
     facts: String,
@@ -105,54 +106,54 @@ enum Shown {
 }
 
 impl Facts {
-    /// Of a session that is about to start; `None` where the system has no random numbers.
-    pub(crate) fn of(setup: &SessionSetup, wanted: &OperatorSetup) -> Option<Self> {
+    /// Of a session that is about to start.
+    pub(crate) fn of(setup: &SessionSetup, wanted: &OperatorSetup) -> Self {
         let safety: &SafetySettings = &setup.safety;
-        Some(Self {
+        Self {
             program: concat!("taut ", env!("CARGO_PKG_VERSION")),
             workbench: wanted.workbench.clone(),
             scene: setup.content.description.name.to_string(),
-            instance: fresh_token()?,
+            instance: String::new(),
+            scene_revision: 0,
             device_behind_bridge: matches!(setup.device, DeviceSource::Remote { .. }),
             manual: safety.rearm == Rearm::Manual,
             force_limit_n: safety.max_force,
             torque_limit_n: safety.max_torque,
             ramp_in_s: safety.ramp_in.as_secs_f64(),
-        })
+        }
     }
 }
 
 impl OperatorPage {
-    /// Opens the page.
+    /// Opens the page, or lets the one that is open show this session.
     ///
     /// # Errors
     /// The port cannot be had.
     pub(crate) fn start(
         wanted: &OperatorSetup,
-        facts: &Facts,
+        facts: Facts,
         feed: StateFeed,
-        switch: Arc<ArmSwitch>,
+        kept: &mut Continuity,
         statistics: &Statistics,
         clock: SessionClock,
         policy: &JoinPolicy,
     ) -> Result<Self, Failure> {
-        let haptics = statistics.haptics.clone();
-        let desk = Arc::new(OperatorDesk::new(switch, haptics, clock, policy));
-        let server = OperatorServer::start(wanted.server.clone(), desk.clone()).map_err(|error| {
-            Failure::bad_input(format!(
-                "[operator] cannot listen on port {} of 127.0.0.1 ({error}); free it or choose another port",
-                wanted.server.port
-            ))
-        })?;
+        let door = kept.door(wanted)?;
+        let desk = &door.desk;
+        desk.begin(statistics.haptics.clone(), clock, policy);
+        let facts = json(&Facts {
+            instance: door.instance.clone(),
+            scene_revision: desk.scenes().revision(),
+            ..facts
+        });
         Ok(Self {
-            server,
-            desk,
+            door,
             token: match &wanted.token_file {
                 Some(file) => Shown::In(file.clone()),
                 None => Shown::Fresh(wanted.server.token.clone()),
             },
             feed,
-            facts: json(facts),
+            facts,
             state: Now {
                 run: run_name(RunState::Waiting),
                 ..Now::default()
@@ -166,7 +167,7 @@ impl OperatorPage {
 
     /// Where it is, with the port that it got.
     pub(crate) fn address(&self) -> SocketAddr {
-        self.server.address()
+        self.door.address()
     }
 
     /// Where it is, and what opens it, for the person who started the server.
@@ -185,7 +186,7 @@ impl OperatorPage {
 
     /// Takes who may join.
     pub(crate) fn follow_policy(&self, policy: &JoinPolicy) {
-        self.desk.follow_policy(policy);
+        self.door.desk.follow_policy(policy);
     }
 
     /// Takes an event of the device port.
@@ -208,9 +209,9 @@ impl OperatorPage {
         if let Some(fresh) = self.feed.fresh() {
             self.state.follow(fresh.state);
             self.sampled = Some(Duration::from_nanos(fresh.state.sample_time_ns));
-            self.desk.follow_state(fresh.state.run, moment.now);
+            self.door.desk.follow_state(fresh.state.run, moment.now);
         }
-        self.desk.look(moment.now);
+        self.door.desk.look();
         if moment.now < self.next {
             return;
         }
@@ -224,8 +225,8 @@ impl OperatorPage {
         [state.force_n, state.torque_nm] = moment.felt;
         state.largest_force_n = moment.largest_force;
         state.recorded = moment.is_recorded;
-        state.why_not_armed = self.desk.why_not();
-        self.server.publish(format!(
+        state.why_not_armed = self.door.desk.why_not();
+        self.door.server.publish(format!(
             r#"{{"type":"status","session":{},"now":{},"recent":{},"metrics":{}}}"#,
             self.facts,
             json(&self.state),
@@ -234,9 +235,9 @@ impl OperatorPage {
         ));
     }
 
-    /// Writes what the audit trail has left.
+    /// The session is over.
     pub(crate) fn end(&self) {
-        self.desk.look(Duration::MAX);
+        self.door.desk.end();
     }
 }
 

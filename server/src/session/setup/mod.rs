@@ -16,7 +16,7 @@ use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltMotion, FidelityPlan};
+use taut_scene::{BuiltMotion, FidelityPlan, Scene};
 
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
@@ -27,6 +27,8 @@ use crate::session::operator::OperatorSetup;
 
 /// Everything that a session is made of.
 pub struct SessionSetup {
+    /// As it was read.
+    pub scene: Scene,
     /// Bodies.
     pub world: Arc<World>,
     /// How obstacles move; nothing for those that stand still. At most

@@ -47,6 +47,8 @@ const MAX_PRIORITY: u8 = 99;
 pub struct Overrides {
     /// A shipped scene's name, or a scene file.
     pub scene: Option<String>,
+    /// A scene that was changed since it was read, whatever is named.
+    pub edited: Option<Scene>,
     /// Address of the control plane.
     pub quic: Option<SocketAddr>,
     /// Address of the state plane.
@@ -69,9 +71,10 @@ pub fn session_setup(
     key: ClusterKey,
     overrides: &Overrides,
 ) -> Result<SessionSetup, Failure> {
-    let scene = match &overrides.scene {
-        Some(named) => Scene::named_or_file(named)?,
-        None => workbench.load_scene()?,
+    let scene = match (&overrides.edited, &overrides.scene) {
+        (Some(edited), _) => edited.clone(),
+        (None, Some(named)) => Scene::named_or_file(named)?,
+        (None, None) => workbench.load_scene()?,
     };
     let built = scene.build()?;
     if built.motions.len() > MAX_MOVING {
@@ -136,6 +139,7 @@ pub fn session_setup(
         crate::session::setup::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
     }
     Ok(SessionSetup {
+        scene,
         fidelity,
         recording,
         device: match &overrides.input {

@@ -1,16 +1,13 @@
-//! A scene that is edited while it is served (`taut serve --follow-scene`).
-//!
-//! A change begins another session: the force is led down, the loops are built anew, and nodes, bridge and observers join again as after a restart of the
-//! server. So nothing jumps, and whoever has to arm after a restart has to arm. A scene that cannot be served changes nothing.
+//! The files of a scene that is served (`taut serve --follow-scene`): edited, they begin another session.
 
 use std::path::{Path, PathBuf};
 
 use taut_scene::{NeededFile, Workbench};
 
+use super::load::Next;
 use crate::report::terminal::Terminal;
 use crate::session::Session;
 use crate::session::file_watch::FileWatch;
-use crate::session::setup::SessionSetup;
 use crate::shared::failure::Failure;
 
 /// Watches the workbench file and the files of its scene.
@@ -27,9 +24,11 @@ impl SceneWatch {
         let mut paths = Vec::new();
         for file in workbench.needed_files()? {
             match file {
-                NeededFile::OfScene { found, .. } => paths.push(found),
+                NeededFile::OfScene { scene, found, .. } if scene == workbench.scene => {
+                    paths.push(found)
+                }
                 NeededFile::Named(path) if path == Path::new(&workbench.scene) => paths.push(path),
-                NeededFile::Named(_) | NeededFile::Secret(_) => {}
+                NeededFile::OfScene { .. } | NeededFile::Named(_) | NeededFile::Secret(_) => {}
             }
         }
         let mut watched = vec![config.to_path_buf()];
@@ -41,26 +40,35 @@ impl SceneWatch {
         })
     }
 
+    /// A file that is watched was written here: what it holds now is no change.
+    pub(super) fn wrote(&mut self, file: &str) {
+        let place = self.paths.iter().position(|path| path == Path::new(file));
+        // The name of the scene is the first of the contents.
+        if let Some(known) = place.and_then(|place| self.contents.get_mut(place + 1)) {
+            *known = std::fs::read(file).unwrap_or_default();
+        }
+    }
+
     /// The session that is to take the place of this one, if the scene is another and can be served; says what became of a change.
     pub(super) fn follow(
         &mut self,
         terminal: &Terminal,
-        load: impl FnOnce() -> Result<(Workbench, SessionSetup), Failure>,
-    ) -> Option<(Workbench, SessionSetup)> {
+        load: impl FnOnce() -> Result<Next, Failure>,
+    ) -> Option<Next> {
         if !self.files.is_due() {
             return None;
         }
-        let loaded = load().and_then(|(workbench, setup)| {
-            Session::begin(&setup)?;
-            Ok((workbench, setup))
+        let loaded = load().and_then(|next| {
+            Session::begin(&next.setup)?;
+            Ok(next)
         });
         match loaded {
             // The workbench file may have changed in what is followed without a new session, or needs a restart.
-            Ok((workbench, _)) if contents(&workbench.scene, &self.paths) == self.contents => None,
+            Ok(next) if contents(&next.workbench.scene, &self.paths) == self.contents => None,
             Ok(next) => {
                 terminal.say(&format!(
                     "the scene {} is taken: the force fades, and another session begins",
-                    next.0.scene
+                    next.workbench.scene
                 ));
                 Some(next)
             }

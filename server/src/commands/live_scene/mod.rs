@@ -1,0 +1,300 @@
+//! The scene of `taut serve` while it runs: one owner of what it is, and the ways in which it becomes another.
+//!
+//! A file is edited (`--follow-scene`), or an operator sets some keys or chooses another scene. Either way a whole scene comes out, is read and checked as at
+//! the start, and begins another session: the force is led down, the loops are built anew, and nodes, bridge and observers join again as after a restart
+//! of the server. So nothing jumps, and whoever has to arm after a restart has to arm. What cannot be served changes nothing.
+
+mod change;
+mod files;
+mod load;
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use taut_scene::{Scene, shipped_scene_text};
+
+use self::change::{Change, Wanted, write_scene};
+use self::files::SceneWatch;
+use self::load::Loader;
+pub(super) use self::load::{Next, load_workbench};
+use crate::cli::ServeArgs;
+use crate::report::terminal::Terminal;
+use crate::session::Session;
+use crate::session::audit::PageAudit;
+use crate::session::operator::{AskedScene, SceneDesk, Standing, objects_of};
+use crate::session::setup::SessionSetup;
+use crate::session::setup::workbench::Overrides;
+use crate::shared::failure::Failure;
+
+/// Why a shipped scene is not kept.
+const NO_FILE: &str =
+    "the scene is part of the program and has no file; serve a scene file of your own";
+/// Shortest life of a session before an operator changes its scene: a flood of changes leaves time for force.
+const SHORTEST_LIFE: Duration = Duration::from_secs(1);
+
+/// A wish that is being looked at, on a thread of its own.
+struct Pending {
+    asked: AskedScene,
+    thread: JoinHandle<Result<Change, Failure>>,
+}
+
+/// A wish whose session begins now, and what it came to.
+struct Taken {
+    asked: AskedScene,
+    what: String,
+    kept: bool,
+}
+
+/// The scene that runs.
+struct Running {
+    scene: Scene,
+    /// A shipped scene's name, or its file.
+    from: String,
+    /// Text of the file, as it was when it was read or written last.
+    in_file: Arc<str>,
+    /// What was changed since.
+    not_kept: Vec<String>,
+    /// What can be chosen.
+    scenes: Vec<String>,
+    why_closed: Option<&'static str>,
+    /// What can be changed, a JSON object.
+    objects: String,
+}
+
+impl Running {
+    /// Why the file cannot take it.
+    fn why_not_kept(&self) -> Option<&'static str> {
+        let is_shipped = shipped_scene_text(&self.from).is_some();
+        is_shipped.then_some(NO_FILE)
+    }
+}
+
+/// The scene of one `taut serve`.
+pub(super) struct LiveScene {
+    loader: Loader,
+    desk: Arc<SceneDesk>,
+    revision: u64,
+    running: Option<Running>,
+    pending: Option<Pending>,
+    taken: Option<Taken>,
+    files: Option<SceneWatch>,
+}
+
+impl LiveScene {
+    pub(super) fn new(args: &ServeArgs, overrides: Overrides, desk: Arc<SceneDesk>) -> Self {
+        Self {
+            loader: Loader::new(args.clone(), overrides),
+            desk,
+            revision: 0,
+            running: None,
+            pending: None,
+            taken: None,
+            files: None,
+        }
+    }
+
+    /// What the first session is made of.
+    pub(super) fn first(&self) -> Result<Next, Failure> {
+        self.loader.load()
+    }
+
+    /// A session of this begins.
+    pub(super) fn begin(&mut self, next: &mut Next) {
+        let setup = &next.setup;
+        self.revision += 1;
+        self.loader.keep(next.chosen.take(), setup);
+        if let Some(files) = next.files.take() {
+            self.files = Some(files);
+        }
+        let all = next.workbench.scenes();
+        self.running = Some(Running {
+            scene: setup.scene.clone(),
+            from: next.workbench.scene.clone(),
+            in_file: next.in_file.clone(),
+            not_kept: std::mem::take(&mut next.not_kept),
+            scenes: all.into_iter().map(str::to_owned).collect(),
+            why_closed: why_closed(setup),
+            objects: objects_of(setup),
+        });
+        self.show();
+    }
+
+    /// Shows the page what runs.
+    fn show(&self) {
+        let Some(running) = &self.running else {
+            return;
+        };
+        let standing = Standing {
+            revision: self.revision,
+            name: running.scene.name(),
+            from: &running.from,
+            scenes: &running.scenes,
+            not_kept: &running.not_kept,
+            why_closed: running.why_closed,
+            why_not_kept: running.why_not_kept(),
+        };
+        self.desk.show(&standing, &running.objects);
+    }
+
+    /// The session runs: it is where its clients find it again, and whoever asked for it hears so.
+    pub(super) fn began(&mut self, session: &Session) {
+        self.loader
+            .stay_at(session.quic_address(), session.udp_address());
+        let Some(Taken { asked, what, kept }) = self.taken.take() else {
+            return;
+        };
+        PageAudit::edited(asked.peer, self.revision, &what);
+        let kept = if kept {
+            "the file has it"
+        } else {
+            "the file does not have it"
+        };
+        asked.answer(Ok(format!(
+            "taken: {what}; revision {} runs, and {kept}",
+            self.revision
+        )));
+    }
+
+    /// What is to take the place of this session, if something is.
+    pub(super) fn follow(&mut self, session: &Session, terminal: &Terminal) -> Option<Next> {
+        if let Some(pending) = self.pending.take() {
+            if !pending.thread.is_finished() {
+                self.pending = Some(pending);
+                return None;
+            }
+            return self.conclude(pending, terminal);
+        }
+        if let Some(files) = &mut self.files {
+            let loader = &self.loader;
+            let next = files.follow(terminal, || loader.load());
+            if let (Some(next), Some(running)) = (next, &self.running) {
+                if !running.not_kept.is_empty() {
+                    terminal.say(&format!(
+                        "what was changed while it ran, and not kept in a file, is gone: {}",
+                        running.not_kept.join("; ")
+                    ));
+                }
+                return Some(next);
+            }
+        }
+        if session.age() >= SHORTEST_LIFE
+            && let Some(asked) = self.desk.take()
+        {
+            self.look_at(asked);
+        }
+        None
+    }
+
+    /// Begins to look at a wish.
+    fn look_at(&mut self, asked: AskedScene) {
+        let Some(running) = &self.running else {
+            return;
+        };
+        let wish = asked.wish.clone();
+        if wish.scene.is_none() && wish.edits.is_empty() {
+            let kept = if wish.keep {
+                self.keep_as_it_runs(&asked)
+            } else {
+                Err("nothing is asked for: name an edit or a scene".to_owned())
+            };
+            return asked.answer(kept.map_err(|why| format!("not kept: {why}")));
+        }
+        if let (true, None, Some(why)) = (wish.keep, &wish.scene, running.why_not_kept()) {
+            return asked.answer(Err(format!("not taken, since it cannot be kept: {why}")));
+        }
+        let wanted = Wanted {
+            loader: self.loader.clone(),
+            scene: running.scene.clone(),
+            from: running.from.clone(),
+            in_file: running.in_file.clone(),
+            not_kept: running.not_kept.clone(),
+            scenes: running.scenes.clone(),
+            wish,
+        };
+        let thread = std::thread::Builder::new().name("scene".to_owned());
+        match thread.spawn(move || wanted.make()) {
+            Ok(thread) => self.pending = Some(Pending { asked, thread }),
+            Err(error) => asked.answer(Err(format!("not taken: no thread reads it ({error})"))),
+        }
+    }
+
+    /// Gives the file what was changed without it.
+    fn keep_as_it_runs(&mut self, asked: &AskedScene) -> Result<String, String> {
+        let running = self.running.as_mut().ok_or("no scene runs")?;
+        if let Some(why) = running.why_not_kept() {
+            return Err(why.to_owned());
+        }
+        let text = running.scene.text().clone();
+        write_scene(&running.from, &text, &running.in_file)?;
+        running.not_kept.clear();
+        running.in_file = text;
+        let from = running.from.clone();
+        self.wrote(&from);
+        self.show();
+        PageAudit::edited(asked.peer, self.revision, "kept in the file");
+        Ok(format!("kept: {from} has the scene as it runs"))
+    }
+
+    /// The file of a scene was written here: that is no change of it.
+    fn wrote(&mut self, file: &str) {
+        if let Some(files) = &mut self.files {
+            files.wrote(file);
+        }
+    }
+
+    /// Takes what came of a wish.
+    fn conclude(&mut self, pending: Pending, terminal: &Terminal) -> Option<Next> {
+        let Pending { asked, thread } = pending;
+        let made = thread.join().unwrap_or_else(|_| {
+            Err(Failure::failed(
+                "the program broke down over it; look at the server's log",
+            ))
+        });
+        let written = made.and_then(|change| {
+            if change.keep {
+                self.write(&change.next)?;
+            }
+            Ok(change)
+        });
+        match written {
+            Ok(change) => {
+                terminal.say(&format!(
+                    "an operator changes the scene ({}): the force fades, and another session begins",
+                    change.what
+                ));
+                let (what, kept, mut next) = (change.what, change.keep, change.next);
+                if kept {
+                    next.in_file = next.setup.scene.text().clone();
+                }
+                self.taken = Some(Taken { asked, what, kept });
+                Some(next)
+            }
+            Err(why) => {
+                asked.answer(Err(format!("not taken, and nothing is changed: {why}")));
+                None
+            }
+        }
+    }
+
+    /// Gives the file of a scene that is about to run what it runs with.
+    fn write(&mut self, next: &Next) -> Result<(), Failure> {
+        let (file, text) = (&next.workbench.scene, next.setup.scene.text());
+        if *text == next.in_file {
+            return Ok(());
+        }
+        if shipped_scene_text(file).is_some() {
+            return Err(Failure::bad_input(NO_FILE));
+        }
+        write_scene(file, text, &next.in_file).map_err(Failure::failed)?;
+        self.wrote(file);
+        Ok(())
+    }
+}
+
+/// Why nobody changes the scene of this session.
+fn why_closed(setup: &SessionSetup) -> Option<&'static str> {
+    let monitor = setup.monitor.as_ref();
+    let is_recorded = setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some());
+    is_recorded.then_some("the session is recorded, and a recording is of one scene; serve without")
+}
