@@ -10,6 +10,7 @@ pub mod broadcast;
 mod clients;
 pub mod edge_sets;
 mod end;
+mod external;
 pub(crate) mod file_watch;
 mod frames;
 pub mod head;
@@ -73,6 +74,7 @@ pub struct Session {
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     audit: AuditTrail,
+    external: external::ExternalTrail,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,
