@@ -28,6 +28,7 @@ mod session;
 mod setup;
 mod support;
 mod tracked_head;
+mod wrench_in;
 
 /// Counts by thread: a test that forbids allocation forbids its own.
 #[global_allocator]
