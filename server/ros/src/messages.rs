@@ -422,7 +422,7 @@ mod tests {
         );
         // The same by hand, the highest byte first.
         let mut big = vec![0, 0, 0, 0, 0, 0, 0, 7, 0, 0, 0, 9, 0, 0, 0, 6];
-        big.extend(b"tool0\0\0\0");
+        big.extend(b"tool0\0\0\0\0\0\0\0");
         for number in &wrench {
             big.extend(number.to_be_bytes());
         }

@@ -140,6 +140,10 @@ impl Refused {
 pub struct ExternalWrenchStatistics {
     taken: AtomicU64,
     refused: [AtomicU64; Refused::NAMED.len()],
+    /// Of a receiver that has no counters of its own; it writes them.
+    pub lost: AtomicU64,
+    /// The same of values that came again, too late, or without what tells their time.
+    pub dropped: AtomicU64,
     /// Of the value that is felt now, ns; the most that it ever was while felt.
     age_ns: AtomicU64,
     largest_age_ns: AtomicU64,
@@ -239,6 +243,13 @@ impl ExternalWrench {
             last_tick: None,
             statistics: Arc::default(),
         }
+    }
+
+    /// The same with counters that a receiver holds already.
+    #[must_use]
+    pub fn with_statistics(mut self, statistics: Arc<ExternalWrenchStatistics>) -> Self {
+        self.statistics = statistics;
+        self
     }
 
     /// The counters that this writes.

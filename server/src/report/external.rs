@@ -1,6 +1,7 @@
 //! A force from outside, as the end report and the metrics tell of it.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
 
 use serde::{Deserialize, Serialize};
 
@@ -26,14 +27,14 @@ pub struct ExternalWrenchReport {
 }
 
 impl ExternalWrenchReport {
-    /// As it is now; `lost` and `dropped` are the receiver's counts.
+    /// As it is now; `lost` and `dropped` are the link's counts.
     #[must_use]
     pub fn of(statistics: &ExternalWrenchStatistics, lost: u64, dropped: u64) -> Self {
         let refused = statistics.refused();
         Self {
             taken: statistics.taken(),
-            lost,
-            dropped,
+            lost: lost + statistics.lost.load(Ordering::Relaxed),
+            dropped: dropped + statistics.dropped.load(Ordering::Relaxed),
             refused: refused.map(|(why, count)| (why.to_owned(), count)).into(),
             age_ms: statistics.age().map(|age| age.as_secs_f64() * 1e3),
             largest_age_ms: statistics.largest_age().as_secs_f64() * 1e3,

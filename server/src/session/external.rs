@@ -3,21 +3,34 @@
 use std::time::Duration;
 
 use taut_link::ServerLink;
-use taut_scene::WrenchSource;
+use taut_scene::{WrenchSource, Zenoh};
 
+#[cfg(feature = "zenoh")]
+use crate::loops::external_wrench::NewestWrench;
 use crate::loops::external_wrench::{ExternalWrench, ExternalWrenchStatistics, WrenchReader};
+#[cfg(feature = "zenoh")]
+use crate::session::ros_order::RosOrder;
 use crate::session::setup::{DeviceSource, ExternalSetup};
+use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 
 /// Refusals of values are told as a sum, at most this often.
 const SUM_PERIOD: Duration = Duration::from_secs(60);
 
-/// The haptics loop's end of the force source that the workbench names, if it names one.
+/// Who hears values that do not come by the link; it ends when it is dropped.
+#[cfg(feature = "zenoh")]
+pub(super) type Receiver = taut_zenoh::RosWrenchSubscriber;
+#[cfg(not(feature = "zenoh"))]
+pub(super) type Receiver = std::convert::Infallible;
+
+/// The haptics loop's end of the force source that the workbench names, and its receiver if that is none of the link's; if it names one.
 pub(super) fn connect(
     wanted: Option<ExternalSetup>,
     device: &DeviceSource,
     link: &ServerLink,
-) -> Result<Option<ExternalWrench>, Failure> {
+    zenoh: &Zenoh,
+    clock: SessionClock,
+) -> Result<Option<(ExternalWrench, Option<Receiver>)>, Failure> {
     let Some(wanted) = wanted else {
         return Ok(None);
     };
@@ -26,19 +39,61 @@ pub(super) fn connect(
             "[wrench_in] does not go with a device behind a bridge; give the server its device (`taut serve --device`), or set wrench_in.enabled = false",
         ));
     }
-    let reader = match wanted.source {
-        WrenchSource::Taut => WrenchReader::Link(link.force_input().ok_or_else(|| {
-            Failure::failed(
-                "forces from outside are read by somebody else: this is a fault of the program",
-            )
-        })?),
-        WrenchSource::Ros { .. } => {
-            return Err(Failure::bad_input(
-                "source = \"ros\" in [wrench_in] needs a program built with the feature zenoh",
-            ));
+    match &wanted.source {
+        WrenchSource::Taut => {
+            let output = link.force_input().ok_or_else(|| {
+                Failure::failed(
+                    "forces from outside are read by somebody else: this is a fault of the program",
+                )
+            })?;
+            let external = ExternalWrench::new(WrenchReader::Link(output), wanted.settings);
+            Ok(Some((external, None)))
         }
+        WrenchSource::Ros {
+            topic,
+            allow_unproven,
+        } => subscribe(&wanted, (topic, *allow_unproven), zenoh, clock).map(Some),
+    }
+}
+
+#[cfg(not(feature = "zenoh"))]
+fn subscribe(
+    _wanted: &ExternalSetup,
+    (topic, _allow_unproven): (&str, bool),
+    _zenoh: &Zenoh,
+    _clock: SessionClock,
+) -> Result<(ExternalWrench, Option<Receiver>), Failure> {
+    Err(Failure::BadInput(format!(
+        "the topic {topic} of [wrench_in] needs a program built with --features zenoh; build it so, or set source = \"taut\""
+    )))
+}
+
+#[cfg(feature = "zenoh")]
+fn subscribe(
+    wanted: &ExternalSetup,
+    (topic, allow_unproven): (&str, bool),
+    zenoh: &Zenoh,
+    clock: SessionClock,
+) -> Result<(ExternalWrench, Option<Receiver>), Failure> {
+    use std::sync::Arc;
+    let (input, output) = triple_buffer::triple_buffer(&NewestWrench::default());
+    let statistics = Arc::<ExternalWrenchStatistics>::default();
+    let mut order = RosOrder::new(input, statistics.clone());
+    let settings = taut_zenoh::RosWrenchSettings {
+        name: zenoh.name.clone(),
+        connect: zenoh.connect.clone(),
+        config: zenoh.config.clone(),
+        domain: taut_zenoh::Domain(zenoh.ros_domain),
+        topic: topic.to_owned(),
+        allow_unproven,
     };
-    Ok(Some(ExternalWrench::new(reader, wanted.settings)))
+    let subscriber = taut_zenoh::RosWrenchSubscriber::start(settings, move |came| {
+        order.take(&came, clock.now());
+    });
+    let subscriber = subscriber.map_err(Failure::bad_input)?;
+    let external = ExternalWrench::new(WrenchReader::Local(output), wanted.settings)
+        .with_statistics(statistics);
+    Ok((external, Some(subscriber)))
 }
 
 /// What was told of a force source.

@@ -20,6 +20,8 @@ pub(crate) mod operator;
 mod refusals;
 mod remote_head;
 mod reporting;
+#[cfg(feature = "zenoh")]
+mod ros_order;
 pub mod setup;
 mod start;
 mod threads;
@@ -75,6 +77,8 @@ pub struct Session {
     clients: ClientLedger,
     audit: AuditTrail,
     external: external::ExternalTrail,
+    /// Who hears a force from outside that does not come by the link.
+    _receiver: Option<external::Receiver>,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,

@@ -97,10 +97,12 @@ impl Session {
             ..options
         };
         let (observers, mut outlets) =
-            ObserverServices::start(&setup.observers, &setup.content.description)?;
+            ObserverServices::start(&setup.observers, &setup.content.description, clock)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
-        let external = external::connect(setup.external, &setup.device, &link)?;
+        let zenoh = &setup.observers.zenoh;
+        let external = external::connect(setup.external, &setup.device, &link, zenoh, clock)?;
+        let (external, receiver) = external.map_or((None, None), |(e, r)| (Some(e), r));
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
         let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
@@ -173,6 +175,7 @@ impl Session {
             clients: ClientLedger::default(),
             audit: AuditTrail::default(),
             external: external::ExternalTrail::default(),
+            _receiver: receiver,
             threads: Vec::new(),
             monitor: None,
             recorder,

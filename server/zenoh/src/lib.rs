@@ -37,4 +37,6 @@ pub use publisher::{ZenohError, ZenohPublisher, ZenohSettings};
 #[cfg(feature = "zenoh")]
 pub use ros::{RosSettings, SessionTime};
 #[cfg(feature = "zenoh")]
+pub use taut_ros::{Attachment, Domain};
+#[cfg(feature = "zenoh")]
 pub use wrench::{RosWrench, RosWrenchSettings, RosWrenchSubscriber};

@@ -58,6 +58,7 @@ pub enum ZenohError {
 #[derive(Debug)]
 pub struct ZenohPublisher {
     prefix: String,
+    ros_namespace: Option<String>,
     stop: Arc<AtomicBool>,
     published: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
@@ -76,6 +77,7 @@ impl ZenohPublisher {
         let config = client_config(&settings.connect, settings.config.as_deref())
             .map_err(|error| ZenohError::Config(error.to_string()))?;
         let prefix = format!("taut/{}", settings.name);
+        let ros_namespace = settings.ros.map(|_| format!("/{}", settings.name));
         let stop = Arc::<AtomicBool>::default();
         let published = Arc::<AtomicU64>::default();
         let work = Work {
@@ -95,6 +97,7 @@ impl ZenohPublisher {
             .spawn(move || work.run(feed))?;
         Ok(Self {
             prefix,
+            ros_namespace,
             stop,
             published,
             thread: Some(thread),
@@ -105,6 +108,12 @@ impl ZenohPublisher {
     #[must_use]
     pub fn prefix(&self) -> &str {
         &self.prefix
+    }
+
+    /// What the names of its topics of ROS 2 begin with, if it has any.
+    #[must_use]
+    pub fn ros_namespace(&self) -> Option<&str> {
+        self.ros_namespace.as_deref()
     }
 
     /// States handed to Zenoh so far.
