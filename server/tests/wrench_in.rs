@@ -189,7 +189,8 @@ fn a_sender_gives_one_newton_the_hand_feels_it_and_when_the_sender_dies_it_fades
     );
     let ticks = || session.metrics().session.haptics_period_us.count;
     let gone = ticks();
-    while ticks() < gone + 200 {
+    // The port damps the hand's way back, until it rests.
+    while ticks() < gone + 1000 {
         assert!(begun.elapsed() < PATIENCE, "the loop stands");
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -202,7 +203,9 @@ fn a_sender_gives_one_newton_the_hand_feels_it_and_when_the_sender_dies_it_fades
     assert!(largest_step <= 0.5, "{largest_step} N in a tick");
     // That it was gone in time is what `largest_age_ms` says; a busy machine may have let it fade before, too, so its end alone is looked at here.
     assert!(felt.iter().any(|(_, force)| *force > 0.99));
-    assert!(felt.iter().rev().take(100).all(|(_, force)| *force == 0.0));
+    let left = felt.iter().rev().take(100).map(|(_, force)| force.abs());
+    let left = left.fold(0.0, f64::max);
+    assert!(left == 0.0, "{left} N");
 }
 
 /// `taut push-wrench`.
