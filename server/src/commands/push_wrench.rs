@@ -2,11 +2,12 @@
 
 use std::future::ready;
 use std::io::{BufRead, BufReader, Read};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
 use taut_bridge::service_manager::{Teller, Turns};
-use taut_link::{ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
+use taut_link::{ClientLink, ClientOptions, LinkError, Renewal, Role, SessionEnd, SupervisedLink};
 use taut_proto::ForceSample;
 
 use crate::cli::PushWrenchArgs;
@@ -42,30 +43,53 @@ pub async fn run(args: &PushWrenchArgs) -> Result<u64, Failure> {
         joined = alive.during(joining) => joined?,
         () = signal.given() => return Ok(0),
     };
+    let (sent, end) = send(
+        &supervised,
+        &mut link,
+        &mut source,
+        args,
+        &mut signal,
+        &alive,
+    )
+    .await;
+    drop(teller);
+    // Nobody is to join again for the session that is left here.
+    drop(supervised);
+    link.leave().await;
+    end.map(|()| sent)
+}
+
+/// How many values were sent, and what ended it.
+async fn send(
+    supervised: &SupervisedLink<()>,
+    link: &mut Arc<ClientLink>,
+    source: &mut Source,
+    args: &PushWrenchArgs,
+    signal: &mut EndSignal,
+    alive: &Turns,
+) -> (u64, Result<(), Failure>) {
     let mut period = tokio::time::interval(Duration::from_secs_f64(args.rate.recip()));
     period.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
     let start = Instant::now();
     let mut index = 0;
-    let end = loop {
+    loop {
         tokio::select! {
-            () = signal.given() => break Ok(()),
+            () = signal.given() => return (index, Ok(())),
             _ = period.tick() => {}
         }
         alive.count();
         let since_start = start.elapsed().as_secs_f64();
         if args.duration.is_some_and(|wanted| since_start >= wanted) {
-            break Ok(());
+            return (index, Ok(()));
         }
         match supervised.take_renewal() {
             None => {}
-            Some(Renewal::Session { link: next, .. }) => link = next,
+            Some(Renewal::Session { link: next, .. }) => *link = next,
             Some(Renewal::Ended(SessionEnd::Lost(reason))) => {
-                break Err(Failure::Failed(format!(
-                    "the server at {} was lost: {reason}",
-                    args.server
-                )));
+                let text = format!("the server at {} was lost: {reason}", args.server);
+                return (index, Err(Failure::Failed(text)));
             }
-            Some(Renewal::Ended(SessionEnd::ServerStopped)) => break Ok(()),
+            Some(Renewal::Ended(SessionEnd::ServerStopped)) => return (index, Ok(())),
         }
         match source.newest() {
             Ok(None) => {}
@@ -81,15 +105,10 @@ pub async fn run(args: &PushWrenchArgs) -> Result<u64, Failure> {
                     });
                 }
             }
-            Err(Over::Input) => break Ok(()),
-            Err(Over::Bad(text)) => break Err(Failure::BadInput(text)),
+            Err(Over::Input) => return (index, Ok(())),
+            Err(Over::Bad(text)) => return (index, Err(Failure::BadInput(text))),
         }
-    };
-    drop(teller);
-    // Nobody is to join again for the session that is left here.
-    drop(supervised);
-    link.leave().await;
-    end.map(|()| index)
+    }
 }
 
 /// Where values come from.

@@ -211,7 +211,10 @@ mod tests {
             (4, 0),
             (5, EPOCH_MS + 4),
         ] {
-            order.take(&came(1, sequence, sent), ms(10 + sequence.unsigned_abs()));
+            order.take(
+                &came(1, sequence, sent),
+                ms(10_000 + sequence.unsigned_abs()),
+            );
             assert_eq!(newest(&mut output).0, sequence.unsigned_abs());
         }
         // One from the far future made all after it old: nothing of them is felt until the publisher is another.
