@@ -71,6 +71,8 @@ pub enum RefusalCode {
     Revoked,
     /// The role is not let in.
     RoleClosed,
+    /// There is a force source already.
+    ForceTaken,
 }
 
 /// First message of a client.
@@ -323,7 +325,7 @@ wire_messages! {
 }
 
 wire_tag!(Transport, "transport" { Udp = 0, QuicDatagram = 1 });
-wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9 });
+wire_tag!(RefusalCode, "refusal" { WrongKey = 0, WrongVersion = 1, NameTaken = 2, DeviceTaken = 3, Full = 4, BadHello = 5, Stopping = 6, TrackerTaken = 7, Revoked = 8, RoleClosed = 9, ForceTaken = 10 });
 wire_tag!(LogLevel, "log level" { Info = 0, Warning = 1, Error = 2 });
 wire_ranged!(Hello {
     versions,

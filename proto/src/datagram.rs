@@ -1,8 +1,8 @@
 //! The payload of a datagram, by kind.
 
 use crate::{
-    Confirmation, ConstraintPart, DecodeError, EncodeError, HeadSample, HotState, InputSample,
-    Kind, WrenchCommand,
+    Confirmation, ConstraintPart, DecodeError, EncodeError, ForceSample, HeadSample, HotState,
+    InputSample, Kind, WrenchCommand,
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,
@@ -45,6 +45,8 @@ pub enum Payload {
     PathChallenge(PathToken),
     /// "I am."
     PathResponse(PathToken),
+    /// A wrench from outside.
+    Force(ForceSample),
 }
 
 impl Payload {
@@ -65,6 +67,7 @@ impl Payload {
             Payload::Confirm(_) => Kind::Confirm,
             Payload::PathChallenge(_) => Kind::PathChallenge,
             Payload::PathResponse(_) => Kind::PathResponse,
+            Payload::Force(_) => Kind::Force,
         }
     }
 
@@ -82,6 +85,7 @@ impl Payload {
             Payload::Wrench(value) => encode_into(value, buffer),
             Payload::Constraints(value) => encode_into(value, buffer),
             Payload::Head(value) => encode_into(value, buffer),
+            Payload::Force(value) => encode_into(value, buffer),
             Payload::Confirm(value) => encode_into(value, buffer),
             Payload::PathChallenge(value) | Payload::PathResponse(value) => {
                 encode_into(value, buffer)
@@ -107,6 +111,7 @@ impl Payload {
             Kind::Confirm => Payload::Confirm(decode(bytes)?),
             Kind::PathChallenge => Payload::PathChallenge(decode(bytes)?),
             Kind::PathResponse => Payload::PathResponse(decode(bytes)?),
+            Kind::Force => Payload::Force(decode(bytes)?),
         })
     }
 }

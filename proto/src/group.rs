@@ -103,7 +103,7 @@ impl Group {
 pub fn is_member(role: Role) -> bool {
     match role {
         Role::Render | Role::Observer | Role::Operator => true,
-        Role::Device | Role::Tracker => false,
+        Role::Device | Role::Tracker | Role::Force => false,
     }
 }
 
@@ -124,7 +124,8 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         | Kind::Constraints
         | Kind::Confirm
         | Kind::PathChallenge
-        | Kind::PathResponse => false,
+        | Kind::PathResponse
+        | Kind::Force => false,
     }
 }
 

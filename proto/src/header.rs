@@ -54,6 +54,8 @@ pub enum Kind {
     PathChallenge,
     /// [`crate::path::PathToken`], client to server, from where the challenge arrived.
     PathResponse,
+    /// [`crate::ForceSample`], force source to server.
+    Force,
 }
 
 impl Kind {
@@ -73,6 +75,7 @@ impl Kind {
             Kind::Confirm => 12,
             Kind::PathChallenge => 13,
             Kind::PathResponse => 14,
+            Kind::Force => 15,
         }
     }
 
@@ -92,6 +95,7 @@ impl Kind {
             12 => Ok(Kind::Confirm),
             13 => Ok(Kind::PathChallenge),
             14 => Ok(Kind::PathResponse),
+            15 => Ok(Kind::Force),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

@@ -3,7 +3,7 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`wrench::WrenchCommand`],
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`force::ForceSample`], [`wrench::WrenchCommand`],
 //!   [`constraints::ConstraintPart`], [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
@@ -25,6 +25,7 @@ pub mod credential;
 pub mod datagram;
 mod derive;
 pub mod events;
+pub mod force;
 pub mod group;
 pub mod head;
 pub mod header;
@@ -66,6 +67,7 @@ pub use coupling::{CouplingOffer, EdgeCoupling};
 pub use credential::{Credential, Holder, JoinKey};
 pub use datagram::Payload;
 pub use events::{EventInbox, EventOutbox, EventsTold};
+pub use force::ForceSample;
 pub use group::{Group, GroupMember, GroupOpener, GroupSealer};
 pub use head::HeadSample;
 pub use header::{Header, Kind};

@@ -228,8 +228,8 @@ impl Number {
 /// Every number of every message, message by message.
 pub fn numbers() -> impl Iterator<Item = &'static Number> {
     use crate::{
-        barrier, constraints, control, coupling, events, group, head, input, path, pose, scene,
-        state,
+        barrier, constraints, control, coupling, events, force, group, head, input, path, pose,
+        scene, state,
     };
     use crate::{confirmation, stats, time, wrench};
     [
@@ -249,6 +249,7 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         time::TimeResponse::NUMBERS,
         input::InputSample::NUMBERS,
         head::HeadSample::NUMBERS,
+        force::ForceSample::NUMBERS,
         wrench::WrenchCommand::NUMBERS,
         constraints::SetHead::NUMBERS,
         constraints::ConstraintPart::NUMBERS,

@@ -129,7 +129,7 @@ impl Default for JoinPolicy {
 pub enum ShutOut {
     /// Its role is closed.
     #[error(
-        "this workbench lets in no {0}: its workbench file (network.roles) names the roles that it does"
+        "this workbench lets in no {0}: its workbench file (network.roles; for forces also wrench_in.enabled) names the roles that it does"
     )]
     Role(Role),
     /// Its credential is revoked.

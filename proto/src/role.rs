@@ -1,17 +1,18 @@
 //! Roles, and what each may do: the one table. The server asks it for everything that a client does or is sent; nobody else decides.
 //!
-//! | act            | render | device | tracker | operator | observer |
-//! |----------------|--------|--------|---------|----------|----------|
-//! | keep the path  | yes    | yes    | yes     | yes      | yes      |
-//! | get states     | yes    | yes    |         | yes      | yes      |
-//! | get meshes     | yes    |        |         |          |          |
-//! | keep frames    | yes    |        |         |          |          |
-//! | report         | yes    | yes    |         |          |          |
-//! | log            | yes    | yes    | yes     | yes      |          |
-//! | give input     |        | yes    |         |          |          |
-//! | get wrenches   |        | yes    |         |          |          |
-//! | give the head  |        |        | yes     |          |          |
-//! | arm            |        |        |         | yes      |          |
+//! | act            | render | device | tracker | operator | observer | force |
+//! |----------------|--------|--------|---------|----------|----------|-------|
+//! | keep the path  | yes    | yes    | yes     | yes      | yes      | yes   |
+//! | get states     | yes    | yes    |         | yes      | yes      |       |
+//! | get meshes     | yes    |        |         |          |          |       |
+//! | keep frames    | yes    |        |         |          |          |       |
+//! | report         | yes    | yes    |         |          |          |       |
+//! | log            | yes    | yes    | yes     | yes      |          | yes   |
+//! | give input     |        | yes    |         |          |          |       |
+//! | get wrenches   |        | yes    |         |          |          |       |
+//! | give the head  |        |        | yes     |          |          |       |
+//! | arm            |        |        |         | yes      |          |       |
+//! | give a force   |        |        |         |          |          | yes   |
 //!
 //! Everybody who is let in also gets the scene description: it holds screens and names, no geometry.
 
@@ -31,6 +32,8 @@ pub enum Role {
     Operator,
     /// Says where the viewer's head is; one at a time.
     Tracker,
+    /// Gives a force from outside (a robot's sensor, a simulation) for the hand to feel; one at a time.
+    Force,
 }
 
 /// Something that a client does, or is sent, once it is in.
@@ -56,11 +59,13 @@ pub enum Act {
     GiveHead,
     /// To ask for force at the device, or for none.
     Arm,
+    /// A wrench that is added to the contact's.
+    GiveForce,
 }
 
 impl Act {
     /// All.
-    pub const ALL: [Act; 10] = [
+    pub const ALL: [Act; 11] = [
         Act::KeepPath,
         Act::GetStates,
         Act::GetMeshes,
@@ -71,6 +76,7 @@ impl Act {
         Act::GetWrenches,
         Act::GiveHead,
         Act::Arm,
+        Act::GiveForce,
     ];
 
     /// Bit of this act in a set of acts.
@@ -91,6 +97,7 @@ impl Act {
             Act::GetWrenches => "get wrenches",
             Act::GiveHead => "give the viewer's head",
             Act::Arm => "arm",
+            Act::GiveForce => "give a force",
         }
     }
 }
@@ -103,12 +110,13 @@ impl fmt::Display for Act {
 
 impl Role {
     /// All, with their names in files and on the command line.
-    pub const NAMED: [(&'static str, Role); 5] = [
+    pub const NAMED: [(&'static str, Role); 6] = [
         ("render", Role::Render),
         ("device", Role::Device),
         ("tracker", Role::Tracker),
         ("operator", Role::Operator),
         ("observer", Role::Observer),
+        ("force", Role::Force),
     ];
 
     /// Its name in files and on the command line.
@@ -117,6 +125,7 @@ impl Role {
             Role::Render => "render",
             Role::Device => "device",
             Role::Tracker => "tracker",
+            Role::Force => "force",
             Role::Operator => "operator",
             Role::Observer => "observer",
         }
@@ -128,6 +137,7 @@ impl Role {
             Role::Render => "render node",
             Role::Device => "device bridge",
             Role::Tracker => "head tracker",
+            Role::Force => "force source",
             Role::Operator => "operator",
             Role::Observer => "observer",
         }
@@ -140,7 +150,7 @@ impl Role {
 
     /// Whether a workbench has at most one at a time.
     pub const fn is_single(self) -> bool {
-        matches!(self, Role::Device | Role::Tracker)
+        matches!(self, Role::Device | Role::Tracker | Role::Force)
     }
 
     /// Datagrams that one session may send: several times what an honest one does (1 kHz of input, an ARRIVE every half millisecond,
@@ -155,7 +165,7 @@ impl Role {
                 per_second: 5_000,
                 burst: 1_000,
             },
-            Role::Tracker => Rate {
+            Role::Tracker | Role::Force => Rate {
                 per_second: 3_000,
                 burst: 500,
             },
@@ -174,6 +184,7 @@ impl Role {
             Role::Observer => 2,
             Role::Operator => 3,
             Role::Tracker => 4,
+            Role::Force => 5,
         }
     }
 
@@ -195,6 +206,7 @@ impl Role {
                         | Act::GetWrenches.bit()
                 }
                 Role::Tracker => Act::Log.bit() | Act::GiveHead.bit(),
+                Role::Force => Act::Log.bit() | Act::GiveForce.bit(),
                 Role::Operator => Act::GetStates.bit() | Act::Log.bit() | Act::Arm.bit(),
                 Role::Observer => Act::GetStates.bit(),
             }
@@ -209,7 +221,7 @@ impl fmt::Display for Role {
 
 /// A text that names no role.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("there is no role \"{0}\": use render, device, tracker, operator or observer")]
+#[error("there is no role \"{0}\": use render, device, tracker, operator, observer or force")]
 pub struct UnknownRole(pub String);
 
 impl FromStr for Role {
@@ -223,4 +235,4 @@ impl FromStr for Role {
     }
 }
 
-wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3, Tracker = 4 });
+wire_tag!(Role, "role" { Render = 0, Device = 1, Observer = 2, Operator = 3, Tracker = 4, Force = 5 });

@@ -10,7 +10,7 @@ use taut_proto::{
 #[test]
 fn each_role_may_do_exactly_this() {
     use Act::*;
-    let may: [(Role, &[Act]); 5] = [
+    let may: [(Role, &[Act]); 6] = [
         (
             Role::Render,
             &[KeepPath, GetStates, GetMeshes, KeepFrames, Report, Log],
@@ -22,6 +22,7 @@ fn each_role_may_do_exactly_this() {
         (Role::Tracker, &[KeepPath, Log, GiveHead]),
         (Role::Operator, &[KeepPath, GetStates, Log, Arm]),
         (Role::Observer, &[KeepPath, GetStates]),
+        (Role::Force, &[KeepPath, Log, GiveForce]),
     ];
     for (role, acts) in may {
         for act in Act::ALL {

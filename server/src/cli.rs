@@ -118,6 +118,8 @@ pub enum Command {
     Doctor(DoctorArgs),
     /// Says where the viewer's head is, from a tracker on this PC
     Track(TrackArgs),
+    /// Gives a force from outside, for the hand to feel beside the contact's
+    PushWrench(PushWrenchArgs),
     /// Makes the cluster key and credentials for nodes and roles, or says what a key file allows
     Keys(KeysArgs),
     /// Asks what a workbench is made of, and writes its file
@@ -472,7 +474,7 @@ pub struct KeysArgs {
     /// For every node of this workbench file, and for device, tracker, operator and observer
     #[arg(long, value_name = "F", requires = "master", conflicts_with = "role")]
     pub config: Option<PathBuf>,
-    /// For one role: render, device, tracker, operator, observer
+    /// For one role: render, device, tracker, operator, observer, force
     #[arg(long, value_name = "ROLE", requires = "master")]
     pub role: Option<taut_link::Role>,
     /// For the node of this name only (default: *, any of the role)
@@ -564,6 +566,38 @@ pub struct TrackArgs {
     #[arg(long, value_enum, default_value_t)]
     pub transport: TransportChoice,
     /// End after this many seconds (default: at Ctrl-C, or when the server stops)
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub duration: Option<f64>,
+    /// Without a server
+    #[command(flatten)]
+    pub membership: MembershipArgs,
+}
+
+/// `taut push-wrench`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "Examples:\n  taut push-wrench --server haptic-pc:4857 --key force.key --wrench 0,0,1,0,0,0 --duration 5\n  robot-sensor | taut push-wrench --server haptic-pc:4857 --key force.key"
+)]
+pub struct PushWrenchArgs {
+    /// The haptic PC
+    #[arg(long, value_name = "H:P")]
+    pub server: String,
+    /// The force source's credential, or the cluster key; else TAUT_KEY_FILE names it
+    #[arg(long, value_name = "FILE")]
+    pub key: Option<PathBuf>,
+    /// The same wrench all the time: force x,y,z in N, torque x,y,z in N m (default: each line of standard input is one, sent once)
+    #[arg(long, value_name = "FX,FY,FZ,TX,TY,TZ", value_parser = crate::commands::push_wrench::parse_wrench, allow_hyphen_values = true)]
+    pub wrench: Option<[f64; 6]>,
+    /// Name of this node, unique in the workbench
+    #[arg(long, value_name = "NAME", default_value = "force")]
+    pub node: String,
+    /// Values per second, at most
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, value_parser = tracking_rate)]
+    pub rate: f64,
+    /// How values travel
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: TransportChoice,
+    /// End after this many seconds (default: at Ctrl-C, at the end of the input, or when the server stops)
     #[arg(long, value_name = "S", value_parser = positive_seconds)]
     pub duration: Option<f64>,
     /// Without a server

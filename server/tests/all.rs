@@ -30,6 +30,8 @@ mod session;
 mod setup;
 mod support;
 mod tracked_head;
+mod wrench_in;
+mod wrench_in_energy;
 
 /// Counts by thread: a test that forbids allocation forbids its own.
 #[global_allocator]

@@ -330,8 +330,8 @@ impl Arming {
 
     /// Follows the way down; at its end nothing is left.
     fn fall(&mut self, now: Duration, settings: &SafetySettings) -> Option<EventKind> {
-        let faded = ratio(now.saturating_sub(self.fade.since), settings.ramp_out);
-        self.gain = self.gain.min(self.fade.gain * (1.0 - faded).max(0.0));
+        let left = fade_share(now.saturating_sub(self.fade.since), settings.ramp_out);
+        self.gain = self.gain.min(self.fade.gain * left);
         if self.gain > 0.0 {
             return None;
         }
@@ -352,6 +352,12 @@ impl Arming {
             Cause::Silence => None,
         }
     }
+}
+
+/// Share of a force that is left when `passed` of a way down of `ramp_out` is over: 1 to 0.
+#[must_use]
+pub fn fade_share(passed: Duration, ramp_out: Duration) -> f64 {
+    (1.0 - ratio(passed, ramp_out)).max(0.0)
 }
 
 /// `part` over `whole`; one when `whole` is zero.

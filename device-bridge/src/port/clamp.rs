@@ -28,6 +28,12 @@ pub(super) fn clamp(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> C
     }
 }
 
+/// `wrench`, which is finite, with the norm of its force and that of its torque limited; see the port's own limits.
+#[must_use]
+pub fn within_limits(wrench: &Vector6<f64>, max_force: f64, max_torque: f64) -> Vector6<f64> {
+    clamp(wrench, max_force, max_torque).wrench
+}
+
 /// Force and torque as one wrench.
 pub(super) fn join(force: &Vector3<f64>, torque: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)

@@ -31,7 +31,8 @@ mod slew;
 mod validation;
 mod watchdog;
 
-pub use arming::{ArmingState, CommandSource};
+pub use arming::{ArmingState, CommandSource, fade_share};
+pub use clamp::within_limits;
 pub use device_port::{DevicePort, Reading, TickReport};
 pub use energy::EnergyObserver;
 pub(crate) use event::Spell;

@@ -89,6 +89,12 @@ counters! {
         heads,
         /// Readings of the viewer's head refused: no pose, or overtaken.
         heads_refused,
+        /// Wrenches from outside taken.
+        forces,
+        /// Wrenches from outside refused: no number of a wrench in its range, or overtaken.
+        forces_refused,
+        /// Wrenches from outside that never came, by the gaps of their numbers.
+        forces_lost,
         /// Clients let in.
         joined,
         /// Clients refused, for whatever reason.

@@ -43,8 +43,8 @@ pub use key_file::{
 pub use multicast::MulticastOptions;
 pub use server::{
     AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
-    FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput, LinkEvent, ServerLink,
-    ServerOptions, Spread, serve,
+    ForceInput, ForceOutput, FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput,
+    LinkEvent, ServerLink, ServerOptions, Spread, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

@@ -6,7 +6,7 @@ use taut_link::{
     ServerLink, ServerOptions, Transport, connect,
 };
 use taut_proto::{
-    HeadSample, PoseF64,
+    ForceSample, HeadSample, PoseF64,
     control::{LogLevel, RefusalCode},
     revocation::Revoked,
 };
@@ -47,11 +47,21 @@ fn head(index: u64) -> HeadSample {
     }
 }
 
+fn force(index: u64) -> ForceSample {
+    ForceSample {
+        sample_time_ns: index * 1_000_000,
+        clock_uncertainty_ns: 0,
+        index,
+        wrench: [0.0, 0.0, index as f64, 0.0, 0.0, 0.0],
+    }
+}
+
 /// Tries `act` as the client would; whether there is a way to.
 async fn attempt(client: &ClientLink, act: Act) -> bool {
     match act {
         Act::GiveInput => client.send_input(&input(1)),
         Act::GiveHead => client.send_head(&head(1)),
+        Act::GiveForce => client.send_force(&force(1)),
         Act::Arm => assert!(client.post_arm(true)),
         Act::Log => assert!(client.post_log(LogLevel::Info, "here".to_owned())),
         Act::Report => assert!(client.post_stats(Default::default())),
@@ -70,6 +80,7 @@ fn has_effect(server: &ServerLink, act: Act) -> bool {
     match act {
         Act::GiveInput => counters.inputs == 1,
         Act::GiveHead => counters.heads == 1,
+        Act::GiveForce => counters.forces == 1,
         _ => {
             let mut found = false;
             while let Some(event) = server.try_event() {
@@ -113,7 +124,7 @@ async fn each_role_against_each_act(transport: Transport) {
             .await;
             assert_eq!(server.counters().forbidden, 1, "{what}");
             assert!(!has_effect(&server, act), "{what} had its effect");
-            if matches!(act, Act::GiveInput | Act::GiveHead) {
+            if matches!(act, Act::GiveInput | Act::GiveHead | Act::GiveForce) {
                 assert_eq!(client.is_closed(), None, "a datagram ends no session");
             } else {
                 wait_until(&what, || client.is_closed().is_some()).await;

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    Confirmation, HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
+    Confirmation, ForceSample, HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
     confirmation::{MAX_CONFIRMED, SentState},
     events::EventAck,
     path::PathToken,
@@ -44,6 +44,12 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
             rotation: [0.5, 0.5, 0.5, 0.5],
         },
     };
+    let force = ForceSample {
+        sample_time_ns: 1_000_000_000,
+        clock_uncertainty_ns: 250_000,
+        index: 44,
+        wrench: [1.0, -0.5, 0.25, 0.0, 0.125, 0.0],
+    };
     let sent = |tick, state_hash| SentState { tick, state_hash };
     let confirmation = Confirmation {
         asked_ns: 17,
@@ -84,6 +90,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
             "path_response",
             Payload::PathResponse(PathToken { token: 0x0102 }),
         ),
+        ("force", Payload::Force(force)),
     ]
 }
 
@@ -143,7 +150,18 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             pose,
         })
     });
+    let force = ((far(), far(), far()), six()).prop_map(
+        |((sample_time_ns, clock_uncertainty_ns, index), wrench)| {
+            Payload::Force(ForceSample {
+                sample_time_ns,
+                clock_uncertainty_ns,
+                index,
+                wrench,
+            })
+        },
+    );
     prop_oneof![
+        force,
         any_hot().prop_map(Payload::Hot),
         far().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
         response,

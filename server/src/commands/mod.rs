@@ -20,6 +20,7 @@ mod preview;
 #[cfg(not(feature = "render"))]
 #[path = "preview_absent.rs"]
 mod preview;
+pub mod push_wrench;
 mod record;
 mod recording_size;
 pub(crate) mod render;
@@ -39,7 +40,7 @@ use taut_bridge::console;
 
 use crate::cli::{
     ArmArgs, CheckArgs, Cli, Command, DoctorArgs, ExportArgs, FIRST_STEPS, ImportArgs, KeysArgs,
-    RecordArgs, ReplayArgs, TrackArgs,
+    PushWrenchArgs, RecordArgs, ReplayArgs, TrackArgs,
 };
 use crate::report::terminal::Terminal;
 use crate::report::{ReplayReport, SessionReport};
@@ -103,6 +104,7 @@ fn run(command: Command) -> Result<ExitCode> {
         }
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
+        Command::PushWrench(args) => push_wrench_command(&args),
         Command::Keys(args) => keys_command(&args),
         Command::Setup(args) => {
             let done = setup::run(&args, std::io::stdin().lock(), std::io::stdout().lock())?;
@@ -254,6 +256,17 @@ fn track_command(args: &TrackArgs) -> Result<ExitCode> {
         "{sent} readings of the head sent to {}",
         args.server
     ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn push_wrench_command(args: &PushWrenchArgs) -> Result<ExitCode> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .context("the network's threads cannot be started")?;
+    let sent = runtime.block_on(push_wrench::run(args))?;
+    print(format!("{sent} wrenches sent to {}", args.server))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,9 +9,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6, angular, linear};
-use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Reading, TickReport};
+use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Felt, Reading, TickReport};
 use taut_recording::{HapticsRecord, Tap};
 
+use super::external_wrench::ExternalWrench;
 use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
@@ -33,6 +34,8 @@ pub struct HapticsLoop {
     /// CPU time of the coupling up to the command rendered last.
     coupling_cpu_time: Duration,
     recording: Option<Tap<HapticsRecord>>,
+    /// A force from outside, where the workbench takes one.
+    external: Option<Box<ExternalWrench>>,
     statistics: Arc<HapticsStatistics>,
 }
 
@@ -129,6 +132,7 @@ impl HapticsLoop {
             last_tick: None,
             coupling_cpu_time: Duration::ZERO,
             recording: None,
+            external: None,
             statistics: Arc::default(),
         }
     }
@@ -144,6 +148,13 @@ impl HapticsLoop {
     #[must_use]
     pub fn with_recording(mut self, tap: Option<Tap<HapticsRecord>>) -> Self {
         self.recording = tap;
+        self
+    }
+
+    /// The same with a force from outside beside the contact's.
+    #[must_use]
+    pub fn with_external(mut self, external: Option<ExternalWrench>) -> Self {
+        self.external = external.map(Box::new);
         self
     }
 
@@ -170,13 +181,27 @@ impl HapticsLoop {
         let (state, states, wrench) = (&mut self.state, &mut self.states, &mut self.wrench);
         let (known, coupling) = (&mut self.newest_sample, &self.coupling);
         let has_motors = self.port.info().actuated_degrees_of_freedom > 0;
+        let rendered = *self.port.rendered();
+        let external = &mut self.external;
         let report = self.port.tick(now, |reading| {
             follow(state, known, reading, now);
+            if external.is_some() {
+                // Others are shown what the hand feels, not the contact's part of it.
+                state.felt = reading.felt.or(Some(Felt {
+                    wrench: rendered,
+                    at_edge: false,
+                    set_made: None,
+                }));
+            }
             states.publish(state);
             coupling.wake();
             // Beside a bridge that couples by itself this force is rendered by nobody.
             let at_edge = reading.felt.is_some_and(|felt| felt.at_edge);
-            Some(newest_command(wrench, has_motors && !at_edge))
+            let mut command = newest_command(wrench, has_motors && !at_edge);
+            if let Some(external) = external {
+                command.wrench += external.tick(now, &state.pose);
+            }
+            Some(command)
         });
         self.count(now, &report);
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::loops::checker::CheckCounts;
 use crate::loops::coupling::CouplingStatistics;
+use crate::loops::external_wrench::ExternalWrenchStatistics;
 use crate::loops::god_object::GodObjectStatistics;
 use crate::loops::haptics::HapticsStatistics;
 
@@ -18,4 +19,6 @@ pub struct Statistics {
     pub god_object: Arc<GodObjectStatistics>,
     /// The checker.
     pub checks: Arc<CheckCounts>,
+    /// A force from outside; `None` where the workbench takes none.
+    pub external: Option<Arc<ExternalWrenchStatistics>>,
 }

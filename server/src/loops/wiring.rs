@@ -8,6 +8,7 @@ use taut_recording::Taps;
 use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
+use super::external_wrench::ExternalWrench;
 use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
@@ -147,6 +148,20 @@ impl WiredLoops {
         Self {
             haptics: self.haptics.with_switch(arm_switch.clone()),
             arm_switch,
+            ..self
+        }
+    }
+
+    /// The same with a force from outside beside the contact's.
+    #[must_use]
+    pub fn with_external(self, external: Option<ExternalWrench>) -> Self {
+        let counters = external.as_ref().map(ExternalWrench::statistics);
+        Self {
+            statistics: Statistics {
+                external: counters,
+                ..self.statistics
+            },
+            haptics: self.haptics.with_external(external),
             ..self
         }
     }

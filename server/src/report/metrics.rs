@@ -18,6 +18,7 @@ use serde::Serialize;
 use taut_link::ClientStatus;
 
 use crate::report::SessionReport;
+use crate::report::external::ExternalWrenchReport;
 use crate::shared::failure::Failure;
 use crate::shared::timing::Distribution;
 
@@ -261,6 +262,9 @@ impl Collector for Exposition {
         ] {
             counter(to, name, help, count)?;
         }
+        if let Some(external) = &session.external_wrench {
+            external_wrench(to, external)?;
+        }
         for (name, count) in &metrics.network {
             counter(
                 to,
@@ -332,6 +336,51 @@ impl Collector for Exposition {
             metrics.open_files as f64,
         )
     }
+}
+
+/// A force from outside.
+fn external_wrench(to: &mut DescriptorEncoder<'_>, of: &ExternalWrenchReport) -> fmt::Result {
+    gauge(
+        to,
+        "wrench_in_age",
+        "age of the force from outside that is felt now; NaN while none is",
+        Some(Unit::Seconds),
+        of.age_ms.map_or(f64::NAN, |ms| 1e-3 * ms),
+    )?;
+    gauge(
+        to,
+        "wrench_in_force",
+        "norm of the force from outside that is added now",
+        Some(Unit::Other("newtons".to_owned())),
+        of.force_n,
+    )?;
+    for (name, help, count) in [
+        (
+            "wrench_in_taken",
+            "values from outside that were felt",
+            of.taken,
+        ),
+        (
+            "wrench_in_lost",
+            "values from outside that never came",
+            of.lost,
+        ),
+        (
+            "wrench_in_dropped",
+            "values from outside that were overtaken, came again or could not be read",
+            of.dropped,
+        ),
+    ] {
+        counter(to, name, help, count)?;
+    }
+    let refused = of.refused.iter();
+    labelled(
+        to,
+        "wrench_in_refused",
+        "values from outside that were not felt",
+        None,
+        refused.map(|(why, count)| ([("reason", why.clone())], *count as f64)),
+    )
 }
 
 #[allow(

@@ -3,6 +3,7 @@
 //! A name carries its unit; a [`Distribution`](crate::shared::timing::Distribution) is `{ p50, p99, p999, max, count }`.
 
 mod client;
+pub mod external;
 pub(crate) mod frames;
 mod loops;
 pub(crate) mod metrics;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::loops::fidelity::FidelityReport;
 use crate::loops::realtime::RealtimeReport;
 use crate::report::client::ClientReport;
+use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
 use crate::report::replay::write_obstacles;
 use crate::shared::timing::{Bin, Distribution};
@@ -79,6 +80,9 @@ pub struct SessionReport {
     pub clients: Vec<ClientReport>,
     /// Clients that looked on as observers.
     pub observers: u64,
+    /// A force from outside; `null` where the workbench takes none.
+    #[serde(default)]
+    pub external_wrench: Option<ExternalWrenchReport>,
     /// The fidelity that the scene chose for itself, and how it held; `null` where it does not choose.
     pub fidelity: Option<FidelityReport>,
 }
@@ -199,6 +203,14 @@ impl fmt::Display for SessionReport {
             "safety events       {}, energy injected {:.2e} J",
             self.safety_events, self.energy_injected_j
         )?;
+        if let Some(external) = &self.external_wrench {
+            let refused: u64 = external.refused.values().sum();
+            writeln!(
+                f,
+                "force from outside  {} values felt, {} lost, {} dropped, {refused} refused, at most {:.0} ms old",
+                external.taken, external.lost, external.dropped, external.largest_age_ms
+            )?;
+        }
         if let Some(fidelity) = &self.fidelity {
             writeln!(f, "fidelity            {fidelity}")?;
         }

@@ -41,6 +41,8 @@ enum Audit<'e> {
     Frames { node: &'e str, what: &'static str },
     /// The device port did something.
     Port { what: &'e str, is_fault: bool },
+    /// A force from outside began or ended to be felt, or was refused.
+    External { what: &'e str },
 }
 
 /// A client, as the trail names it.
@@ -112,6 +114,7 @@ impl Audit<'_> {
                 tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, node = %who.node, role = %who.role, credential = %who.credential, address = %who.address);
             }
             Self::Frames { node, what } => record!("frames", %node, what),
+            Self::External { what } => record!("wrench-in", what),
             Self::Port { what, is_fault } => {
                 let event_is = if *is_fault { "fault" } else { "device" };
                 tracing::info!(target: taut_log::AUDIT_TARGET, event = event_is, what);
@@ -199,6 +202,11 @@ impl AuditTrail {
     /// Takes an event of the device port.
     pub fn follow_port(&mut self, what: &str, is_fault: bool) {
         Audit::Port { what, is_fault }.record();
+    }
+
+    /// Takes what is told of a force from outside.
+    pub fn follow_external(&mut self, what: &str) {
+        Audit::External { what }.record();
     }
 
     /// Tells the sums that are due at session time `now`.

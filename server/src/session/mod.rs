@@ -10,6 +10,7 @@ pub mod broadcast;
 mod clients;
 pub mod edge_sets;
 mod end;
+mod external;
 pub(crate) mod file_watch;
 mod frames;
 pub mod head;
@@ -19,6 +20,8 @@ pub(crate) mod operator;
 mod refusals;
 mod remote_head;
 mod reporting;
+#[cfg(feature = "zenoh")]
+mod ros_order;
 pub mod setup;
 mod start;
 mod threads;
@@ -73,6 +76,9 @@ pub struct Session {
     network: Arc<NetworkCounts>,
     clients: ClientLedger,
     audit: AuditTrail,
+    external: external::ExternalTrail,
+    /// Who hears a force from outside that does not come by the link.
+    _receiver: Option<external::Receiver>,
     /// In the order of their start.
     threads: Vec<JoinHandle<()>>,
     monitor: Option<MonitorFeed>,

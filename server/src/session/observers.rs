@@ -11,6 +11,7 @@ use taut_observers::{
 use taut_proto::{HotState, SceneDescription};
 use taut_scene::{ObserverStream, Vrpn, Workbench, Zenoh};
 
+use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 
 /// Who may look on, before anything is started.
@@ -99,6 +100,11 @@ impl ObserverServices {
     pub fn start(
         settings: &ObserverSettings,
         scene: &SceneDescription,
+        #[cfg_attr(
+            not(feature = "zenoh"),
+            expect(unused_variables, reason = "for times of ROS 2")
+        )]
+        clock: SessionClock,
     ) -> Result<(Self, Outlets), Failure> {
         let (mut services, mut outlets) = (Self::default(), Outlets::default());
         let vrpn = &settings.vrpn;
@@ -151,6 +157,10 @@ impl ObserverServices {
                     config: zenoh.config.clone(),
                     rate: zenoh.rate,
                     naming: event_name,
+                    ros: zenoh.ros.then_some(taut_zenoh::RosSettings {
+                        domain: taut_zenoh::Domain(zenoh.ros_domain),
+                        session_time: taut_zenoh::SessionTime::reading(clock.now()),
+                    }),
                 },
                 &hello(zenoh.rate),
                 outlets.add(),
@@ -212,6 +222,9 @@ impl ObserverServices {
         #[cfg(feature = "zenoh")]
         if let Some(zenoh) = &self.zenoh {
             lines.push(format!("Zenoh: {}/**", zenoh.prefix()));
+            if let Some(namespace) = zenoh.ros_namespace() {
+                lines.push(format!("ROS 2 by rmw_zenoh: {namespace}"));
+            }
         }
         lines
     }

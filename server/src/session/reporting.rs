@@ -9,6 +9,7 @@ use taut_recording::EventRecord;
 
 use crate::loops::incidents::{self};
 use crate::report::SessionReport;
+use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
 use crate::report::metrics::{self, ClientLink, Metrics};
 use crate::report::terminal::Terminal;
@@ -62,6 +63,11 @@ impl Session {
         }
         let clients = link.clients();
         self.clients.look_at(&clients);
+        if let Some(statistics) = &self.statistics.external {
+            for what in self.external.look(statistics, now) {
+                self.audit.follow_external(&what);
+            }
+        }
         let counters = link.counters();
         self.audit.look(&counters, now);
         self.network
@@ -115,6 +121,9 @@ impl Session {
                 + counters.forged
                 + counters.replayed
                 + counters.inputs_refused;
+            report.external_wrench = self.statistics.external.as_ref().map(|external| {
+                ExternalWrenchReport::of(external, counters.forces_lost, counters.forces_refused)
+            });
             let frames = link.frame_report();
             report.frames =
                 frames.map(|measured| FramesReport::new(&measured, &mut report.clients));

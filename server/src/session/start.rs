@@ -29,7 +29,7 @@ use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 use crate::shared::shutdown::Shutdown;
 
-use super::{Fidelity, Session};
+use super::{Fidelity, Session, external};
 
 /// Threads of the network runtime: one for packets, one for joins.
 const NETWORK_THREADS: usize = 2;
@@ -95,9 +95,12 @@ impl Session {
             ..options
         };
         let (observers, mut outlets) =
-            ObserverServices::start(&setup.observers, &setup.content.description)?;
+            ObserverServices::start(&setup.observers, &setup.content.description, clock)?;
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
+        let zenoh = &setup.observers.zenoh;
+        let external = external::connect(setup.external, &setup.device, &link, zenoh, clock)?;
+        let (external, receiver) = external.map_or((None, None), |(e, r)| (Some(e), r));
         let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
         let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
@@ -131,6 +134,7 @@ impl Session {
             taps,
         )
         .with_motions(setup.motions.clone())
+        .with_external(external)
         .with_arm_switch(kept.switch.clone());
         let switch = loops.arm_switch.clone();
         link.on_arm(move |arm| {
@@ -170,6 +174,8 @@ impl Session {
             network: Arc::default(),
             clients: ClientLedger::default(),
             audit: AuditTrail::default(),
+            external: external::ExternalTrail::default(),
+            _receiver: receiver,
             threads: Vec::new(),
             monitor: None,
             recorder,

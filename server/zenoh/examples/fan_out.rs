@@ -138,6 +138,7 @@ fn looped(endpoint: Option<&str>, plan: &Plan) -> Outcome<(f64, f64)> {
                 config: None,
                 rate: plan.rate,
                 naming: |_| None,
+                ros: None,
             },
             &hello(plan.rate),
             feed,

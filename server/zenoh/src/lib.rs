@@ -14,13 +14,19 @@
 //! to costs nothing on the way.
 //!
 //! Whoever may read a router's keys may read these. Zenoh's own configuration says who that is (TLS, access control); the data
-//! carry no command, and nothing is read from the network.
+//! carry no command. What is read from the network is one topic of ROS 2, where the workbench file wants it ([`RosWrenchSubscriber`]): a force for the hand.
+//!
+//! With [`RosSettings`] the workbench is a node of ROS 2 too, as `rmw_zenoh_cpp` sees one.
 //!
 //! Everything here needs the feature `zenoh`. Its licence is EPL-2.0 or Apache-2.0; it is used under Apache-2.0.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "zenoh")]
 mod publisher;
+#[cfg(feature = "zenoh")]
+mod ros;
+#[cfg(feature = "zenoh")]
+mod wrench;
 
 /// Zenoh itself, for those who receive.
 #[cfg(feature = "zenoh")]
@@ -28,3 +34,9 @@ pub use zenoh;
 
 #[cfg(feature = "zenoh")]
 pub use publisher::{ZenohError, ZenohPublisher, ZenohSettings};
+#[cfg(feature = "zenoh")]
+pub use ros::{RosSettings, SessionTime};
+#[cfg(feature = "zenoh")]
+pub use taut_ros::{Attachment, Domain};
+#[cfg(feature = "zenoh")]
+pub use wrench::{RosWrench, RosWrenchSettings, RosWrenchSubscriber};

@@ -1,7 +1,7 @@
 //! The publisher: a thread that reads the newest state at its own rate and puts it on Zenoh's keys.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -9,11 +9,14 @@ use std::time::{Duration, Instant};
 
 use taut_observers::lines::{Naming, state_line};
 use taut_observers::{EventLines, Hello, StateFeed};
+use taut_proto::SceneDescription;
 use taut_proto::codec::encode_onto;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Config, Session, Wait};
+
+use crate::ros::{RosSettings, RosTopics};
 
 /// Time between two attempts to reach a router.
 const RETRY_PERIOD: Duration = Duration::from_secs(1);
@@ -31,6 +34,8 @@ pub struct ZenohSettings {
     pub rate: f64,
     /// What the device port's events are called.
     pub naming: Naming,
+    /// Also as a node of ROS 2.
+    pub ros: Option<RosSettings>,
 }
 
 /// Why nothing can be published.
@@ -39,6 +44,11 @@ pub enum ZenohError {
     /// Zenoh's configuration.
     #[error("[zenoh] cannot be used: {0}; check `connect` and the file of `config`")]
     Config(String),
+    /// Routers that prove nobody, where forces would come from.
+    #[error(
+        "[wrench_in] would take forces from the router {0}, which proves nobody; use tls/ with root_ca_certificate and connect_private_key in the file of `config` in [zenoh], or a router on this machine, or write allow_unproven = true in [wrench_in]"
+    )]
+    Unproven(String),
     /// The thread.
     #[error("the thread of [zenoh] cannot be started: {0}")]
     Thread(#[from] io::Error),
@@ -48,6 +58,7 @@ pub enum ZenohError {
 #[derive(Debug)]
 pub struct ZenohPublisher {
     prefix: String,
+    ros_namespace: Option<String>,
     stop: Arc<AtomicBool>,
     published: Arc<AtomicU64>,
     thread: Option<JoinHandle<()>>,
@@ -63,14 +74,19 @@ impl ZenohPublisher {
         hello: &Hello,
         feed: StateFeed,
     ) -> Result<Self, ZenohError> {
-        let config = config(&settings).map_err(|error| ZenohError::Config(error.to_string()))?;
+        let config = client_config(&settings.connect, settings.config.as_deref())
+            .map_err(|error| ZenohError::Config(error.to_string()))?;
         let prefix = format!("taut/{}", settings.name);
+        let ros_namespace = settings.ros.map(|_| format!("/{}", settings.name));
         let stop = Arc::<AtomicBool>::default();
         let published = Arc::<AtomicU64>::default();
         let work = Work {
             config,
             prefix: prefix.clone(),
             hello: hello.line(),
+            ros: settings
+                .ros
+                .map(|ros| (ros, settings.name, hello.scene.clone())),
             period: Duration::from_secs_f64(settings.rate.recip()),
             trail: EventLines::new(settings.naming),
             stop: stop.clone(),
@@ -81,6 +97,7 @@ impl ZenohPublisher {
             .spawn(move || work.run(feed))?;
         Ok(Self {
             prefix,
+            ros_namespace,
             stop,
             published,
             thread: Some(thread),
@@ -91,6 +108,12 @@ impl ZenohPublisher {
     #[must_use]
     pub fn prefix(&self) -> &str {
         &self.prefix
+    }
+
+    /// What the names of its topics of ROS 2 begin with, if it has any.
+    #[must_use]
+    pub fn ros_namespace(&self) -> Option<&str> {
+        self.ros_namespace.as_deref()
     }
 
     /// States handed to Zenoh so far.
@@ -111,15 +134,15 @@ impl Drop for ZenohPublisher {
 }
 
 /// Zenoh's configuration: the file's, as a client of routers that listens nowhere and looks for nobody by itself.
-fn config(settings: &ZenohSettings) -> zenoh::Result<Config> {
-    let mut config = match &settings.config {
+pub(crate) fn client_config(connect: &[String], file: Option<&Path>) -> zenoh::Result<Config> {
+    let mut config = match file {
         Some(path) => Config::from_file(path)?,
         None => Config::default(),
     };
     config.insert_json5("mode", "\"client\"")?;
     config.insert_json5("scouting/multicast/enabled", "false")?;
-    if !settings.connect.is_empty() {
-        let routers: Vec<String> = settings.connect.iter().map(|r| format!("{r:?}")).collect();
+    if !connect.is_empty() {
+        let routers: Vec<String> = connect.iter().map(|r| format!("{r:?}")).collect();
         config.insert_json5("connect/endpoints", &format!("[{}]", routers.join(",")))?;
     }
     Ok(config)
@@ -129,6 +152,7 @@ struct Work {
     config: Config,
     prefix: String,
     hello: String,
+    ros: Option<(RosSettings, String, SceneDescription)>,
     period: Duration,
     trail: EventLines,
     stop: Arc<AtomicBool>,
@@ -137,7 +161,7 @@ struct Work {
 
 impl Work {
     fn run(mut self, feed: StateFeed) {
-        let Some(session) = self.session() else {
+        let Some(session) = open(&self.config, &self.stop) else {
             return;
         };
         if let Err(error) = self.publish(&session, feed) {
@@ -145,23 +169,6 @@ impl Work {
         }
         // It ends with this thread; a router that does not hear of it notices.
         let _ = session.close().wait();
-    }
-
-    /// The session with a router; `None` where the end came before one was reached.
-    fn session(&self) -> Option<Session> {
-        let mut told = false;
-        while !self.stop.load(Ordering::Relaxed) {
-            match zenoh::open(self.config.clone()).wait() {
-                Ok(session) => return Some(session),
-                Err(error) if !told => {
-                    tracing::warn!("[zenoh] reaches no router and goes on trying: {error}");
-                    told = true;
-                }
-                Err(_) => {}
-            }
-            self.sleep_until(Instant::now() + RETRY_PERIOD);
-        }
-        None
     }
 
     fn publish(&mut self, session: &Session, mut feed: StateFeed) -> zenoh::Result<()> {
@@ -201,6 +208,10 @@ impl Work {
             .congestion_control(CongestionControl::Block)
             .wait()?;
 
+        let ros = self.ros.as_ref();
+        let ros =
+            ros.map(|(settings, name, scene)| RosTopics::new(session, name, scene, *settings));
+        let mut ros = ros.transpose()?;
         let mut payload = Vec::new();
         let mut deadline = Instant::now();
         while !self.stop.load(Ordering::Relaxed) {
@@ -215,24 +226,44 @@ impl Work {
                 if encode_onto(state, &mut payload).is_ok() {
                     hot.put(payload.as_slice()).wait()?;
                 }
+                if let Some(ros) = &mut ros {
+                    ros.publish(state)?;
+                }
                 self.published.fetch_add(1, Ordering::Relaxed);
             }
             // Late ones are given up, not made up for.
             deadline = (deadline + self.period).max(Instant::now());
-            self.sleep_until(deadline);
+            sleep_until(deadline, &self.stop);
         }
         Ok(())
     }
+}
 
-    /// Sleeps in pieces that keep the end from waiting.
-    fn sleep_until(&self, end: Instant) {
-        const PIECE: Duration = Duration::from_millis(100);
-        while !self.stop.load(Ordering::Relaxed) {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return;
+/// The session with a router; `None` where the end came before one was reached.
+pub(crate) fn open(config: &Config, stop: &AtomicBool) -> Option<Session> {
+    let mut told = false;
+    while !stop.load(Ordering::Relaxed) {
+        match zenoh::open(config.clone()).wait() {
+            Ok(session) => return Some(session),
+            Err(error) if !told => {
+                tracing::warn!("[zenoh] reaches no router and goes on trying: {error}");
+                told = true;
             }
-            std::thread::sleep(left.min(PIECE));
+            Err(_) => {}
         }
+        sleep_until(Instant::now() + RETRY_PERIOD, stop);
+    }
+    None
+}
+
+/// Sleeps in pieces that keep the end from waiting.
+fn sleep_until(end: Instant, stop: &AtomicBool) {
+    const PIECE: Duration = Duration::from_millis(100);
+    while !stop.load(Ordering::Relaxed) {
+        let left = end.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return;
+        }
+        std::thread::sleep(left.min(PIECE));
     }
 }

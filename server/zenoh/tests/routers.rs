@@ -103,6 +103,7 @@ fn publisher(connect: &str, feed: StateFeed) -> ZenohPublisher {
         config: None,
         rate: 100.0,
         naming: |_| None,
+        ros: None,
     };
     ZenohPublisher::start(settings, &hello(), feed).expect("a good configuration")
 }
@@ -202,6 +203,7 @@ fn a_wrong_configuration_is_said_at_once_and_an_end_without_a_router_does_not_wa
         config: config.map(Into::into),
         rate: 100.0,
         naming: |_| None,
+        ros: None,
     };
     let (_, feed) = state_channel();
     let refused = ZenohPublisher::start(settings("no endpoint", None), &hello(), feed);

@@ -327,6 +327,7 @@ impl Inner {
             // The server has no business sending these.
             Payload::Input(_)
             | Payload::Head(_)
+            | Payload::Force(_)
             | Payload::TimeRequest(_)
             | Payload::Arrive(_)
             | Payload::PathChallenge(_) // under a group key: taken before under its own

@@ -13,8 +13,8 @@ use std::{
     time::{Duration, Instant},
 };
 use taut_proto::{
-    ClientStats, ConstraintSet, CouplingOffer, HeadSample, InputSample, MeshBlob, MeshHash,
-    Payload, SceneDescription, SessionTime,
+    ClientStats, ConstraintSet, CouplingOffer, ForceSample, HeadSample, InputSample, MeshBlob,
+    MeshHash, Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
     state::EventRecord,
 };
@@ -184,6 +184,11 @@ impl ClientLink {
     /// Sends a reading of the viewer's head at once. Counts if [`crate::Role::Tracker`] joined; from any other role the server refuses it.
     pub fn send_head(&self, sample: &HeadSample) {
         self.hot.send(&Payload::Head(*sample));
+    }
+
+    /// Sends a wrench from outside at once. Counts if [`crate::Role::Force`] joined; from any other role the server refuses it.
+    pub fn send_force(&self, sample: &ForceSample) {
+        self.hot.send(&Payload::Force(*sample));
     }
 
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.

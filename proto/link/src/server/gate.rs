@@ -14,6 +14,7 @@ pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
         | Payload::PathResponse(_) => Some(Act::KeepPath),
         Payload::Input(_) => Some(Act::GiveInput),
         Payload::Head(_) => Some(Act::GiveHead),
+        Payload::Force(_) => Some(Act::GiveForce),
         Payload::Arrive(_) => Some(Act::KeepFrames),
         Payload::Hot(_)
         | Payload::Release(_)

@@ -1,12 +1,13 @@
 //! A running server: its addresses, its clients, its end.
 
 use super::{
-    Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FrameMaster, FrameReport,
-    HEAD_READERS, HeadOutput, LinkEvent, ServerOptions, accept,
+    Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, ForceOutput, FrameMaster,
+    FrameReport, HEAD_READERS, HeadOutput, LinkEvent, ServerOptions, accept,
     device_input::InputWriter,
     device_receiver::DevicePaths,
     events::EventHub,
     eviction,
+    force_input::force_input,
     frames::Frames,
     group::{self, GroupHub},
     head_input::head_inputs,
@@ -61,6 +62,7 @@ pub struct ServerLink {
     events: Mutex<Receiver<LinkEvent>>,
     inputs: Mutex<Option<triple_buffer::Output<Option<DeviceInput>>>>,
     heads: Mutex<Option<[HeadOutput; HEAD_READERS]>>,
+    force: Mutex<Option<ForceOutput>>,
     threads: Mutex<Vec<JoinHandle<()>>>,
     eviction: tokio::task::JoinHandle<()>,
 }
@@ -106,6 +108,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
     let group = GroupHub::new(epoch, options.multicast)
         .map_err(|error| system("open the multicast socket (check the interface)", &error))?;
     let (heads, head_outputs) = head_inputs();
+    let (forces, force_output) = force_input();
     let shared = Arc::new(Shared {
         key: options.key,
         also: options.also,
@@ -115,6 +118,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         joins: Mutex::new(options.limits.guard()),
         unknown: Mutex::new(options.limits.unknown()),
         heads,
+        forces,
         clock: options.clock,
         node_timeout_ms,
         epoch,
@@ -165,6 +169,7 @@ pub async fn serve(options: ServerOptions, content: Content) -> Result<ServerLin
         events: Mutex::new(events),
         inputs: Mutex::new(Some(output)),
         heads: Mutex::new(Some(head_outputs)),
+        force: Mutex::new(Some(force_output)),
         threads: Mutex::new(threads),
         eviction,
     })
@@ -225,6 +230,11 @@ impl ServerLink {
     /// Newest reading of the tracker on the viewer's head, for each reader. The first call takes them, later ones get `None`.
     pub fn head_inputs(&self) -> Option<[HeadOutput; HEAD_READERS]> {
         lock(&self.heads).take()
+    }
+
+    /// Newest wrench of the force source, for the haptics loop. The first call takes it, later ones get `None`.
+    pub fn force_input(&self) -> Option<ForceOutput> {
+        lock(&self.force).take()
     }
 
     /// The clients that are in.

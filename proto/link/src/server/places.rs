@@ -62,10 +62,12 @@ impl Places {
             Role::Device | Role::Tracker => true,
             Role::Operator => operators == 0,
             Role::Render => named,
-            Role::Observer => false,
+            Role::Observer | Role::Force => false,
         };
-        let sharing =
-            of_role(Role::Observer).count() + operators.saturating_sub(1) + strange_renders;
+        let sharing = of_role(Role::Observer).count()
+            + of_role(Role::Force).count()
+            + operators.saturating_sub(1)
+            + strange_renders;
         if has_own || sharing < self.shared {
             return Ok(());
         }

@@ -6,6 +6,7 @@
 use super::{
     DeviceInput, HeadInput,
     device_input::Taken,
+    force_input::TakenForce,
     gate::{act_of_datagram, permits},
     session::Session,
     shared::Shared,
@@ -75,7 +76,14 @@ pub(crate) fn receive(
         // A group key proves a member, not this one: nothing under it is opened here.
         Err(OpenError::Forged | OpenError::Misplaced) => return counters.forged.one(),
         Err(OpenError::Replayed) => return counters.replayed.one(),
-        Err(OpenError::Payload(_)) => return counters.garbage.one(),
+        Err(OpenError::Payload(_)) => {
+            // Its seal was good: a source of forces that says what is no wrench is stopped, not only overheard.
+            if session.role.may(Act::GiveForce) {
+                shared.forces.spoil(session.number, now_ns);
+                counters.forces_refused.one();
+            }
+            return counters.garbage.one();
+        }
     };
     // Only what is authentic counts against a session's rate: nobody else can use it up by naming its address.
     if !session.rights.take_datagram(now_ns) {
@@ -158,6 +166,13 @@ pub(crate) fn receive(
                 counters.heads_refused.one();
             }
         }
+        Payload::Force(sample) => match shared.forces.offer(sample, session.number, now_ns) {
+            TakenForce::Newest { lost } => {
+                counters.forces.one();
+                counters.forces_lost.add(lost);
+            }
+            TakenForce::Overtaken => counters.forces_refused.one(),
+        },
         Payload::Heartbeat
         | Payload::Hot(_)
         | Payload::Release(_)

@@ -2,9 +2,9 @@
 
 use super::{
     LinkEvent, content::EncodedContent, device_input::InputWriter, device_receiver::DevicePaths,
-    events::EventHub, frames::Frames, group::GroupHub, head_input::HeadWriter, joining::Place,
-    options::AlsoKey, places::Places, quic_outbox::QuicSender, sent_states::SentStates,
-    session::Session,
+    events::EventHub, force_input::ForceWriter, frames::Frames, group::GroupHub,
+    head_input::HeadWriter, joining::Place, options::AlsoKey, places::Places,
+    quic_outbox::QuicSender, sent_states::SentStates, session::Session,
 };
 use crate::{
     SessionClock,
@@ -56,6 +56,7 @@ pub(crate) struct Shared {
     pub(crate) inputs: InputWriter,
     pub(crate) frames: Option<Frames>,
     pub(crate) heads: HeadWriter,
+    pub(crate) forces: ForceWriter,
     pub(crate) sent_states: SentStates,
     pub(crate) group: GroupHub,
     /// How fast meshes go to all clients together.
@@ -176,6 +177,7 @@ impl Sessions {
                 );
                 let code = match role {
                     Role::Tracker => RefusalCode::TrackerTaken,
+                    Role::Force => RefusalCode::ForceTaken,
                     _ => RefusalCode::DeviceTaken,
                 };
                 return Err((code, text));

@@ -1,7 +1,6 @@
 //! A recording as an MCAP file of ROS 2 messages, for Foxglove, rosbags and `ros2 bag`.
 
 mod report;
-mod ros;
 mod run;
 mod topics;
 

@@ -3,15 +3,15 @@
 use std::io::Write;
 use std::time::Duration;
 
-use god_object::nalgebra::{Point3, Translation3, UnitQuaternion};
-use god_object::spatial::Pose;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, McapResult, WriteOptions, Writer};
 
-use super::ros::{
+use taut_ros::{
     Header, Joy, Message, PoseStamped, TfMessage, TransformStamped, TwistStamped, WrenchStamped,
+    obstacle_frame, reference_frame,
 };
+
 use super::run::SceneFrames;
 use crate::records::{ForceRecord, HapticsRecord, UpdateRecord};
 
@@ -66,7 +66,7 @@ impl<'a, W: Write> Topics<'a, W> {
             obstacles: obstacles
                 .iter()
                 .map(|obstacle| {
-                    let frame = frame_of(obstacle.index, &obstacle.name);
+                    let frame = obstacle_frame(obstacle.index, &obstacle.name);
                     let topic = topic::<PoseStamped<'_>, W>(w, &format!("/{frame}/pose"))?;
                     Ok((frame, topic))
                 })
@@ -239,28 +239,4 @@ fn put<W: Write, M: Message>(
     };
     topic.messages = topic.messages.wrapping_add(1);
     writer.write_to_known_channel(&header, bytes)
-}
-
-/// Such as `obstacle_2_upper_plate`: a name in ROS has letters, digits and underscores, and the index tells two apart that become the same.
-fn frame_of(index: usize, name: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-    format!(
-        "obstacle_{index}_{}",
-        name.chars().map(plain).collect::<String>()
-    )
-}
-
-fn reference_frame(body: &Pose, reference_point: &Point3<f64>) -> Pose {
-    let at = body * reference_point;
-    Pose::from_parts(Translation3::from(at.coords), UnitQuaternion::identity())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_obstacles_become_names_of_ros() {
-        assert_eq!(frame_of(2, "upper plate/é"), "obstacle_2_upper_plate__");
-    }
 }

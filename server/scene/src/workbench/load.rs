@@ -13,6 +13,7 @@ use super::parse::parse;
 use super::spec::{
     Device, Machine, Monitoring, Network, Node, RealTime, Safety, Screen, Show, Viewer,
 };
+use super::wrench_in::WrenchIn;
 use crate::document::{At, Document};
 use crate::files::{MAX_TOML_BYTES, read_text};
 use crate::problem::FileError;
@@ -64,6 +65,8 @@ pub struct Workbench {
     pub operator: Operator,
     /// Publication through Zenoh routers.
     pub zenoh: Zenoh,
+    /// A force from outside.
+    pub wrench_in: WrenchIn,
     pub(super) scene_at: At,
 }
 

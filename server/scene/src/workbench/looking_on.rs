@@ -11,6 +11,8 @@ use crate::document::{Range, Section};
 const MAX_RATE: f64 = 1000.0;
 /// Fastest stream of JSON lines, 1/s: no screen shows more, and no script reads more.
 const MAX_LINE_RATE: f64 = 60.0;
+/// Last domain of ROS 2 that has ports on every system.
+const LAST_ROS_DOMAIN: i64 = 101;
 /// Most that may be let in.
 const MAX_CLIENTS: i64 = 1024;
 /// Longest name of a VRPN device, and of a workbench among Zenoh's keys.
@@ -63,6 +65,10 @@ pub struct Zenoh {
     pub config: Option<PathBuf>,
     /// States per second.
     pub rate: f64,
+    /// Also as a node of ROS 2, as rmw_zenoh sees one.
+    pub ros: bool,
+    /// `ROS_DOMAIN_ID` of that node.
+    pub ros_domain: u8,
 }
 
 impl Default for Vrpn {
@@ -99,6 +105,8 @@ impl Default for Zenoh {
             connect: Vec::new(),
             config: None,
             rate: 60.0,
+            ros: false,
+            ros_domain: 0,
         }
     }
 }
@@ -167,7 +175,26 @@ pub(super) fn zenoh(section: &Section<'_>, files: &Files<'_>) -> Zenoh {
             .collect(),
         config: files.path(section, "config"),
         rate: section.number_or("rate", Range::PositiveUpTo(MAX_RATE), default.rate),
+        ros: section.boolean("ros").unwrap_or(false),
+        ros_domain: section
+            .integer("ros_domain", 0, LAST_ROS_DOMAIN)
+            .and_then(|domain| u8::try_from(domain).ok())
+            .unwrap_or(default.ros_domain),
     };
+    let is_word = |name: &str| {
+        !name.starts_with(|c: char| c.is_ascii_digit())
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    if zenoh.ros && !is_word(&zenoh.name) {
+        let at = section.get("name").map_or(section.at(), |node| &node.at);
+        section.complain(
+            at,
+            format!(
+                "`name` in [zenoh] is \"{}\", which is no namespace of ROS 2; write letters, digits and `_`, no digit first, or ros = false",
+                zenoh.name
+            ),
+        );
+    }
     if zenoh.enabled && zenoh.connect.is_empty() && zenoh.config.is_none() {
         let text = "[zenoh] names no router; write connect = [\"tcp/router.example:7447\"], or config = \"zenoh.json5\"";
         section.complain(section.at(), text);

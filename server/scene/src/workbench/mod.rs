@@ -22,6 +22,7 @@ mod spec;
 mod token;
 mod tracker;
 mod viewer;
+mod wrench_in;
 
 pub use dynamics::DeviceDynamics;
 pub use frames::{FrameSwap, Frames};
@@ -35,3 +36,4 @@ pub use spec::{
     AlsoKeyFile, Device, HeadTracking, Machine, Monitoring, Network, Node, Passivity, RealTime,
     RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
 };
+pub use wrench_in::{WrenchFrame, WrenchIn, WrenchSource};

@@ -21,6 +21,7 @@ use super::realtime::realtime;
 use super::safety::safety;
 use super::spec::Device;
 use super::viewer::{show, viewer};
+use super::wrench_in::{WrenchIn, beside, wrench_in};
 use crate::document::{Document, Section};
 use crate::problem::FileError;
 use crate::scene::pose_of;
@@ -59,7 +60,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     };
     let device = table(&root, "device", |s| device(s, &files)).unwrap_or(Some(simulated));
     let dynamics = table(&root, "dynamics", dynamics).flatten();
-    let network = network(root.section("network"), &root, &files);
+    let mut network = network(root.section("network"), &root, &files);
     let frames = table(&root, "frames", frames).unwrap_or_default();
     if let Some(network) = &network {
         places(&root, network, nodes.len(), &frames);
@@ -82,6 +83,13 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
     let observers = table(&root, "observers", |s| observers(s, &files)).unwrap_or_default();
     let operator = table(&root, "operator", |s| operator(s, &files)).unwrap_or_default();
     let zenoh = table(&root, "zenoh", |s| zenoh(s, &files)).unwrap_or_default();
+    let outside = root.section("wrench_in");
+    let wrench_in = outside.as_ref().map_or_else(WrenchIn::default, wrench_in);
+    let beside_it = (device.as_ref(), &safety, &zenoh);
+    beside(outside.as_ref(), &wrench_in, beside_it, network.as_mut());
+    if let Some(outside) = outside {
+        outside.finish();
+    }
     root.finish();
     let mut found = problems.into_inner();
     // In the order of the file, overrides last.
@@ -124,6 +132,7 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         observers,
         operator,
         zenoh,
+        wrench_in,
         scene_at,
     })
 }

@@ -16,8 +16,9 @@ use taut_bridge::{Device, DeviceLimits, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
-use taut_scene::{BuiltMotion, FidelityPlan, Scene};
+use taut_scene::{BuiltMotion, FidelityPlan, Scene, WrenchSource};
 
+use crate::loops::external_wrench::ExternalWrenchSettings;
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::head::HeadSource;
@@ -42,6 +43,8 @@ pub struct SessionSetup {
     pub device: DeviceSource,
     /// Limits and times of the force.
     pub safety: SafetySettings,
+    /// A force from outside, where the workbench takes one.
+    pub external: Option<ExternalSetup>,
     /// The viewer.
     pub head: HeadSource,
     /// What clients fetch at join.
@@ -71,6 +74,15 @@ pub struct RecordingSettings {
     pub manifest: Manifest,
     /// Text of the scene.
     pub scene: Arc<str>,
+}
+
+/// A force from outside.
+#[derive(Clone, Debug)]
+pub struct ExternalSetup {
+    /// What is let through.
+    pub settings: ExternalWrenchSettings,
+    /// Where it comes from.
+    pub source: WrenchSource,
 }
 
 /// What moves the god-object.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use god_object::Pose;
 use taut_bridge::{
     ContactBound, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
     ValidationSettings,
@@ -13,9 +14,10 @@ use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
 use taut_scene::{
     BuiltScene, Device, HeadTracking, Monitoring, RealTimeMode, Scene, TransportKind, Viewer,
-    Workbench,
+    Workbench, WrenchFrame,
 };
 
+use crate::loops::external_wrench::{ExternalWrenchSettings, WrenchAxes};
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::frames;
@@ -26,7 +28,9 @@ use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
 use crate::session::setup::devices::{device, input, vrpn_source};
 use crate::session::setup::stability::{declared, judge, of_input, stiffnesses};
-use crate::session::setup::{LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup};
+use crate::session::setup::{
+    ExternalSetup, LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup,
+};
 use crate::shared::contact_snapshot::MAX_MOVING;
 use crate::shared::failure::Failure;
 
@@ -156,6 +160,7 @@ pub fn session_setup(
         start: built.start,
         world: Arc::new(built.world),
         safety,
+        external: external(workbench, overrides, &workbench_from_scene)?,
         head: head(&workbench.viewer),
         content,
         link,
@@ -164,6 +169,39 @@ pub fn session_setup(
         realtime,
         monitor: monitor(&workbench.monitoring, overrides),
     })
+}
+
+/// A force from outside, with the port's own ramps.
+fn external(
+    workbench: &Workbench,
+    overrides: &Overrides,
+    workbench_from_scene: &Pose,
+) -> Result<Option<ExternalSetup>, Failure> {
+    let wanted = &workbench.wrench_in;
+    if !wanted.enabled {
+        return Ok(None);
+    }
+    if overrides.input.is_none() && workbench.device == Device::Remote {
+        return Err(Failure::bad_input(
+            "[wrench_in] does not go with a device behind a bridge; give the server its device (`taut serve --device`), or set wrench_in.enabled = false",
+        ));
+    }
+    let seconds = |ms: f64| Duration::from_secs_f64(ms * 1e-3);
+    let axes = match wanted.frame {
+        WrenchFrame::Workbench => WrenchAxes::Fixed(workbench_from_scene.rotation.inverse()),
+        WrenchFrame::Body => WrenchAxes::Body,
+    };
+    Ok(Some(ExternalSetup {
+        settings: ExternalWrenchSettings {
+            axes,
+            max_force: wanted.max_force,
+            max_torque: wanted.max_torque,
+            hold: seconds(wanted.hold_ms()),
+            ramp_out: seconds(wanted.fade_ms()),
+            ramp_in: Duration::from_secs_f64(workbench.safety.ramp_in),
+        },
+        source: wanted.source.clone(),
+    }))
 }
 
 /// The second cluster key, while its time is not over.

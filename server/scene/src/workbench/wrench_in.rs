@@ -1,0 +1,227 @@
+//! `[wrench_in]`: a force from outside (a robot's sensor, a simulation) that the hand feels beside the contact's. Off unless the file says otherwise.
+
+use super::looking_on::Zenoh;
+use super::spec::{Device, Network, Passivity, Safety};
+use crate::document::{Range, Section};
+
+/// Longest age of a value, ms: what docs/safety.md promises of every force.
+const LONGEST_AGE_MS: f64 = 120.0;
+/// Shortest, ms: less would leave no time to fade.
+const SHORTEST_AGE_MS: f64 = 20.0;
+/// Largest limits that make sense: N, N m.
+const MAX_FORCE: f64 = 200.0;
+const MAX_TORQUE: f64 = 20.0;
+
+/// Where values come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WrenchSource {
+    /// taut's own sealed datagrams, from a client of the role force.
+    Taut,
+    /// `geometry_msgs/msg/WrenchStamped` of a topic of ROS 2, through the routers of `[zenoh]`.
+    Ros {
+        /// Absolute name.
+        topic: String,
+        /// The routers may be such as prove nobody.
+        allow_unproven: bool,
+    },
+}
+
+/// In which axes values are given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WrenchFrame {
+    /// The workbench's.
+    #[default]
+    Workbench,
+    /// Those of the body in the hand, as the device turns it.
+    Body,
+}
+
+/// A force from outside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WrenchIn {
+    /// Whether there is any.
+    pub enabled: bool,
+    /// Where it comes from.
+    pub source: WrenchSource,
+    /// Its axes. It acts at the reference point.
+    pub frame: WrenchFrame,
+    /// Largest norm of the force, N.
+    pub max_force: f64,
+    /// Largest norm of the torque, N m.
+    pub max_torque: f64,
+    /// Age from which on nothing of a value is felt, ms.
+    pub max_age_ms: f64,
+}
+
+impl Default for WrenchIn {
+    fn default() -> Self {
+        Self {
+            enabled: false,
+            source: WrenchSource::Taut,
+            frame: WrenchFrame::Workbench,
+            max_force: 5.0,
+            max_torque: 0.2,
+            max_age_ms: LONGEST_AGE_MS,
+        }
+    }
+}
+
+impl WrenchIn {
+    /// Age up to which a value is felt in full, ms: 20 of 120.
+    #[must_use]
+    pub fn hold_ms(&self) -> f64 {
+        self.max_age_ms / 6.0
+    }
+
+    /// Time in which it then fades, ms. The 5 ms that are left of `max_age_ms` are a period of 1 kHz and what a loop may be late.
+    #[must_use]
+    pub fn fade_ms(&self) -> f64 {
+        self.max_age_ms - self.hold_ms() - 5.0
+    }
+
+    /// Whether clients of the role force have anything to do here.
+    #[must_use]
+    pub fn takes_clients(&self) -> bool {
+        self.enabled && self.source == WrenchSource::Taut
+    }
+}
+
+/// Reads the table.
+pub(super) fn wrench_in(section: &Section<'_>) -> WrenchIn {
+    let default = WrenchIn::default();
+    let sources = [("taut", false), ("ros", true)];
+    let frames = [
+        ("workbench", WrenchFrame::Workbench),
+        ("body", WrenchFrame::Body),
+    ];
+    let is_ros = section.choice("source", &sources).unwrap_or(false);
+    let topic = section.text("topic");
+    let allow_unproven = section.boolean("allow_unproven").unwrap_or(false);
+    let source = if is_ros {
+        WrenchSource::Ros {
+            topic: ros_topic(section, topic).unwrap_or_default(),
+            allow_unproven,
+        }
+    } else {
+        for key in ["topic", "allow_unproven"] {
+            if let Some(node) = section.get(key) {
+                let text = format!("`{key}` in [wrench_in] is for source = \"ros\"; leave it out");
+                section.complain(&node.at, text);
+            }
+        }
+        WrenchSource::Taut
+    };
+    let up_to = Range::PositiveUpTo;
+    WrenchIn {
+        enabled: section.boolean("enabled").unwrap_or(false),
+        source,
+        frame: section.choice("frame", &frames).unwrap_or_default(),
+        max_force: section.number_or("max_force", up_to(MAX_FORCE), default.max_force),
+        max_torque: section.number_or("max_torque", up_to(MAX_TORQUE), default.max_torque),
+        max_age_ms: age(section).unwrap_or(default.max_age_ms),
+    }
+}
+
+fn age(section: &Section<'_>) -> Option<f64> {
+    let age = section.number("max_age_ms", Range::PositiveUpTo(LONGEST_AGE_MS))?;
+    if age < SHORTEST_AGE_MS {
+        let at = section
+            .get("max_age_ms")
+            .map_or(section.at(), |node| &node.at);
+        let text = format!(
+            "`max_age_ms` in [wrench_in] is {age}, which leaves no time to fade; write {SHORTEST_AGE_MS} to {LONGEST_AGE_MS}"
+        );
+        section.complain(at, text);
+        return None;
+    }
+    Some(age)
+}
+
+/// An absolute name of ROS 2: parts of letters, digits and `_`, none of which begins with a digit.
+fn ros_topic(section: &Section<'_>, topic: Option<&str>) -> Option<String> {
+    let is_name = |part: &str| {
+        part.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    match topic {
+        Some(text)
+            if text.len() <= 200
+                && text
+                    .strip_prefix('/')
+                    .is_some_and(|rest| rest.split('/').all(is_name)) =>
+        {
+            Some(text.to_owned())
+        }
+        Some(text) => {
+            let at = section.get("topic").map_or(section.at(), |node| &node.at);
+            section.complain(
+                at,
+                format!("`topic` in [wrench_in] is \"{text}\", which is no absolute name of ROS 2; write one such as \"/ft_sensor/wrench\""),
+            );
+            None
+        }
+        None => {
+            section.complain_missing("topic", "topic = \"/ft_sensor/wrench\"");
+            None
+        }
+    }
+}
+
+/// Complains of what does not go with it, and closes the role of force sources where nobody waits for them.
+pub(super) fn beside(
+    section: Option<&Section<'_>>,
+    wanted: &WrenchIn,
+    (device, safety, zenoh): (Option<&Device>, &Safety, &Zenoh),
+    network: Option<&mut Network>,
+) {
+    if let Some(network) = network
+        && !wanted.takes_clients()
+    {
+        network
+            .admission
+            .roles
+            .retain(|role| *role != taut_proto::Role::Force);
+    }
+    let Some(section) = section.filter(|_| wanted.enabled) else {
+        return;
+    };
+    let complain = |key: &'static str, text: String| {
+        let at = section.get(key).map_or(section.at(), |node| &node.at);
+        section.complain(at, text);
+    };
+    if safety.passivity != Passivity::Control {
+        complain(
+            "enabled",
+            "[wrench_in] needs passivity = \"control\" in [safety]: who sends a force could give the hand energy without end otherwise".to_owned(),
+        );
+    }
+    if device == Some(&Device::Remote) {
+        complain(
+            "enabled",
+            "[wrench_in] adds its force at the server, and a device behind a bridge could feel it later than its age allows; give the server its device (`taut serve --device`), or set enabled = false".to_owned(),
+        );
+    }
+    if let WrenchSource::Ros { .. } = &wanted.source
+        && !zenoh.enabled
+    {
+        complain(
+            "source",
+            "source = \"ros\" in [wrench_in] comes through the routers of [zenoh], which is off; set enabled = true there".to_owned(),
+        );
+    }
+    let fade = wanted.fade_ms();
+    for (key, limit, slew, unit) in [
+        ("max_force", wanted.max_force, safety.force_slew, "N"),
+        ("max_torque", wanted.max_torque, safety.torque_slew, "N m"),
+    ] {
+        if limit > slew * fade {
+            complain(
+                key,
+                format!(
+                    "`{key}` in [wrench_in] is {limit} {unit}, which cannot fade in {fade:.0} ms at {slew} {unit}/ms of [safety]; use at most {:.2}, or a longer `max_age_ms`",
+                    slew * fade
+                ),
+            );
+        }
+    }
+}

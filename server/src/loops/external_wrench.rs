@@ -1,0 +1,344 @@
+//! A wrench from outside (a robot's sensor, a simulation) on its way to the hand: judged, limited, and gone when it is old.
+//!
+//! What comes out is added to the contact's wrench before the device port, so every promise of the port holds of the sum.
+//!
+//! | name in code | unit | meaning |
+//! |--------------|------|---------|
+//! | `made`       | s    | when a value was measured, session time, at the earliest that its sender's clock allows |
+//! | `hold`       | s    | age up to which it is felt in full |
+//! | `ramp_out`   | s    | time in which it then fades; the same ramp as the port's own |
+//! | `gain`       | –    | share that is felt: falls with the age at once, rises by the port's ramp-in |
+//!
+//! A value that is no number or out of its range stops the force; what is old, repeated, out of order or ahead of time changes nothing. Pure: times are
+//! arguments. A tick neither allocates nor waits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use god_object::nalgebra::UnitQuaternion;
+use god_object::spatial::{Pose, Vector6, angular, linear, six};
+use taut_bridge::{fade_share, within_limits};
+use taut_link::ForceOutput;
+
+/// Most that the time of a value may be ahead of its arrival: clocks that agree differ by far less.
+pub const MAX_AHEAD: Duration = Duration::from_millis(20);
+
+/// The axes that values are given in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WrenchAxes {
+    /// Fixed ones: scene from these.
+    Fixed(UnitQuaternion<f64>),
+    /// Those of the body in the hand.
+    Body,
+}
+
+/// What is let through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExternalWrenchSettings {
+    /// Axes of the values.
+    pub axes: WrenchAxes,
+    /// Largest norm of the force, N.
+    pub max_force: f64,
+    /// Largest norm of the torque, N m.
+    pub max_torque: f64,
+    /// Age up to which a value is felt in full.
+    pub hold: Duration,
+    /// Time in which it then fades.
+    pub ramp_out: Duration,
+    /// Time from nothing to all of it.
+    pub ramp_in: Duration,
+}
+
+/// A value as its receiver hands it on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SentWrench {
+    /// Force then torque, N and N m; finite.
+    pub wrench: Vector6,
+    /// When it was measured, session time; `None` where the sender's clock is not known.
+    pub made: Option<Duration>,
+    /// By how much `made` may be too late, because the clocks are not known better.
+    pub uncertainty: Duration,
+    /// When it came, session time.
+    pub received: Duration,
+    /// Who sent it: numbers of one sender go up.
+    pub sender: u64,
+    /// Counts the values of one sender.
+    pub index: u64,
+}
+
+/// The newest that a receiver knows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NewestWrench {
+    /// The newest value; `None` before the first.
+    pub sent: Option<SentWrench>,
+    /// Session time at which something came that is no wrench; zero for never.
+    pub spoiled: Duration,
+}
+
+/// Where values come from: a reading end that never waits.
+pub enum WrenchReader {
+    /// The sealed datagrams of a force source.
+    Link(ForceOutput),
+    /// Another receiver of this process.
+    Local(triple_buffer::Output<NewestWrench>),
+}
+
+impl WrenchReader {
+    /// The newest, if anything came since the last call.
+    fn news(&mut self) -> Option<NewestWrench> {
+        match self {
+            Self::Local(output) => output.update().then(|| *output.output_buffer()),
+            Self::Link(output) => {
+                if !output.update() {
+                    return None;
+                }
+                let input = (*output.output_buffer())?;
+                let ns = Duration::from_nanos;
+                let sent = input.sample.map(|sample| SentWrench {
+                    wrench: Vector6::from(sample.wrench),
+                    made: (sample.sample_time_ns > 0).then(|| ns(sample.sample_time_ns)),
+                    uncertainty: ns(sample.clock_uncertainty_ns),
+                    received: ns(input.received_ns),
+                    sender: u64::from(input.session),
+                    index: sample.index,
+                });
+                Some(NewestWrench {
+                    sent,
+                    spoiled: ns(input.spoiled_ns),
+                })
+            }
+        }
+    }
+}
+
+/// Why a value is not felt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// Older than may be felt when it came.
+    Old,
+    /// Its time is that of no clock that is known, or ahead of it.
+    NotOnClock,
+    /// Its time is not after that of the value before.
+    WentBack,
+    /// It was no wrench.
+    Spoiled,
+}
+
+impl Refused {
+    /// All, with their names in metrics.
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("old", Self::Old),
+        ("not-on-clock", Self::NotOnClock),
+        ("went-back", Self::WentBack),
+        ("no-wrench", Self::Spoiled),
+    ];
+}
+
+/// What is known of it outside the loop. One writer: the haptics thread.
+#[derive(Debug, Default)]
+pub struct ExternalWrenchStatistics {
+    taken: AtomicU64,
+    refused: [AtomicU64; Refused::NAMED.len()],
+    /// Of a receiver that has no counters of its own; it writes them.
+    pub lost: AtomicU64,
+    /// The same of values that came again, too late, or without what tells their time.
+    pub dropped: AtomicU64,
+    /// Of the value that is felt now, ns; the most that it ever was while felt.
+    age_ns: AtomicU64,
+    largest_age_ns: AtomicU64,
+    felt: AtomicBool,
+    /// Norms of force and torque that are added now, as bits of an `f64`.
+    added_bits: [AtomicU64; 2],
+}
+
+impl ExternalWrenchStatistics {
+    /// Values that were felt.
+    #[must_use]
+    pub fn taken(&self) -> u64 {
+        self.taken.load(Ordering::Relaxed)
+    }
+
+    /// Values that were not, by the reason's name.
+    #[must_use]
+    pub fn refused(&self) -> [(&'static str, u64); Refused::NAMED.len()] {
+        Refused::NAMED.map(|(name, why)| (name, self.refused[why as usize].load(Ordering::Relaxed)))
+    }
+
+    /// Age of the value that is felt now; `None` while none is.
+    #[must_use]
+    pub fn age(&self) -> Option<Duration> {
+        self.is_felt()
+            .then(|| Duration::from_nanos(self.age_ns.load(Ordering::Relaxed)))
+    }
+
+    /// The most that the age of a value was while anything of it was felt.
+    #[must_use]
+    pub fn largest_age(&self) -> Duration {
+        Duration::from_nanos(self.largest_age_ns.load(Ordering::Relaxed))
+    }
+
+    /// Whether anything of it goes to the device port now.
+    #[must_use]
+    pub fn is_felt(&self) -> bool {
+        self.felt.load(Ordering::Relaxed)
+    }
+
+    /// Norms of the force, N, and the torque, N m, that are added now.
+    #[must_use]
+    pub fn added(&self) -> [f64; 2] {
+        let value = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
+        [value(&self.added_bits[0]), value(&self.added_bits[1])]
+    }
+
+    fn refuse(&self, why: Refused) {
+        self.refused[why as usize].fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn tell(&self, age: Option<Duration>, added: &Vector6) {
+        self.felt.store(age.is_some(), Ordering::Relaxed);
+        if let Some(age) = age {
+            let age = u64::try_from(age.as_nanos()).unwrap_or(u64::MAX);
+            self.age_ns.store(age, Ordering::Relaxed);
+            self.largest_age_ns.fetch_max(age, Ordering::Relaxed);
+        }
+        let norms = [linear(added).norm(), angular(added).norm()];
+        for (bits, norm) in self.added_bits.iter().zip(norms) {
+            bits.store(norm.to_bits(), Ordering::Relaxed);
+        }
+    }
+}
+
+/// The value that is felt.
+#[derive(Clone, Copy, Debug)]
+struct Taken {
+    wrench: Vector6,
+    /// Its time as it was told, and at the earliest: the age counts from the latter.
+    told: Duration,
+    made: Duration,
+    sender: u64,
+}
+
+/// A wrench from outside, as the haptics loop adds it.
+pub struct ExternalWrench {
+    reader: WrenchReader,
+    settings: ExternalWrenchSettings,
+    newest: Option<Taken>,
+    spoiled: Duration,
+    gain: f64,
+    last_tick: Option<Duration>,
+    statistics: Arc<ExternalWrenchStatistics>,
+}
+
+impl ExternalWrench {
+    /// Nothing is felt until the first value.
+    #[must_use]
+    pub fn new(reader: WrenchReader, settings: ExternalWrenchSettings) -> Self {
+        Self {
+            reader,
+            settings,
+            newest: None,
+            spoiled: Duration::ZERO,
+            gain: 0.0,
+            last_tick: None,
+            statistics: Arc::default(),
+        }
+    }
+
+    /// The same with counters that a receiver holds already.
+    #[must_use]
+    pub fn with_statistics(mut self, statistics: Arc<ExternalWrenchStatistics>) -> Self {
+        self.statistics = statistics;
+        self
+    }
+
+    /// The counters that this writes.
+    #[must_use]
+    pub fn statistics(&self) -> Arc<ExternalWrenchStatistics> {
+        self.statistics.clone()
+    }
+
+    /// What is added to the contact's wrench at session time `now`, N and N m, scene axes; `body` is the body in the hand. Call it once a period.
+    pub fn tick(&mut self, now: Duration, body: &Pose) -> Vector6 {
+        let passed = now.saturating_sub(self.last_tick.replace(now).unwrap_or(now));
+        if let Some(news) = self.reader.news() {
+            self.take(&news);
+        }
+        let settings = &self.settings;
+        let Some(Taken { wrench, made, .. }) = self.newest else {
+            self.gain = 0.0;
+            self.statistics.tell(None, &Vector6::zeros());
+            return Vector6::zeros();
+        };
+        let age = now.saturating_sub(made);
+        let by_age = fade_share(age.saturating_sub(settings.hold), settings.ramp_out);
+        // A stall of the caller lets nothing in at once.
+        let risen = passed.min(settings.hold).as_secs_f64() / settings.ramp_in.as_secs_f64();
+        let risen = if risen.is_finite() { risen } else { 1.0 }; // no ramp-in
+        self.gain = (self.gain + risen).min(by_age);
+        let limited = within_limits(&wrench, settings.max_force, settings.max_torque);
+        let turn = match settings.axes {
+            WrenchAxes::Fixed(turn) => turn,
+            WrenchAxes::Body => body.rotation,
+        };
+        let (force, torque) = (turn * linear(&limited), turn * angular(&limited));
+        let added = six(&force, &torque) * self.gain;
+        self.statistics.tell((by_age > 0.0).then_some(age), &added);
+        added
+    }
+
+    fn take(&mut self, news: &NewestWrench) {
+        if news.spoiled > self.spoiled {
+            self.spoiled = news.spoiled;
+            self.newest = None;
+            self.statistics.refuse(Refused::Spoiled);
+        }
+        // What came before the spoiled one is not felt again.
+        let Some(sent) = news.sent.filter(|sent| sent.received > self.spoiled) else {
+            return;
+        };
+        match self.judge(&sent) {
+            Ok(taken) => {
+                self.newest = Some(taken);
+                self.statistics.taken.fetch_add(1, Ordering::Relaxed);
+            }
+            Err(why) => {
+                if why == Refused::Spoiled {
+                    self.newest = None;
+                }
+                self.statistics.refuse(why);
+            }
+        }
+    }
+
+    fn judge(&self, sent: &SentWrench) -> Result<Taken, Refused> {
+        let finite = sent.wrench.iter().all(|x| x.is_finite());
+        let made = sent.made.ok_or(Refused::NotOnClock)?;
+        if !finite {
+            return Err(Refused::Spoiled);
+        }
+        if made > sent.received + MAX_AHEAD {
+            return Err(Refused::NotOnClock);
+        }
+        let earliest = made.saturating_sub(sent.uncertainty).min(sent.received);
+        if sent.received - earliest > self.settings.hold + self.settings.ramp_out {
+            return Err(Refused::Old);
+        }
+        if let Some(newest) = self.newest
+            && newest.sender == sent.sender
+            && made < newest.told
+        {
+            return Err(Refused::WentBack);
+        }
+        Ok(Taken {
+            wrench: sent.wrench,
+            told: made,
+            made: earliest,
+            sender: sent.sender,
+        })
+    }
+}
+
+#[cfg(test)]
+#[path = "external_wrench_tests.rs"]
+mod tests;
