@@ -19,7 +19,7 @@ const NOTE_HEIGHT: f32 = 0.42;
 const WIDEST: f32 = 0.92;
 
 /// Width of a letter over its line's height: that of the bitmap font.
-const LETTER_SHAPE: f32 = 0.56;
+pub(crate) const LETTER_SHAPE: f32 = 0.56;
 
 /// Distance of the HUD from the edges of the screen, in heights of its line.
 const MARGIN: f32 = 0.6;

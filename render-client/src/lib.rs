@@ -7,9 +7,11 @@
 //! ([`canvas`]) or in windows, and [`statistics`] counts it.
 #![forbid(unsafe_code)]
 
+pub mod calibration;
 pub mod canvas;
 pub mod cli;
 pub mod comfort;
+pub mod correction;
 mod description;
 pub mod error;
 mod hand;

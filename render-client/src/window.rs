@@ -145,7 +145,7 @@ impl ApplicationHandler for App<'_> {
             }
             WindowEvent::Resized(size) => {
                 if let Some(screen) = &mut self.screen {
-                    screen.resize(id, size);
+                    screen.resize(&self.stage, id, size);
                 }
                 self.last_drawn = None;
             }

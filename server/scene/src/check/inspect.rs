@@ -152,6 +152,10 @@ fn check_toml(path: &Path) -> FileReport {
         let mut notes = Vec::new();
         let workbench = Workbench::load(path).and_then(|workbench| {
             notes = workbench.notes();
+            let faults = workbench.screen_faults();
+            if !faults.is_empty() {
+                return Err(FileError::of_all(faults));
+            }
             let scene = workbench.load_scene()?;
             let (inner, fidelity) = summarise_scene(&scene, &mut notes)?;
             let (screens, nodes) = (workbench.screens.len(), workbench.nodes.len());

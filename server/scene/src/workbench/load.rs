@@ -65,6 +65,8 @@ pub struct Workbench {
     /// Publication through Zenoh routers.
     pub zenoh: Zenoh,
     pub(super) scene_at: At,
+    /// Of the file: what it names is relative to it.
+    pub(super) directory: PathBuf,
 }
 
 impl Workbench {

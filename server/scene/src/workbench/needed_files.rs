@@ -24,7 +24,7 @@ pub enum NeededFile {
 }
 
 impl Workbench {
-    /// Every file that `taut serve` reads beside the workbench file and the cluster key.
+    /// Every file that `taut serve` reads beside the workbench file and the cluster key, and what its nodes read of screens.
     pub fn needed_files(&self) -> Result<Vec<NeededFile>, FileError> {
         let mut files = Vec::new();
         if shipped_scene_text(&self.scene).is_none() {
@@ -44,6 +44,10 @@ impl Workbench {
             }
             Device::Trace { path, .. } => files.push(NeededFile::Named(path.clone())),
             Device::Vrpn { .. } | Device::SpaceMouse { .. } | Device::Remote => {}
+        }
+        // The nodes read them; here `taut check` does.
+        for name in self.screens.iter().flat_map(|screen| screen.output.files()) {
+            files.push(NeededFile::Named(self.screen_file(name)));
         }
         if self.zenoh.enabled {
             files.extend(self.zenoh.config.clone().map(NeededFile::Named));

@@ -131,5 +131,6 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         operator,
         zenoh,
         scene_at,
+        directory: directory.to_path_buf(),
     })
 }

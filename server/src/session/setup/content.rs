@@ -5,7 +5,8 @@ use god_object::nalgebra::Point3;
 use taut_link::Content;
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
-    BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+    BodyDescription, NodeDescription, OutputDescription, ScreenDescription, ShowOptions, Stereo,
+    WindowDescription,
 };
 use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64, SceneDescription};
 use taut_scene::{BuiltBody, BuiltScene, Workbench, srgb};
@@ -151,6 +152,21 @@ fn screen(screen: &taut_scene::Screen) -> ScreenDescription {
         lower_left: array(&screen.lower_left),
         lower_right: array(&screen.lower_right),
         upper_left: array(&screen.upper_left),
+        output: output(&screen.output),
+    }
+}
+
+fn output(output: &taut_scene::ScreenOutput) -> OutputDescription {
+    let names = |files: &[String]| files.iter().map(|name| name.as_str().into()).collect();
+    let mix = output.colour.transpose(); // stored column by column
+    OutputDescription {
+        warp: names(&output.warp),
+        surface: names(&output.surface),
+        blend: names(&output.blend),
+        blend_gamma: output.blend_gamma,
+        colour: std::array::from_fn(|i| mix[i]),
+        gamma: output.gamma.into(),
+        sampling: output.sampling,
     }
 }
 
