@@ -10,7 +10,7 @@ mod grid;
 use nalgebra::Point3;
 use taut_screens::{OutputMesh, Target};
 
-use crate::hud::{Banner, LETTER_SHAPE, MAX_MARKS, Mark, Overlay};
+use crate::hud::{LETTER_SHAPE, MAX_MARKS, Mark, centred};
 use crate::view::{Eye, Screen};
 use grid::{Piece, Surface};
 
@@ -20,6 +20,8 @@ const MOST_LINES: f64 = 24.0;
 const HEAVY: i64 = 5;
 /// Steps of the grey wedge.
 const STEPS: u32 = 11;
+/// Height of the name over that of the screen.
+const NAME_HEIGHT: f32 = 0.09;
 /// Linear light of the ground: a quarter of the signal, on which seams of blend zones and black levels show.
 const GROUND: [f32; 4] = [0.05, 0.05, 0.05, 1.0];
 const LIGHT: [f32; 4] = [0.16, 0.16, 0.16, 1.0];
@@ -74,7 +76,7 @@ impl Chart {
         }
         let marks = surface.corner_marks(0.06 * extent.min());
         quads.extend(marks.iter().map(|piece| ribbon(piece, 4.0 * pixel, CORNER)));
-        let height = (0.3 * step).max(13.0 * pixel);
+        let height = (0.3 * step).max(16.0 * pixel);
         let decimals = (-step.log10()).ceil().max(0.0) as usize;
         let heavy = step * HEAVY as f64;
         for (multiples, at) in surface.crossings(screen, heavy) {
@@ -101,20 +103,17 @@ impl Chart {
             Eye::Left => "left eye",
             Eye::Right => "right eye",
         };
-        let named = Overlay {
-            lines: Vec::new(),
-            banner: Some(Banner {
-                text: self.name.clone(),
-                note: format!("{whose}, {}", self.note),
-            }),
-        };
-        let mut marks = named.marks(shape);
+        let named = [
+            (self.name.as_str(), 1.0),
+            (&*format!("{whose}, {}", self.note), 0.5),
+        ];
+        let mut marks = centred(&named, NAME_HEIGHT, shape, 0.0);
         let wide = 1.1 / STEPS as f32;
         for step in 0..STEPS {
             let left = -0.55 + wide * step as f32;
             let grey = light(step as f32 / (STEPS - 1) as f32);
             marks.push(Mark {
-                place: [left, -0.52, left + wide, -0.32],
+                place: [left, -0.55, left + wide, -0.35],
                 letter: None,
                 colour: [grey, grey, grey, 1.0],
             });

@@ -267,6 +267,16 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             show,
             node: args.node.clone(),
         };
+        let warped = stage.screens.iter().find(|screen| screen.is_warped());
+        if let (true, Some(screen)) = (args.hold, warped) {
+            session.leave();
+            return Err(RenderError::Option {
+                option: "--hold",
+                rule: "left out where a screen is warped, since the mouse would point beside it"
+                    .to_owned(),
+                value: format!("given with the screen \"{}\"", screen.name),
+            });
+        }
         let hand = if args.hold {
             Some(Hand::join(&args, &stage)?)
         } else {

@@ -260,8 +260,8 @@ mod tests {
         for eye in [
             [0.0, 0.0, 0.5],
             [0.4, -0.5, 0.9],
-            [-0.3, 0.7, 0.4],
-            [0.0, 0.83, 0.5],
+            [-0.3, 0.55, 0.4],
+            [0.0, 0.68, 0.5],
         ] {
             let eye = Point3::from(eye);
             let fitted = hull.screen(&screen, &[eye]);

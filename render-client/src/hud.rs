@@ -117,6 +117,15 @@ impl Overlay {
     }
 }
 
+/// Texts on a box of their own in the middle of a screen, downwards from `top`; each with its height over the line's.
+pub(crate) fn centred(texts: &[(&str, f32)], wanted: f32, shape: f32, top: f32) -> Vec<Mark> {
+    let mut marks = Vec::new();
+    let height = fitting(texts, wanted, shape);
+    let left = |wide: f32| -0.5 * wide;
+    write(&mut marks, texts, height, shape, DARKEST, left, top);
+    marks
+}
+
 /// The HUD: one fact per line.
 fn lines(status: &NodeStatus, stale: bool) -> Vec<String> {
     let link = match status.link {

@@ -7,6 +7,7 @@
 //! ([`canvas`]) or in windows, and [`statistics`] counts it.
 #![forbid(unsafe_code)]
 
+pub mod calibrate;
 pub mod calibration;
 pub mod canvas;
 pub mod cli;

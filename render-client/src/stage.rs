@@ -109,6 +109,14 @@ pub struct Bounds {
     pub radius: f64,
 }
 
+impl StageScreen {
+    /// Whether a place of a picture is not where it was drawn.
+    pub fn is_warped(&self) -> bool {
+        let correction = self.correction.as_ref();
+        correction.is_some_and(|correction| !correction.meshes.is_empty())
+    }
+}
+
 impl TriangleMesh {
     /// Lowest and highest coordinates, body frame; both the origin for an empty mesh.
     pub fn corners(&self) -> (Point3<f64>, Point3<f64>) {

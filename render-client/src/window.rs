@@ -5,6 +5,7 @@
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 mod display;
+pub(crate) mod still;
 
 use std::time::{Duration, Instant};
 

@@ -124,6 +124,28 @@ fn lights(image: &RgbaImage, x: u32, y: u32) -> [f64; 3] {
     [red, green, blue].map(light)
 }
 
+/// The pictures without a correction, those with two views put together from two windows.
+fn plain(
+    (width, height): (u32, u32),
+    stereo: Stereo,
+    pose: Isometry3<f64>,
+) -> Option<Vec<RgbaImage>> {
+    let drawn = |stereo| draw(peg_in_hole((width, height), stereo), pose);
+    let right = match stereo {
+        Stereo::SideBySide => (width, 0),
+        Stereo::TopBottom => (0, height),
+        _ => return drawn(stereo),
+    };
+    let (wide, high) = stereo.picture_size((width, height));
+    let together = |eyes: &[RgbaImage]| {
+        let mut picture = RgbaImage::new(wide, high);
+        image::imageops::replace(&mut picture, &eyes[0], 0, 0);
+        image::imageops::replace(&mut picture, &eyes[1], right.0.into(), right.1.into());
+        picture
+    };
+    Some(drawn(Stereo::TwoWindows)?.chunks(2).map(together).collect())
+}
+
 #[test]
 fn an_identity_changes_no_picture_in_any_stereo_mode() {
     let (_keep, coarse) = written("coarse.pfm", &map(7, 5, |x, y| [x, y, 0.0]));
@@ -135,7 +157,8 @@ fn an_identity_changes_no_picture_in_any_stereo_mode() {
     for stereo in ALL {
         let stage = || peg_in_hole(pixels, stereo);
         let pose = Isometry3::translation(0.0, -0.042, 0.0);
-        let Some(plain) = draw(stage(), pose) else {
+        // Views that share a picture are drawn where they stand; each alone is what is warped.
+        let Some(plain) = plain(pixels, stereo, pose) else {
             return;
         };
         for path in [None, Some(&coarse), Some(&fine)] {
@@ -235,7 +258,7 @@ fn pixel_on_cylinder(eye: &Point3<f64>, point: &Point3<f64>) -> (f64, f64) {
 fn on_a_cylinder_a_point_is_seen_where_it_is_from_every_head() {
     let surface = cylinder();
     for head in [[0.0, 0.0, 0.6], [0.35, -0.4, 0.9], [-0.45, 0.35, 0.4]] {
-        for at in [[0.2, 1.0, 0.7], [-0.5, 1.6, 0.35], [0.7, 0.75, 0.8]] {
+        for at in [[0.2, 1.0, 0.7], [-0.5, 1.6, 0.35], [0.45, 0.85, 0.75]] {
             let mut stage = plate(Stereo::TwoWindows);
             stage.screens[0].screen = chord();
             stage.head = Isometry3::translation(head[0], head[1], head[2]);
@@ -362,20 +385,33 @@ fn the_light_of_two_screens_that_overlap_sums_to_that_of_one() {
         }));
     }
     let blended = draw(stage, Isometry3::identity()).expect("drawn before");
+    // Means of 4 x 8 pixels: a single one is only known to a step of 8 bits, and dithered.
+    let mean = |image: &RgbaImage, left: u32, top: u32| {
+        let all = (0..4).flat_map(|x| (0..8).map(move |y| (left + x, top + y)));
+        let sum = all.fold([0.0; 3], |sum, (x, y)| {
+            let own = lights(image, x, y);
+            [0, 1, 2].map(|i| sum[i] + own[i] / 32.0)
+        });
+        Vector3::from(sum)
+    };
     let mut compared = 0;
-    for (x, y) in (0..80).flat_map(|x| (0..240).map(move |y| (x, y))) {
-        let whole = lights(&whole[1], x, y);
-        let (left, right) = (lights(&blended[0], 320 + x, y), lights(&blended[1], x, y));
-        for ((whole, left), right) in whole.into_iter().zip(left).zip(right) {
-            // Below, a step of the output's 8 bits is more than 2 % of the light.
-            if whole > 0.15 {
-                let off = (left + right) / whole - 1.0;
-                assert!(off.abs() < 0.02, "{:.1} % at {x}, {y}", 100.0 * off);
-                compared += 1;
-            }
+    for (x, y) in (0..80)
+        .step_by(4)
+        .flat_map(|x| (0..240).step_by(8).map(move |y| (x, y)))
+    {
+        let whole = mean(&whole[1], x, y);
+        let sum = mean(&blended[0], 320 + x, y) + mean(&blended[1], x, y);
+        for (whole, sum) in whole
+            .iter()
+            .zip(sum.iter())
+            .filter(|(whole, _)| **whole > 0.02)
+        {
+            let off = sum / whole - 1.0;
+            assert!(off.abs() < 0.02, "{:.1} % at {x}, {y}", 100.0 * off);
+            compared += 1;
         }
     }
-    assert!(compared > 1000, "{compared} bright values");
+    assert!(compared > 300, "{compared} bright values");
 }
 
 #[test]
@@ -460,11 +496,13 @@ fn the_calibration_picture_of_a_cylinder_has_its_lines_where_a_tape_measure_has(
         // Straight across from the left edge of the chord: 0.5 m is at this angle, at every height and from every head.
         let angle = ((0.5 - 0.5 * chord().width()) / RADIUS).asin();
         let column = (0.5 + 0.5 * angle / HALF_ANGLE) * f64::from(PIXELS.0);
-        let found = (15..PIXELS.1 - 15).step_by(2).filter(|y| {
-            let near = (column as u32 - 1)..=(column as u32 + 1);
-            near.into_iter().any(|x| is_bright(&pictures[0], x, *y))
+        // Above the name, without the mark of the corner.
+        let rows = || (15..PIXELS.1 / 3).step_by(2);
+        let found = rows().filter(|y| {
+            let mut near = column as u32 - 1..=column as u32 + 1;
+            near.any(|x| is_bright(&pictures[0], x, *y))
         });
-        let (found, all) = (found.count(), (15..PIXELS.1 - 15).step_by(2).count());
+        let (found, all) = (found.count(), rows().count());
         assert!(
             found * 100 > all * 97,
             "{found} of {all} rows from {head:?}"

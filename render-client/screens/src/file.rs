@@ -283,6 +283,34 @@ mod tests {
         assert!(read_blend(folder.path(), 1.0).is_err());
     }
 
+    proptest::proptest! {
+        #[test]
+        fn a_file_with_any_bytes_changed_is_read_or_refused(
+            places in proptest::collection::vec((0_usize..140, proptest::prelude::any::<u8>()), 0..6),
+            kept in 0_usize..160,
+        ) {
+            let mut files = [
+                map(3, 3, |c, r| [c as f32 / 3.0, r as f32 / 3.0, 0.0]),
+                b"2\n2 2\n-1 -1 0 0 1\n1 -1 1 0 1\n-1 1 0 1 1\n1 1 1 1 1\n".to_vec(),
+            ];
+            for (file, name) in files.iter_mut().zip(["a.pfm", "a.data"]) {
+                for (place, byte) in &places {
+                    if let Some(at) = file.get_mut(*place) {
+                        *at = *byte;
+                    }
+                }
+                file.truncate(kept);
+                let (_keep, path) = written(name, file);
+                if let Ok(mesh) = read_warp(&path, 1.0) {
+                    proptest::prop_assert!(mesh.nodes.iter().all(|node| {
+                        node.target.iter().chain(&node.place).all(|value| value.is_finite())
+                    }));
+                }
+                let _ = read_surface(&path); // it ends
+            }
+        }
+    }
+
     #[test]
     fn names_stay_in_their_folder_and_mpcdi_is_refused_by_name() {
         let pfm = |name: &str| file_name_fault(name, &["pfm"]);

@@ -12,6 +12,9 @@ const MOST: usize = 96;
 /// Smallest area that has a side, m².
 const LEAST_AREA: f64 = 1e-12;
 
+/// What the points of a map are rounded by, over the distance of lines or the size of a triangle.
+const ROUNDING: f64 = 1e-5;
+
 /// A grid of points, row by row from the lower left.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
@@ -164,8 +167,9 @@ impl Surface {
             let places = corners.map(|p| screen.place(&p).xy() / step);
             let low = places[0].inf(&places[1]).inf(&places[2]);
             let high = places[0].sup(&places[1]).sup(&places[2]);
-            for across in low.x.ceil() as i64..=high.x.floor() as i64 {
-                for upward in low.y.ceil() as i64..=high.y.floor() as i64 {
+            for across in (low.x - ROUNDING).ceil() as i64..=(high.x + ROUNDING).floor() as i64 {
+                for upward in (low.y - ROUNDING).ceil() as i64..=(high.y + ROUNDING).floor() as i64
+                {
                     let wanted = Vector2::new(across as f64, upward as f64);
                     if let Some(point) = within(&places, &corners, &wanted) {
                         found.insert([across, upward], point);
@@ -202,7 +206,7 @@ fn within(
     );
     let area = u.perp(&v);
     let (b, c) = (w.perp(&v) / area, u.perp(&w) / area); // not finite where seen edge-on: not within
-    let inside = b >= -1e-9 && c >= -1e-9 && b + c <= 1.0 + 1e-9;
+    let inside = b >= -ROUNDING && c >= -ROUNDING && b + c <= 1.0 + ROUNDING;
     inside.then(|| corners[0] + (corners[1] - corners[0]) * b + (corners[2] - corners[0]) * c)
 }
 
@@ -271,8 +275,8 @@ mod tests {
         assert_eq!(crossings.len(), 4 * 3, "{crossings:?}");
         for ([across, upward], point) in crossings {
             let place = wall().place(&point);
-            assert!((place.x - 0.5 * across as f64).abs() < 1e-6);
-            assert!((place.y - 0.5 * upward as f64).abs() < 1e-6);
+            assert!((place.x - 0.5 * across as f64).abs() < 1e-5);
+            assert!((place.y - 0.5 * upward as f64).abs() < 1e-5);
             let deep = 0.3 * (place.x / 1.8 * std::f64::consts::PI).sin();
             assert!((point.y - deep).abs() < 2e-3, "{point}");
         }

@@ -1,23 +1,24 @@
 //! Puts the drawn things together: once per state the instances, and the shadow map where it changed; then each
 //! picture of each screen.
 
+mod corrected;
+
 use nalgebra::{Isometry3, Point3};
 
 use super::anaglyph::Anaglyph;
-use super::chart::ChartDrawing;
 use super::frame::{Floor, FrameUniform, KeyLight};
 use super::gpu::Gpu;
 use super::mesh::{Batch, Instance, MeshBuffers};
 use super::overlay::OverlayPipeline;
 use super::picture::{PictureTarget, ViewTarget};
-use super::pipeline::{FrameLayout, Output, attachment};
+use super::pipeline::{FrameLayout, Output};
 use super::shadow::ShadowMap;
-use super::warp::{Corrected, WarpPipeline, WarpTarget};
+use super::warp::WarpPipeline;
 use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
 use crate::comfort::Comfort;
 use crate::hud::Overlay;
 use crate::stage::{Bounds, Show, Stage, StageBody};
-use crate::stereo::{Part, Picture};
+use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
 use crate::view::{ClipPlanes, Eye, Eyes, Screen};
 
@@ -159,49 +160,6 @@ impl Renderer {
             ..
         } = self;
         PictureTarget::new(gpu, picture, size, *output, layout, shadow, anaglyph)
-    }
-
-    /// Attachments for a picture of `size` pixels that is corrected for what shows it.
-    pub fn corrected_picture(
-        &self,
-        gpu: &Gpu,
-        picture: &Picture,
-        size: (u32, u32),
-        corrected: &Corrected<'_>,
-    ) -> PictureTarget {
-        // The scenes have attachments of their own; only views that lie over each other need pictures here.
-        let mut target = if picture.anaglyph {
-            self.picture(gpu, picture, size)
-        } else {
-            self.picture(gpu, picture, (1, 1))
-        };
-        target.size = size;
-        let most = gpu.device.limits().max_texture_dimension_2d;
-        let sampling = corrected.correction.sampling;
-        let sampled = |pixels: u32| ((f64::from(pixels) * sampling).round() as u32).clamp(1, most);
-        let scene = |view: &ViewTarget| {
-            let [_, _, width, height] = pixels_of(view, size);
-            let size = (sampled(width), sampled(height));
-            let whole = Picture {
-                suffix: "",
-                views: vec![(view.eye, Part::WHOLE)],
-                anaglyph: false,
-            };
-            let single = Output {
-                samples: 1,
-                ..self.output
-            };
-            let usage = wgpu::TextureUsages::TEXTURE_BINDING;
-            let texture = attachment(&gpu.device, "scene", size, single, usage);
-            let mut picture = self.picture(gpu, &whole, size);
-            let chart = corrected.chart;
-            picture.chart =
-                chart.map(|chart| ChartDrawing::new(gpu, self.output, &self.text, chart, view.eye));
-            (view.eye, picture, texture.create_view(&Default::default()))
-        };
-        let scenes = target.views.iter().map(scene).collect();
-        target.warp = Some(Box::new(self.warp.target(gpu, corrected, scenes)));
-        target
     }
 
     /// Size of all meshes on the graphics card, in bytes.
@@ -358,38 +316,6 @@ impl Renderer {
             for (view, seen) in picture.views.iter().zip(&seen) {
                 draw_eye(&mut pass, view, *seen);
             }
-        }
-    }
-
-    /// Draws the scenes of a picture, then the picture from them.
-    fn draw_corrected(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        (screen, eyes): (&Screen, &Eyes),
-        (picture, warp): (&PictureTarget, &WarpTarget),
-        target: &wgpu::TextureView,
-    ) {
-        let screen = warp.screen(screen, eyes);
-        for scene in warp.scenes() {
-            self.draw(gpu, encoder, &screen, eyes, &scene.picture, &scene.view);
-        }
-        warp.aim(&gpu.queue, &screen, eyes, &self.clip_planes);
-        let (width, height) = picture.size;
-        if let Some(combined) = &picture.anaglyph {
-            for (view, scene) in picture.views.iter().zip(warp.scenes()) {
-                let own = view.own.as_ref().unwrap_or(target);
-                let whole = [(scene, [0, 0, width, height])];
-                self.warp.draw(encoder, warp, whole, own);
-            }
-            self.anaglyph.draw(encoder, combined, target);
-        } else {
-            let parts = picture
-                .views
-                .iter()
-                .map(|view| pixels_of(view, picture.size));
-            self.warp
-                .draw(encoder, warp, warp.scenes().iter().zip(parts), target);
         }
     }
 

@@ -88,15 +88,28 @@ pub(super) fn content(
         ));
     }
     let god_object = described.remove(0);
-    let viewer = &workbench.viewer;
     let description = SceneDescription {
-        name: scene.name.as_str().into(),
         revision: FIRST_REVISION,
-        god_object,
         obstacles: described,
         reference_point: array(&scene.reference_point()),
         scene_origin: PoseF64::from_isometry(workbench_from_scene),
         display_scale: scene.view.display_scale,
+        ..of_workbench(&scene.name, god_object, workbench)
+    };
+    Ok(Content {
+        description,
+        meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
+    })
+}
+
+/// What clients are told of the workbench itself, with one body.
+pub(crate) fn of_workbench(
+    name: &str,
+    god_object: BodyDescription,
+    workbench: &Workbench,
+) -> SceneDescription {
+    let viewer = &workbench.viewer;
+    SceneDescription {
         screens: workbench.screens.iter().map(screen).collect(),
         nodes: workbench.nodes.iter().map(node).collect(),
         viewer: PoseF64::from_isometry(&viewer.head),
@@ -111,11 +124,8 @@ pub(super) fn content(
             force: workbench.show.force,
             hud: workbench.show.hud,
         },
-    };
-    Ok(Content {
-        description,
-        meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
-    })
+        ..SceneDescription::of_body(name, god_object)
+    }
 }
 
 fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
