@@ -98,6 +98,14 @@ pub const PUPILS: Bounds = bounds(0.0, 1.0, "0 to 1 m");
 pub const SHARE: Bounds = bounds(0.0, 1.0, "0 to 1");
 /// Part of a colour.
 pub const COLOUR: Bounds = bounds(0.0, 1.0, "0 to 1");
+/// Part of a matrix that mixes colours.
+pub const COLOUR_MIX: Bounds = bounds(-16.0, 16.0, "-16 to 16");
+/// Exponent of a display's response.
+pub const RESPONSE: Bounds = bounds(0.0, 8.0, "0 to 8; 0 is that of sRGB");
+/// Exponent of a mask's values.
+pub const EXPONENT: Bounds = bounds(0.1, 8.0, "0.1 to 8");
+/// Pixels drawn for a pixel shown, each way.
+pub const SAMPLING: Bounds = bounds(0.25, 4.0, "0.25 to 4");
 /// Half a turn.
 pub const ANGLE: Bounds = bounds(0.0, std::f64::consts::PI, "0 to pi rad");
 /// Size on the workbench over size in the simulation.
@@ -273,6 +281,7 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         scene::SceneDescription::NUMBERS,
         scene::BodyDescription::NUMBERS,
         scene::ScreenDescription::NUMBERS,
+        scene::OutputDescription::NUMBERS,
         scene::WindowDescription::NUMBERS,
     ]
     .into_iter()

@@ -3,7 +3,10 @@
 use crate::{
     MeshHash, PoseF64, Untrusted,
     codec::{wire_ranged, wire_tag},
-    range::{ANGLE, COLOUR, LENGTH, NAME, PIXELS, PUPILS, SCALE, SHARE, SIZE},
+    range::{
+        ANGLE, COLOUR, COLOUR_MIX, EXPONENT, LENGTH, NAME, PIXELS, PUPILS, RESPONSE, SAMPLING,
+        SCALE, SHARE, SIZE,
+    },
 };
 
 /// What a client learns at join, before the first state.
@@ -92,6 +95,44 @@ pub struct ScreenDescription {
     pub lower_right: [f64; 3],
     /// Upper left corner.
     pub upper_left: [f64; 3],
+    /// How its picture becomes what its projector or monitor gets.
+    pub output: OutputDescription,
+}
+
+/// How the picture of a screen is corrected for what shows it. Files are named as the workbench file names them, and are read
+/// by the nodes that draw the screen; of a list, the one file is for both eyes, or the first for the left and the
+/// second for the right.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputDescription {
+    /// Meshes that warp the flat picture; none leaves it.
+    pub warp: Vec<Untrusted>,
+    /// Points of the surface that is lit, instead of the flat screen; none has the flat screen.
+    pub surface: Vec<Untrusted>,
+    /// Masks of the light that each pixel keeps; none keeps all.
+    pub blend: Vec<Untrusted>,
+    /// Exponent that makes a mask's values shares of light.
+    pub blend_gamma: f64,
+    /// Light sent for light wanted, both linear red, green and blue; row by row.
+    pub colour: [f64; 9],
+    /// Exponents of the responses of red, green and blue, light over signal; 0 is that of sRGB.
+    pub gamma: [f64; 3],
+    /// Pixels that are drawn for a pixel of the output, each way, before they are warped.
+    pub sampling: f64,
+}
+
+impl Default for OutputDescription {
+    /// The picture as it is drawn.
+    fn default() -> Self {
+        Self {
+            warp: Vec::new(),
+            surface: Vec::new(),
+            blend: Vec::new(),
+            blend_gamma: 1.0,
+            colour: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            gamma: [0.0; 3],
+            sampling: 1.0,
+        }
+    }
 }
 
 /// A render node.
@@ -177,7 +218,17 @@ wire_ranged!(ScreenDescription {
     name,
     lower_left in LENGTH,
     lower_right in LENGTH,
-    upper_left in LENGTH
+    upper_left in LENGTH,
+    output
+});
+wire_ranged!(OutputDescription {
+    warp,
+    surface,
+    blend,
+    blend_gamma in EXPONENT,
+    colour in COLOUR_MIX,
+    gamma in RESPONSE,
+    sampling in SAMPLING
 });
 wire_ranged!(NodeDescription {
     name,

@@ -5,8 +5,9 @@ use image::RgbaImage;
 use crate::error::RenderError;
 use crate::hud::Overlay;
 use crate::node_status::NodeStatus;
-use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
-use crate::stage::{Show, Stage};
+use crate::renderer::{Corrected, Gpu, OffScreen, PictureTarget, Renderer};
+use crate::stage::{Show, Stage, StageScreen};
+use crate::stereo::Picture;
 use crate::timeline::Latched;
 use crate::view::Eyes;
 
@@ -56,10 +57,11 @@ impl Canvas {
             let most = gpu.device.limits().max_texture_dimension_2d;
             let (width, height) = screen.stereo.picture_size(screen.pixels);
             let size = (width.clamp(1, most), height.clamp(1, most));
-            sheets.extend(screen.stereo.pictures().iter().map(|picture| Sheet {
+            let pictures = screen.stereo.pictures();
+            sheets.extend(pictures.iter().enumerate().map(|(place, picture)| Sheet {
                 screen: index,
                 name: format!("{}{}", screen.name, picture.suffix),
-                target: renderer.picture(gpu, picture, size),
+                target: target_of(gpu, &renderer, screen, (place, picture), size),
                 image: OffScreen::new(gpu, size),
             }));
         }
@@ -129,6 +131,27 @@ impl Canvas {
             Ok((name.as_str(), image.read(&self.gpu)?))
         };
         self.sheets.iter().map(image).collect()
+    }
+}
+
+/// What the picture at a place among those of a screen is drawn to, corrected as the screen is.
+pub(crate) fn target_of(
+    gpu: &Gpu,
+    renderer: &Renderer,
+    screen: &StageScreen,
+    (place, picture): (usize, &Picture),
+    size: (u32, u32),
+) -> PictureTarget {
+    match &screen.correction {
+        None => renderer.picture(gpu, picture, size),
+        Some(correction) => {
+            let corrected = Corrected {
+                correction,
+                picture: place,
+                chart: screen.chart.as_deref(),
+            };
+            renderer.corrected_picture(gpu, picture, size, &corrected)
+        }
     }
 }
 

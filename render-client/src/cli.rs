@@ -95,6 +95,9 @@ pub struct RenderArgs {
     /// Graphics adapter by number or part of its name [default: the best; `taut doctor` lists them].
     #[arg(long, value_name = "NAME|INDEX")]
     pub gpu: Option<String>,
+    /// Folder of the warp, surface and blend files that the workbench file names for screens [default: the folder of --key].
+    #[arg(long, value_name = "DIR")]
+    pub screens: Option<PathBuf>,
     /// Write text about the node over the pictures, whatever the server says.
     #[arg(long)]
     pub hud: bool,
@@ -207,6 +210,10 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         pictures: args.out.is_some(),
         show: args.show.as_deref().map(listed),
         hud: args.hud,
+        screen_files: args.screens.clone().unwrap_or_else(|| {
+            let beside = args.key.parent();
+            beside.map(PathBuf::from).unwrap_or_default()
+        }),
     };
     let Some((mut session, stage, show)) = Session::join(options, policy, overrides)? else {
         return Ok(RenderReport::of_nothing(&args));
@@ -260,6 +267,16 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
             show,
             node: args.node.clone(),
         };
+        let warped = stage.screens.iter().find(|screen| screen.is_warped());
+        if let (true, Some(screen)) = (args.hold, warped) {
+            session.leave();
+            return Err(RenderError::Option {
+                option: "--hold",
+                rule: "left out where a screen is warped, since the mouse would point beside it"
+                    .to_owned(),
+                value: format!("given with the screen \"{}\"", screen.name),
+            });
+        }
         let hand = if args.hold {
             Some(Hand::join(&args, &stage)?)
         } else {

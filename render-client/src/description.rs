@@ -1,5 +1,6 @@
 //! From the server's scene description to the stage that this node draws.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Point3, Similarity3};
@@ -7,6 +8,7 @@ use taut_proto::scene::{BodyDescription, NodeDescription, SceneDescription, Scre
 use taut_proto::{MeshBlob, PoseF64, scene};
 
 use crate::comfort::Comfort;
+use crate::correction::Correction;
 use crate::error::RenderError;
 use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
 use crate::stereo::Stereo;
@@ -20,7 +22,7 @@ const GOD_OBJECT_ID: u16 = u16::MAX;
 const OFF_SCREEN_WIDTH: u32 = 480;
 
 /// What the command line asks for, over what the server says.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Overrides {
     pub(crate) width: Option<u32>,
     pub(crate) height: Option<u32>,
@@ -31,6 +33,8 @@ pub(crate) struct Overrides {
     pub(crate) show: Option<Show>,
     /// Show the HUD, whatever `show` and the server say.
     pub(crate) hud: bool,
+    /// Where the files of screens are.
+    pub(crate) screen_files: PathBuf,
 }
 
 /// The description of the node named `node`.
@@ -174,12 +178,34 @@ fn stage_screen(
         scene::Stereo::Anaglyph => Stereo::Anaglyph,
         scene::Stereo::TwoWindows => Stereo::TwoWindows,
     });
+    let aspect = f64::from(node.window.width.max(1)) / f64::from(node.window.height.max(1));
+    let correction = Correction::read(&described.output, &overrides.screen_files, aspect)?;
+    if let Some(correction) = &correction {
+        let name = &described.name;
+        fits(correction, stereo).map_err(|what| RenderError::ScreenFile {
+            what: format!("the screen \"{name}\" {what}"),
+        })?;
+    }
     Ok(StageScreen {
         name: described.name.to_string(),
         pixels: pixels(&screen, node, stereo, overrides),
         screen,
         stereo,
+        correction: correction.map(Arc::new),
+        chart: None,
     })
+}
+
+/// What a way to show two eyes cannot do; the command line may have chosen another than the workbench file.
+fn fits(correction: &Correction, stereo: Stereo) -> Result<(), &'static str> {
+    let two = correction.meshes.len() > 1 || correction.masks.len() > 1;
+    if two && stereo != Stereo::TwoWindows {
+        return Err("has a file for each eye, which needs --stereo two-windows");
+    }
+    if correction.corrects_colour() && stereo == Stereo::Anaglyph {
+        return Err("has `colour`, which an anaglyph would mix; use another --stereo");
+    }
+    Ok(())
 }
 
 /// As asked for; a length left open follows from the other and the screen's shape. Windows, and pictures that are written, have
@@ -257,12 +283,12 @@ mod tests {
         // What the command line says comes first; the other length follows from the screen.
         let wide = Overrides {
             width: Some(300),
-            ..written
+            ..written.clone()
         };
         assert_eq!(of(960, 640, Stereo::Mono, &wide), (300, 200));
         let unseen = Overrides {
             pictures: false,
-            ..written
+            ..written.clone()
         };
         assert_eq!(of(960, 640, Stereo::Mono, &unseen), (480, 320));
         assert_eq!(

@@ -113,6 +113,14 @@ pub enum RenderError {
         /// Why not.
         source: ScreenError,
     },
+    /// A file that corrects the picture of a screen cannot be used.
+    #[error(
+        "{what} (files of screens are read on the node that draws them, in the folder of --screens)"
+    )]
+    ScreenFile {
+        /// What is wrong, with the file's name and what to do.
+        what: String,
+    },
     /// The scene's description has a value that cannot be drawn.
     #[error(
         "the server's scene cannot be drawn: {what}; correct the scene or workbench file on the server"
@@ -147,6 +155,7 @@ impl RenderError {
         match self {
             Self::Option { .. } | Self::UnknownNode { .. } | Self::UnknownScreen { .. } => 2,
             Self::BadScreen { .. } | Self::BadScene { .. } | Self::MeshCache { .. } => 2,
+            Self::ScreenFile { .. } => 2,
             Self::UnknownGpu { .. } | Self::UnknownMonitor { .. } => 2,
             // A wrong key, a name that does not resolve, a server that does not answer.
             Self::Link(error) => match error {

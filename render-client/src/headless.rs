@@ -169,7 +169,7 @@ fn write_pictures(canvas: &Canvas, plan: &Plan, frame: u64) -> Result<(), Render
 }
 
 /// A file name without characters that a file system or a shell might take for something else.
-fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     let keep = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
     name.chars()
         .map(|c| if keep(c) { c } else { '_' })

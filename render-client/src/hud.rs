@@ -19,7 +19,7 @@ const NOTE_HEIGHT: f32 = 0.42;
 const WIDEST: f32 = 0.92;
 
 /// Width of a letter over its line's height: that of the bitmap font.
-const LETTER_SHAPE: f32 = 0.56;
+pub(crate) const LETTER_SHAPE: f32 = 0.56;
 
 /// Distance of the HUD from the edges of the screen, in heights of its line.
 const MARGIN: f32 = 0.6;
@@ -115,6 +115,15 @@ impl Overlay {
         marks.truncate(MAX_MARKS);
         marks
     }
+}
+
+/// Texts on a box of their own in the middle of a screen, downwards from `top`; each with its height over the line's.
+pub(crate) fn centred(texts: &[(&str, f32)], wanted: f32, shape: f32, top: f32) -> Vec<Mark> {
+    let mut marks = Vec::new();
+    let height = fitting(texts, wanted, shape);
+    let left = |wide: f32| -0.5 * wide;
+    write(&mut marks, texts, height, shape, DARKEST, left, top);
+    marks
 }
 
 /// The HUD: one fact per line.

@@ -7,9 +7,12 @@
 //! ([`canvas`]) or in windows, and [`statistics`] counts it.
 #![forbid(unsafe_code)]
 
+pub mod calibrate;
+pub mod calibration;
 pub mod canvas;
 pub mod cli;
 pub mod comfort;
+pub mod correction;
 mod description;
 pub mod error;
 mod hand;

@@ -293,7 +293,7 @@ fn axes(azimuth: f64) -> [Vector3<f64>; 3] {
 }
 
 /// The scene at its start: everything where it was described.
-fn at_start(stage: &Stage) -> Latched {
+pub(crate) fn at_start(stage: &Stage) -> Latched {
     let pose: Isometry3<f64> = stage.god_object.pose;
     Latched {
         sample_ns: 0,

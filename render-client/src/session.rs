@@ -94,7 +94,7 @@ impl Session {
                 known.clone(),
                 name.clone(),
                 address.clone(),
-                overrides,
+                overrides.clone(),
             )
         };
         let joining = SupervisedLink::join(options, policy, prepare);

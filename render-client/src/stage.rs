@@ -9,7 +9,9 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Similarity3};
 use taut_proto::Finish;
 
+use crate::calibration::Chart;
 use crate::comfort::Comfort;
+use crate::correction::Correction;
 use crate::stereo::Stereo;
 use crate::view::{ClipPlanes, Screen};
 
@@ -49,6 +51,10 @@ pub struct StageScreen {
     pub pixels: (u32, u32),
     /// How it shows two eyes.
     pub stereo: Stereo,
+    /// What is done to its pictures; `None` shows them as they are drawn.
+    pub correction: Option<Arc<Correction>>,
+    /// Drawn instead of the scene, by `taut calibrate`; only where there is a correction.
+    pub chart: Option<Arc<Chart>>,
 }
 
 /// A body to draw.
@@ -101,6 +107,14 @@ pub struct Bounds {
     pub center: Point3<f64>,
     /// Its radius, in metres.
     pub radius: f64,
+}
+
+impl StageScreen {
+    /// Whether a place of a picture is not where it was drawn.
+    pub fn is_warped(&self) -> bool {
+        let correction = self.correction.as_ref();
+        correction.is_some_and(|correction| !correction.meshes.is_empty())
+    }
 }
 
 impl TriangleMesh {

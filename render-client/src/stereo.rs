@@ -42,12 +42,17 @@ pub struct Picture {
     pub anaglyph: bool,
 }
 
-const WHOLE: Part = Part {
-    x: 0.0,
-    y: 0.0,
-    width: 1.0,
-    height: 1.0,
-};
+const WHOLE: Part = Part::WHOLE;
+
+impl Part {
+    /// All of the picture.
+    pub const WHOLE: Self = Self {
+        x: 0.0,
+        y: 0.0,
+        width: 1.0,
+        height: 1.0,
+    };
+}
 
 impl Stereo {
     /// The pictures that one screen needs.

@@ -160,6 +160,32 @@ impl Screen {
         self.lower_left + self.right * (across * self.width) + self.up * (upward * self.height)
     }
 
+    /// Where a point is from the lower left corner, in metres: to the right, up, and towards the viewer.
+    pub fn place(&self, point: &Point3<f64>) -> Vector3<f64> {
+        let from = point - self.lower_left;
+        Vector3::new(
+            from.dot(&self.right),
+            from.dot(&self.up),
+            from.dot(&self.normal),
+        )
+    }
+
+    /// The screen that lies parallel to this one, `towards` metres nearer to the viewer, and reaches from the one to the other place along each axis.
+    pub fn part(&self, across: [f64; 2], upward: [f64; 2], towards: f64) -> Self {
+        let [left, right] = across;
+        let [bottom, top] = upward;
+        debug_assert!(left < right && bottom < top);
+        Self {
+            lower_left: self.lower_left
+                + self.right * left
+                + self.up * bottom
+                + self.normal * towards,
+            width: right - left,
+            height: top - bottom,
+            ..*self
+        }
+    }
+
     /// Distance of `eye` from the plane of the screen, in metres, positive in front of it.
     pub fn distance(&self, eye: &Point3<f64>) -> f64 {
         (eye - self.lower_left).dot(&self.normal)

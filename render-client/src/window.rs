@@ -5,6 +5,7 @@
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 mod display;
+pub(crate) mod still;
 
 use std::time::{Duration, Instant};
 
@@ -145,7 +146,7 @@ impl ApplicationHandler for App<'_> {
             }
             WindowEvent::Resized(size) => {
                 if let Some(screen) = &mut self.screen {
-                    screen.resize(id, size);
+                    screen.resize(&self.stage, id, size);
                 }
                 self.last_drawn = None;
             }

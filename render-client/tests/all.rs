@@ -8,4 +8,5 @@ mod network;
 mod perceptual;
 mod pictures;
 mod preview;
+mod screens;
 mod support;

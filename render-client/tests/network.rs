@@ -66,6 +66,7 @@ fn content() -> Content {
         lower_left,
         lower_right,
         upper_left,
+        output: Default::default(),
     };
     let node = |name: &str, screens: &[&str], stereo| NodeDescription {
         name: name.into(),
@@ -190,6 +191,7 @@ impl Server {
             fullscreen: false,
             gpu: None,
             hud: false,
+            screens: None,
             display_ms: 8.0,
             delay_ms: 2.0,
             membership: MembershipArgs {

@@ -114,6 +114,8 @@ pub enum Command {
     Import(ImportArgs),
     /// Draws a scene into a PNG file, without a server
     Preview(PreviewArgs),
+    /// Draws a calibration picture for each screen: grid in metres, names, corners, grey wedge, blend zones
+    Calibrate(CalibrateArgs),
     /// Says what this machine lacks for real time and for rendering, or what a string-driven device can render
     Doctor(DoctorArgs),
     /// Says where the viewer's head is, from a tracker on this PC
@@ -437,6 +439,32 @@ pub struct PreviewArgs {
     /// Draw so many pictures of a turn around the scene instead, FILE-01.png and so on
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_VIEWS))]
     pub orbit: Option<u32>,
+    /// Graphics adapter by number or part of its name (default: the best; `taut doctor` lists them)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub gpu: Option<String>,
+}
+
+/// `taut calibrate`.
+#[derive(Clone, Debug, Args)]
+#[command(
+    after_help = "The pictures go through the warp, blend mask and colours that the workbench file gives each screen, for the head that it declares.\nIn windows, Esc ends and F covers the monitor.\n\nExamples:\n  taut calibrate workbench.toml --out pictures\n  taut calibrate /etc/taut/workbench.toml --node front --fullscreen"
+)]
+pub struct CalibrateArgs {
+    /// The workbench file; the files of its screens are beside it
+    #[arg(value_name = "WORKBENCH")]
+    pub workbench: PathBuf,
+    /// The node whose screens are drawn (default: with --out all, in windows the only one)
+    #[arg(long, value_name = "NAME")]
+    pub node: Option<String>,
+    /// Write NODE-SCREEN.png into this folder instead of opening windows
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["fullscreen", "monitor"])]
+    pub out: Option<PathBuf>,
+    /// Cover the monitors, whatever the workbench file says
+    #[arg(long)]
+    pub fullscreen: bool,
+    /// Monitors of the windows in order, by name (DP-1) or number from 0, whatever the workbench file says
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub monitor: Vec<String>,
     /// Graphics adapter by number or part of its name (default: the best; `taut doctor` lists them)
     #[arg(long, value_name = "NAME|INDEX")]
     pub gpu: Option<String>,

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use taut_proto::{
     MeshHash, PoseF64, SceneDescription, Untrusted,
     scene::{
-        BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+        BodyDescription, NodeDescription, OutputDescription, ScreenDescription, ShowOptions,
+        Stereo, WindowDescription,
     },
 };
 
@@ -30,6 +31,15 @@ pub fn scene() -> SceneDescription {
             lower_left: [-1.0, 1.0, 0.0],
             lower_right: [1.0, 1.0, 0.0],
             upper_left: [-1.0, 1.0, 1.0],
+            output: OutputDescription {
+                warp: vec!["left.data".into(), "right.data".into()],
+                surface: vec!["wall.pfm".into()],
+                blend: vec!["blend.png".into()],
+                blend_gamma: 2.0,
+                colour: [1.0, 0.25, 0.0, 0.0, 0.5, 0.0, -0.125, 0.0, 1.0],
+                gamma: [2.25, 2.0, 0.0],
+                sampling: 1.5,
+            },
         }],
         nodes: vec![NodeDescription {
             name: "left".into(),
@@ -57,6 +67,30 @@ pub fn scene() -> SceneDescription {
     }
 }
 
+fn any_output() -> impl Strategy<Value = OutputDescription> {
+    let files = || {
+        prop::collection::vec(".{0,9}", 0..3)
+            .prop_map(|names| names.into_iter().map(Untrusted::from).collect())
+    };
+    let numbers = (
+        0.1..=8.0_f64,
+        prop::collection::vec(-16.0..=16.0_f64, 9),
+        prop::array::uniform3(0.0..=8.0_f64),
+        0.25..=4.0_f64,
+    );
+    (files(), files(), files(), numbers).prop_map(
+        |(warp, surface, blend, (blend_gamma, colour, gamma, sampling))| OutputDescription {
+            warp,
+            surface,
+            blend,
+            blend_gamma,
+            colour: std::array::from_fn(|i| colour[i]),
+            gamma,
+            sampling,
+        },
+    )
+}
+
 pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
     let body = || {
         (
@@ -73,12 +107,13 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             })
     };
     let corner = || prop::array::uniform3(finite64());
-    let screen = (".{0,20}", corner(), corner(), corner()).prop_map(
-        |(name, lower_left, lower_right, upper_left)| ScreenDescription {
+    let screen = (".{0,20}", corner(), corner(), corner(), any_output()).prop_map(
+        |(name, lower_left, lower_right, upper_left, output)| ScreenDescription {
             name: name.into(),
             lower_left,
             lower_right,
             upper_left,
+            output,
         },
     );
     let stereo = prop::sample::select(vec![

@@ -1,6 +1,8 @@
 //! Puts the drawn things together: once per state the instances, and the shadow map where it changed; then each
 //! picture of each screen.
 
+mod corrected;
+
 use nalgebra::{Isometry3, Point3};
 
 use super::anaglyph::Anaglyph;
@@ -11,6 +13,7 @@ use super::overlay::OverlayPipeline;
 use super::picture::{PictureTarget, ViewTarget};
 use super::pipeline::{FrameLayout, Output};
 use super::shadow::ShadowMap;
+use super::warp::WarpPipeline;
 use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
 use crate::comfort::Comfort;
 use crate::hud::Overlay;
@@ -26,6 +29,7 @@ pub struct Renderer {
     layout: FrameLayout,
     pipelines: Pipelines,
     anaglyph: Anaglyph,
+    warp: WarpPipeline,
     shadow: ShadowMap,
     meshes: Vec<MeshBuffers>,
     mesh_bounds: Vec<Bounds>,
@@ -118,6 +122,7 @@ impl Renderer {
             layout,
             pipelines,
             anaglyph: Anaglyph::new(device, format),
+            warp: WarpPipeline::new(device, format),
             shadow: ShadowMap::new(device),
             meshes,
             mesh_bounds,
@@ -275,17 +280,26 @@ impl Renderer {
         picture: &PictureTarget,
         target: &wgpu::TextureView,
     ) {
+        if let Some(warp) = &picture.warp {
+            self.draw_corrected(gpu, encoder, (screen, eyes), (picture, warp), target);
+            return;
+        }
         let sees = |view: &ViewTarget| self.set_view(gpu, screen, eyes, view);
         let seen: Vec<Option<Point3<f64>>> = picture.views.iter().map(sees).collect();
-        let marks = self
-            .overlay
-            .marks((screen.width() / screen.height()) as f32);
+        let shape = (screen.width() / screen.height()) as f32;
+        let chart = picture.chart.as_ref();
+        let marks = chart.map_or_else(|| self.overlay.marks(shape), |chart| chart.marks(shape));
         let letters = picture.overlay.set(&gpu.queue, &marks);
         let draw_eye =
             |pass: &mut wgpu::RenderPass<'_>, view: &ViewTarget, seen: Option<Point3<f64>>| {
                 enter(pass, picture, view);
-                if let Some(eye) = seen {
-                    self.draw_view(pass, view, &eye);
+                match (seen, chart) {
+                    (Some(eye), None) => self.draw_view(pass, view, &eye),
+                    (Some(eye), Some(chart)) => {
+                        let clip = screen.clip_from_workbench(&eye, &self.clip_planes);
+                        clip.iter().for_each(|clip| chart.draw(gpu, pass, clip));
+                    }
+                    (None, _) => {}
                 }
                 if letters > 0 {
                     self.text.draw(pass, &picture.overlay, letters);

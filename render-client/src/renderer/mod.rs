@@ -2,6 +2,7 @@
 
 mod anaglyph;
 mod background;
+mod chart;
 mod contacts;
 mod draw;
 mod floor;
@@ -17,8 +18,10 @@ mod picture;
 mod pipeline;
 mod shadow;
 pub mod shapes;
+mod warp;
 
 pub use draw::Renderer;
 pub(crate) use gpu::new_instance;
 pub use gpu::{AdapterSummary, Gpu, GpuChoice};
 pub use picture::{OffScreen, PictureTarget};
+pub use warp::Corrected;

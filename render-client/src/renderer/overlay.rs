@@ -37,6 +37,8 @@ pub(crate) struct Quad {
 pub(crate) struct OverlayPipeline {
     pipeline: wgpu::RenderPipeline,
     group: wgpu::BindGroup,
+    pub(crate) letters: wgpu::TextureView,
+    pub(crate) sampler: wgpu::Sampler,
 }
 
 /// The text of one picture.
@@ -114,7 +116,12 @@ impl OverlayPipeline {
                 entry(1, wgpu::BindingResource::Sampler(&sampler)),
             ],
         });
-        Self { pipeline, group }
+        Self {
+            pipeline,
+            group,
+            letters: texture,
+            sampler,
+        }
     }
 
     /// Draws `count` quads over what the pass has drawn in its viewport.
@@ -147,23 +154,28 @@ impl OverlayQuads {
 }
 
 fn quad(mark: &Mark) -> Quad {
+    Quad {
+        place: mark.place,
+        part: part_of(mark.letter),
+        colour: mark.colour,
+    }
+}
+
+/// The part of the letters' texture that shows a letter, or a full place: left, top, right, bottom.
+pub(crate) fn part_of(letter: Option<char>) -> [f32; 4] {
     let (size_x, size_y) = texture_size();
-    let (x, y) = match mark.letter {
+    let (x, y) = match letter {
         Some(letter) => place_of(letter),
         None => cell(places() - 1),
     };
     let (width, height) = letter_size();
     // A box takes the middle of its full place only: its edges are sharp.
-    let inset = if mark.letter.is_some() { 0 } else { height / 3 };
+    let inset = if letter.is_some() { 0 } else { height / 3 };
     let u = |texels: u32| texels as f32 / size_x as f32;
     let v = |texels: u32| texels as f32 / size_y as f32;
     let left = if inset == 0 { x } else { x + width / 2 };
     let right = if inset == 0 { x + width } else { left };
-    Quad {
-        place: mark.place,
-        part: [u(left), v(y + inset), u(right), v(y + height - inset)],
-        colour: mark.colour,
-    }
+    [u(left), v(y + inset), u(right), v(y + height - inset)]
 }
 
 /// Texels of a letter: those of the bitmap font.

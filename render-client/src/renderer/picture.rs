@@ -1,10 +1,12 @@
 //! What one picture (window or image) needs on the graphics card, and pictures that are read back.
 
 use super::anaglyph::Anaglyph;
+use super::chart::ChartDrawing;
 use super::gpu::Gpu;
 use super::overlay::OverlayQuads;
 use super::pipeline::{DEPTH, FrameLayout, Output, attachment};
 use super::shadow::ShadowMap;
+use super::warp::WarpTarget;
 use crate::error::RenderError;
 use crate::stereo::{Part, Picture};
 use crate::view::Eye;
@@ -20,6 +22,10 @@ pub struct PictureTarget {
     /// Combines the views when they lie over each other.
     pub(crate) anaglyph: Option<wgpu::BindGroup>,
     pub(crate) overlay: OverlayQuads,
+    /// What is drawn to it comes from pictures of its own, warped.
+    pub(crate) warp: Option<Box<WarpTarget>>,
+    /// Drawn instead of the scene.
+    pub(crate) chart: Option<ChartDrawing>,
 }
 
 /// One eye's part of a picture.
@@ -90,6 +96,8 @@ impl PictureTarget {
             views,
             anaglyph: combined,
             overlay: OverlayQuads::new(device),
+            warp: None,
+            chart: None,
         }
     }
 }

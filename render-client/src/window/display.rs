@@ -8,6 +8,7 @@ use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::Plan;
+use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor;
 use crate::mouse;
@@ -30,6 +31,8 @@ pub(super) struct Pane {
     /// The format that is drawn: that of the surface, with sRGB encoding.
     pub(super) format: wgpu::TextureFormat,
     pub(super) picture: Picture,
+    /// Place of the picture among those of the screen.
+    pub(super) place: usize,
     pub(super) target: PictureTarget,
     /// Place of the screen in the stage.
     pub(super) screen: usize,
@@ -54,7 +57,7 @@ impl Display {
         let mut opened = Vec::new();
         let mut below = 0;
         for (index, screen) in stage.screens.iter().enumerate() {
-            for picture in screen.stereo.pictures() {
+            for (eye, picture) in screen.stereo.pictures().into_iter().enumerate() {
                 let (width, height) = screen.pixels;
                 // On one monitor the windows stand in a column, the first screen above.
                 let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;
@@ -76,7 +79,7 @@ impl Display {
                 let surface = instance
                     .create_surface(Arc::clone(&window))
                     .map_err(|error| missing(&error))?;
-                opened.push((index, picture, window, surface));
+                opened.push(((index, eye), picture, window, surface));
             }
         }
         let gpu = Gpu::open_for(
@@ -86,7 +89,7 @@ impl Display {
         )?;
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
-        for (screen, picture, window, surface) in opened {
+        for ((screen, place), picture, window, surface) in opened {
             // One window waits for the monitor; the others would make it wait twice.
             let present_mode = if panes.is_empty() {
                 wgpu::PresentMode::AutoVsync
@@ -97,13 +100,16 @@ impl Display {
             let (config, format) = configuration(&gpu, &surface, size, present_mode)?;
             surface.configure(&gpu.device, &config);
             let renderer = renderer.get_or_insert_with(|| Renderer::new(&gpu, stage, format));
-            let target = renderer.picture(&gpu, &picture, (config.width, config.height));
+            let size = (config.width, config.height);
+            let drawn = &stage.screens[screen];
+            let target = target_of(&gpu, renderer, drawn, (place, &picture), size);
             panes.push(Pane {
                 window,
                 surface,
                 config,
                 format,
                 picture,
+                place,
                 target,
                 screen,
             });
@@ -126,11 +132,11 @@ impl Display {
         self.renderer = Renderer::new(&self.gpu, stage, format);
         for pane in &mut self.panes {
             let size = (pane.config.width, pane.config.height);
-            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size);
+            pane.target = pane.target_for(&self.gpu, &self.renderer, stage, size);
         }
     }
 
-    pub(super) fn resize(&mut self, id: WindowId, size: PhysicalSize<u32>) {
+    pub(super) fn resize(&mut self, stage: &Stage, id: WindowId, size: PhysicalSize<u32>) {
         let hidden = size.width == 0 || size.height == 0;
         let pane = self
             .panes
@@ -139,12 +145,23 @@ impl Display {
         if let Some(pane) = pane {
             (pane.config.width, pane.config.height) = (size.width, size.height);
             pane.surface.configure(&self.gpu.device, &pane.config);
-            pane.target = self.renderer.picture(&self.gpu, &pane.picture, size.into());
+            pane.target = pane.target_for(&self.gpu, &self.renderer, stage, size.into());
         }
     }
 }
 
 impl Pane {
+    fn target_for(
+        &self,
+        gpu: &Gpu,
+        renderer: &Renderer,
+        stage: &Stage,
+        size: (u32, u32),
+    ) -> PictureTarget {
+        let screen = &stage.screens[self.screen];
+        target_of(gpu, renderer, screen, (self.place, &self.picture), size)
+    }
+
     /// What to draw to next; `None` while the window is hidden or changes.
     pub(super) fn texture(&self, gpu: &Gpu) -> Result<Option<wgpu::SurfaceTexture>, RenderError> {
         match self.surface.get_current_texture() {

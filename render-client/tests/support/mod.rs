@@ -46,6 +46,8 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
                 screen,
                 pixels,
                 stereo,
+                correction: None,
+                chart: None,
             })
             .collect(),
         head: Isometry3::translation(0.12, -1.1, 0.85),

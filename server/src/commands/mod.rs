@@ -4,6 +4,11 @@
 
 pub mod arguments;
 pub mod arm;
+#[cfg(feature = "render")]
+mod calibrate;
+#[cfg(not(feature = "render"))]
+#[path = "calibrate_absent.rs"]
+mod calibrate;
 mod demo;
 mod deploy;
 mod doctor;
@@ -54,7 +59,13 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let draws = matches!(
         cli.command,
-        Some(Command::Render(_) | Command::Doctor(_) | Command::Preview(_) | Command::Import(_))
+        Some(
+            Command::Render(_)
+                | Command::Doctor(_)
+                | Command::Preview(_)
+                | Command::Import(_)
+                | Command::Calibrate(_)
+        )
     );
     if draws {
         render::restart_with_runtime_directory();
@@ -102,6 +113,10 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Preview(args) => {
             print(preview::run(&args)?.join("\n")).map(|()| ExitCode::SUCCESS)
         }
+        Command::Calibrate(args) => match calibrate::run(&args)? {
+            written if written.is_empty() => Ok(ExitCode::SUCCESS),
+            written => print(written.join("\n")).map(|()| ExitCode::SUCCESS),
+        },
         Command::Doctor(args) => doctor_command(&args),
         Command::Track(args) => track_command(&args),
         Command::PushWrench(args) => push_wrench_command(&args),

@@ -100,7 +100,7 @@ fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
     })
 }
 
-fn failure(error: RenderError) -> Failure {
+pub(super) fn failure(error: RenderError) -> Failure {
     if error.exit_code() == EXIT_BAD_INPUT {
         Failure::bad_input(error)
     } else {
@@ -109,7 +109,7 @@ fn failure(error: RenderError) -> Failure {
 }
 
 /// The whole file, or none.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let written = FinishedFile::create(path).and_then(|mut file| {
         file.write_all(bytes)?;
         file.finish()

@@ -311,3 +311,27 @@ fn interrupt(child: &Child) {
         .status();
     assert!(sent.is_ok_and(|status| status.success()));
 }
+
+#[test]
+fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
+    let place = prepared();
+    let mut file: Table = workbench().parse().expect("a workbench");
+    let screens = file.get_mut("screen").and_then(Value::as_array_mut);
+    let screen = screens
+        .and_then(|list| list[0].as_table_mut())
+        .expect("a screen");
+    screen.insert("blend".to_owned(), "masks/front.png".into());
+    place.write("workbench.toml", &file.to_string());
+    let (code, said) = deploy(&place, &[]);
+    assert!(code != Some(0) && said.contains("front.png"), "{said}");
+    fs::create_dir(place.path("masks")).expect("a folder");
+    place.write("masks/front.png", "grey");
+    let (code, said) = deploy(&place, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    for (machine, has) in [("left", true), ("right", false), ("haptic-pc", true)] {
+        let there = unpacked(&place, machine)
+            .join("etc/masks/front.png")
+            .exists();
+        assert_eq!(there, has, "{machine}");
+    }
+}

@@ -62,6 +62,7 @@ pub fn content() -> Content {
             lower_left: [-0.5, 0.5, 0.0],
             lower_right: [0.5, 0.5, 0.0],
             upper_left: [-0.5, 0.5, 1.0],
+            output: Default::default(),
         }],
         nodes: vec![NodeDescription {
             name: "left".into(),

@@ -152,6 +152,10 @@ fn check_toml(path: &Path) -> FileReport {
         let mut notes = Vec::new();
         let workbench = Workbench::load(path).and_then(|workbench| {
             notes = workbench.notes();
+            let faults = workbench.screen_faults();
+            if !faults.is_empty() {
+                return Err(FileError::of_all(faults));
+            }
             let scene = workbench.load_scene()?;
             for other in workbench.scenes() {
                 Scene::named_or_file(other)?;

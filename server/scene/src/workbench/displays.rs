@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use super::output::{fault_of_node, output};
 use super::parts::table;
 use super::spec::{Node, Screen, Stereo, Window};
 use crate::document::{Range, Section};
@@ -28,6 +29,7 @@ pub(super) fn screens(root: &Section<'_>) -> Vec<Screen> {
             corner("lower_right"),
             corner("upper_left"),
         );
+        let output = output(&section);
         if let (Some(name), (Some(lower_left), Some(lower_right), Some(upper_left))) =
             (name, corners)
         {
@@ -40,6 +42,7 @@ pub(super) fn screens(root: &Section<'_>) -> Vec<Screen> {
                 section.complain(section.at(), text);
             }
             screens.push(Screen {
+                output,
                 name,
                 lower_left,
                 lower_right,
@@ -92,6 +95,13 @@ pub(super) fn nodes(root: &Section<'_>, screens: &[Screen]) -> Vec<Node> {
             );
         }
         let stereo = section.choice("stereo", &Stereo::NAMED).unwrap_or_default();
+        let at = section.get("stereo").map_or(section.at(), |node| &node.at);
+        let named = name.as_deref().unwrap_or_default();
+        for screen in screens.iter().filter(|screen| drawn.contains(&screen.name)) {
+            if let Some(text) = fault_of_node(named, stereo, screen) {
+                section.complain(at, text);
+            }
+        }
         let window = table(&section, "window", |window| {
             let pixels = |key, default| {
                 window

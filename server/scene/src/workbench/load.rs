@@ -68,6 +68,8 @@ pub struct Workbench {
     /// A force from outside.
     pub wrench_in: WrenchIn,
     pub(super) scene_at: At,
+    /// Of the file: what it names is relative to it.
+    pub(super) directory: PathBuf,
 }
 
 impl Workbench {

@@ -13,6 +13,7 @@ mod monitoring;
 mod needed_files;
 mod network;
 mod operator;
+mod output;
 mod parse;
 mod parts;
 mod realtime;
@@ -32,6 +33,7 @@ pub use looking_on::{ObserverStream, Vrpn, Zenoh};
 pub use machines::is_machine_name;
 pub use needed_files::NeededFile;
 pub use operator::Operator;
+pub use output::ScreenOutput;
 pub use spec::{
     AlsoKeyFile, Device, HeadTracking, Machine, Monitoring, Network, Node, Passivity, RealTime,
     RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,

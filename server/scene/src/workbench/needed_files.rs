@@ -42,7 +42,7 @@ impl Workbench {
         scenes
     }
 
-    /// Every file that `taut serve` reads beside the workbench file and the cluster key.
+    /// Every file that `taut serve` reads beside the workbench file and the cluster key, and what its nodes read of screens.
     pub fn needed_files(&self) -> Result<Vec<NeededFile>, FileError> {
         let mut files = Vec::new();
         self.load_scene()?;
@@ -66,6 +66,10 @@ impl Workbench {
             }
             Device::Trace { path, .. } => files.push(NeededFile::Named(path.clone())),
             Device::Vrpn { .. } | Device::SpaceMouse { .. } | Device::Remote => {}
+        }
+        // The nodes read them; here `taut check` does.
+        for name in self.screens.iter().flat_map(|screen| screen.output.files()) {
+            files.push(NeededFile::Named(self.screen_file(name)));
         }
         if self.zenoh.enabled {
             files.extend(self.zenoh.config.clone().map(NeededFile::Named));

@@ -134,5 +134,6 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         zenoh,
         wrench_in,
         scene_at,
+        directory: directory.to_path_buf(),
     })
 }

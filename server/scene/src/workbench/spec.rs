@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use taut_proto::JoinPolicy;
 use taut_vrpn::{Address, SensorMapping};
 
+use super::output::ScreenOutput;
 use crate::scene::HandPreset;
 
 /// A flat screen by three of its corners, m, workbench frame.
@@ -22,6 +23,8 @@ pub struct Screen {
     pub lower_right: Point3<f64>,
     /// As the viewer sees it.
     pub upper_left: Point3<f64>,
+    /// What is done to its picture.
+    pub output: ScreenOutput,
 }
 
 /// How a node shows two eyes.
@@ -49,6 +52,15 @@ impl Stereo {
         ("anaglyph", Self::Anaglyph),
         ("two-windows", Self::TwoWindows),
     ];
+
+    /// Size of one eye's view, in pixels, in a window of this size.
+    pub fn view_size(self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self {
+            Self::SideBySide => (width / 2, height),
+            Self::TopBottom => (width, height / 2),
+            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
+        }
+    }
 }
 
 /// A node's windows: one per screen, or two with a window per eye.

@@ -13,3 +13,4 @@ mod simplification;
 mod workbench_faults;
 mod workbench_inputs;
 mod workbench_lookers_on;
+mod workbench_screens;

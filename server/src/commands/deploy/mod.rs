@@ -83,6 +83,11 @@ impl Plan<'_> {
         if machine.server {
             files.extend(self.configuration()?);
         }
+        for file in self.screen_files(machine)? {
+            if files.iter().all(|known| known.path != file.path) {
+                files.push(file);
+            }
+        }
         let units = units(self.workbench, machine, self.address)?;
         let firewall = firewall::rules(self.workbench, machine);
         let has_firewall = firewall.is_some();
@@ -148,6 +153,20 @@ impl Plan<'_> {
             files.push(File::new("etc/cluster.key", Mode::Secret, text.as_bytes()));
         }
         Ok(files)
+    }
+
+    /// What the nodes of a machine read for their screens, beside their credentials.
+    fn screen_files(&self, machine: &Machine) -> Result<Vec<File>, Failure> {
+        let nodes = self.workbench.nodes.iter();
+        let drawn = nodes.filter(|node| machine.nodes.contains(&node.name));
+        let names = drawn.flat_map(|node| self.workbench.screen_files(node));
+        let folder = self.config.parent().unwrap_or(Path::new(""));
+        let file = |name: &str| {
+            let found = self.workbench.screen_file(name);
+            let place = Path::new("etc").join(below(folder, &found)?);
+            Ok(File::new(place, Mode::Plain, read(&found)?))
+        };
+        names.map(file).collect()
     }
 
     /// The workbench file as it is, and what it names, where it names it.

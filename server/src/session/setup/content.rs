@@ -5,7 +5,8 @@ use god_object::nalgebra::Point3;
 use taut_link::Content;
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
-    BodyDescription, NodeDescription, ScreenDescription, ShowOptions, Stereo, WindowDescription,
+    BodyDescription, NodeDescription, OutputDescription, ScreenDescription, ShowOptions, Stereo,
+    WindowDescription,
 };
 use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64, SceneDescription};
 use taut_scene::{BuiltBody, BuiltScene, Workbench, srgb};
@@ -87,15 +88,28 @@ pub(super) fn content(
         ));
     }
     let god_object = described.remove(0);
-    let viewer = &workbench.viewer;
     let description = SceneDescription {
-        name: scene.name.as_str().into(),
         revision: FIRST_REVISION,
-        god_object,
         obstacles: described,
         reference_point: array(&scene.reference_point()),
         scene_origin: PoseF64::from_isometry(workbench_from_scene),
         display_scale: scene.view.display_scale,
+        ..of_workbench(&scene.name, god_object, workbench)
+    };
+    Ok(Content {
+        description,
+        meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
+    })
+}
+
+/// What clients are told of the workbench itself, with one body.
+pub(crate) fn of_workbench(
+    name: &str,
+    god_object: BodyDescription,
+    workbench: &Workbench,
+) -> SceneDescription {
+    let viewer = &workbench.viewer;
+    SceneDescription {
         screens: workbench.screens.iter().map(screen).collect(),
         nodes: workbench.nodes.iter().map(node).collect(),
         viewer: PoseF64::from_isometry(&viewer.head),
@@ -110,11 +124,8 @@ pub(super) fn content(
             force: workbench.show.force,
             hud: workbench.show.hud,
         },
-    };
-    Ok(Content {
-        description,
-        meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
-    })
+        ..SceneDescription::of_body(name, god_object)
+    }
 }
 
 fn mesh(body: &BuiltBody) -> Result<(MeshHash, MeshBlob), Failure> {
@@ -151,6 +162,21 @@ fn screen(screen: &taut_scene::Screen) -> ScreenDescription {
         lower_left: array(&screen.lower_left),
         lower_right: array(&screen.lower_right),
         upper_left: array(&screen.upper_left),
+        output: output(&screen.output),
+    }
+}
+
+fn output(output: &taut_scene::ScreenOutput) -> OutputDescription {
+    let names = |files: &[String]| files.iter().map(|name| name.as_str().into()).collect();
+    let mix = output.colour.transpose(); // stored column by column
+    OutputDescription {
+        warp: names(&output.warp),
+        surface: names(&output.surface),
+        blend: names(&output.blend),
+        blend_gamma: output.blend_gamma,
+        colour: std::array::from_fn(|i| mix[i]),
+        gamma: output.gamma.into(),
+        sampling: output.sampling,
     }
 }
 

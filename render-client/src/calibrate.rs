@@ -1,0 +1,114 @@
+//! Calibration pictures of the screens of a node, without a server: as PNG files or in its windows.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nalgebra::Point3;
+use taut_proto::mesh_blob::Positions;
+use taut_proto::scene::BodyDescription;
+use taut_proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
+
+use crate::calibration::Chart;
+use crate::canvas::Canvas;
+use crate::description::{self, Overrides};
+use crate::error::RenderError;
+use crate::headless::plain;
+use crate::preview::at_start;
+use crate::renderer::{Gpu, GpuChoice};
+use crate::stage::{Show, Stage};
+use crate::window::still;
+
+/// Size of the body that the scene of a calibration has and that is not drawn, m.
+const SIZE: f64 = 0.01;
+
+/// The screens of one node.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    node: String,
+    stage: Stage,
+}
+
+/// Which windows show it.
+#[derive(Clone, Debug, Default)]
+pub struct CalibrationWindows {
+    /// Without frames, over whole monitors.
+    pub fullscreen: bool,
+    /// Monitors in the order of the windows, by name or number; empty takes what the description says.
+    pub monitors: Vec<String>,
+    /// The graphics adapter.
+    pub gpu: GpuChoice,
+}
+
+impl Calibration {
+    /// The node of this name, of a workbench that was described for nodes; its files are in `folder`.
+    pub fn new(
+        workbench: &SceneDescription,
+        node: &str,
+        folder: &Path,
+    ) -> Result<Self, RenderError> {
+        let found = description::find_node(workbench, node)?;
+        let overrides = Overrides {
+            headless: true,
+            pictures: true, // as large as the windows are
+            screen_files: folder.to_path_buf(),
+            ..Overrides::default()
+        };
+        let mesh = Arc::new(speck()?);
+        let meshes = vec![mesh; 1 + workbench.obstacles.len()];
+        let mut stage = description::stage(workbench, found, &meshes, &overrides)?;
+        for screen in &mut stage.screens {
+            let correction = screen.correction.take().unwrap_or_default();
+            let mesh = correction.mesh(0);
+            let chart = Chart::new(&screen.name, &screen.screen, screen.pixels, &mesh);
+            screen.chart = Some(Arc::new(chart));
+            screen.correction = Some(correction);
+        }
+        Ok(Self {
+            node: node.to_owned(),
+            stage,
+        })
+    }
+
+    /// The body of a scene in which nothing is drawn.
+    pub fn body() -> BodyDescription {
+        BodyDescription {
+            name: "nothing".into(),
+            mesh: MeshHash { bytes: [0; 32] },
+            pose: PoseF64::IDENTITY,
+            colour: [0.0; 4],
+        }
+    }
+
+    /// File name (node, screen, and eye where it has a picture of its own) and bytes of each picture, as PNG.
+    pub fn pictures(&self, gpu: Gpu) -> Result<Vec<(PathBuf, Vec<u8>)>, RenderError> {
+        let mut canvas = Canvas::new(gpu, self.stage.clone());
+        canvas.draw(&at_start(&self.stage), Show::default(), true)?;
+        let images = canvas.images()?;
+        let png = |(name, image): (&str, image::RgbaImage)| {
+            let mut bytes = Cursor::new(Vec::new());
+            image
+                .write_to(&mut bytes, image::ImageFormat::Png)
+                .map_err(|error| canvas.gpu().broken(&error))?;
+            let name = plain(&format!("{}-{name}.png", self.node));
+            Ok((name.into(), bytes.into_inner()))
+        };
+        images.into_iter().map(png).collect()
+    }
+
+    /// Shows the pictures in the node's windows until Esc, a closed window or a signal. Wants the main thread.
+    pub fn show(&self, windows: &CalibrationWindows) -> Result<(), RenderError> {
+        still::show(&self.stage, &self.node, windows)
+    }
+}
+
+/// A triangle.
+fn speck() -> Result<MeshBlob, RenderError> {
+    let corners = [[0.0, 0.0], [SIZE, 0.0], [0.0, SIZE]];
+    let points = corners.map(|[x, y]| Point3::new(x, y, 0.0).into());
+    MeshBlob::new(Positions::F64(points.to_vec()), vec![[0, 1, 2]], None).map_err(|error| {
+        RenderError::BadScene {
+            what: error.to_string(),
+        }
+    })
+}
