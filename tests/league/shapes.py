@@ -146,20 +146,3 @@ def torus(radius, tube, segments, sides):
     faces = np.vstack([np.column_stack([corner(0, 0), corner(1, 0), corner(1, 1)]), np.column_stack([corner(0, 0), corner(1, 1), corner(0, 1)])])
     solid = manifold3d.Manifold(manifold3d.Mesh64(rings.reshape(-1, 3), faces.astype(np.uint64)))
     return Part([np.vstack([rings[k - 1], rings[k]]) for k in range(segments)], solid)
-
-
-def relief(cells, side, seed, amplitude):
-    """A rolling height field over a square, as one upright prism for each triangle; depth 20 mm."""
-    rng = np.random.default_rng(seed)
-    waves = [(rng.normal(size=2) * 2 * np.pi / 0.05, rng.uniform(0, 2 * np.pi), rng.uniform(0.3, 1)) for _ in range(6)]
-    axis = np.linspace(-side / 2, side / 2, cells + 1)
-    x, y = np.meshgrid(axis, axis, indexing="ij")
-    z = amplitude * sum(w * np.sin(k[0] * x + k[1] * y + p) for k, p, w in waves) / 2
-    grid, pieces = np.stack([x, y, z], -1), []
-    for i in range(cells):
-        for j in range(cells):
-            a, b, c, d = grid[i, j], grid[i + 1, j], grid[i + 1, j + 1], grid[i, j + 1]
-            for top in ((a, b, c), (a, c, d)):
-                top = np.array(top)
-                pieces.append(np.vstack([top, np.column_stack([top[:, :2], np.full(3, -0.02)])]))
-    return Part(pieces), z
