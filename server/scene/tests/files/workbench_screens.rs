@@ -76,7 +76,13 @@ fn keys_of_a_screen_are_read_and_none_is_the_picture_as_it_is_drawn() {
     );
     assert_eq!(output.gamma[1], 2.0);
     let one = parsed(&with("colour = { gamma = 2.4 }")).expect("read");
-    assert!(one.screens[0].output.gamma.iter().all(|exponent| *exponent == 2.4));
+    assert!(
+        one.screens[0]
+            .output
+            .gamma
+            .iter()
+            .all(|exponent| *exponent == 2.4)
+    );
     let needed = workbench.needed_files().expect("files");
     let named = NeededFile::Named("folder/maps/front.pfm".into());
     assert!(needed.contains(&named), "{needed:?}");
