@@ -16,7 +16,6 @@
 //! The driver on top is [`ArmDevice`](crate::ArmDevice). Sources: the service's documentation of 3.5 and the vendor's client `haply` 1.3.1, read
 //! for facts. No device was at hand.
 
-mod address;
 mod client;
 mod exchange;
 mod message;
@@ -24,7 +23,6 @@ mod service;
 mod simulated;
 mod version;
 
-pub use address::{AddressError as HaplyAddressError, ServiceAddress};
 pub(crate) use client::ForceHold;
 pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
@@ -32,4 +30,5 @@ pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::workspace_centre;
 pub use simulated::{SimulatedInverse, SimulatedSettings};
+pub use taut_kinds::ServiceAddress;
 pub use version::{ServiceVersion, VersionError, service_version};

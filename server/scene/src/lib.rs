@@ -49,7 +49,7 @@ pub use workbench::{
     AlsoKeyFile, Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Log, LogLevel, Machine,
     Monitoring, NeededFile, Network, Node, ObserverStream, Operator, Passivity, RealTime,
     RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, Show, Stereo, TransportKind, Viewer,
-    Vrpn, VrpnSensor, Window, Workbench, Zenoh, is_machine_name,
+    Vrpn, Window, Workbench, Zenoh, is_machine_name,
 };
 
 /// Why a scene could not be used.

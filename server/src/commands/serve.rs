@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use taut_bridge::ArmSwitch;
 use taut_bridge::signals::EndFlag;
 use taut_link::ClusterKey;
-use taut_scene::{FidelityPlan, Log, LogLevel, Workbench};
+use taut_scene::{Device, FidelityPlan, Log, LogLevel, Workbench};
 
 use crate::cli::ServeArgs;
 use crate::commands::scene_watch::SceneWatch;
@@ -23,6 +23,9 @@ use crate::shared::failure::Failure;
 
 /// Time between two looks at network, children and clock; also of the status line.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
+/// How force comes at a device that can push.
+pub(super) const HELP_ARM: &str =
+    "no force yet: type arm and Enter for force, off and Enter for none (docs/safety.md)";
 
 /// Serves the workbench. The report comes with the failure, if the session broke down on the way.
 pub(super) fn run(
@@ -63,6 +66,10 @@ pub(super) fn run(
         // Whoever comes again comes to where he was.
         (overrides.quic, overrides.udp) = (session.quic_address(), session.udp_address());
         announce(&session, terminal);
+        if matches!(&workbench.device, Device::Driver(chosen) if chosen.kind.has_motors) {
+            // Somebody holds it: a person arms.
+            terminal.say(HELP_ARM);
+        }
         if let Some(directory) = &args.recording {
             terminal.say(&recording_size::sentence(directory));
         }
@@ -111,7 +118,21 @@ fn load_workbench(args: &ServeArgs) -> Result<Workbench, Failure> {
     if let Some(scene) = &args.scene {
         workbench.scene.clone_from(scene);
     }
+    refuse_to_follow(args, &workbench)?;
     Ok(workbench)
+}
+
+/// Another scene's session is made before this one ends, and a force device can be opened once.
+fn refuse_to_follow(args: &ServeArgs, workbench: &Workbench) -> Result<(), Failure> {
+    match &workbench.device {
+        Device::Driver(chosen) if args.follow_scene && chosen.kind.has_motors => {
+            Err(Failure::BadInput(format!(
+                "--follow-scene needs a device that stays while sessions change, but [device] is of kind \"{0}\"; write kind = \"remote\" there and run `taut bridge --device {0}` beside the server",
+                chosen.kind.name
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What a session of this workbench is made of.

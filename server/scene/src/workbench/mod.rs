@@ -20,7 +20,6 @@ mod safety;
 mod scale;
 mod spec;
 mod token;
-mod tracker;
 mod viewer;
 
 pub use dynamics::DeviceDynamics;
@@ -33,5 +32,5 @@ pub use needed_files::NeededFile;
 pub use operator::Operator;
 pub use spec::{
     AlsoKeyFile, Device, HeadTracking, Machine, Monitoring, Network, Node, Passivity, RealTime,
-    RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
+    RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, Window,
 };

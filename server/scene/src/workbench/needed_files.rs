@@ -43,7 +43,10 @@ impl Workbench {
                 files.extend(geometry.map(|named| NeededFile::Named(named.into())));
             }
             Device::Trace { path, .. } => files.push(NeededFile::Named(path.clone())),
-            Device::Vrpn { .. } | Device::SpaceMouse { .. } | Device::Remote => {}
+            Device::Driver(chosen) => {
+                files.extend(chosen.files().map(NeededFile::Named));
+            }
+            Device::Remote => {}
         }
         if self.zenoh.enabled {
             files.extend(self.zenoh.config.clone().map(NeededFile::Named));
