@@ -13,6 +13,7 @@ mod moving_obstacle;
 mod no_allocation;
 mod operation;
 mod operator;
+mod own_device;
 mod record;
 mod recording;
 #[allow(

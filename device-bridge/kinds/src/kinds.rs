@@ -255,6 +255,11 @@ pub const KINDS: [Kind; 12] = [
                 Takes::YesOrNo,
                 "no: the grip is left out, 3 degrees of freedom; default yes",
             ),
+            key(
+                "events",
+                Takes::Whole(0, 65_535),
+                "port of the service's events, which are told in the log; 0: none; default 10020",
+            ),
             AXES,
             SCALE,
             ANCHOR,
@@ -500,7 +505,7 @@ mod tests {
         assert_eq!(form("simulated"), "simulated[,strings=NAME]");
         assert_eq!(
             form("haply"),
-            "haply[=HOST:PORT][,arm=NAME,grip=yes|no,axes=x y z,scale=X,anchor=start|workbench]"
+            "haply[=HOST:PORT][,arm=NAME,grip=yes|no,events=N,axes=x y z,scale=X,anchor=start|workbench]"
         );
         assert!(form("plugin").ends_with(",...]"));
     }

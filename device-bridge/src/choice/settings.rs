@@ -122,6 +122,10 @@ pub(super) fn haply_settings(chosen: &Chosen) -> HaplySettings {
     if let Some(grip) = chosen.yes("grip") {
         settings.exchange.with_grip = grip;
     }
+    if let Some(port) = chosen.whole("events") {
+        // 0 is none, and the range is that of ports.
+        settings.events_port = u16::try_from(port).ok().filter(|port| *port > 0);
+    }
     stand(chosen, &mut settings.mapping, &mut settings.anchor);
     settings
 }

@@ -5,10 +5,10 @@
 //!
 //! | file           | what                                                                  |
 //! |----------------|-----------------------------------------------------------------------|
-//! | `address.rs`   | HOST:PORT                                                             |
 //! | `message.rs`   | what the service says, checked; what is said to it                    |
 //! | `exchange.rs`  | one connection without sockets: which device, which grip, what is next |
 //! | `client.rs`    | the thread: sockets, the millisecond's beat, another connection        |
+//! | `events.rs`    | what the service tells of itself on a second socket                   |
 //! | `version.rs`   | which service is there: 3.5 or later                                  |
 //! | `simulated.rs` | the service's side without sockets: device, hand and grip simulated    |
 //! | `service.rs`   | the same on a socket                                                  |
@@ -17,6 +17,7 @@
 //! for facts. No device was at hand.
 
 mod client;
+mod events;
 mod exchange;
 mod message;
 mod service;
@@ -25,6 +26,8 @@ mod version;
 
 pub(crate) use client::ForceHold;
 pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
+pub use events::EVENTS_PORT;
+pub(crate) use events::ServiceEvents;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
