@@ -313,3 +313,20 @@ fn the_example_is_felt_and_is_that_of_the_document() {
         fault.is_none() && force > 0.3
     });
 }
+
+#[test]
+fn the_types_name_every_key_that_is_taken() {
+    let read = |path: &str| std::fs::read_to_string(here().join(path)).expect(path);
+    let host = read("src/plugin/taut_host.py");
+    let types = read("../server/python/taut/device.py");
+    for set in ["SAMPLE_KEYS = {", "INFO_KEYS = {"] {
+        let (_, keys) = host.split_once(set).expect("a set of keys");
+        let (keys, _) = keys.split_once('}').expect("its end");
+        let names: Vec<&str> = keys.split('"').skip(1).step_by(2).collect();
+        assert!(names.len() >= 7, "{keys}");
+        for name in names {
+            let is_typed = types.contains(&format!("\n    {name}: "));
+            assert!(is_typed, "taut/device.py lacks {name}");
+        }
+    }
+}

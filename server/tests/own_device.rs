@@ -23,9 +23,7 @@ fn served(keys: &str, seconds: &str) -> serde_json::Value {
     assert!(output.status.success(), "{said}");
     assert!(said.contains("type arm and Enter"), "{said}");
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
-    let report = printed.lines().rfind(|line| line.starts_with('{'));
-    serde_json::from_str(report.unwrap_or(&printed))
-        .unwrap_or_else(|error| panic!("{error}: {printed}"))
+    serde_json::from_str(&printed).unwrap_or_else(|error| panic!("{error}: {printed}"))
 }
 
 #[test]
@@ -49,9 +47,15 @@ fn a_haply_arm_is_opened_by_the_server_itself() {
         "kind = \"haply\"\naddress = \"{}\"\nscale = 2.0",
         service.address()
     );
-    let report = served(&keys, "3");
-    assert_eq!(report["actuated_degrees_of_freedom"], 3, "{report}");
-    assert_eq!(report["sensed_degrees_of_freedom"], 6, "{report}");
+    let report = served(&keys, "6");
+    let totals = service.totals();
+    assert!(totals.messages > 1000, "{totals:?}");
+    let force = report["largest_force_n"].as_f64().expect("a number");
+    assert!(
+        force > 0.3 && totals.largest_force > 0.3,
+        "{force}, {totals:?}"
+    );
+    assert_eq!(totals.force, 0.0, "a force outlived its session");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 use taut_vrpn::{Address, Axes};
 
 use crate::key::Takes;
-use crate::kinds::Kind;
+use crate::kind::Kind;
 use crate::service_address::ServiceAddress;
 
 /// A device as it was asked for.

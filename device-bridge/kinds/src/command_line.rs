@@ -2,7 +2,8 @@
 
 use crate::chosen::Chosen;
 use crate::key::Key;
-use crate::kinds::{KINDS, Kind};
+use crate::kind::Kind;
+use crate::kinds::KINDS;
 
 /// Similarity (Jaro-Winkler, 0 to 1) from which a name is offered for an unknown one.
 const SUGGESTION_SIMILARITY: f64 = 0.7;
@@ -185,7 +186,7 @@ pub fn device_help() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinds::KindId;
+    use crate::kind::KindId;
 
     fn error(text: &str) -> String {
         read_choice(text).expect_err(text).to_string()

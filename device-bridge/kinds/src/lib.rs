@@ -5,6 +5,7 @@
 //! |-------------------|-------------------------------------------------------|
 //! | `kinds`           | the declarations                                      |
 //! | `key`             | what a key takes                                      |
+//! | `kind`            | what a declaration says                               |
 //! | `chosen`          | a kind with the values that somebody gave             |
 //! | `command_line`    | `haply=lab:10001,scale=2` into a [`Chosen`]           |
 //! | `page`            | the table of the document                             |
@@ -14,6 +15,7 @@
 mod chosen;
 mod command_line;
 mod key;
+mod kind;
 mod kinds;
 mod page;
 mod service_address;
@@ -21,6 +23,7 @@ mod service_address;
 pub use chosen::{Chosen, Value};
 pub use command_line::{UnknownDevice, device_help, read_choice};
 pub use key::{Key, Takes};
-pub use kinds::{KINDS, Kind, KindId};
+pub use kind::{Kind, KindId};
+pub use kinds::KINDS;
 pub use page::keys_page;
 pub use service_address::{AddressError, ServiceAddress};

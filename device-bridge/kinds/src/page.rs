@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 
 use crate::key::{Key, Takes};
-use crate::kinds::{KINDS, Kind};
+use crate::kind::Kind;
+use crate::kinds::KINDS;
 
 /// The table, as the document has it.
 #[must_use]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use crate::realtime::monotonic_now;
+use crate::realtime::{leave_fifo, monotonic_now};
 
 /// Longest line that is told, bytes; the rest of it is left out.
 const MAX_LINE: usize = 400;
@@ -35,7 +35,10 @@ impl Printed {
         // Without the thread the process is stopped by its own lines, and that is told as a device that hangs.
         let _ = thread::Builder::new()
             .name("taut-printed".to_owned())
-            .spawn(move || lines.run(from));
+            .spawn(move || {
+                leave_fifo(); // of the thread that starts it
+                lines.run(from);
+            });
         Self { last }
     }
 

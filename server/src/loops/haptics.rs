@@ -16,6 +16,7 @@ use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
+use crate::shared::felt_ticks::{FeltTick, FeltWriter};
 use crate::shared::timing::Histogram;
 use crate::shared::wrench_command::WrenchCommand;
 
@@ -33,6 +34,7 @@ pub struct HapticsLoop {
     /// CPU time of the coupling up to the command rendered last.
     coupling_cpu_time: Duration,
     recording: Option<Tap<HapticsRecord>>,
+    felt: Option<FeltWriter>,
     statistics: Arc<HapticsStatistics>,
 }
 
@@ -129,6 +131,7 @@ impl HapticsLoop {
             last_tick: None,
             coupling_cpu_time: Duration::ZERO,
             recording: None,
+            felt: None,
             statistics: Arc::default(),
         }
     }
@@ -144,6 +147,13 @@ impl HapticsLoop {
     #[must_use]
     pub fn with_recording(mut self, tap: Option<Tap<HapticsRecord>>) -> Self {
         self.recording = tap;
+        self
+    }
+
+    /// The same, with every tick told to the monitor.
+    #[must_use]
+    pub fn with_felt(mut self, felt: FeltWriter) -> Self {
+        self.felt = Some(felt);
         self
     }
 
@@ -238,6 +248,12 @@ impl HapticsLoop {
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
         statistics.count_felt(&report.felt);
         self.publish_obstacle_work();
+        if let Some(felt) = &mut self.felt {
+            felt.push(FeltTick {
+                wrench: report.felt,
+                constraint_age: self.wrench.held().constraint_age,
+            });
+        }
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,
