@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use taut_kinds::device_help;
 use taut_link::Transport;
 
 use crate::bridge::{BridgeError, run};
-use crate::choice::{DeviceChoice, drivers_help};
+use crate::choice::DeviceChoice;
 use crate::console;
 use crate::devices::HandPreset;
 use crate::port::{ContactBound, Passivity, PassivitySettings, Rearm, SafetySettings};
@@ -15,7 +16,7 @@ use crate::port::{ContactBound, Passivity, PassivitySettings, Rearm, SafetySetti
 /// Read a device, send its poses to the server and render the forces that come back.
 #[derive(Clone, Debug, clap::Args)]
 #[command(
-    after_help = drivers_help() + "\nExample: taut bridge --server haptic-pc:4857 --key device.key --device simulated --hand firm --path reach.csv --loop"
+    after_help = device_help() + "\nExample: taut bridge --server haptic-pc:4857 --key device.key --device simulated --hand firm --path reach.csv --loop"
 )]
 pub struct BridgeArgs {
     /// Server, as host:port.

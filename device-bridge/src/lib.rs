@@ -51,10 +51,7 @@ pub mod wooden;
 pub use arm_switch::{ArmSwitch, ArmWish, listen_at_console};
 pub use bridge::{BridgeError, run, run_device};
 pub use bridge_loop::{BridgeLoop, TickOutput};
-pub use choice::{
-    DRIVERS, DeviceChoice, Driver, ForceDevice, InputChoice, InputError, UnknownDevice,
-    drivers_help,
-};
+pub use choice::{DeviceChoice, ForceDevice, InputChoice, InputError, vrpn_settings};
 pub use cli::{BridgeArgs, CouplingChoice, SafetyArgs, execute};
 pub use device::{Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Felt, Pose};
 #[cfg(unix)]

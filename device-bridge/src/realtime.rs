@@ -72,6 +72,12 @@ pub fn request_fifo(priority: u8) -> RealtimeGrant {
     )
 }
 
+/// Leaves the real-time class, which a thread inherits from the one that started it.
+#[cfg(unix)]
+pub(crate) fn leave_fifo() {
+    os::leave_fifo();
+}
+
 /// Asks to keep all memory of this process in RAM, now and later.
 pub fn lock_memory() -> RealtimeGrant {
     let what = "locked memory".to_owned();
@@ -163,6 +169,12 @@ mod os {
         };
         // SAFETY: `parameters` is valid for the call; 0 names the calling thread.
         done(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) })
+    }
+
+    pub(super) fn leave_fifo() {
+        let parameters = libc::sched_param { sched_priority: 0 };
+        // SAFETY: `parameters` is valid for the call; 0 names the calling thread. Whoever may have a class may leave it.
+        unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &raw const parameters) };
     }
 
     pub(super) fn lock_memory() -> Result<(), String> {
@@ -271,6 +283,9 @@ mod os {
     pub(super) fn request_fifo(_priority: u8) -> Result<(), String> {
         unknown()
     }
+
+    /// Nobody is in it.
+    pub(super) fn leave_fifo() {}
 
     pub(super) fn lock_memory() -> Result<(), String> {
         unknown()

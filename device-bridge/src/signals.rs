@@ -16,6 +16,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use signal_hook::flag;
 
+/// Sends SIGINT to a child that was not waited for yet.
+#[cfg(unix)]
+#[allow(unsafe_code, reason = "a system call")]
+pub(crate) fn interrupt(child: &std::process::Child) {
+    let Ok(process) = libc::pid_t::try_from(child.id()) else {
+        return; // no process has such a number
+    };
+    // SAFETY: takes two integers. The number is the child's for as long as nobody waited for it, which takes its only handle.
+    unsafe { libc::kill(process, libc::SIGINT) };
+}
+
 /// Set once the end is asked for. Clones look at the same flags.
 #[derive(Clone, Debug, Default)]
 pub struct EndFlag {

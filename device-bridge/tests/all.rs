@@ -12,6 +12,7 @@ mod loopback;
 mod no_alloc;
 mod plugin;
 mod polhem;
+mod python;
 mod spidar;
 mod spidar_uart;
 mod support;

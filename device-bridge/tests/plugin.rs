@@ -9,27 +9,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use libloading::Library;
-use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
-use taut_bridge::{
-    ArmingState, Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Placement,
-    Pose, Rearm, SafetySettings,
+use nalgebra::{UnitQuaternion, Vector3};
+use taut_bridge::{ArmingState, Rearm};
+
+use crate::support::stage::{
+    GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
+    Stage, TOO_HOT, UNPLUGGED, goes_wrong, ms, opened,
 };
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-// Of tests/plugin_c/plant.h.
-const GOOD: i64 = 0;
-const HANGS: i64 = 1;
-const NOT_A_NUMBER: i64 = 2;
-const LONG_QUATERNION: i64 = 3;
-const TOO_HOT: i64 = 4;
-const UNPLUGGED: i64 = 5;
-const NOTHING_NEW: i64 = 6;
-const NOT_CALIBRATED: i64 = 7;
 
 fn here() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -66,9 +55,9 @@ fn stand_in(folder: &Path, source: &str, define: &str) -> PathBuf {
 }
 
 /// What the test sees of a library, loaded a second time: the same one.
-struct Inside(Library);
+struct Loaded(Library);
 
-impl Inside {
+impl Loaded {
     fn of(path: &Path) -> Self {
         // SAFETY: it was built from a source of this folder.
         Self(unsafe { Library::new(path) }.expect("it was built"))
@@ -85,7 +74,9 @@ impl Inside {
             &**symbol
         }
     }
+}
 
+impl Inside for Loaded {
     fn get(&self, name: &str) -> i64 {
         self.number(name).load(Ordering::SeqCst)
     }
@@ -93,124 +84,13 @@ impl Inside {
     fn set(&self, name: &str, value: i64) {
         self.number(name).store(value, Ordering::SeqCst);
     }
-
-    fn wait(&self, what: &str, done: impl Fn() -> bool) {
-        let begun = Instant::now();
-        while !done() {
-            assert!(begun.elapsed() < PATIENCE, "{what}");
-            thread::sleep(ms(1));
-        }
-    }
-}
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
-
-fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
-    let DeviceChoice::Input(input) = choice.parse().map_err(|e| format!("{e}"))? else {
-        panic!("it is opened");
-    };
-    let placement = Placement::plain(Pose::identity(), Point3::origin());
-    input.open(placement, 0).map_err(|error| error.to_string())
-}
-
-/// A port around the device, on a clock that goes a millisecond by tick, however long that takes.
-struct Stage {
-    port: DevicePort,
-    time: u64,
-}
-
-impl Stage {
-    fn new(choice: &str, rearm: Rearm) -> Self {
-        let settings = SafetySettings {
-            rearm,
-            ..SafetySettings::default()
-        };
-        let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
-        let mut port = DevicePort::new(device, settings, Point3::origin(), &Pose::identity());
-        port.restart(CommandSource::Same);
-        Self { port, time: 1000 }
-    }
-
-    /// A floor 20 mm below the start, which also turns the hand.
-    fn tick(&mut self) -> (Option<DeviceFault>, f64) {
-        self.time += 1;
-        let now = ms(self.time);
-        let report = self.port.tick(now, |reading| {
-            let below = (-0.02 - reading.sample.pose.translation.vector.z).max(0.0);
-            let wrench = Vector6::new(0.0, 0.0, 200.0 * below, 20.0 * below, 0.0, 0.0);
-            Some(Command::fresh(now, wrench))
-        });
-        (report.reading.fault, report.wrench.norm())
-    }
-
-    /// Milliseconds of its clock that it took.
-    fn until(&mut self, what: &str, done: impl Fn(&Self, Option<DeviceFault>, f64) -> bool) -> u64 {
-        let (begun, from) = (Instant::now(), self.time);
-        loop {
-            let (fault, force) = self.tick();
-            if done(self, fault, force) {
-                return self.time - from;
-            }
-            assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
-            thread::sleep(ms(1));
-        }
-    }
-
-    fn until_felt(&mut self, inside: &Inside) -> u64 {
-        self.until("the floor", |_, fault, force| {
-            fault.is_none() && force > 0.3 && inside.get("force") > 300_000
-        })
-    }
-
-    /// 120 ms on its clock after the last good sample there is no force.
-    fn is_without_force_in_time(&mut self) -> Option<DeviceFault> {
-        let mut fault = None;
-        for _ in 0..119 {
-            fault = self.tick().0;
-        }
-        let (_, force) = self.tick();
-        assert_eq!(force, 0.0, "{fault:?}");
-        fault
-    }
-}
-
-/// Everything that goes wrong with a device that has been felt, and what the port calls it.
-fn goes_wrong(choice: &str, inside: &Inside, modes: &[(i64, &str)]) {
-    let mut stage = Stage::new(choice, Rearm::Automatic);
-    for &(mode, named) in modes {
-        stage.until_felt(inside);
-        assert!(inside.get("torque") > 0, "no torque");
-        inside.set("served", 0);
-        inside.set("after", -1);
-        let closes = inside.get("closes");
-        inside.set("mode", mode);
-        inside.wait("it goes wrong", || {
-            inside.get("served") > 0 || inside.get("closes") > closes
-        });
-        let fault = stage.is_without_force_in_time().expect(named);
-        assert!(fault.to_string().contains(named), "{named}: {fault}");
-        if mode != HANGS {
-            stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
-        }
-        if [TOO_HOT, UNPLUGGED].contains(&mode) {
-            inside.wait("it is closed", || inside.get("closes") > closes);
-        }
-        inside.set("mode", GOOD);
-        let back = stage.until_felt(inside);
-        println!("{named}: felt again after {back} ms");
-        assert!(inside.get("after") <= 0, "a hang kept a force");
-    }
-    drop(stage);
-    assert_eq!(inside.get("force"), 0, "a force stayed");
 }
 
 #[test]
 fn a_hand_in_c_is_felt_lost_and_felt_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Inside::of(&library);
+    let inside = Loaded::of(&library);
     let choice = format!("plugin:{},side=left,scale=1,firm", library.display());
     let device = opened(&choice).unwrap_or_else(|error| panic!("{error}"));
     let info = device.info().clone();
@@ -238,16 +118,16 @@ fn a_hand_in_c_is_felt_lost_and_felt_again() {
 fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Inside::of(&library);
+    let inside = Loaded::of(&library);
     let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
     stage.until_felt(&inside);
     inside.set("after", -1);
     inside.set("mode", HANGS);
-    inside.wait("it hangs", || inside.get("served") > 0);
+    inside.wait("it hangs", &|| inside.get("served") > 0);
     drop(stage); // comes back, though the library does not
     assert!(inside.get("force") > 0, "nobody can take it away");
     inside.set("mode", GOOD);
-    inside.wait("it is closed", || inside.get("closes") == 1);
+    inside.wait("it is closed", &|| inside.get("closes") == 1);
     assert_eq!((inside.get("after"), inside.get("force")), (0, 0));
 }
 
@@ -255,11 +135,11 @@ fn a_device_that_hangs_is_left_and_closed_when_it_comes_back() {
 fn a_force_does_not_outlive_the_loop_that_wrote_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Inside::of(&library);
+    let inside = Loaded::of(&library);
     let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Automatic);
     stage.until_felt(&inside);
     // Nobody ticks any more; the library is read and written on.
-    inside.wait("zero without a write", || inside.get("force") == 0);
+    inside.wait("zero without a write", &|| inside.get("force") == 0);
     stage.until_felt(&inside);
 }
 
@@ -279,7 +159,7 @@ fn a_device_without_motors_is_read_and_never_written() {
 fn a_person_arms_a_plug_in_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
-    let inside = Inside::of(&library);
+    let inside = Loaded::of(&library);
     let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Manual);
     let in_order = |stage: &mut Stage| {
         stage.until("it is there", |_, fault, _| fault.is_none());
@@ -335,7 +215,7 @@ fn what_does_not_fit_is_named() {
     let choice = format!("plugin:{},colour=red", hand.display());
     let said = opened(&choice).err().expect("no such option");
     assert!(said.contains("what options are these?"), "{said}");
-    Inside::of(&hand).set("mode", UNPLUGGED);
+    Loaded::of(&hand).set("mode", UNPLUGGED);
     assert!(error(&hand).contains("no hand is plugged in"));
 }
 
@@ -353,7 +233,7 @@ fn force_dimension_s_functions_are_called_as_published() {
     let status = shell.args(["-c", line]).current_dir(folder.path()).status();
     assert!(status.expect("a shell").success(), "{line}");
     let vendor = stand_in(folder.path(), "stand_in_dhd.c", "DHD");
-    let inside = Inside::of(&vendor);
+    let inside = Loaded::of(&vendor);
     let plugin = folder.path().join("taut_dhd.so");
     // The same source with every warning an error.
     built(

@@ -140,7 +140,7 @@ pub enum Command {
 
 /// `taut demo`.
 #[derive(Clone, Debug, Default, Args)]
-#[command(after_help = taut_bridge::drivers_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
+#[command(after_help = taut_kinds::device_help() + "\nExample: taut demo --scene two-bunnies --duration 30 --headless --json")]
 pub struct DemoArgs {
     /// A shipped scene by its name, or a scene file
     #[arg(long, value_name = "NAME|FILE")]
@@ -700,7 +700,7 @@ const MAX_RATE_HZ: f64 = 1e6;
 const MAX_TRACKING_RATE_HZ: f64 = 1000.0;
 
 /// The text of a device, as it is, if it names one.
-fn device_text(text: &str) -> Result<String, taut_bridge::UnknownDevice> {
+fn device_text(text: &str) -> Result<String, taut_kinds::UnknownDevice> {
     text.parse::<taut_bridge::DeviceChoice>()
         .map(|_| text.to_owned())
 }

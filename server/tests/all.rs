@@ -15,6 +15,7 @@ mod moving_obstacle;
 mod no_allocation;
 mod operation;
 mod operator;
+mod own_device;
 mod record;
 mod recording;
 #[allow(

@@ -1,23 +1,18 @@
-//! Which device: one word on the command line, with options after commas.
-//!
-//! `simulated,strings=wb`, `trace:FILE`, `haply=HOST:PORT`, `space-mouse,speed=0.2`, `vrpn:Tracker0@host,axes=x -z y`, `mouse`.
+//! Which device: what was chosen of [`taut_kinds::KINDS`], on the command line or in a workbench file, and how each kind is opened.
 
-mod option_text;
 mod settings;
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use taut_kinds::{Chosen, KindId, UnknownDevice, read_choice};
 use taut_plant::Grip;
-use taut_vrpn::{Address, AddressError};
+use taut_vrpn::Address;
 
-use option_text::nearest;
+pub use settings::vrpn_settings;
 #[cfg(unix)]
 use settings::wooden_settings;
-use settings::{
-    cap_settings, haply_settings, plugin_settings, polhem_settings, spidar_settings,
-    strings_option, vrpn_settings,
-};
+use settings::{cap_settings, haply_settings, plugin_settings, polhem_settings, spidar_settings};
 
 use crate::device::Device;
 #[cfg(unix)]
@@ -26,74 +21,9 @@ use crate::devices::{
     ArmDevice, CapSettings, HaplySettings, HidPort, PluginSettings, PolhemSettings, SourceError,
     SpaceMouse, SpidarUartError, SpidarUartSettings, VrpnDevice, VrpnSettings,
 };
-use crate::haply::{HaplyAddressError, HaplyError};
+use crate::haply::HaplyError;
 use crate::placement::Placement;
-use crate::plugin::PluginError;
-
-/// A driver, for lists that people read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Driver {
-    /// Its name in choices and in workbench files.
-    pub name: &'static str,
-    /// How it is chosen.
-    pub form: &'static str,
-    /// What it is.
-    pub what: &'static str,
-}
-
-/// All drivers.
-pub const DRIVERS: [Driver; 10] = [
-    Driver {
-        name: "simulated",
-        form: "simulated[,strings=g6x3r|g6x5r|wb|FILE]",
-        what: "a simulated device in a simulated hand, made of strings on request: pose and force",
-    },
-    Driver {
-        name: "trace",
-        form: "trace:FILE",
-        what: "a recorded trace of poses: no force",
-    },
-    Driver {
-        name: "haply",
-        form: "haply[=HOST:PORT][,arm=ID,grip=yes|no,axes=x y z,scale=S,anchor=start|workbench]",
-        what: "a Haply Inverse arm behind its service, with or without a VerseGrip: force without torque",
-    },
-    Driver {
-        name: "spidar",
-        form: "spidar:PORT[,geometry=g6x4r|NAME|FILE,axes=x -z y]",
-        what: "a SPIDAR-G on its UART motor boards: six degrees of freedom, force and torque",
-    },
-    Driver {
-        name: "polhem",
-        form: "polhem:PORT[,axes=y -x z,scale=S,anchor=start|workbench]",
-        what: "a Polhem arm on its text board: six degrees of freedom, force without torque",
-    },
-    Driver {
-        name: "wooden",
-        form: "wooden[=PATH][,model=NAME,axes=y -x z,scale=S,anchor=start|workbench]",
-        what: "a WoodenHaptics arm, or a kin of it, on its HID board: force without torque",
-    },
-    Driver {
-        name: "plugin",
-        form: "plugin:LIBRARY[,axes=x y z,scale=S,anchor=start|workbench,...]",
-        what: "a force device in a shared library of your own (taut_device.h); other options go to the library",
-    },
-    Driver {
-        name: "space-mouse",
-        form: "space-mouse[,mode=rate|position,speed=M/S,turn-rate=RAD/S,dead-zone=D,...]",
-        what: "a 3Dconnexion SpaceMouse: six degrees of freedom in, no force",
-    },
-    Driver {
-        name: "vrpn",
-        form: "vrpn:TRACKER@HOST[:PORT][,sensor=N,mode=tcp|udp,axes=x -z y,scale=M,...]",
-        what: "a sensor of a VRPN tracker: six degrees of freedom in, no force",
-    },
-    Driver {
-        name: "mouse",
-        form: "mouse",
-        what: "mouse and keyboard of a render window (`taut demo`, `taut render --hold`): no force",
-    },
-];
+use crate::plugin::{Language, PluginError};
 
 /// Which device is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -231,130 +161,67 @@ impl InputChoice {
     }
 }
 
-/// A text that chooses no device.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum UnknownDevice {
-    /// No driver of that name.
-    #[error("there is no device `{name}`{hint}; use {}", names_and_forms())]
-    Name {
-        /// What was written.
-        name: String,
-        /// The nearest name, in a sentence's end, or nothing.
-        hint: String,
-    },
-    /// The driver needs more than its name.
-    #[error("the device `{name}` is incomplete; write {form}")]
-    Incomplete {
-        /// The driver.
-        name: &'static str,
-        /// What to write.
-        form: &'static str,
-    },
-    /// The tracker's address.
-    #[error(transparent)]
-    Address(#[from] AddressError),
-    /// The Inverse service's address.
-    #[error(transparent)]
-    Service(#[from] HaplyAddressError),
-    /// The geometry of a string-driven device.
-    #[error("{0}")]
-    Geometry(String),
-    /// No such option.
-    #[error("the device `{device}` has no option `{option}`{hint}; it has {known}")]
-    Option {
-        /// The driver.
-        device: &'static str,
-        /// What was written.
-        option: String,
-        /// The nearest option.
-        hint: String,
-        /// All of them.
-        known: String,
-    },
-    /// A value that the option does not take.
-    #[error("`{option}` of the device `{device}` is `{value}`, but must be {wanted}")]
-    Value {
-        /// The driver.
-        device: &'static str,
-        /// The option.
-        option: &'static str,
-        /// What was written.
-        value: String,
-        /// What it takes.
-        wanted: String,
-    },
+impl DeviceChoice {
+    /// What was chosen, where it is read by a driver of this process; `None` is a device of the network.
+    ///
+    /// # Errors
+    /// [`UnknownDevice`]: a geometry cannot be read.
+    pub fn of(chosen: &Chosen) -> Result<Option<Self>, UnknownDevice> {
+        let input = match chosen.kind.id {
+            KindId::Remote => return Ok(None),
+            KindId::Mouse => return Ok(Some(Self::Mouse)),
+            KindId::Simulated => {
+                let strings = chosen.text("strings").map(str::to_owned);
+                return Ok(Some(Self::Simulated { strings }));
+            }
+            KindId::Trace => {
+                let path = chosen.file("path").unwrap_or("".as_ref());
+                return Ok(Some(Self::Trace(path.to_owned())));
+            }
+            KindId::Haply => InputChoice::Haply(Box::new(haply_settings(chosen))),
+            KindId::Spidar => InputChoice::Spidar(Box::new(spidar_settings(chosen)?)),
+            KindId::Polhem => InputChoice::Polhem(Box::new(polhem_settings(chosen))),
+            #[cfg(unix)]
+            KindId::Wooden => InputChoice::Wooden(Box::new(wooden_settings(chosen))),
+            #[cfg(not(unix))]
+            KindId::Wooden => {
+                return Err(UnknownDevice::Incomplete {
+                    name: chosen.kind.name,
+                    form: "it on Unix only".to_owned(),
+                });
+            }
+            KindId::Plugin => {
+                InputChoice::Plugin(Box::new(plugin_settings(chosen, "library", Language::C)))
+            }
+            KindId::Python => {
+                let interpreter = chosen.text("interpreter").unwrap_or("python3");
+                let language = Language::Python {
+                    interpreter: interpreter.into(),
+                };
+                InputChoice::Plugin(Box::new(plugin_settings(chosen, "file", language)))
+            }
+            KindId::SpaceMouse => InputChoice::SpaceMouse(cap_settings(chosen)),
+            KindId::Vrpn => {
+                let settings = vrpn_settings(chosen).ok_or_else(|| UnknownDevice::Incomplete {
+                    name: chosen.kind.name,
+                    form: chosen.kind.form(),
+                })?;
+                InputChoice::Vrpn(Box::new(settings))
+            }
+        };
+        Ok(Some(Self::Input(input)))
+    }
 }
 
 impl FromStr for DeviceChoice {
     type Err = UnknownDevice;
 
     fn from_str(text: &str) -> Result<Self, UnknownDevice> {
-        let end = text.find([':', ',', '=']).unwrap_or(text.len());
-        let (name, rest) = text.split_at(end);
-        let Some(driver) = DRIVERS.iter().find(|driver| driver.name == name) else {
-            return Err(UnknownDevice::Name {
-                name: text.to_owned(),
-                hint: nearest(name, DRIVERS.iter().map(|driver| driver.name)),
-            });
-        };
-        let incomplete = UnknownDevice::Incomplete {
-            name: driver.name,
-            form: driver.form,
-        };
-        match (driver.name, rest.strip_prefix(':')) {
-            ("simulated", None) => Ok(Self::Simulated {
-                strings: strings_option(rest.trim_start_matches(','))?,
-            }),
-            ("mouse", None) if rest.is_empty() => Ok(Self::Mouse),
-            ("trace", Some(file)) if !file.is_empty() => Ok(Self::Trace(file.into())),
-            ("spidar", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Spidar(
-                Box::new(spidar_settings(rest)?),
-            ))),
-            ("polhem", Some(rest)) if !rest.is_empty() => Ok(Self::Input(InputChoice::Polhem(
-                Box::new(polhem_settings(rest)?),
-            ))),
-            ("plugin", Some(rest)) if !rest.is_empty() && !rest.starts_with(',') => Ok(
-                Self::Input(InputChoice::Plugin(Box::new(plugin_settings(rest)?))),
-            ),
-            #[cfg(unix)]
-            ("wooden", None) => Ok(Self::Input(InputChoice::Wooden(Box::new(wooden_settings(
-                rest,
-            )?)))),
-            ("haply", None) => Ok(Self::Input(InputChoice::Haply(Box::new(haply_settings(
-                rest,
-            )?)))),
-            ("space-mouse", None) => {
-                let settings = cap_settings(rest.trim_start_matches(','))?;
-                Ok(Self::Input(InputChoice::SpaceMouse(settings)))
-            }
-            ("vrpn", Some(rest)) => Ok(Self::Input(InputChoice::Vrpn(Box::new(vrpn_settings(
-                rest,
-            )?)))),
-            _ => Err(incomplete),
-        }
+        Self::of(&read_choice(text)?)?.ok_or_else(|| UnknownDevice::Name {
+            name: text.to_owned(),
+            hint: String::new(),
+        })
     }
-}
-
-/// The forms of all drivers, in a sentence.
-fn names_and_forms() -> String {
-    let forms: Vec<&str> = DRIVERS.iter().map(|driver| short(driver.form)).collect();
-    let (last, others) = forms.split_last().unwrap_or((&"", &[]));
-    format!("{} or {last}", others.join(", "))
-}
-
-/// A form without its options.
-fn short(form: &'static str) -> &'static str {
-    form.split('[').next().unwrap_or(form)
-}
-
-/// What follows the arguments in `--help`: every driver with its options.
-#[must_use]
-pub fn drivers_help() -> String {
-    let mut help = "Devices:\n".to_owned();
-    for Driver { form, what, .. } in DRIVERS {
-        help += &format!("  {form}\n      {what}\n");
-    }
-    help
 }
 
 #[cfg(test)]
@@ -368,23 +235,52 @@ mod tests {
         text.parse().unwrap_or_else(|error| panic!("{error}"))
     }
 
-    fn error(text: &str) -> String {
-        text.parse::<DeviceChoice>().expect_err(text).to_string()
-    }
-
     #[test]
-    fn every_driver_is_chosen_by_its_form() {
-        for driver in DRIVERS {
-            let text = short(driver.form)
-                .replace("TRACKER@HOST", "Tracker0@host")
-                .replace("PORT", "/dev/ttyUSB0")
-                .replace("FILE", "a,b.csv");
-            choice(&text);
+    fn every_kind_of_the_command_line_has_a_driver() {
+        for kind in taut_kinds::KINDS.iter().filter(|kind| kind.on_command_line) {
+            let text = kind.short_form();
+            choice(&text.replace("TRACKER@HOST", "Tracker0@host"));
         }
         assert_eq!(
             choice("trace:a,b.csv"),
             DeviceChoice::Trace("a,b.csv".into())
         );
+        let error = "spidar:/dev/x,geometry=nothing".parse::<DeviceChoice>();
+        let error = error.expect_err("no geometry").to_string();
+        assert!(error.contains("g6x4r"), "{error}");
+    }
+
+    #[test]
+    fn words_of_a_declaration_are_those_of_its_driver() {
+        use taut_kinds::Takes;
+        let known: [(KindId, &str, Vec<&str>); 5] = [
+            (
+                KindId::Wooden,
+                "model",
+                crate::wooden::WOODEN_MODELS
+                    .iter()
+                    .map(|m| m.name)
+                    .collect(),
+            ),
+            (
+                KindId::SpaceMouse,
+                "mode",
+                CapMode::NAMED.map(|m| m.0).to_vec(),
+            ),
+            (KindId::Vrpn, "mode", VrpnMode::NAMED.map(|m| m.0).to_vec()),
+            (KindId::Vrpn, "anchor", Anchor::NAMED.map(|m| m.0).to_vec()),
+            (KindId::Haply, "anchor", Anchor::NAMED.map(|m| m.0).to_vec()),
+        ];
+        for (id, name, words) in known {
+            let mut kinds = taut_kinds::KINDS.iter();
+            let kind = kinds.find(|kind| kind.id == id).expect("declared");
+            let mut keys = kind.keys.iter();
+            let key = keys.find(|key| key.name == name).expect("declared");
+            let Takes::OneOf(declared) = key.takes else {
+                panic!("{name}");
+            };
+            assert_eq!(declared, words, "{}: {name}", kind.name);
+        }
     }
 
     #[test]
@@ -428,56 +324,5 @@ mod tests {
         );
         let plain = DeviceChoice::Input(InputChoice::Haply(Box::default()));
         assert_eq!(choice("haply"), plain);
-    }
-
-    #[test]
-    fn wrong_words_are_answered_with_the_right_ones() {
-        for (text, part) in [
-            ("spacemouse", "did you mean `space-mouse`?"),
-            ("simulatd", "did you mean `simulated`?"),
-            (
-                "phantom",
-                "use simulated, trace:FILE, haply, spidar:PORT, polhem:PORT, wooden, plugin:LIBRARY, space-mouse",
-            ),
-            ("spidar", "write spidar:PORT"),
-            ("spidar:", "write spidar:PORT"),
-            ("wooden,model=phantom", "must be woodenhaptics-2019 or"),
-            ("polhem", "write polhem:PORT"),
-            ("plugin", "write plugin:LIBRARY"),
-            ("plugin:", "write plugin:LIBRARY"),
-            ("plugin:/l.so,scale=0", "a number from 0.01 to 100"),
-            ("polhem:/dev/x,scal=1", "did you mean `scale`?"),
-            ("spidar:/dev/x,geometry=nothing", "g6x4r"),
-            ("spidar:/dev/x,axes=y x z", "right-handed"),
-            ("haply=", "write HOST or HOST:PORT"),
-            ("haply:10001", "write haply[=HOST:PORT]"),
-            ("haply=pc:1,grip=maybe", "must be yes or no"),
-            ("haply,scale=0", "a number from 0.01 to 100"),
-            ("haply,arms=1", "did you mean `arm`?"),
-            ("trace:", "write trace:FILE"),
-            ("trace", "write trace:FILE"),
-            ("simulated,hand=firm", "it has strings"),
-            ("simulated,strings", "must be g6x3r, g6x4r, g6x5r, wb or"),
-            ("simulated:wb", "write simulated"),
-            ("vrpn", "write vrpn:TRACKER@HOST"),
-            ("vrpn:Tracker0", "DEVICE@HOST:PORT"),
-            ("vrpn:T@h,sensors=1", "did you mean `sensor`?"),
-            ("vrpn:T@h,axes=x y", "such as `x -z y`"),
-            ("vrpn:T@h,mode=tpc", "must be tcp or udp"),
-            ("space-mouse,speed=fast", "a number from 0.001 to 10"),
-            ("space-mouse,speed=NaN", "a number from 0.001 to 10"),
-            ("space-mouse,sped=1", "did you mean `speed`?"),
-        ] {
-            let error = error(text);
-            assert!(error.contains(part), "{text}: {error}");
-        }
-    }
-
-    #[test]
-    fn the_help_names_every_driver() {
-        let help = drivers_help();
-        for driver in DRIVERS {
-            assert!(help.contains(driver.form) && help.contains(driver.what));
-        }
     }
 }

@@ -13,7 +13,10 @@ use crate::choice::ForceDevice;
 use crate::device::DeviceLimits;
 use crate::devices::Anchor;
 use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
-use crate::haply::{ExchangeSettings, HaplyClient, HaplyError, ServiceAddress, workspace_centre};
+use crate::haply::{
+    EVENTS_PORT, ExchangeSettings, HaplyClient, HaplyError, ServiceAddress, ServiceEvents,
+    workspace_centre,
+};
 use crate::placement::Placement;
 
 /// The client's messages, and the loop around them, Hz.
@@ -60,6 +63,14 @@ pub struct HaplySettings {
     pub mapping: SensorMapping,
     /// How the body follows.
     pub anchor: Anchor,
+    /// Where the service tells its events; `None` does not listen.
+    pub events_port: Option<u16>,
+}
+
+/// The client, and who listens beside it: dropped in this order, so that the force goes first.
+struct Connected {
+    client: HaplyClient,
+    _events: Option<ServiceEvents>,
 }
 
 impl HaplySettings {
@@ -82,7 +93,15 @@ impl HaplySettings {
     /// [`HaplyError`]: it is not there, or too old. An arm that is not there yet is waited for.
     pub fn open(&self, placement: Placement, priority: u8) -> Result<ArmDevice, HaplyError> {
         let client = HaplyClient::start(self.address.clone(), self.exchange.clone(), priority)?;
-        Ok(ArmDevice::new(Box::new(client), self.arm(), placement))
+        let events = self.events_port.map(|port| {
+            // Without the thread nothing is told, and all else goes on.
+            ServiceEvents::listen(&self.address.host, port).ok()
+        });
+        let port = Connected {
+            client,
+            _events: events.flatten(),
+        };
+        Ok(ArmDevice::new(Box::new(port), self.arm(), placement))
     }
 
     /// What the arm is assumed to bear.
@@ -104,16 +123,17 @@ impl Default for HaplySettings {
             exchange: ExchangeSettings::default(),
             mapping: SensorMapping::identity(),
             anchor: Anchor::default(),
+            events_port: Some(EVENTS_PORT),
         }
     }
 }
 
-impl ArmPort for HaplyClient {
+impl ArmPort for Connected {
     fn newest(&mut self) -> ArmState {
-        *Self::newest(self)
+        *self.client.newest()
     }
 
     fn push(&mut self, force: [f64; 3]) {
-        Self::push(self, force);
+        self.client.push(force);
     }
 }

@@ -1,4 +1,4 @@
-//! A device in a shared library, as it is chosen and opened.
+//! A device in a shared library or in Python, as it is chosen and opened.
 //!
 //! What the library says bounds force and stiffness. Mass and damping it does not say: they are assumed light, which is the cautious side.
 
@@ -11,13 +11,15 @@ use crate::choice::ForceDevice;
 use crate::devices::arm::{ArmDevice, ArmSettings};
 use crate::devices::{Anchor, haply_grip};
 use crate::placement::Placement;
-use crate::plugin::{Plugin, PluginError};
+use crate::plugin::{Language, Plugin, PluginError};
 
 /// A library, and where its device stands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PluginSettings {
-    /// Of the library.
+    /// Of the library or the file.
     pub path: PathBuf,
+    /// What it is written in.
+    pub language: Language,
     /// For the library: what is not one of ours, with commas between.
     pub options: String,
     /// From the device's frame to the workbench's.
@@ -43,7 +45,7 @@ impl PluginSettings {
     /// # Errors
     /// [`PluginError`].
     pub fn open(&self, placement: Placement, priority: u8) -> Result<ArmDevice, PluginError> {
-        let (plugin, info) = Plugin::open(&self.path, &self.options, priority)?;
+        let (plugin, info) = Plugin::open(&self.path, &self.language, &self.options, priority)?;
         let arm = ArmSettings {
             name: info.name,
             limits: info.limits,

@@ -18,12 +18,12 @@ use std::time::Duration;
 use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Message, WebSocket};
 
-use super::address::ServiceAddress;
 use super::exchange::{Exchange, ExchangeSettings};
 use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
 use crate::devices::ArmState;
 use crate::realtime::{self, Ticker, monotonic_now};
+use taut_kinds::ServiceAddress;
 
 /// From message to message.
 const PERIOD: Duration = Duration::from_millis(1);

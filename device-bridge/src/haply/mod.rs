@@ -5,10 +5,10 @@
 //!
 //! | file           | what                                                                  |
 //! |----------------|-----------------------------------------------------------------------|
-//! | `address.rs`   | HOST:PORT                                                             |
 //! | `message.rs`   | what the service says, checked; what is said to it                    |
 //! | `exchange.rs`  | one connection without sockets: which device, which grip, what is next |
 //! | `client.rs`    | the thread: sockets, the millisecond's beat, another connection        |
+//! | `events.rs`    | what the service tells of itself on a second socket                   |
 //! | `version.rs`   | which service is there: 3.5 or later                                  |
 //! | `simulated.rs` | the service's side without sockets: device, hand and grip simulated    |
 //! | `service.rs`   | the same on a socket                                                  |
@@ -16,20 +16,22 @@
 //! The driver on top is [`ArmDevice`](crate::ArmDevice). Sources: the service's documentation of 3.5 and the vendor's client `haply` 1.3.1, read
 //! for facts. No device was at hand.
 
-mod address;
 mod client;
+mod events;
 mod exchange;
 mod message;
 mod service;
 mod simulated;
 mod version;
 
-pub use address::{AddressError as HaplyAddressError, ServiceAddress};
 pub(crate) use client::ForceHold;
 pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
+pub use events::EVENTS_PORT;
+pub(crate) use events::ServiceEvents;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};
 pub use message::{Arm, GripKind, GripSaid, MessageError, Said};
 pub use service::{HaplyService, ServiceTotals};
 pub(crate) use simulated::workspace_centre;
 pub use simulated::{SimulatedInverse, SimulatedSettings};
+pub use taut_kinds::ServiceAddress;
 pub use version::{ServiceVersion, VersionError, service_version};

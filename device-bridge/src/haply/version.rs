@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
-use super::address::ServiceAddress;
+use taut_kinds::ServiceAddress;
 
 /// The first whose messages are understood.
 const FIRST: ServiceVersion = ServiceVersion { major: 3, minor: 5 };

@@ -1,6 +1,5 @@
 //! What a library may say of its device, and which of its samples are ones.
 
-use super::library::{RawInfo, RawSample, until_zero};
 use crate::device::DeviceLimits;
 
 /// `TAUT_DEVICE_HAS_ANGULAR_VELOCITY`.
@@ -17,6 +16,67 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 const STALE: f64 = 0.02;
 /// An age beyond this is none, s.
 const MAX_AGE: f64 = 1.0;
+
+/// `taut_device_info`.
+#[repr(C)]
+pub(super) struct RawInfo {
+    pub(super) name: [u8; 64],
+    pub(super) sensed: u32,
+    pub(super) actuated: u32,
+    pub(super) max_force: f64,
+    pub(super) max_torque: f64,
+    pub(super) max_stiffness: f64,
+    pub(super) max_rotational_stiffness: f64,
+    pub(super) rate: f64,
+}
+
+/// `taut_device_sample`.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub(super) struct RawSample {
+    pub(super) position: [f64; 3],
+    pub(super) orientation: [f64; 4],
+    pub(super) velocity: [f64; 3],
+    pub(super) angular_velocity: [f64; 3],
+    pub(super) age: f64,
+    pub(super) buttons: u32,
+    pub(super) measured: u32,
+}
+
+impl RawInfo {
+    /// What a library gets: a number that it does not set is none.
+    pub(super) const UNSET: Self = Self {
+        name: [0; 64],
+        sensed: 0,
+        actuated: 0,
+        max_force: f64::NAN,
+        max_torque: f64::NAN,
+        max_stiffness: f64::NAN,
+        max_rotational_stiffness: f64::NAN,
+        rate: f64::NAN,
+    };
+}
+
+impl RawSample {
+    /// What a library gets: a number that it does not set is none.
+    pub(super) const UNSET: Self = Self {
+        position: [f64::NAN; 3],
+        orientation: [f64::NAN; 4],
+        velocity: [f64::NAN; 3],
+        angular_velocity: [f64::NAN; 3],
+        age: f64::NAN,
+        buttons: 0,
+        measured: 0,
+    };
+}
+
+/// The text before the first 0.
+pub(super) fn until_zero(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|byte| *byte == 0);
+    String::from_utf8_lossy(&bytes[..end.unwrap_or(bytes.len())])
+        .trim()
+        .to_owned()
+}
 
 /// What a library says of its device and no device is.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

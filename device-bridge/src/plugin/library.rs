@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use libloading::Library;
 
-use super::claims::{Claim, PluginInfo};
+use super::claims::{PluginInfo, RawInfo, RawSample, until_zero};
+use super::{Answer, OpenDevice, Opener, PluginError};
 
 /// `TAUT_DEVICE_VERSION`.
 const VERSION: u32 = 1;
@@ -17,45 +18,6 @@ const VERSION: u32 = 1;
 const ENTRY: &str = "taut_device_entry";
 /// Longest text of an error that is read, with its end.
 const TEXT: usize = 256;
-
-/// `taut_device_info`.
-#[repr(C)]
-pub(super) struct RawInfo {
-    pub(super) name: [u8; 64],
-    pub(super) sensed: u32,
-    pub(super) actuated: u32,
-    pub(super) max_force: f64,
-    pub(super) max_torque: f64,
-    pub(super) max_stiffness: f64,
-    pub(super) max_rotational_stiffness: f64,
-    pub(super) rate: f64,
-}
-
-/// `taut_device_sample`.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub(super) struct RawSample {
-    pub(super) position: [f64; 3],
-    pub(super) orientation: [f64; 4],
-    pub(super) velocity: [f64; 3],
-    pub(super) angular_velocity: [f64; 3],
-    pub(super) age: f64,
-    pub(super) buttons: u32,
-    pub(super) measured: u32,
-}
-
-impl RawSample {
-    /// What a library gets: a number that it does not set is none.
-    pub(super) const UNSET: Self = Self {
-        position: [f64::NAN; 3],
-        orientation: [f64::NAN; 4],
-        velocity: [f64::NAN; 3],
-        angular_velocity: [f64::NAN; 3],
-        age: f64::NAN,
-        buttons: 0,
-        measured: 0,
-    };
-}
 
 type Entry = unsafe extern "C" fn() -> *const RawTable;
 
@@ -73,107 +35,36 @@ struct RawTable {
     error_text: Option<unsafe extern "C" fn(*mut c_void, *mut c_char, usize)>,
 }
 
-/// What a call returned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Answer {
-    /// `TAUT_DEVICE_OK`.
-    Good,
-    /// `TAUT_DEVICE_NOTHING_NEW`.
-    NothingNew,
-    /// `TAUT_DEVICE_NOT_READY`.
-    NotReady,
-    /// `TAUT_DEVICE_GONE`.
-    Gone,
-    /// Any other.
-    Failed(i32),
+/// Loads a library in the thread that calls it, and opens its device.
+pub(super) struct LibraryOpener {
+    path: PathBuf,
+    options: String,
+    loaded: Option<PluginLibrary>,
 }
 
-impl From<i32> for Answer {
-    fn from(code: i32) -> Self {
-        match code {
-            0 => Self::Good,
-            1 => Self::NothingNew,
-            2 => Self::NotReady,
-            3 => Self::Gone,
-            other => Self::Failed(other),
+impl LibraryOpener {
+    pub(super) fn new(path: &Path, options: &str) -> Self {
+        Self {
+            path: path.to_owned(),
+            options: options.to_owned(),
+            loaded: None,
         }
     }
 }
 
-/// Why a plug-in is no device.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PluginError {
-    /// The file.
-    #[error("there is no plug-in at {path} ({cause}); write its whole path, plugin:/path/lib.so")]
-    Missing {
-        /// As written.
-        path: PathBuf,
-        /// What the system says.
-        cause: String,
-    },
-    /// The system cannot load it.
-    #[error(
-        "the plug-in {path} cannot be loaded: {cause}; build it for this machine, and install the libraries that it needs"
-    )]
-    Load {
-        /// Whole.
-        path: PathBuf,
-        /// What the system says.
-        cause: String,
-    },
-    /// It is another library.
-    #[error(
-        "{path} exports no function `taut_device_entry`, so it is no plug-in; a vendor's library needs one around it: docs/devices.md, Write a device in C"
-    )]
-    NoEntry {
-        /// Whole.
-        path: PathBuf,
-    },
-    /// Another version of the interface, or half a table.
-    #[error(
-        "the plug-in {path} does not fit: {what}; compile it with the taut_device.h of this release"
-    )]
-    Table {
-        /// Whole.
-        path: PathBuf,
-        /// What is wrong.
-        what: String,
-    },
-    /// It found no device.
-    #[error(
-        "the plug-in {path} cannot open its device: {cause}; plug it in and switch it on, and look at the plug-in's options"
-    )]
-    Open {
-        /// Whole.
-        path: PathBuf,
-        /// What it says.
-        cause: String,
-    },
-    /// It says what no device is.
-    #[error("the plug-in {path} says what no device is: {claim}; mend its `info`")]
-    Info {
-        /// Whole.
-        path: PathBuf,
-        /// What.
-        claim: Claim,
-    },
-    /// It does not come back.
-    #[error(
-        "the plug-in {path} did not open its device within {seconds} s; switch the device off and on, and end other programs that use it"
-    )]
-    Hangs {
-        /// As written.
-        path: PathBuf,
-        /// That were waited.
-        seconds: u64,
-    },
-    /// No thread.
-    #[error("cannot start a thread for the plug-in: {0}; end other programs or raise the limit")]
-    Thread(String),
+impl Opener for LibraryOpener {
+    fn open(&mut self) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError> {
+        let library = match self.loaded.take() {
+            Some(library) => library,
+            None => PluginLibrary::load(&self.path)?,
+        };
+        let (device, info) = self.loaded.insert(library).open(&self.options)?;
+        Ok((Box::new(device), info))
+    }
 }
 
 /// A library whose table fits. It stays loaded until the process ends: threads of its own may run in it.
-pub(super) struct PluginLibrary {
+struct PluginLibrary {
     path: PathBuf,
     table: Fitting,
 }
@@ -191,7 +82,7 @@ struct Fitting {
 
 impl PluginLibrary {
     /// Loads `path` and asks for its table.
-    pub(super) fn load(path: &Path) -> Result<Self, PluginError> {
+    fn load(path: &Path) -> Result<Self, PluginError> {
         let whole = path.canonicalize().map_err(|error| PluginError::Missing {
             path: path.to_owned(),
             cause: error.to_string(),
@@ -245,7 +136,7 @@ impl PluginLibrary {
     }
 
     /// Opens the device and asks what it is; closed again when it is dropped.
-    pub(super) fn open(&self, options: &str) -> Result<(OpenDevice<'_>, PluginInfo), PluginError> {
+    fn open(&self, options: &str) -> Result<(OpenLibrary<'_>, PluginInfo), PluginError> {
         let failed = |cause: String| PluginError::Open {
             path: self.path.clone(),
             cause,
@@ -258,20 +149,11 @@ impl PluginLibrary {
         if answer != Answer::Good {
             return Err(failed(self.error_text(std::ptr::null_mut(), answer)));
         }
-        let mut open = OpenDevice {
+        let mut open = OpenLibrary {
             library: self,
             device,
         };
-        let mut info = RawInfo {
-            name: [0; 64],
-            sensed: 0,
-            actuated: 0,
-            max_force: f64::NAN,
-            max_torque: f64::NAN,
-            max_stiffness: f64::NAN,
-            max_rotational_stiffness: f64::NAN,
-            rate: f64::NAN,
-        };
+        let mut info = RawInfo::UNSET;
         // SAFETY: the device is open, and `info` is of the header's layout.
         let answer = unsafe { (self.table.info)(device, &raw mut info) }.into();
         if answer != Answer::Good {
@@ -297,39 +179,31 @@ impl PluginLibrary {
     }
 }
 
-/// The text before the first 0.
-pub(super) fn until_zero(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|byte| *byte == 0);
-    String::from_utf8_lossy(&bytes[..end.unwrap_or(bytes.len())])
-        .trim()
-        .to_owned()
-}
-
-/// A device between its open and its close. Not `Send`: it stays on its thread.
-pub(super) struct OpenDevice<'a> {
+/// A library's device between its open and its close. Not `Send`: it stays on its thread.
+struct OpenLibrary<'a> {
     library: &'a PluginLibrary,
     device: *mut c_void,
 }
 
-impl OpenDevice<'_> {
-    pub(super) fn read(&mut self) -> (Answer, RawSample) {
+impl OpenDevice for OpenLibrary<'_> {
+    fn read(&mut self) -> (Answer, RawSample) {
         let mut sample = RawSample::UNSET;
         // SAFETY: the device is open, and `sample` is of the header's layout.
         let answer = unsafe { (self.library.table.read)(self.device, &raw mut sample) };
         (answer.into(), sample)
     }
 
-    pub(super) fn write(&mut self, wrench: &[f64; 6]) -> Answer {
+    fn write(&mut self, wrench: &[f64; 6]) -> Answer {
         // SAFETY: the device is open, and six numbers are there.
         unsafe { (self.library.table.write)(self.device, wrench.as_ptr()) }.into()
     }
 
-    pub(super) fn error_text(&mut self, answer: Answer) -> String {
+    fn error_text(&mut self, answer: Answer) -> String {
         self.library.error_text(self.device, answer)
     }
 }
 
-impl Drop for OpenDevice<'_> {
+impl Drop for OpenLibrary<'_> {
     fn drop(&mut self) {
         // SAFETY: the device is open, and this is the last call for it.
         let answer: Answer = unsafe { (self.library.table.close)(self.device) }.into();

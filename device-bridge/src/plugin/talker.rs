@@ -1,17 +1,18 @@
-//! The thread that calls a library: read and write in turn, and the device opened again when it is gone.
+//! The thread that calls a library, or a process in Python: read and write in turn, and the device opened again when it is gone.
 //!
 //! A thread of its own, so that the device's loop goes on while a library hangs: its samples stop, and the port holds and fades. What no thread can do is
 //! to hand a hanging library the zero; that waits until the call returns, and is the library's first command then.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-use super::claims::{PluginInfo, Worth};
-use super::library::{Answer, OpenDevice, PluginError, PluginLibrary, RawSample};
+use super::claims::{PluginInfo, RawSample, Worth};
+use super::pace::Pace;
+use super::{Answer, Language, OpenDevice, Opener, PluginError};
 use crate::devices::{ArmPort, ArmState};
 use crate::realtime::{self, Ticker, monotonic_now};
 
@@ -25,6 +26,8 @@ const HOLDS: Duration = Duration::from_millis(20);
 const RETRY: Duration = Duration::from_millis(200);
 /// For the first one.
 const OPEN_WITHIN: Duration = Duration::from_secs(10);
+/// A device that was there for longer and is gone is told of again.
+const HELD_ON: Duration = Duration::from_secs(1);
 /// For the last calls. A library that hangs longer is left to itself.
 const CLOSE_WITHIN: Duration = Duration::from_secs(1);
 
@@ -45,12 +48,13 @@ pub struct Plugin {
 }
 
 impl Plugin {
-    /// Loads the library at `path` and opens its device with `options`; `priority` asks for real time, 0 does not.
+    /// Loads what is at `path`, written in `language`, and opens its device with `options`; `priority` asks for real time, 0 does not.
     ///
     /// # Errors
     /// [`PluginError`].
     pub fn open(
         path: &Path,
+        language: &Language,
         options: &str,
         priority: u8,
     ) -> Result<(Self, PluginInfo), PluginError> {
@@ -58,9 +62,8 @@ impl Plugin {
         let (wanted, taken) = triple_buffer::TripleBuffer::new(&Wanted::default()).split();
         let end = Arc::new(AtomicBool::new(false));
         let (ready, readied) = sync_channel(1);
+        let opener = language.opener(path, options, priority, &end)?;
         let mut talker = Talker {
-            path: path.to_owned(),
-            options: options.to_owned(),
             out,
             wanted: taken,
             written: (0, Duration::ZERO),
@@ -70,7 +73,7 @@ impl Plugin {
         };
         let thread = thread::Builder::new()
             .name("taut-plugin".to_owned())
-            .spawn(move || talker.run(priority, &ready))
+            .spawn(move || talker.run(opener, priority, &ready))
             .map_err(|error| PluginError::Thread(error.to_string()))?;
         match readied.recv_timeout(OPEN_WITHIN) {
             Ok(Ok(info)) => Ok((
@@ -133,8 +136,6 @@ impl Drop for Plugin {
 
 /// The thread's own.
 struct Talker {
-    path: PathBuf,
-    options: String,
     out: triple_buffer::Input<ArmState>,
     wanted: triple_buffer::Output<Wanted>,
     /// Writes of the device's loop, and when the last was seen.
@@ -145,50 +146,51 @@ struct Talker {
 }
 
 impl Talker {
-    fn run(&mut self, priority: u8, ready: &SyncSender<Result<PluginInfo, PluginError>>) {
-        let opened = PluginLibrary::load(&self.path);
-        let library = match opened {
-            Ok(library) => library,
-            Err(error) => {
-                let _ = ready.try_send(Err(error));
-                return;
-            }
-        };
-        let (first, info) = match library.open(&self.options) {
-            Ok(opened) => opened,
-            Err(error) => {
-                let _ = ready.try_send(Err(error));
-                return;
-            }
-        };
-        // After the library's own threads were started, which would inherit it.
-        if priority > 0 {
-            let grant = realtime::request_fifo(priority);
-            if !grant.is_granted() {
-                tracing::warn!("{grant}: calls of the plug-in may be late");
-            }
-        }
-        let _ = ready.try_send(Ok(info.clone()));
-        let mut next = Some(first);
-        let mut told = String::new();
-        while !self.is_over() {
-            let lost = match next.take().map_or_else(|| self.again(&library, &info), Ok) {
-                Ok(mut device) => match self.turn(&mut device, &info) {
-                    Ok(()) => return,
-                    Err(lost) => {
-                        told.clear();
-                        lost
+    fn run(
+        &mut self,
+        mut opener: Box<dyn Opener>,
+        priority: u8,
+        ready: &SyncSender<Result<PluginInfo, PluginError>>,
+    ) {
+        let (mut lost, info) = match opener.open() {
+            Ok((mut device, info)) => {
+                // After the library's own threads were started, which would inherit it.
+                if priority > 0 {
+                    let grant = realtime::request_fifo(priority);
+                    if !grant.is_granted() {
+                        tracing::warn!("{grant}: calls of the plug-in may be late");
                     }
-                },
-                Err(lost) => lost,
-            };
-            self.state.is_usable = false;
-            self.out.write(self.state);
-            if lost != told {
-                tracing::warn!("{} is gone: {lost}; looking for it", info.name);
-                told = lost;
+                }
+                let _ = ready.try_send(Ok(info.clone()));
+                (self.turn(&mut *device, &info), info)
             }
+            Err(error) => {
+                let _ = ready.try_send(Err(error));
+                return;
+            }
+        };
+        let mut told = String::new();
+        let mut begun = monotonic_now();
+        while let Err(why) = lost {
+            self.not_ready();
+            // One that breaks at once, again and again, is told once.
+            let held_on = monotonic_now().saturating_sub(begun) > HELD_ON;
+            if why != told || held_on {
+                tracing::warn!("{} is gone: {why}; looking for it", info.name);
+                told = why;
+            }
+            begun = monotonic_now();
             thread::sleep(RETRY);
+            if self.is_over() {
+                return;
+            }
+            lost = match again(&mut *opener, &info) {
+                Ok(mut device) => {
+                    begun = monotonic_now();
+                    self.turn(&mut *device, &info)
+                }
+                Err(why) => Err(why),
+            };
         }
     }
 
@@ -196,28 +198,16 @@ impl Talker {
         self.end.load(Ordering::Relaxed)
     }
 
-    /// Opens the device again; another one is none.
-    fn again<'a>(
-        &self,
-        library: &'a PluginLibrary,
-        before: &PluginInfo,
-    ) -> Result<OpenDevice<'a>, String> {
-        let (device, info) = library.open(&self.options).map_err(|e| e.to_string())?;
-        if info == *before {
-            Ok(device)
-        } else {
-            Err(format!("{} was plugged in instead; start again", info.name))
-        }
-    }
-
     /// Calls until the end, or until the device is gone.
-    fn turn(&mut self, device: &mut OpenDevice<'_>, info: &PluginInfo) -> Result<(), String> {
+    fn turn(&mut self, device: &mut dyn OpenDevice, info: &PluginInfo) -> Result<(), String> {
         let period = PERIOD.max(Duration::from_secs_f64(1.0 / info.rate_hz));
         let mut ticker = Ticker::at_phase(period, PHASE);
+        let mut pace = Pace::new(&info.name);
         while !self.is_over() {
             ticker.wait();
             let begun = monotonic_now();
             let (answer, sample) = device.read();
+            pace.read();
             self.slow(begun);
             match answer {
                 Answer::Good => self.take(&sample, info.with_orientation),
@@ -229,9 +219,10 @@ impl Talker {
                 continue;
             }
             let wrench = self.wrench();
-            let begun = monotonic_now();
+            let at_write = monotonic_now();
             let answer = device.write(&wrench);
-            self.slow(begun);
+            self.slow(at_write);
+            pace.cycle(begun);
             match answer {
                 Answer::Good | Answer::NothingNew => {}
                 Answer::NotReady => self.not_ready(),
@@ -297,5 +288,18 @@ impl Talker {
                 took.as_millis()
             );
         }
+    }
+}
+
+/// Opens the device again; another one is none.
+fn again<'a>(
+    opener: &'a mut dyn Opener,
+    before: &PluginInfo,
+) -> Result<Box<dyn OpenDevice + 'a>, String> {
+    let (device, info) = opener.open().map_err(|e| e.to_string())?;
+    if info == *before {
+        Ok(device)
+    } else {
+        Err(format!("{} was plugged in instead; start again", info.name))
     }
 }

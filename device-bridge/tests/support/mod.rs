@@ -1,5 +1,8 @@
 //! A server on this machine that renders a wall, and a bridge's way to it.
 
+#[cfg(unix)]
+pub mod stage;
+
 use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;

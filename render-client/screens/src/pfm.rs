@@ -69,8 +69,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<FloatMap, Unnamed> {
     }
     let scale = word(&mut rest)?;
     let little = match scale.parse::<f32>() {
-        Ok(value) if value == -1.0 => true,
-        Ok(value) if value == 1.0 => false,
+        Ok(-1.0) => true,
+        Ok(1.0) => false,
         _ => {
             return Err(Unnamed::new(format!(
                 "has the scale {scale}, but must have -1.0 (little-endian) or 1.0 (big-endian); save the values in metres or shares, unscaled"

@@ -197,6 +197,7 @@ fn sample_at(time: f64, index: u64) -> MonitorSample {
     let loop_time = |base: f32, scale: f32, salt: u64| LoopTime {
         last_us: base + jitter(scale, salt),
         p99_us: base + 0.97 * scale,
+        longest_us: base + scale,
     };
     sample.haptics_period = loop_time(995.0, 12.0, 1);
     sample.god_object_update = loop_time(420.0, 300.0, 2);

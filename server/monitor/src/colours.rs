@@ -19,14 +19,23 @@ pub(crate) const WORKBENCH: [u8; 3] = [120, 120, 130];
 
 /// Plots: x, y, z and the magnitude.
 pub(crate) const AXES: [[u8; 3]; 4] = [[229, 72, 77], [70, 190, 100], [80, 140, 255], FORCE];
-/// Plots: one hue per loop (haptics, god-object, force), bright for the 99th percentile.
-pub(crate) const LOOPS: [[u8; 3]; 6] = [
+/// The same three times: the newest, and darker the least and the largest.
+pub(crate) const AXES_WITH_ENVELOPE: [[u8; 3]; 12] = [
+    AXES[0], AXES[1], AXES[2], AXES[3], DARK[0], DARK[1], DARK[2], DARK[3], DARK[0], DARK[1],
+    DARK[2], DARK[3],
+];
+const DARK: [[u8; 3]; 4] = [[114, 36, 38], [35, 95, 50], [40, 70, 127], [125, 108, 25]];
+/// Plots: one hue per loop (haptics, god-object, force), bright for the 99th percentile, pale for the longest.
+pub(crate) const LOOPS: [[u8; 3]; 9] = [
     [40, 120, 135],
     [64, 214, 230],
+    [178, 240, 246],
     [150, 90, 35],
     GOD_OBJECT,
+    [249, 205, 164],
     [135, 115, 30],
     FORCE,
+    NORMAL,
 ];
 
 /// Behind the 3D picture: dark, neutral.

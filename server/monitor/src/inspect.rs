@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use re_async::AsyncRuntimeHandle;
 use re_log_channel::{DataSourceMessage, RecvTimeoutError, SmartMessagePayload};
 use rerun::StoreKind;
+use rerun::external::re_byte_size::SizeBytes as _;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::{re_grpc_client, re_uri};
 use rerun::log::{Chunk, LogMsg};
@@ -30,6 +31,10 @@ pub struct RrdSummary {
     pub last_time_s: Option<f64>,
     /// Blueprints (layouts of the viewer).
     pub blueprints: usize,
+    /// Bytes of values and times per entity path, uncompressed.
+    pub bytes: BTreeMap<String, u64>,
+    /// Least and largest number of a plot per entity path.
+    pub numbers: BTreeMap<String, (f64, f64)>,
 }
 
 impl RrdSummary {
@@ -110,6 +115,8 @@ struct Contents {
     timelines: BTreeSet<String>,
     time_ns: Option<(i64, i64)>,
     blueprints: usize,
+    bytes: BTreeMap<String, u64>,
+    numbers: BTreeMap<String, (f64, f64)>,
 }
 
 impl Contents {
@@ -130,6 +137,17 @@ impl Contents {
             .rows
             .entry(chunk.entity_path().to_string())
             .or_default() += chunk.num_rows() as u64;
+        *self
+            .bytes
+            .entry(chunk.entity_path().to_string())
+            .or_default() += chunk.total_size_bytes();
+        let scalars = rerun::Scalars::descriptor_scalars().component;
+        for number in chunk.iter_slices::<f64>(scalars).flatten() {
+            let none = (f64::INFINITY, f64::NEG_INFINITY);
+            let path = chunk.entity_path().to_string();
+            let (least, largest) = self.numbers.entry(path).or_insert(none);
+            (*least, *largest) = (least.min(*number), largest.max(*number));
+        }
         for (name, column) in chunk.timelines() {
             self.timelines.insert(name.to_string());
             if name.as_str() == crate::stream::TIMELINE {
@@ -150,6 +168,8 @@ impl Contents {
             first_time_s: self.time_ns.map(|(first, _)| seconds(first)),
             last_time_s: self.time_ns.map(|(_, last)| seconds(last)),
             blueprints: self.blueprints,
+            bytes: self.bytes,
+            numbers: self.numbers,
         }
     }
 }

@@ -27,6 +27,7 @@ mod scene;
 mod served;
 mod shading;
 mod stream;
+mod window;
 
 /// The application's name in rerun: viewers keep their layouts under it.
 const APPLICATION: &str = "taut";
@@ -40,7 +41,7 @@ pub use options::{
 };
 pub use queue::MonitorSender;
 pub use sample::{
-    LoopTime, MAX_MOVING_OBSTACLES, MAX_SHOWN_CONTACTS, MonitorSample, MovingObstacles,
+    Envelope, LoopTime, MAX_MOVING_OBSTACLES, MAX_SHOWN_CONTACTS, MonitorSample, MovingObstacles,
     ShownContact, ShownContacts,
 };
 pub use scene::{BodyRole, MonitorBody, MonitorScene, MonitorScreen, Pose};

@@ -1,4 +1,4 @@
-//! The plots: many samples in one message, every sample a point.
+//! The plots: every window of samples a point, with the newest value, the least and the largest; several points in one message.
 
 use rerun::{
     RecordingStream, RecordingStreamError, RecordingStreamResult, Scalars, SeriesLines, TimeColumn,
@@ -6,81 +6,94 @@ use rerun::{
 
 use crate::sample::MonitorSample;
 use crate::stream::{TIMELINE, timeline_ns};
+use crate::window::{Window, Windows, loop_times};
 use crate::{colours, paths};
 
 /// Rates are counted over at least this long, seconds: shorter, and single datagrams show.
 const RATE_WINDOW_S: f64 = 0.25;
 
-/// One plot: where it is, what its lines are called, and their values in a sample.
+/// One plot: where it is, what its lines are called, and their values in a window.
 struct Plot {
     path: &'static str,
     names: &'static [&'static str],
     colours: &'static [[u8; 3]],
-    values: fn(&MonitorSample, &mut Vec<f64>),
+    values: fn(&Window, &mut Vec<f64>),
 }
 
 const PLOTS: [Plot; 6] = [
     Plot {
         path: paths::FORCE,
-        names: &["Fx", "Fy", "Fz", "|F|"],
-        colours: &colours::AXES,
-        values: |sample, out| push_with_norm(sample, 0, out),
+        names: &[
+            "Fx", "Fy", "Fz", "|F|", "Fx min", "Fy min", "Fz min", "|F| min", "Fx max", "Fy max",
+            "Fz max", "|F| max",
+        ],
+        colours: &colours::AXES_WITH_ENVELOPE,
+        values: |window, out| out.extend(window.felt(0)),
     },
     Plot {
         path: paths::TORQUE,
-        names: &["Tx", "Ty", "Tz", "|T|"],
-        colours: &colours::AXES,
-        values: |sample, out| push_with_norm(sample, 3, out),
+        names: &[
+            "Tx", "Ty", "Tz", "|T|", "Tx min", "Ty min", "Tz min", "|T| min", "Tx max", "Ty max",
+            "Tz max", "|T| max",
+        ],
+        colours: &colours::AXES_WITH_ENVELOPE,
+        values: |window, out| out.extend(window.felt(1)),
     },
     Plot {
         path: paths::LOOPS,
         names: &[
             "haptics period",
             "haptics p99",
+            "haptics max",
             "god-object",
             "god-object p99",
+            "god-object max",
             "force",
             "force p99",
+            "force max",
         ],
         colours: &colours::LOOPS,
-        values: |sample, out| {
-            for time in [
-                sample.haptics_period,
-                sample.god_object_update,
-                sample.force_update,
-            ] {
-                out.extend([f64::from(time.last_us), f64::from(time.p99_us)]);
+        values: |window, out| {
+            for (time, longest) in loop_times(&window.last).iter().zip(window.longest_us) {
+                out.extend([time.last_us, time.p99_us, longest].map(f64::from));
             }
         },
     },
     Plot {
         path: paths::CONTACT_COUNT,
-        names: &["contacts", "penetrations"],
-        colours: &[colours::NORMAL, colours::CONTACT],
-        values: |sample, out| {
+        names: &["contacts", "penetrations", "contacts max"],
+        colours: &[colours::NORMAL, colours::CONTACT, colours::WORKBENCH],
+        values: |window, out| {
             out.extend([
-                f64::from(sample.contacts.total()),
-                sample.penetrations as f64,
+                f64::from(window.last.contacts.total()),
+                window.last.penetrations as f64,
+                f64::from(window.contacts),
             ]);
         },
     },
     Plot {
         path: paths::GAP,
-        names: &["smallest gap"],
-        colours: &[colours::OBSTACLE],
-        values: |sample, out| out.push(1e3 * sample.gap_min),
+        names: &["smallest gap", "smallest gap min"],
+        colours: &[colours::OBSTACLE, colours::WORKBENCH],
+        values: |window, out| out.extend([1e3 * window.last.gap_min, 1e3 * window.gap]),
     },
     Plot {
         path: paths::CONSTRAINT_AGE,
-        names: &["constraint age"],
-        colours: &[colours::GOD_OBJECT],
-        values: |sample, out| out.push(f64::from(sample.constraint_age_us)),
+        names: &["constraint age", "constraint age max"],
+        colours: &[colours::GOD_OBJECT, colours::WORKBENCH],
+        values: |window, out| {
+            out.extend([
+                f64::from(window.last.constraint_age_us),
+                f64::from(window.envelope.oldest_constraints_us()),
+            ]);
+        },
     },
 ];
 
 /// Sends the plots; remembers what the rates are counted from.
 #[derive(Default)]
 pub(crate) struct Plots {
+    windows: Windows,
     rates_from: Option<CountersAt>,
 }
 
@@ -106,24 +119,22 @@ impl Plots {
         stream.log_static(paths::NETWORK, &style)
     }
 
-    /// Adds these samples, in order of time, to all plots.
+    /// Adds these samples, in order of time: every window that they end is a point in all plots.
     pub(crate) fn show(
         &mut self,
         stream: &RecordingStream,
         samples: &[MonitorSample],
     ) -> RecordingStreamResult<()> {
-        let times: Vec<i64> = samples
-            .iter()
-            .map(|sample| timeline_ns(sample.session_time_ns))
-            .collect();
-        for plot in &PLOTS {
-            let mut values = Vec::with_capacity(samples.len() * plot.names.len());
-            for sample in samples {
-                (plot.values)(sample, &mut values);
-            }
-            send(stream, plot.path, &times, plot.names.len(), values)?;
-        }
+        let windows = &mut self.windows;
+        let ended: Vec<Window> = samples.iter().filter_map(|s| windows.add(s)).collect();
+        show_windows(stream, &ended)?;
         self.show_rates(stream, samples)
+    }
+
+    /// Shows the window that is not full yet.
+    pub(crate) fn finish(&mut self, stream: &RecordingStream) -> RecordingStreamResult<()> {
+        let last: Vec<Window> = self.windows.finish().into_iter().collect();
+        show_windows(stream, &last)
     }
 
     fn show_rates(
@@ -158,11 +169,20 @@ impl Plots {
     }
 }
 
-/// Three components of the wrench from `first` on, then their norm.
-fn push_with_norm(sample: &MonitorSample, first: usize, out: &mut Vec<f64>) {
-    let vector = sample.wrench.fixed_rows::<3>(first);
-    out.extend(vector.iter());
-    out.push(vector.norm());
+fn show_windows(stream: &RecordingStream, windows: &[Window]) -> RecordingStreamResult<()> {
+    if windows.is_empty() {
+        return Ok(());
+    }
+    let time = |window: &Window| timeline_ns(window.last.session_time_ns);
+    let times: Vec<i64> = windows.iter().map(time).collect();
+    for plot in &PLOTS {
+        let mut values = Vec::with_capacity(windows.len() * plot.names.len());
+        for window in windows {
+            (plot.values)(window, &mut values);
+        }
+        send(stream, plot.path, &times, plot.names.len(), values)?;
+    }
+    Ok(())
 }
 
 /// One message with `width` values per time.

@@ -95,7 +95,7 @@ pub(crate) fn queue(
 impl MonitorSender {
     /// Hands a sample over; `false` if the queue was full and the sample was dropped and counted.
     ///
-    /// 30 to 100 a second is plenty: the picture moves 30 times a second, the plots show every sample.
+    /// 30 to 100 a second is plenty: the picture moves 30 times a second, the plots show what lies between samples, too, where it was added to [`MonitorSample::between`].
     pub fn offer(&mut self, sample: MonitorSample) -> bool {
         let taken = self.samples.push(sample).is_ok();
         if !taken {

@@ -46,6 +46,8 @@ pub struct MonitorSample {
     pub clients: u32,
     /// Poses found to intersect an obstacle since the start; anything but 0 is a fault.
     pub penetrations: u64,
+    /// What lay between this sample and the one before.
+    pub between: Envelope,
 }
 
 impl MonitorSample {
@@ -69,8 +71,68 @@ impl MonitorSample {
             packets_received: 0,
             clients: 0,
             penetrations: 0,
+            between: Envelope::default(),
         }
     }
+}
+
+/// Least and largest of what was between two samples: nothing where nothing was added.
+#[derive(Clone, Copy, Debug)]
+pub struct Envelope {
+    felt: [(f64, f64); 8],
+    oldest_constraints_us: f32,
+}
+
+impl Envelope {
+    /// Adds a tick: the wrench on the hand (N, N m) and the age of its constraints. No allocation; NaN adds nothing.
+    pub fn add(&mut self, wrench: &Vector6<f64>, constraint_age_us: f32) {
+        for (value, (least, largest)) in felt(wrench).into_iter().zip(&mut self.felt) {
+            (*least, *largest) = (least.min(value), largest.max(value));
+        }
+        self.oldest_constraints_us = self.oldest_constraints_us.max(constraint_age_us);
+    }
+
+    /// Adds what another has.
+    pub(crate) fn join(&mut self, other: &Self) {
+        for ((least, largest), more) in self.felt.iter_mut().zip(&other.felt) {
+            (*least, *largest) = (least.min(more.0), largest.max(more.1));
+        }
+        self.oldest_constraints_us = self.oldest_constraints_us.max(other.oldest_constraints_us);
+    }
+
+    /// Least and largest of a force's (0) or a torque's (1) components and norm, with `newest` among them.
+    pub(crate) fn of(&self, which: usize) -> &[(f64, f64)] {
+        &self.felt[4 * which..4 * which + 4]
+    }
+
+    pub(crate) fn oldest_constraints_us(&self) -> f32 {
+        self.oldest_constraints_us
+    }
+}
+
+impl Default for Envelope {
+    fn default() -> Envelope {
+        Envelope {
+            felt: [(f64::INFINITY, f64::NEG_INFINITY); 8],
+            oldest_constraints_us: 0.0,
+        }
+    }
+}
+
+/// Components and norm of the force, then of the torque.
+pub(crate) fn felt(wrench: &Vector6<f64>) -> [f64; 8] {
+    let force = wrench.fixed_rows::<3>(0);
+    let torque = wrench.fixed_rows::<3>(3);
+    [
+        force[0],
+        force[1],
+        force[2],
+        force.norm(),
+        torque[0],
+        torque[1],
+        torque[2],
+        torque.norm(),
+    ]
 }
 
 /// A loop's time: the newest and the 99th percentile over the loop's recent past.
@@ -80,6 +142,8 @@ pub struct LoopTime {
     pub last_us: f32,
     /// 99th percentile, microseconds.
     pub p99_us: f32,
+    /// The longest since the sample before, microseconds.
+    pub longest_us: f32,
 }
 
 /// Places of up to [`MAX_MOVING_OBSTACLES`] obstacles.

@@ -92,7 +92,10 @@ impl Stream {
     }
 
     /// Writes out everything and closes files and ports; what went wrong, if the recording is not whole.
-    pub(crate) fn close(self) -> Result<(), String> {
+    pub(crate) fn close(mut self) -> Result<(), String> {
+        if let Err(error) = self.plots.finish(&self.rerun) {
+            tracing::warn!("rerun refused a message: {error}");
+        }
         // Only the recording can fail here: the served end never waits.
         let flushed = self.rerun.flush_blocking();
         self.rerun.disconnect();

@@ -118,8 +118,8 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
         .filter(|path| path.starts_with("/world/obstacles/"));
     assert_eq!(obstacles.count(), 1, "{:?}", summary.entities);
 
-    // Every sample is a point in the plots, plus one row for the lines' names and colours.
-    assert_eq!(summary.rows["/plots/force"], SAMPLES + 1);
+    // Every window of five samples is a point in the plots, plus one row for the lines' names and colours; the first window has four.
+    assert_eq!(summary.rows["/plots/force"], SAMPLES / 5 + 1 + 1);
     // The scene's two lines, the loop's, the server's.
     assert_eq!(summary.rows["/log"], 4);
     assert!(summary.rows["/world/god_object"] > 1);
@@ -128,6 +128,29 @@ fn a_recorded_stream_is_read_back_with_its_entities_and_times() {
     let last = SAMPLES * SAMPLE_PERIOD_NS;
     assert_eq!(summary.last_time_s, Some(last as f64 * 1e-9));
     assert_eq!(summary.blueprints, 1);
+}
+
+#[test]
+fn a_peak_of_a_millisecond_between_two_samples_is_in_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.rrd");
+    let (monitor, mut sender) = Monitor::start(&recording_only(&path), scene()).unwrap();
+    for index in 0..SAMPLES {
+        let mut sample = sample(index);
+        for tick in 0..20 {
+            let is_peak = (index, tick) == (31, 13);
+            let force = if is_peak { 17.5 } else { 3.0 };
+            let wrench = Vector6::new(0.0, 0.0, force, 0.0, if is_peak { -0.4 } else { 0.1 }, 0.0);
+            sample.between.add(&wrench, 900.0);
+        }
+        assert!(sender.offer(sample));
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert_eq!(monitor.stop().unwrap().samples_dropped, 0);
+    let summary = inspect(&path).unwrap();
+    assert_eq!(summary.numbers["/plots/force"], (0.0, 17.5));
+    assert_eq!(summary.numbers["/plots/torque"], (-0.4, 0.4));
+    assert_eq!(summary.numbers["/plots/constraint_age"], (0.0, 900.0));
 }
 
 #[test]

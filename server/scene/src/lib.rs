@@ -49,8 +49,8 @@ pub use workbench::{
     AlsoKeyFile, Device, DeviceDynamics, FrameSwap, Frames, HeadTracking, Log, LogLevel, Machine,
     Monitoring, NeededFile, Network, Node, ObserverStream, Operator, Passivity, RealTime,
     RealTimeMode, Rearm, SHIPPED_WORKBENCH, Safety, Screen, ScreenOutput, Show, Stereo,
-    TransportKind, Viewer, Vrpn, VrpnSensor, Window, Workbench, WrenchFrame, WrenchIn,
-    WrenchSource, Zenoh, is_machine_name,
+    TransportKind, Viewer, Vrpn, Window, Workbench, WrenchFrame, WrenchIn, WrenchSource, Zenoh,
+    is_machine_name,
 };
 
 /// Why a scene could not be used.

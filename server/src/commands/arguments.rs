@@ -6,7 +6,8 @@ pub use taut_render::RenderArgs;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use taut_bridge::{DeviceChoice, InputChoice, UnknownDevice, VrpnSettings};
+use taut_bridge::{DeviceChoice, InputChoice, VrpnSettings};
+use taut_kinds::UnknownDevice;
 
 /// `taut render` of a build that cannot draw: takes any arguments and says so.
 #[cfg(not(feature = "render"))]

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use taut_bridge::signals::EndFlag;
-use taut_scene::{FidelityPlan, Log, LogLevel};
+use taut_scene::{Device, FidelityPlan, Log, LogLevel};
 
 use crate::cli::ServeArgs;
 use crate::commands::live_scene::{LiveScene, load_workbench};
@@ -19,6 +19,9 @@ use crate::shared::failure::Failure;
 
 /// Time between two looks at network, children and clock; also of the status line.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
+/// How force comes at a device that can push.
+pub(super) const HELP_ARM: &str =
+    "no force yet: type arm and Enter for force, off and Enter for none (docs/safety.md)";
 
 /// Serves the workbench. The report comes with the failure, if the session broke down on the way.
 pub(super) fn run(
@@ -50,6 +53,10 @@ pub(super) fn run(
         session.end_with(&end);
         scene.began(&session);
         announce(&session, terminal);
+        if matches!(&workbench.device, Device::Driver(chosen) if chosen.kind.has_motors) {
+            // Somebody holds it: a person arms.
+            terminal.say(HELP_ARM);
+        }
         if let Some(directory) = &args.recording {
             terminal.say(&recording_size::sentence(directory));
         }

@@ -17,6 +17,7 @@ use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
+use crate::shared::felt_ticks::{FeltTick, FeltWriter};
 use crate::shared::timing::Histogram;
 use crate::shared::wrench_command::WrenchCommand;
 
@@ -36,6 +37,7 @@ pub struct HapticsLoop {
     recording: Option<Tap<HapticsRecord>>,
     /// A force from outside, where the workbench takes one.
     external: Option<Box<ExternalWrench>>,
+    felt: Option<FeltWriter>,
     statistics: Arc<HapticsStatistics>,
 }
 
@@ -133,6 +135,7 @@ impl HapticsLoop {
             coupling_cpu_time: Duration::ZERO,
             recording: None,
             external: None,
+            felt: None,
             statistics: Arc::default(),
         }
     }
@@ -155,6 +158,13 @@ impl HapticsLoop {
     #[must_use]
     pub fn with_external(mut self, external: Option<ExternalWrench>) -> Self {
         self.external = external.map(Box::new);
+        self
+    }
+
+    /// The same, with every tick told to the monitor.
+    #[must_use]
+    pub fn with_felt(mut self, felt: FeltWriter) -> Self {
+        self.felt = Some(felt);
         self
     }
 
@@ -263,6 +273,12 @@ impl HapticsLoop {
             .store(self.port.energy().injected().to_bits(), Ordering::Relaxed);
         statistics.count_felt(&report.felt);
         self.publish_obstacle_work();
+        if let Some(felt) = &mut self.felt {
+            felt.push(FeltTick {
+                wrench: report.felt,
+                constraint_age: self.wrench.held().constraint_age,
+            });
+        }
         if let Some(tap) = &mut self.recording {
             tap.push(HapticsRecord {
                 sequence: self.state.sequence,

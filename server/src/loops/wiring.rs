@@ -16,6 +16,7 @@ use crate::loops::statistics::Statistics;
 use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::Subscriber;
+use crate::shared::felt_ticks::{self, FeltReader};
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
 
@@ -48,6 +49,8 @@ pub struct SharedDataReaders {
     pub checker: Subscriber<ContactSnapshot>,
     /// For the status line.
     pub status: Subscriber<WrenchCommand>,
+    /// For the monitor, tick by tick.
+    pub felt: FeltReader,
 }
 
 /// One reader's ends of all that the loops publish.
@@ -77,6 +80,7 @@ impl WiredLoops {
             contact_snapshot::channel(&start, settings.max_constraints);
         let (wrenches, wrench_readers) = wrench_command::channel();
         let (shaded, shaded_reader) = shaded_acceleration::channel();
+        let (felt_writer, felt) = felt_ticks::channel();
         let coupling_waker = Waker::default();
         let arm_switch = Arc::<ArmSwitch>::default();
         let (haptics_tap, update_taps, force_tap) = taps.map_or((None, None, None), |taps| {
@@ -110,7 +114,8 @@ impl WiredLoops {
             coupling_waker.clone(),
             arm_switch.clone(),
         )
-        .with_recording(haptics_tap);
+        .with_recording(haptics_tap)
+        .with_felt(felt_writer);
         let statistics = Statistics {
             haptics: haptics.statistics(),
             coupling: coupling.statistics(),
@@ -130,6 +135,7 @@ impl WiredLoops {
             },
             checker: contact_readers.checker,
             status: wrench_readers.status,
+            felt,
         };
         Self {
             god_object,

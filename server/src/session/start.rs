@@ -192,6 +192,7 @@ impl Session {
             let sources = MonitorSources {
                 head: watched_head,
                 shared: loops.readers.monitor,
+                felt: loops.readers.felt,
                 statistics: loops.statistics.clone(),
                 clock,
             };

@@ -17,6 +17,7 @@ pub mod contact_snapshot;
 pub mod device_state;
 pub mod failure;
 pub(crate) mod fanout;
+pub mod felt_ticks;
 pub mod shaded_acceleration;
 pub mod shutdown;
 pub mod timing;

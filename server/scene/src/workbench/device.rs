@@ -1,91 +1,107 @@
-//! The device in the user's hand.
+//! The device in the user's hand: the kinds and keys of [`taut_kinds::KINDS`], out of the file.
+
+use taut_kinds::{Chosen, KINDS, Key, Kind, KindId, Takes, Value};
 
 use super::parts::Files;
 use super::spec::Device;
-use super::tracker::vrpn_sensor;
 use crate::document::{Range, Section};
-use crate::scene::HandPreset;
+use crate::scene::{HandPreset, pose_of};
 
 pub(super) fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
-    #[derive(Clone, Copy)]
-    enum Kind {
-        Simulated,
-        Trace,
-        Vrpn,
-        SpaceMouse,
-        Remote,
-    }
     if !section.has("kind") {
         section.complain_missing("kind", "kind = \"simulated\"");
     }
-    let kinds = [
-        ("simulated", Kind::Simulated),
-        ("trace", Kind::Trace),
-        ("vrpn", Kind::Vrpn),
-        ("space-mouse", Kind::SpaceMouse),
-        ("mouse", Kind::Remote),
-        ("remote", Kind::Remote),
-    ];
+    let kinds = KINDS.each_ref().map(|kind| (kind.name, kind));
     let Some(kind) = section.choice("kind", &kinds) else {
         // Which keys belong here depends on the kind: complain of nothing else.
-        for key in ["hand", "path", "tremor", "seed", "strings", "loop"]
-            .iter()
-            .chain(&["server", "sensor", "mode", "axes", "scale", "max_age"])
-            .chain(&[
-                "origin",
-                "mount",
-                "anchor",
-                "dead_zone",
-                "speed",
-                "turn_rate",
-            ])
-            .chain(&["reach", "tilt", "yield_force", "yield_torque"])
-        {
-            section.has(key);
+        for key in KINDS.iter().flat_map(Kind::every_key) {
+            section.has(key.name);
         }
         return None;
     };
-    match kind {
-        Kind::Simulated => Some(Device::Simulated {
-            hand: section.choice("hand", &HandPreset::NAMED),
-            path: files.path(section, "path"),
-            tremor: section.number_or("tremor", Range::UpTo(1e-3), 0.0),
-            seed: section
-                .integer("seed", 0, i64::MAX)
-                .unwrap_or(0)
-                .unsigned_abs(),
-            strings: section.text("strings").map(|named| files.named(named)),
-        }),
-        Kind::Trace => {
-            section.required_text("path", "path = \"trace.csv\"")?;
-            Some(Device::Trace {
-                path: files.path(section, "path")?,
-                repeat: section.boolean("loop").unwrap_or(false),
-            })
+    let chosen = keys_of(kind, section, files, &[])?;
+    Some(match kind.id {
+        KindId::Simulated => Device::Simulated {
+            hand: chosen.named("hand", &HandPreset::NAMED),
+            path: chosen.file("path").map(Into::into),
+            tremor: chosen.number("tremor").unwrap_or(0.0),
+            seed: chosen.whole("seed").unwrap_or(0).unsigned_abs(),
+            strings: chosen.text("strings").map(str::to_owned),
+        },
+        KindId::Trace => Device::Trace {
+            path: chosen.file("path")?.to_owned(),
+            repeat: chosen.yes("loop").unwrap_or(false),
+        },
+        KindId::Mouse | KindId::Remote => Device::Remote,
+        KindId::Haply
+        | KindId::Spidar
+        | KindId::Polhem
+        | KindId::Wooden
+        | KindId::Plugin
+        | KindId::Python
+        | KindId::SpaceMouse
+        | KindId::Vrpn => Device::Driver(Box::new(chosen)),
+    })
+}
+
+/// The keys of `kind`, but for those of `without`; every fault is noted.
+pub(super) fn keys_of(
+    kind: &'static Kind,
+    section: &Section<'_>,
+    files: &Files<'_>,
+    without: &[&str],
+) -> Option<Chosen> {
+    let (mut chosen, mut is_whole) = (Chosen::plain(kind), true);
+    if let Some(place) = kind.place.as_ref().filter(|_| kind.needs_place) {
+        let example = format!("{} = \"{}\"", place.name, kind.place_example);
+        is_whole = section.required_text(place.name, &example).is_some();
+    }
+    for key in kind.every_key().filter(|key| !without.contains(&key.name)) {
+        if let Some(value) = value(section, key, files) {
+            chosen.set(key.name, value);
         }
-        Kind::Vrpn => {
-            let anchors = [("start", false), ("workbench", true)];
-            let on_workbench = section.choice("anchor", &anchors).unwrap_or(false);
-            Some(Device::Vrpn {
-                sensor: Box::new(vrpn_sensor(section)?),
-                on_workbench,
-            })
+    }
+    is_whole.then_some(chosen)
+}
+
+fn value(section: &Section<'_>, key: &Key, files: &Files<'_>) -> Option<Value> {
+    let name = key.name;
+    match key.takes {
+        Takes::Number(low, high) => section
+            .number(name, Range::Between(low, high))
+            .map(Value::Number),
+        Takes::Whole(low, high) => section.integer(name, low, high).map(Value::Whole),
+        Takes::OneOf(words) => {
+            let words: Vec<_> = words.iter().map(|word| (*word, *word)).collect();
+            section.choice(name, &words).map(Value::Word)
         }
-        Kind::SpaceMouse => {
-            let number = |key, most| section.number(key, Range::PositiveUpTo(most));
-            Some(Device::SpaceMouse {
-                position: section
-                    .choice("mode", &[("rate", false), ("position", true)])
-                    .unwrap_or(false),
-                dead_zone: section.number("dead_zone", Range::UpTo(0.9)),
-                speed: number("speed", 10.0),
-                turn_rate: number("turn_rate", 100.0),
-                reach: number("reach", 10.0),
-                tilt: number("tilt", 3.0),
-                yield_force: number("yield_force", 1e3),
-                yield_torque: number("yield_torque", 1e3),
-            })
+        Takes::YesOrNo => section.boolean(name).map(Value::Yes),
+        Takes::Pose => {
+            let table = section.section(name)?;
+            let pose = pose_of(&table);
+            table.finish();
+            pose.map(Value::Pose)
         }
-        Kind::Remote => Some(Device::Remote),
+        Takes::File => files.path(section, name).map(Value::File),
+        Takes::NameOrFile(_) => {
+            let named = section.text(name)?;
+            Some(Value::Text(files.named(named)))
+        }
+        Takes::Axes | Takes::RightHandedAxes | Takes::Text(_) | Takes::Service | Takes::Tracker => {
+            let text = section.text(name)?;
+            let value = key.takes.read(text);
+            if value.is_none() {
+                let at = section.get(name).map_or(section.at(), |node| &node.at);
+                let wanted = key.takes.wanted();
+                section.complain(
+                    at,
+                    format!(
+                        "`{name}` in {} is \"{text}\", but must be {wanted}",
+                        section.name()
+                    ),
+                );
+            }
+            value
+        }
     }
 }

@@ -21,7 +21,6 @@ mod safety;
 mod scale;
 mod spec;
 mod token;
-mod tracker;
 mod viewer;
 mod wrench_in;
 
@@ -36,6 +35,6 @@ pub use operator::Operator;
 pub use output::ScreenOutput;
 pub use spec::{
     AlsoKeyFile, Device, HeadTracking, Machine, Monitoring, Network, Node, Passivity, RealTime,
-    RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, VrpnSensor, Window,
+    RealTimeMode, Rearm, Safety, Screen, Show, Stereo, TransportKind, Viewer, Window,
 };
 pub use wrench_in::{WrenchFrame, WrenchIn, WrenchSource};

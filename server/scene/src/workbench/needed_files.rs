@@ -65,7 +65,10 @@ impl Workbench {
                 files.extend(geometry.map(|named| NeededFile::Named(named.into())));
             }
             Device::Trace { path, .. } => files.push(NeededFile::Named(path.clone())),
-            Device::Vrpn { .. } | Device::SpaceMouse { .. } | Device::Remote => {}
+            Device::Driver(chosen) => {
+                files.extend(chosen.files().map(NeededFile::Named));
+            }
+            Device::Remote => {}
         }
         // The nodes read them; here `taut check` does.
         for name in self.screens.iter().flat_map(|screen| screen.output.files()) {

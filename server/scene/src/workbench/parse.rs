@@ -42,7 +42,8 @@ pub(super) fn parse(document: &Document, directory: &Path) -> Result<Workbench, 
         .unwrap_or_else(Pose::identity);
     let screens = screens(&root);
     let nodes = nodes(&root, &screens);
-    let viewer = match table(&root, "viewer", viewer) {
+    let files = Files { directory };
+    let viewer = match table(&root, "viewer", |s| viewer(s, &files)) {
         Some(viewer) => viewer,
         None => {
             if !root.has("viewer") {

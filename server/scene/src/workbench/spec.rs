@@ -6,8 +6,8 @@ use std::time::SystemTime;
 
 use god_object::Pose;
 use nalgebra::Point3;
+use taut_kinds::Chosen;
 use taut_proto::JoinPolicy;
-use taut_vrpn::{Address, SensorMapping};
 
 use super::output::ScreenOutput;
 use crate::scene::HandPreset;
@@ -119,25 +119,10 @@ pub enum HeadTracking {
         /// s.
         period: f64,
     },
-    /// A VRPN tracker says where it is.
-    Vrpn(Box<VrpnSensor>),
+    /// A VRPN tracker says where it is: the keys of the device of that kind.
+    Vrpn(Box<Chosen>),
     /// `taut track`, somewhere on the network, says where it is.
     Remote,
-}
-
-/// A sensor of a VRPN tracker, and where the thing that it is fixed to is on the workbench.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VrpnSensor {
-    /// The tracker.
-    pub address: Address,
-    /// Which of its sensors, from 0.
-    pub sensor: i32,
-    /// Reports as datagrams, by a call-back of the server; else all over TCP.
-    pub udp: bool,
-    /// Axes, unit, origin and mount.
-    pub mapping: SensorMapping,
-    /// Silence after which it counts as lost, s.
-    pub max_age: f64,
 }
 
 /// The viewer.
@@ -182,32 +167,8 @@ pub enum Device {
         /// Begin again at the end.
         repeat: bool,
     },
-    /// A sensor of a VRPN tracker; no force.
-    Vrpn {
-        /// Which.
-        sensor: Box<VrpnSensor>,
-        /// The body is where the sensor is on the workbench; else it moves from its start as the sensor does.
-        on_workbench: bool,
-    },
-    /// A 3Dconnexion SpaceMouse; no force. What is `None` is as the driver has it.
-    SpaceMouse {
-        /// The body comes back when the cap is let go.
-        position: bool,
-        /// Deflections up to this share of the largest count as none.
-        dead_zone: Option<f64>,
-        /// At full deflection, m/s on the workbench.
-        speed: Option<f64>,
-        /// At full deflection, rad/s.
-        turn_rate: Option<f64>,
-        /// At full deflection in position mode, m on the workbench.
-        reach: Option<f64>,
-        /// At full deflection in position mode, rad.
-        tilt: Option<f64>,
-        /// Coupling force that stops the body, N.
-        yield_force: Option<f64>,
-        /// Coupling torque that stops it, N m.
-        yield_torque: Option<f64>,
-    },
+    /// Any other that a driver of the server's own process opens.
+    Driver(Box<Chosen>),
     /// `taut bridge`, or the mouse of a render window, over the network.
     Remote,
 }

@@ -1,15 +1,17 @@
 //! Who looks: eyes, head, its tracking, comfort; and what is drawn beside the scene.
 
-use super::parts::table;
+use super::device::keys_of;
+use super::parts::{Files, table};
 use super::spec::{HeadTracking, Show, Viewer};
-use super::tracker::vrpn_sensor;
+use taut_kinds::{KINDS, KindId};
+
 use crate::document::{Range, Section};
 use crate::scene::pose_of;
 
 /// Largest limit on what stands out from a screen, degrees: nobody fuses more.
 const MAX_DISPARITY_DEG: f64 = 30.0;
 
-pub(super) fn viewer(section: &Section<'_>) -> Option<Viewer> {
+pub(super) fn viewer(section: &Section<'_>, files: &Files<'_>) -> Option<Viewer> {
     let eye_separation = section.number_or("eye_separation", Range::UpTo(0.2), 0.064);
     let head = table(section, "head", pose_of);
     if head.is_none() && !section.has("head") {
@@ -37,7 +39,11 @@ pub(super) fn viewer(section: &Section<'_>) -> Option<Viewer> {
             ),
         );
     }
-    let tracker = table(section, "tracker", vrpn_sensor);
+    let vrpn = KINDS.iter().find(|kind| kind.id == KindId::Vrpn)?;
+    // A head is where it is.
+    let tracker = table(section, "tracker", |tracker| {
+        keys_of(vrpn, tracker, files, &["anchor"])
+    });
     if let (Some(_), Some(_), Some(node)) = (&sway, &tracker, section.get("tracker")) {
         let text = "`tracker` and `sway` in [viewer] exclude each other; leave one out";
         section.complain(&node.at, text);
@@ -51,7 +57,7 @@ pub(super) fn viewer(section: &Section<'_>) -> Option<Viewer> {
     }
     let tracking = match tracker {
         None if remote => HeadTracking::Remote,
-        Some(sensor) => HeadTracking::Vrpn(Box::new(sensor?)),
+        Some(chosen) => HeadTracking::Vrpn(Box::new(chosen?)),
         None => sway.unwrap_or(HeadTracking::Fixed),
     };
     Some(Viewer {

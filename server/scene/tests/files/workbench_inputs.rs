@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use taut_scene::{Device, HeadTracking, SHIPPED_WORKBENCH, Workbench};
+use taut_kinds::{Chosen, KINDS, KindId, Takes};
+use taut_scene::{Device, HeadTracking, NeededFile, SHIPPED_WORKBENCH, Workbench};
 
 fn with_device(keys: &str) -> Result<Workbench, String> {
     let begin = SHIPPED_WORKBENCH.find("[device]").expect("a device");
@@ -14,6 +15,77 @@ fn with_device(keys: &str) -> Result<Workbench, String> {
         &SHIPPED_WORKBENCH[end..]
     );
     Workbench::parse("w.toml", &text, Path::new("")).map_err(|error| error.to_string())
+}
+
+fn driver(workbench: &Workbench) -> &Chosen {
+    match &workbench.device {
+        Device::Driver(chosen) => chosen,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A value that a key takes, as a file has it.
+fn example(takes: &Takes) -> String {
+    match takes {
+        Takes::Number(low, high) => format!("{:?}", (low + high) / 2.0),
+        Takes::Whole(low, _) => low.to_string(),
+        Takes::OneOf(words) => format!("{:?}", words[0]),
+        Takes::YesOrNo => "true".to_owned(),
+        Takes::Axes | Takes::RightHandedAxes => "\"x -z y\"".to_owned(),
+        Takes::Text(_) | Takes::NameOrFile(_) | Takes::File => "\"wb\"".to_owned(),
+        Takes::Service => "\"lab\"".to_owned(),
+        Takes::Tracker => "\"T@lab\"".to_owned(),
+        Takes::Pose => "{ position = [0.0, 0.0, 0.0] }".to_owned(),
+    }
+}
+
+#[test]
+fn every_key_of_every_kind_is_read_and_none_of_another() {
+    for kind in &KINDS {
+        let mut keys = format!("kind = \"{}\"\n", kind.name);
+        for key in kind.every_key() {
+            keys += &format!("{} = {}\n", key.name, example(&key.takes));
+        }
+        let workbench = with_device(&keys).unwrap_or_else(|error| panic!("{keys}: {error}"));
+        if let Device::Driver(chosen) = &workbench.device {
+            assert_eq!(chosen.kind.id, kind.id);
+        }
+        for other in KINDS.iter().flat_map(|kind| kind.every_key()) {
+            if !kind.has(other.name) {
+                let wrong = format!("{keys}{} = {}\n", other.name, example(&other.takes));
+                let error = with_device(&wrong).expect_err(&wrong);
+                let named = format!("unknown key `{}` in [device]", other.name);
+                assert!(error.contains(&named), "{wrong}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_force_device_is_read_and_its_files_are_relative_to_the_workbench() {
+    let workbench = with_device("kind = \"haply\"\naddress = \"lab\"\ngrip = false\nscale = 2.0")
+        .expect("valid");
+    let chosen = driver(&workbench);
+    let address = chosen.service("address").expect("given");
+    assert_eq!(address.to_string(), "lab:10001");
+    assert_eq!(
+        (chosen.yes("grip"), chosen.number("scale")),
+        (Some(false), Some(2.0))
+    );
+    let begin = SHIPPED_WORKBENCH.find("[device]").expect("a device");
+    let end = SHIPPED_WORKBENCH.find("[network]").expect("a network");
+    let text = format!(
+        "{}[device]\nkind = \"python\"\nfile = \"mine.py\"\noptions = \"side=left,gain=2\"\n{}",
+        &SHIPPED_WORKBENCH[..begin],
+        &SHIPPED_WORKBENCH[end..]
+    );
+    let workbench = Workbench::parse("w.toml", &text, Path::new("/etc/taut")).expect("valid");
+    let chosen = driver(&workbench);
+    assert_eq!(chosen.text("options"), Some("side=left,gain=2"));
+    let files = workbench.needed_files().expect("its scene is shipped");
+    assert!(files.contains(&NeededFile::Named("/etc/taut/mine.py".into())));
+    let ported = with_device("kind = \"polhem\"\nport = \"/dev/ttyACM0\"").expect("valid");
+    assert_eq!(ported.needed_files().map(|files| files.len()), Ok(0));
 }
 
 fn with_viewer(from: &str, to: &str) -> Result<Workbench, String> {
@@ -28,35 +100,32 @@ fn a_vrpn_tracker_is_read_with_its_axes_and_unit() {
         "kind = \"vrpn\"\nserver = \"Hand@lab-pc\"\nsensor = 2\nmode = \"udp\"\naxes = \"x -z y\"\nscale = 0.001\nanchor = \"workbench\"\nmax_age = 0.25\norigin = { position = [0.0, -0.5, 0.0] }",
     )
     .expect("valid");
-    let Device::Vrpn {
-        sensor,
-        on_workbench,
-    } = &workbench.device
-    else {
-        panic!("{:?}", workbench.device);
-    };
-    assert_eq!(sensor.address.to_string(), "Hand@lab-pc:3883");
-    assert_eq!((sensor.sensor, sensor.udp, *on_workbench), (2, true, true));
-    assert_eq!(sensor.mapping.axes.to_string(), "x -z y");
-    assert_eq!((sensor.mapping.scale, sensor.max_age), (0.001, 0.25));
-    let origin = sensor.mapping.origin.translation.vector;
-    assert_eq!(origin, Vector3::new(0.0, -0.5, 0.0));
+    let chosen = driver(&workbench);
+    assert_eq!(chosen.kind.id, KindId::Vrpn);
+    let address = chosen.tracker("server").expect("given");
+    assert_eq!(address.to_string(), "Hand@lab-pc:3883");
+    assert_eq!(chosen.whole("sensor"), Some(2));
+    let words = [chosen.text("mode"), chosen.text("anchor")];
+    assert_eq!(words, [Some("udp"), Some("workbench")]);
+    let axes = chosen.axes("axes").expect("given");
+    assert_eq!(axes.to_string(), "x -z y");
+    let numbers = [chosen.number("scale"), chosen.number("max_age")];
+    assert_eq!(numbers, [Some(0.001), Some(0.25)]);
+    let origin = chosen.pose("origin").expect("given");
+    assert_eq!(origin.translation.vector, Vector3::new(0.0, -0.5, 0.0));
+    assert_eq!(chosen.pose("mount"), None);
 }
 
 #[test]
 fn the_space_mouse_and_the_mouse_are_read() {
     let workbench =
         with_device("kind = \"space-mouse\"\nmode = \"position\"\nreach = 0.3").expect("valid");
-    let Device::SpaceMouse {
-        position,
-        reach,
-        speed,
-        ..
-    } = workbench.device
-    else {
-        panic!();
-    };
-    assert_eq!((position, reach, speed), (true, Some(0.3), None));
+    let chosen = driver(&workbench);
+    assert_eq!(chosen.text("mode"), Some("position"));
+    assert_eq!(
+        (chosen.number("reach"), chosen.number("speed")),
+        (Some(0.3), None)
+    );
     let workbench = with_device("kind = \"mouse\"").expect("valid");
     assert_eq!(workbench.device, Device::Remote);
 }
@@ -66,10 +135,14 @@ fn a_head_tracker_takes_the_place_of_the_sway() {
     let sway = "sway = { amplitude = 0.05, period = 8.0 }";
     let tracker = "tracker = { server = \"Head@host\", axes = \"y x z\" }";
     let workbench = with_viewer(sway, tracker).expect("valid");
-    let HeadTracking::Vrpn(sensor) = &workbench.viewer.tracking else {
+    let HeadTracking::Vrpn(chosen) = &workbench.viewer.tracking else {
         panic!("{:?}", workbench.viewer.tracking);
     };
-    assert_eq!(sensor.address.device, "Head");
+    let address = chosen.tracker("server").expect("given");
+    assert_eq!(address.device, "Head");
+    let anchored = with_viewer(sway, &tracker.replace("axes", "anchor = \"start\", axes"));
+    let error = anchored.expect_err("a head is where it is");
+    assert!(error.contains("unknown key `anchor`"), "{error}");
     let error = with_viewer(sway, &format!("{sway}\n{tracker}")).expect_err("both");
     assert!(error.contains("exclude each other"), "{error}");
 }
@@ -81,7 +154,7 @@ fn faults_name_the_key_and_the_way_out() {
         ("kind = \"vrpn\"\nserver = \"Tracker0\"", "DEVICE@HOST:PORT"),
         (
             "kind = \"vrpn\"\nserver = \"T@h\"\naxes = \"x y\"",
-            "such as \"x -z y\"",
+            "such as `x -z y`",
         ),
         (
             "kind = \"vrpn\"\nserver = \"T@h\"\nsensors = 1",
@@ -89,11 +162,24 @@ fn faults_name_the_key_and_the_way_out() {
         ),
         (
             "kind = \"vrpn\"\nserver = \"T@h\"\nscale = 0.0",
-            "greater than zero",
+            "between 0.000001 and 1000000",
         ),
         (
             "kind = \"space-mouse\"\ndead_zone = 1.0",
             "between 0 and 0.9",
+        ),
+        (
+            "kind = \"haply\"\naddress = \"a b\"",
+            "must be HOST or HOST:PORT",
+        ),
+        ("kind = \"spidar\"", "add port = \"/dev/ttyUSB0\""),
+        (
+            "kind = \"plugin\"\nscale = 0",
+            "`library` is missing in [device]",
+        ),
+        (
+            "kind = \"polhem\"\nport = \"/dev/x\"\nscale = nan",
+            "between 0.01 and 100",
         ),
         ("kind = \"spacemouse\"", "did you mean `space-mouse`?"),
         (

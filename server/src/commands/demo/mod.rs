@@ -16,7 +16,7 @@ use taut_scene::{Device, HeadTracking, Scene, Workbench};
 use crate::cli::DemoArgs;
 use crate::commands::demo::children::{NamedChild, wait_or_kill};
 use crate::commands::demo::directory::DemoDirectory;
-use crate::commands::serve::{announce, watch};
+use crate::commands::serve::{HELP_ARM, announce, watch};
 use crate::commands::{recording_size, render};
 use crate::loops::realtime::after_parent;
 use crate::report::SessionReport;
@@ -35,9 +35,6 @@ const LOG_VARIABLE: &str = "TAUT_LOG";
 const MOUSE_MAX_AGE: Duration = Duration::from_millis(200);
 /// How the mouse holds the body.
 const HELP_MOUSE: &str = "mouse in the first window: left button moves the body along the screen, right button or wheel to and fro, middle button (or Shift + left) turns it; P lets go or takes hold, R goes back to the start, arrow and page keys move in small steps; more in docs/devices.md";
-/// How force comes at a device that can push.
-const HELP_ARM: &str =
-    "no force yet: type arm and Enter for force, off and Enter for none (docs/safety.md)";
 /// What the bridge is called.
 const BRIDGE_NODE: &str = "bridge";
 

@@ -48,11 +48,17 @@ pub(super) fn units(
     };
     if machine.server {
         let command = "taut serve --config /etc/taut/workbench.toml --key /etc/taut/cluster.key";
-        let reached: Vec<String> = match workbench.device {
-            Device::SpaceMouse { .. } => ON_HID.iter().map(ToString::to_string).collect(),
+        let mut more = match &workbench.device {
+            Device::Driver(chosen) => {
+                let reached = DeviceChoice::of(chosen)
+                    .map_err(|error| error.to_string())
+                    .and_then(|choice| choice.as_ref().map_or(Ok(Vec::new()), allowed));
+                reached.map_err(|why| {
+                    Failure::BadInput(format!("[device] of kind \"{}\": {why}", chosen.kind.name))
+                })?
+            }
             _ => Vec::new(),
         };
-        let mut more = reached;
         more.push("Environment=TAUT_DATA=/etc/taut/data".to_owned());
         units.push(system(
             "taut-serve.service",
@@ -164,28 +170,36 @@ fn reached_by(device: &str, machine: &Machine) -> Result<Vec<String>, Failure> {
 
 /// What the unit of the bridge must be allowed, so that it reaches this device; or why a service cannot have it.
 pub(in crate::commands) fn reached_by_a_service(device: &str) -> Result<Vec<String>, String> {
-    let choice = device
-        .parse::<DeviceChoice>()
-        .map_err(|error| error.to_string())?;
-    let lines: &[&str] = match &choice {
+    let choice = device.parse::<DeviceChoice>();
+    allowed(&choice.map_err(|error| error.to_string())?)
+}
+
+/// What the unit must be allowed for this device.
+fn allowed(choice: &DeviceChoice) -> Result<Vec<String>, String> {
+    let on_serial = |port: &str| {
+        vec![
+            format!("DeviceAllow={} rw", quoted(port)),
+            "SupplementaryGroups=dialout".to_owned(),
+        ]
+    };
+    let lines: &[&str] = match choice {
         DeviceChoice::Mouse => {
             return Err("that is a render window's; run `taut render --hold` there by hand".into());
         }
         DeviceChoice::Trace(path) if !path.is_absolute() => {
             return Err("a service finds a file by its whole path; begin it with /".into());
         }
-        DeviceChoice::Input(InputChoice::Spidar(_) | InputChoice::Polhem(_)) => {
-            let port = device.split([':', ',']).nth(1).unwrap_or_default();
-            return Ok(vec![
-                format!("DeviceAllow={} rw", quoted(port)),
-                "SupplementaryGroups=dialout".to_owned(),
-            ]);
+        DeviceChoice::Input(InputChoice::Spidar(settings)) => {
+            return Ok(on_serial(&settings.path));
+        }
+        DeviceChoice::Input(InputChoice::Polhem(settings)) => {
+            return Ok(on_serial(&settings.path));
         }
         DeviceChoice::Input(InputChoice::SpaceMouse(_)) => ON_HID,
         #[cfg(unix)]
         DeviceChoice::Input(InputChoice::Wooden(_)) => ON_HID,
         DeviceChoice::Input(InputChoice::Plugin(_)) => {
-            return Err("what a plug-in opens is not known; run `taut bridge` there by hand, or write a unit that allows its device".into());
+            return Err("what a plug-in opens is not known; run `taut bridge` there by hand (with kind = \"remote\" in the workbench file), or write a unit that allows its device".into());
         }
         DeviceChoice::Input(InputChoice::Vrpn(_) | InputChoice::Haply(_))
         | DeviceChoice::Simulated { .. }

@@ -12,7 +12,8 @@ use taut_bridge::realtime::{
     AWAKE, RealtimeGrant, keep_cores_awake, may_lock_memory, monotonic_now, request_fifo,
     sharpen_timers, sleep_until,
 };
-use taut_bridge::{DRIVERS, HidPort, ReportPort, SourceError};
+use taut_bridge::{HidPort, ReportPort, SourceError};
+use taut_kinds::{KINDS, Kind};
 
 use crate::shared::timing::{Distribution, Histogram};
 
@@ -141,7 +142,8 @@ fn measure_timers() -> std::io::Result<(RealtimeGrant, Distribution)> {
 
 /// The drivers, and the input device that is plugged in. None of it is needed.
 fn devices() -> [Finding; 2] {
-    let forms: Vec<&str> = DRIVERS.iter().map(|driver| driver.name).collect();
+    let named = KINDS.iter().filter(|kind| kind.on_command_line);
+    let forms: Vec<String> = named.map(Kind::short_form).collect();
     let space_mouse = match HidPort.open() {
         Ok(source) => Finding::good("SpaceMouse", format!("{} can be read", source.name())),
         Err(error @ SourceError::NotOpened { .. }) => Finding::lacking(

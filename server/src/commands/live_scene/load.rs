@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use taut_link::ClusterKey;
-use taut_scene::{Scene, Workbench};
+use taut_scene::{Device, Scene, Workbench};
 
 use super::files::SceneWatch;
 use crate::cli::ServeArgs;
@@ -141,7 +141,21 @@ pub(in crate::commands) fn load_workbench(args: &ServeArgs) -> Result<Workbench,
     if let Some(scene) = &args.scene {
         workbench.scene.clone_from(scene);
     }
+    refuse_to_follow(args, &workbench)?;
     Ok(workbench)
+}
+
+/// Another scene's session is made before this one ends, and a force device can be opened once.
+fn refuse_to_follow(args: &ServeArgs, workbench: &Workbench) -> Result<(), Failure> {
+    match &workbench.device {
+        Device::Driver(chosen) if args.follow_scene && chosen.kind.has_motors => {
+            Err(Failure::BadInput(format!(
+                "--follow-scene needs a device that stays while sessions change, but [device] is of kind \"{0}\"; write kind = \"remote\" there and run `taut bridge --device {0}` beside the server",
+                chosen.kind.name
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The key of the command line, else of the workbench file, else of the environment.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use taut_scene::{Scene, shipped_scene_text};
+use taut_scene::{Device, Scene, Workbench, shipped_scene_text};
 
 use self::change::{Change, Wanted, write_scene};
 use self::files::SceneWatch;
@@ -114,7 +114,7 @@ impl LiveScene {
             in_file: next.in_file.clone(),
             not_kept: std::mem::take(&mut next.not_kept),
             scenes: all.into_iter().map(str::to_owned).collect(),
-            why_closed: why_closed(setup),
+            why_closed: why_closed(&next.workbench, setup),
             objects: objects_of(setup),
         });
         self.show();
@@ -293,8 +293,15 @@ impl LiveScene {
 }
 
 /// Why nobody changes the scene of this session.
-fn why_closed(setup: &SessionSetup) -> Option<&'static str> {
+fn why_closed(workbench: &Workbench, setup: &SessionSetup) -> Option<&'static str> {
     let monitor = setup.monitor.as_ref();
-    let is_recorded = setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some());
-    is_recorded.then_some("the session is recorded, and a recording is of one scene; serve without")
+    if setup.recording.is_some() || monitor.is_some_and(|m| m.record.is_some()) {
+        return Some("the session is recorded, and a recording is of one scene; serve without");
+    }
+    match &workbench.device {
+        Device::Driver(chosen) if chosen.kind.has_motors => Some(
+            "the force device is opened by the server itself, and once; write kind = \"remote\" in [device] and run `taut bridge` beside it",
+        ),
+        _ => None,
+    }
 }

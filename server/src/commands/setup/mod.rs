@@ -8,6 +8,7 @@ use std::io::{BufRead, Write};
 use std::net::IpAddr;
 use std::path::Path;
 
+use taut_kinds::{KINDS, Kind, KindId};
 use taut_scene::{Stereo, Workbench};
 
 use file::{Answers, Pc, Place, Wall};
@@ -130,7 +131,10 @@ fn ask(
     let stereo = stereo(questions)?;
     let device = questions.text(
         "the haptic device",
-        "as `taut bridge --help` lists them; a simulated one needs nothing and pushes nobody",
+        &format!(
+            "{}; `taut bridge --help` has their options; a simulated one needs nothing and pushes nobody",
+            device_names()
+        ),
         found.device.as_deref().unwrap_or("simulated"),
         |text| reached_by_a_service(text).map(|_| ()),
     )?;
@@ -142,6 +146,16 @@ fn ask(
         pcs,
         window: found.window(),
     })
+}
+
+/// Those that a machine can have.
+fn device_names() -> String {
+    let forms: Vec<String> = KINDS
+        .iter()
+        .filter(|kind| kind.on_command_line && kind.id != KindId::Mouse)
+        .map(Kind::short_form)
+        .collect();
+    forms.join(", ")
 }
 
 fn stereo(questions: &mut Questions<impl BufRead, impl Write>) -> Result<&'static str, Failure> {

@@ -27,6 +27,7 @@ use crate::loops::statistics::Statistics;
 use crate::loops::wiring::SharedView;
 use crate::session::head::Head;
 use crate::shared::clock::SessionClock;
+use crate::shared::felt_ticks::FeltReader;
 
 /// Where the monitor is served and recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,6 +78,8 @@ pub struct MonitorSources {
     pub head: Head,
     /// What the loops publish.
     pub shared: SharedView,
+    /// What the hand feels, tick by tick.
+    pub felt: FeltReader,
     /// All counters.
     pub statistics: Statistics,
     /// Session time.

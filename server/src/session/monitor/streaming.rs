@@ -208,6 +208,10 @@ fn feed(
         sleep_until(sources.clock.monotonic(deadline));
         let mut sample = sample(&mut sources, frame);
         times.follow(&sources, &mut sample);
+        for tick in sources.felt.take() {
+            let age_us = tick.constraint_age.as_secs_f32() * 1e6;
+            sample.between.add(&tick.wrench, age_us);
+        }
         sample.packets_sent = network.packets_sent.load(Ordering::Relaxed);
         sample.packets_received = network.packets_received.load(Ordering::Relaxed);
         sample.clients = network.clients.load(Ordering::Relaxed);
@@ -272,6 +276,8 @@ struct LoopTimes {
     samples: u32,
     windows: [HistogramWindow; 3],
     p99_us: [f32; 3],
+    /// Between two samples.
+    between: [HistogramWindow; 3],
 }
 
 impl LoopTimes {
@@ -293,9 +299,16 @@ impl LoopTimes {
             }
         }
         self.samples = self.samples.wrapping_add(1);
+        let mut longest_us = [0.0; 3];
+        for ((window, histogram), longest) in
+            self.between.iter_mut().zip(histograms).zip(&mut longest_us)
+        {
+            *longest = window.advance_us(histogram).max as f32;
+        }
         let loop_time = |index: usize| LoopTime {
             last_us: histograms[index].newest_time().as_secs_f32() * 1e6,
             p99_us: self.p99_us[index],
+            longest_us: longest_us[index],
         };
         sample.haptics_period = loop_time(0);
         sample.god_object_update = loop_time(1);

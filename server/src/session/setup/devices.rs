@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use std::time::Duration;
-
 use god_object::nalgebra::{Point3, Similarity3, UnitQuaternion};
 use god_object::spatial::Pose;
 use taut_bridge::{
-    Anchor, AtEnd, CapMode, CapSettings, Device, DeviceLimits, Grip, Hand, HeldStrings,
-    InputChoice, MinJerkPath, Placement, RecordedDevice, SimulatedDevice, SpidarDevice, TraceRow,
-    Tremor, ViaPoint, VrpnMode, VrpnSettings, VrpnSource, simulated_spidar, string_geometry,
+    AtEnd, Device, DeviceLimits, Grip, Hand, HeldStrings, InputChoice, MinJerkPath, Placement,
+    RecordedDevice, SimulatedDevice, SpidarDevice, TraceRow, Tremor, ViaPoint, simulated_spidar,
+    string_geometry,
 };
-use taut_scene::{BuiltScene, DeviceTrace, HandPreset, VrpnSensor};
+use taut_scene::{BuiltScene, DeviceTrace, HandPreset};
 
 use crate::loops::realtime::thread_cpu_time;
 use crate::session::setup::DeviceSource;
@@ -29,27 +27,6 @@ pub fn device(
     workbench_from_scene: &Pose,
 ) -> Result<DeviceSource, Failure> {
     match wanted {
-        taut_scene::Device::Vrpn {
-            sensor,
-            on_workbench,
-        } => {
-            let settings = vrpn_settings(sensor, *on_workbench);
-            input(
-                &InputChoice::Vrpn(Box::new(settings)),
-                scene,
-                workbench_from_scene,
-                0,
-            )
-        }
-        taut_scene::Device::SpaceMouse { .. } => {
-            let settings = cap_settings(wanted);
-            input(
-                &InputChoice::SpaceMouse(settings),
-                scene,
-                workbench_from_scene,
-                0,
-            )
-        }
         taut_scene::Device::Simulated {
             hand,
             path,
@@ -75,7 +52,8 @@ pub fn device(
             recorded(path, *repeat, &scene.reference_point())
                 .map(|device| DeviceSource::Local(Box::new(device)))
         }
-        taut_scene::Device::Remote => Ok(DeviceSource::Remote {
+        // A driver's is opened by [`input`].
+        taut_scene::Device::Driver(_) | taut_scene::Device::Remote => Ok(DeviceSource::Remote {
             limits: DeviceLimits::UNLIMITED,
             max_age: taut_bridge::DEFAULT_MAX_AGE,
         }),
@@ -102,64 +80,6 @@ pub fn input(
         tracing::warn!("{sentence}");
     }
     Ok(DeviceSource::Local(device))
-}
-
-/// The sensor of a workbench file as the driver takes it.
-pub fn vrpn_source(sensor: &VrpnSensor) -> VrpnSource {
-    VrpnSource {
-        address: sensor.address.clone(),
-        sensor: sensor.sensor,
-        mode: if sensor.udp {
-            VrpnMode::Udp
-        } else {
-            VrpnMode::Tcp
-        },
-    }
-}
-
-fn vrpn_settings(sensor: &VrpnSensor, on_workbench: bool) -> VrpnSettings {
-    VrpnSettings {
-        source: vrpn_source(sensor),
-        mapping: sensor.mapping,
-        anchor: if on_workbench {
-            Anchor::Workbench
-        } else {
-            Anchor::Start
-        },
-        max_age: Duration::from_secs_f64(sensor.max_age),
-    }
-}
-
-/// The gains of a workbench file, the driver's own where it names none.
-fn cap_settings(device: &taut_scene::Device) -> CapSettings {
-    let standard = CapSettings::default();
-    let taut_scene::Device::SpaceMouse {
-        position,
-        dead_zone,
-        speed,
-        turn_rate,
-        reach,
-        tilt,
-        yield_force,
-        yield_torque,
-    } = *device
-    else {
-        return standard;
-    };
-    CapSettings {
-        mode: if position {
-            CapMode::Position
-        } else {
-            CapMode::Rate
-        },
-        dead_zone: dead_zone.unwrap_or(standard.dead_zone),
-        speed: speed.unwrap_or(standard.speed),
-        turn_rate: turn_rate.unwrap_or(standard.turn_rate),
-        reach: reach.unwrap_or(standard.reach),
-        tilt: tilt.unwrap_or(standard.tilt),
-        yield_force: yield_force.unwrap_or(standard.yield_force),
-        yield_torque: yield_torque.unwrap_or(standard.yield_torque),
-    }
 }
 
 /// The simulated hand and what it intends; path and hand are the workbench's, else the scene's.

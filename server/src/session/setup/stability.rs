@@ -59,8 +59,8 @@ pub(super) fn declared(
                 hand: hand.or(scene_hand).unwrap_or_default(),
             }))
         }
-        // They feel nothing.
-        (Device::Trace { .. } | Device::Vrpn { .. } | Device::SpaceMouse { .. }, _) => Ok(None),
+        // It feels nothing.
+        (Device::Trace { .. }, _) => Ok(None),
         (_, dynamics) => Ok(dynamics.copied()),
     }
 }

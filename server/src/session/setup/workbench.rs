@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use god_object::Pose;
 use taut_bridge::{
-    ContactBound, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm, SafetySettings,
-    ValidationSettings,
+    ContactBound, DeviceChoice, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm,
+    SafetySettings, ValidationSettings, vrpn_settings,
 };
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
@@ -26,7 +26,7 @@ use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
 use crate::session::setup::content::content;
-use crate::session::setup::devices::{device, input, vrpn_source};
+use crate::session::setup::devices::{device, input};
 use crate::session::setup::stability::{declared, judge, of_input, stiffnesses};
 use crate::session::setup::{
     ExternalSetup, LinkSettings, RealtimeSettings, RecordingSettings, SessionSetup,
@@ -89,8 +89,14 @@ pub fn session_setup(
         )));
     }
     let scene_hand = built.hand.as_ref().map(|hand| hand.preset);
-    let declared = match &overrides.input {
-        Some(choice) => of_input(choice, built.view.display_scale, scene_hand),
+    let choice = driver(workbench, overrides)?;
+    let declared = match &choice {
+        Some(choice) => {
+            let by_driver = of_input(choice, built.view.display_scale, scene_hand);
+            // What the file declares is of the file's device.
+            let in_file = workbench.dynamics.filter(|_| overrides.input.is_none());
+            by_driver.map(|(dynamics, torque)| (in_file.unwrap_or(dynamics), torque))
+        }
         None => declared(&workbench.device, workbench.dynamics.as_ref(), scene_hand)?
             .map(|dynamics| (dynamics, true)),
     };
@@ -130,7 +136,12 @@ pub fn session_setup(
         frames: frames::settings(&workbench.frames),
         node_timeout: Duration::from_secs_f64(network.node_timeout),
     };
-    let safety = safety(workbench, overrides, &built.settings, &built.world.body);
+    let safety = safety(
+        workbench,
+        choice.as_ref(),
+        &built.settings,
+        &built.world.body,
+    );
     let recording = overrides
         .recording
         .as_ref()
@@ -139,14 +150,14 @@ pub fn session_setup(
     let mut fidelity = built.fidelity.clone();
     if let Some(plan) = &mut fidelity {
         let rate_is_set = workbench.realtime.god_object_rate.is_some();
-        let at_bridge = overrides.input.is_none() && workbench.device == Device::Remote;
+        let at_bridge = choice.is_none() && workbench.device == Device::Remote;
         crate::session::setup::fidelity::apply(plan, &mut realtime, rate_is_set, at_bridge);
     }
     Ok(SessionSetup {
         scene,
         fidelity,
         recording,
-        device: match &overrides.input {
+        device: match &choice {
             Some(choice) => input(
                 choice,
                 &built,
@@ -204,6 +215,20 @@ fn external(
     }))
 }
 
+/// The device that a driver of this process opens: the command line's, else the file's.
+fn driver(workbench: &Workbench, overrides: &Overrides) -> Result<Option<InputChoice>, Failure> {
+    if overrides.input.is_some() {
+        return Ok(overrides.input.clone());
+    }
+    let Device::Driver(chosen) = &workbench.device else {
+        return Ok(None);
+    };
+    match DeviceChoice::of(chosen).map_err(Failure::bad_input)? {
+        Some(DeviceChoice::Input(input)) => Ok(Some(input)),
+        _ => Ok(None),
+    }
+}
+
 /// The second cluster key, while its time is not over.
 fn also_key(network: &taut_scene::Network) -> Result<Option<AlsoKey>, Failure> {
     let Some(also) = &network.also_key else {
@@ -255,10 +280,13 @@ fn head(viewer: &Viewer) -> HeadSource {
                 period: *period,
             }),
             HeadTracking::Remote => HeadMotion::Remote,
-            HeadTracking::Vrpn(sensor) => HeadMotion::Tracker(Box::new(TrackerSource {
-                source: vrpn_source(sensor),
-                mapping: sensor.mapping,
-            })),
+            HeadTracking::Vrpn(chosen) => match vrpn_settings(chosen) {
+                Some(settings) => HeadMotion::Tracker(Box::new(TrackerSource {
+                    source: settings.source,
+                    mapping: settings.mapping,
+                })),
+                None => HeadMotion::Still, // the file's reader demands an address
+            },
         },
     }
 }
@@ -275,22 +303,13 @@ fn contact_bound(scene: &god_object::Settings, body: &god_object::Body) -> Conta
 /// What the device port keeps to: the workbench's limits, and the scene's where those are smaller.
 fn safety(
     workbench: &Workbench,
-    overrides: &Overrides,
+    choice: Option<&InputChoice>,
     scene: &god_object::Settings,
     body: &god_object::Body,
 ) -> SafetySettings {
     let wanted = &workbench.safety;
-    let nobody_is_hurt = match &overrides.input {
-        Some(choice) => choice.force_device().is_none(),
-        None => matches!(
-            workbench.device,
-            Device::Simulated { .. }
-                | Device::Trace { .. }
-                | Device::Vrpn { .. }
-                | Device::SpaceMouse { .. }
-                | Device::Remote
-        ),
-    };
+    // Without a driver it is simulated, recorded, or behind a bridge.
+    let nobody_is_hurt = choice.is_none_or(|choice| choice.force_device().is_none());
     let rearm = match wanted.rearm {
         Some(taut_scene::Rearm::Automatic) => Rearm::Automatic,
         Some(taut_scene::Rearm::Manual) => Rearm::Manual,

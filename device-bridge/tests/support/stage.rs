@@ -1,0 +1,145 @@
+//! A floor under a device of a user's own, in whatever language: felt, lost, felt again; and what a test sees and switches of it.
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+use nalgebra::{Point3, Vector6};
+use taut_bridge::{
+    Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Placement, Pose, Rearm,
+    SafetySettings,
+};
+
+/// Only a hang takes this long.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+// Of tests/plugin_c/plant.h.
+pub const GOOD: i64 = 0;
+pub const HANGS: i64 = 1;
+pub const NOT_A_NUMBER: i64 = 2;
+pub const LONG_QUATERNION: i64 = 3;
+pub const TOO_HOT: i64 = 4;
+pub const UNPLUGGED: i64 = 5;
+pub const NOTHING_NEW: i64 = 6;
+pub const NOT_CALIBRATED: i64 = 7;
+
+/// Numbers of the stand-in: `mode`, `served`, `force`, `torque`, `after`, `closes`, as in plant.h.
+pub trait Inside {
+    fn get(&self, name: &str) -> i64;
+
+    fn set(&self, name: &str, value: i64);
+
+    fn wait(&self, what: &str, done: &dyn Fn() -> bool) {
+        let begun = Instant::now();
+        while !done() {
+            assert!(begun.elapsed() < PATIENCE, "{what}");
+            thread::sleep(ms(1));
+        }
+    }
+}
+
+pub fn ms(time: u64) -> Duration {
+    Duration::from_millis(time)
+}
+
+pub fn opened(choice: &str) -> Result<Box<dyn Device>, String> {
+    let DeviceChoice::Input(input) = choice.parse().map_err(|e| format!("{e}"))? else {
+        panic!("it is opened");
+    };
+    let placement = Placement::plain(Pose::identity(), Point3::origin());
+    input.open(placement, 0).map_err(|error| error.to_string())
+}
+
+/// A port around the device, on a clock that goes a millisecond by tick, however long that takes.
+pub struct Stage {
+    pub port: DevicePort,
+    pub time: u64,
+}
+
+impl Stage {
+    pub fn new(choice: &str, rearm: Rearm) -> Self {
+        let settings = SafetySettings {
+            rearm,
+            ..SafetySettings::default()
+        };
+        let device = opened(choice).unwrap_or_else(|error| panic!("{error}"));
+        let mut port = DevicePort::new(device, settings, Point3::origin(), &Pose::identity());
+        port.restart(CommandSource::Same);
+        Self { port, time: 1000 }
+    }
+
+    /// A floor 20 mm below the start, which also turns the hand.
+    pub fn tick(&mut self) -> (Option<DeviceFault>, f64) {
+        self.time += 1;
+        let now = ms(self.time);
+        let report = self.port.tick(now, |reading| {
+            let below = (-0.02 - reading.sample.pose.translation.vector.z).max(0.0);
+            let wrench = Vector6::new(0.0, 0.0, 200.0 * below, 20.0 * below, 0.0, 0.0);
+            Some(Command::fresh(now, wrench))
+        });
+        (report.reading.fault, report.wrench.norm())
+    }
+
+    /// Milliseconds of its clock that it took.
+    pub fn until(
+        &mut self,
+        what: &str,
+        done: impl Fn(&Self, Option<DeviceFault>, f64) -> bool,
+    ) -> u64 {
+        let (begun, from) = (Instant::now(), self.time);
+        loop {
+            let (fault, force) = self.tick();
+            if done(self, fault, force) {
+                return self.time - from;
+            }
+            assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
+            thread::sleep(ms(1));
+        }
+    }
+
+    pub fn until_felt(&mut self, inside: &dyn Inside) -> u64 {
+        self.until("the floor", |_, fault, force| {
+            fault.is_none() && force > 0.3 && inside.get("force") > 300_000
+        })
+    }
+
+    /// 120 ms on its clock after the last good sample there is no force.
+    pub fn is_without_force_in_time(&mut self) -> Option<DeviceFault> {
+        let mut fault = None;
+        for _ in 0..119 {
+            fault = self.tick().0;
+        }
+        let (_, force) = self.tick();
+        assert_eq!(force, 0.0, "{fault:?}");
+        fault
+    }
+}
+
+/// Everything that goes wrong with a device that has been felt, and what the port calls it.
+pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
+    let mut stage = Stage::new(choice, Rearm::Automatic);
+    for &(mode, named) in modes {
+        stage.until_felt(inside);
+        assert!(inside.get("torque") > 0, "no torque");
+        inside.set("served", 0);
+        inside.set("after", -1);
+        let closes = inside.get("closes");
+        inside.set("mode", mode);
+        inside.wait("it goes wrong", &|| {
+            inside.get("served") > 0 || inside.get("closes") > closes
+        });
+        let fault = stage.is_without_force_in_time().expect(named);
+        assert!(fault.to_string().contains(named), "{named}: {fault}");
+        if mode != HANGS {
+            stage.until("zero at the motors", |_, _, _| inside.get("force") == 0);
+        }
+        if [TOO_HOT, UNPLUGGED].contains(&mode) {
+            inside.wait("it is closed", &|| inside.get("closes") > closes);
+        }
+        inside.set("mode", GOOD);
+        let back = stage.until_felt(inside);
+        println!("{named}: felt again after {back} ms");
+        assert!(inside.get("after") <= 0, "a hang kept a force");
+    }
+    drop(stage);
+    assert_eq!(inside.get("force"), 0, "a force stayed");
+}

@@ -1,0 +1,104 @@
+//! What the hand feels in each tick: haptics loop to monitor.
+//!
+//! Writer: loop 3, once per tick, wait-free. Reader: the monitor's feed, 50 times a second, which takes all there are, so that a peak of one tick is seen.
+//! A full queue means that nobody reads, or not in time: the newest tick is left out and counted. All memory is allocated at the start.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use god_object::spatial::Vector6;
+use rtrb::{Consumer, Producer, RingBuffer};
+
+/// Ticks that fit: two seconds at 1 kHz.
+const CAPACITY: usize = 2048;
+
+/// One tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FeltTick {
+    /// Force then torque on the hand, N and N m, world axes.
+    pub wrench: Vector6,
+    /// Age of the constraint set that the force rests on.
+    pub constraint_age: Duration,
+}
+
+/// The loop's end.
+#[derive(Debug)]
+pub struct FeltWriter {
+    ticks: Producer<FeltTick>,
+    left_out: Arc<AtomicU64>,
+}
+
+/// The monitor's end.
+#[derive(Debug)]
+pub struct FeltReader {
+    ticks: Consumer<FeltTick>,
+    left_out: Arc<AtomicU64>,
+}
+
+/// Both ends.
+pub fn channel() -> (FeltWriter, FeltReader) {
+    let (writer, reader) = RingBuffer::new(CAPACITY);
+    let left_out = Arc::<AtomicU64>::default();
+    let counted = Arc::clone(&left_out);
+    (
+        FeltWriter {
+            ticks: writer,
+            left_out,
+        },
+        FeltReader {
+            ticks: reader,
+            left_out: counted,
+        },
+    )
+}
+
+impl FeltWriter {
+    /// Hands a tick over, or counts it.
+    pub fn push(&mut self, tick: FeltTick) {
+        if self.ticks.push(tick).is_err() {
+            self.left_out.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+impl FeltReader {
+    /// The ticks since the last call, in order; no more than the queue holds, however fast the writer is.
+    pub fn take(&mut self) -> impl Iterator<Item = FeltTick> + '_ {
+        let there = self.ticks.slots();
+        (0..there).map_while(|_| self.ticks.pop().ok())
+    }
+
+    /// Ticks that found no room.
+    pub fn left_out(&self) -> u64 {
+        self.left_out.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_of_one_tick_is_taken_and_a_full_queue_stops_nobody() {
+        let (mut writer, mut reader) = channel();
+        let tick = |force: f64| FeltTick {
+            wrench: Vector6::x() * force,
+            constraint_age: Duration::ZERO,
+        };
+        for number in 0..20 {
+            writer.push(tick(if number == 7 { 9.0 } else { 1.0 }));
+        }
+        let taken: Vec<f64> = reader.take().map(|tick| tick.wrench.x).collect();
+        assert_eq!((taken.len(), taken[7]), (20, 9.0));
+        assert_eq!(reader.take().count(), 0);
+        for number in 0..CAPACITY + 5 {
+            writer.push(tick(number as f64));
+        }
+        assert_eq!(reader.left_out(), 5);
+        assert_eq!(
+            reader.take().last().map(|tick| tick.wrench.x),
+            Some((CAPACITY - 1) as f64)
+        );
+    }
+}
