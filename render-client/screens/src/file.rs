@@ -302,9 +302,10 @@ mod tests {
                 file.truncate(kept);
                 let (_keep, path) = written(name, file);
                 if let Ok(mesh) = read_warp(&path, 1.0) {
-                    proptest::prop_assert!(mesh.nodes.iter().all(|node| {
+                    let finite = mesh.nodes.iter().all(|node| {
                         node.target.iter().chain(&node.place).all(|value| value.is_finite())
-                    }));
+                    });
+                    proptest::prop_assert!(finite);
                 }
                 let _ = read_surface(&path); // it ends
             }
