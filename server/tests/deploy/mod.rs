@@ -320,17 +320,19 @@ fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
     let screen = screens
         .and_then(|list| list[0].as_table_mut())
         .expect("a screen");
-    screen.insert("blend".to_owned(), "masks/front.png".into());
+    screen.insert("blend".to_owned(), "masks/front.pfm".into());
     place.write("workbench.toml", &file.to_string());
     let (code, said) = deploy(&place, &[]);
-    assert!(code != Some(0) && said.contains("front.png"), "{said}");
+    assert!(code != Some(0) && said.contains("front.pfm"), "{said}");
     fs::create_dir(place.path("masks")).expect("a folder");
-    place.write("masks/front.png", "grey");
+    let light = [1.0_f32; 4].map(f32::to_le_bytes).concat();
+    let mask = [b"Pf\n2 2\n-1.0\n".as_slice(), &light].concat();
+    fs::write(place.path("masks/front.pfm"), mask).expect("written");
     let (code, said) = deploy(&place, &[]);
     assert_eq!(code, Some(0), "{said}");
     for (machine, has) in [("left", true), ("right", false), ("haptic-pc", true)] {
         let there = unpacked(&place, machine)
-            .join("etc/masks/front.png")
+            .join("etc/masks/front.pfm")
             .exists();
         assert_eq!(there, has, "{machine}");
     }

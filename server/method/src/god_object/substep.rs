@@ -15,7 +15,7 @@ use crate::surface::Friction;
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
-/// A motion that is a smaller share of the way that the update has made, or of the one that the device went meanwhile, is left to the next update.
+/// A motion that is a smaller share of the way that the update has made is left to the next update.
 const LEAST_STEP_SHARE: f64 = 0.1;
 /// A body with less than this share of the rest distance left is eased out in the same update, however little that is.
 const TIGHT_GAP_SHARE: f64 = 0.5;
@@ -23,8 +23,6 @@ const TIGHT_GAP_SHARE: f64 = 0.5;
 const MAX_REVERSALS: u32 = 2;
 /// Most by which motions become shorter when one turns back on the last.
 const LARGEST_DAMPING: f64 = 16.0;
-/// Damping is taken back by this factor at least in each motion that goes on like the last.
-const LEAST_RECOVERY: f64 = 0.5;
 /// A sub-step that loses more than this share of the rest distance to what is nearest shows the same.
 const LOST_GAP_SHARE: f64 = 0.5;
 /// One that loses less than this was as the rows predicted.
@@ -105,14 +103,14 @@ impl GodObject {
         {
             update.reversals += 1;
         }
-        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway, and so is
-        // what is little beside the way that the device has gone: the answer is as old. But not easing out, which is little always: a body
-        // left far below the rest distance stops at every motion. Nor is a motion little that was cut to what is trusted, or that begins a fall.
+        // What is little beside the way made so far is left to the next update, which has a share k_s of the way to cover anyway;
+        // but for easing out, which is little always: a body left far below the rest distance stops at every motion. Nor is a motion
+        // little that was cut to what is trusted, or that begins a fall.
         let tight = self.set.gap_min < TIGHT_GAP_SHARE * self.settings.rest_distance;
         let little = if tight || cut {
             0.0
         } else {
-            LEAST_STEP_SHARE * update.made.max(update.moved)
+            LEAST_STEP_SHARE * update.made
         };
         // What sticks creeps by as much as friction's answer is in error: that is no motion.
         let error = self.friction.as_ref().map_or(0.0, Friction::error) * length;
@@ -251,12 +249,13 @@ impl StepMemory {
         };
         let along = weighed(motion, &self.last_motion);
         let turns_back = along < 0.0;
-        // Aitken's extrapolation: motions in proportion to the way that is left would end here.
-        let ratio = along / weighed(&self.last_motion, &self.last_motion);
         if turns_back {
+            // Aitken's extrapolation: motions in proportion to the way that is left would end here.
+            let ratio = along / weighed(&self.last_motion, &self.last_motion);
             self.damping /= (1.0 - ratio).min(LARGEST_DAMPING);
         } else if along > 0.0 {
-            self.damping = (self.damping / (1.0 - ratio).clamp(0.0, LEAST_RECOVERY)).min(1.0);
+            // By twice, and not at once: a peg at the mouth of its hole would go to and fro, and stay there.
+            self.damping = (2.0 * self.damping).min(1.0);
         }
         self.last_motion = *motion;
         turns_back
