@@ -1,5 +1,6 @@
 //! A simulated device behind a pseudo-terminal, in place of `/dev/ttyUSB0`.
 
+use std::fs::File;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,7 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use serialport::{SerialPort, TTYPort};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use crate::realtime::monotonic_now;
 
@@ -43,14 +45,11 @@ impl<T: FarEnd> PseudoTerminal<T> {
     /// # Errors
     /// As [`Self::start`].
     pub fn start_shared(device: Arc<Mutex<T>>, link: Option<&Path>) -> std::io::Result<Self> {
-        let (mut master, slave) = TTYPort::pair().map_err(std::io::Error::from)?;
-        let path = slave.name().unwrap_or_default();
-        drop(slave); // it is locked: the driver opens the path itself
+        let (master, path) = open()?;
         if let Some(link) = link {
             let _ = std::fs::remove_file(link); // most often there is none
             std::os::unix::fs::symlink(&path, link)?;
         }
-        master.set_timeout(LOOK).map_err(std::io::Error::from)?;
         let end = Arc::new(AtomicBool::new(false));
         let (ended, answering) = (Arc::clone(&end), Arc::clone(&device));
         let thread = thread::Builder::new()
@@ -89,17 +88,43 @@ impl<T> Drop for PseudoTerminal<T> {
     }
 }
 
-fn answer<T: FarEnd>(mut master: TTYPort, device: &Mutex<T>, end: &AtomicBool) {
+/// The device's end, and the path of the driver's.
+///
+/// No other process inherits it: one that did would keep the cable in.
+fn open() -> std::io::Result<(File, String)> {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    grantpt(&master)?;
+    unlockpt(&master)?;
+    let path = ptsname(&master, Vec::new())?;
+    let path = path.into_string().map_err(std::io::Error::other)?;
+    Ok((File::from(master), path))
+}
+
+/// Whether there is something to read; waits for [`LOOK`] at most.
+fn is_readable(master: &File) -> bool {
+    let within = Timespec {
+        tv_sec: 0,
+        tv_nsec: LOOK.subsec_nanos().into(),
+    };
+    let mut polled = [PollFd::new(master, PollFlags::IN)];
+    let is_ready = poll(&mut polled, Some(&within)).is_ok_and(|count| count > 0);
+    if is_ready && !polled[0].revents().contains(PollFlags::IN) {
+        thread::sleep(LOOK); // nobody has opened the other end
+        return false;
+    }
+    is_ready
+}
+
+fn answer<T: FarEnd>(mut master: File, device: &Mutex<T>, end: &AtomicBool) {
     let mut bytes = [0; 512];
     let mut out = Vec::with_capacity(512);
     while !end.load(Ordering::Relaxed) {
-        let count = match master.read(&mut bytes) {
-            Ok(count) => count,
-            Err(error) if error.kind() == std::io::ErrorKind::TimedOut => continue,
-            Err(_) => {
-                thread::sleep(LOOK); // nobody has opened the other end
-                continue;
-            }
+        if !is_readable(&master) {
+            continue;
+        }
+        let Ok(count) = master.read(&mut bytes) else {
+            thread::sleep(LOOK); // the other end was closed meanwhile
+            continue;
         };
         out.clear();
         let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);

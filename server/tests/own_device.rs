@@ -70,6 +70,16 @@ fn what_cannot_be_is_refused_by_name() {
         "{said}"
     );
 
+    // Each session would write over the one before.
+    let record = with_device("kind = \"remote\"")
+        .replace("[monitoring]", "[monitoring]\nrecord = \"all.rrd\"");
+    assert!(record.contains("all.rrd"));
+    place.write("workbench.toml", &record);
+    let output = taut(&place.serve("workbench.toml", "1", &["--follow-scene"]));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("[monitoring] record"), "{said}");
+
     // With its line, before anything is opened.
     place.write(
         "workbench.toml",

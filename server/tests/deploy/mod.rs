@@ -325,8 +325,9 @@ fn files_of_screens_go_to_the_machine_that_draws_them_beside_its_credential() {
     let (code, said) = deploy(&place, &[]);
     assert!(code != Some(0) && said.contains("front.pfm"), "{said}");
     fs::create_dir(place.path("masks")).expect("a folder");
-    let light = [1.0_f32; 4].map(f32::to_le_bytes).concat();
-    let mask = [b"Pf\n2 2\n-1.0\n".as_slice(), &light].concat();
+    // As large as the window that shows the screen.
+    let light = 1.0_f32.to_le_bytes().repeat(1280 * 427);
+    let mask = [b"Pf\n1280 427\n-1.0\n".as_slice(), &light].concat();
     fs::write(place.path("masks/front.pfm"), mask).expect("written");
     let (code, said) = deploy(&place, &[]);
     assert_eq!(code, Some(0), "{said}");

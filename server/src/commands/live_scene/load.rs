@@ -145,15 +145,22 @@ pub(in crate::commands) fn load_workbench(args: &ServeArgs) -> Result<Workbench,
     Ok(workbench)
 }
 
-/// Another scene's session is made before this one ends, and a force device can be opened once.
+/// What a session that is followed by another cannot have: a file that is of one session, or a force device, which can be opened once and
+/// would be opened before the session before ends.
 fn refuse_to_follow(args: &ServeArgs, workbench: &Workbench) -> Result<(), Failure> {
+    if !args.follow_scene {
+        return Ok(());
+    }
+    if workbench.monitoring.record.is_some() {
+        return Err(Failure::bad_input(
+            "--follow-scene begins a session for each scene, and each would write over the file of [monitoring] record; take record out, or serve without --follow-scene",
+        ));
+    }
     match &workbench.device {
-        Device::Driver(chosen) if args.follow_scene && chosen.kind.has_motors => {
-            Err(Failure::BadInput(format!(
-                "--follow-scene needs a device that stays while sessions change, but [device] is of kind \"{0}\"; write kind = \"remote\" there and run `taut bridge --device {0}` beside the server",
-                chosen.kind.name
-            )))
-        }
+        Device::Driver(chosen) if chosen.kind.has_motors => Err(Failure::BadInput(format!(
+            "--follow-scene needs a device that stays while sessions change, but [device] is of kind \"{0}\"; write kind = \"remote\" there and run `taut bridge --device {0}` beside the server",
+            chosen.kind.name
+        ))),
         _ => Ok(()),
     }
 }
