@@ -32,10 +32,10 @@ pub struct EditArgs {
     /// The operator's page of the session, on this machine or at this end of an SSH tunnel
     #[arg(long, value_name = "H:P", default_value = "127.0.0.1:4861")]
     pub page: String,
-    /// The token of the page: [operator] token_file
+    /// The token of the page: token_file of the section operator
     #[arg(long, value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// Another scene, one of [operator] scenes; the edits are then of that
+    /// Another scene, one of the scenes of the section operator; the edits are then of that
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
     /// Put it into the scene's file, too; without edits: what was changed before
