@@ -14,9 +14,9 @@
 //! to costs nothing on the way.
 //!
 //! Whoever may read a router's keys may read these. Zenoh's own configuration says who that is (TLS, access control); the data
-//! carry no command. What is read from the network is one topic of ROS 2, where the workbench file wants it ([`RosWrenchSubscriber`]): a force for the hand.
+//! carry no command. What is read from the network is one topic of ROS 2, where the workbench file wants it (`RosWrenchSubscriber`): a force for the hand.
 //!
-//! With [`RosSettings`] the workbench is a node of ROS 2 too, as `rmw_zenoh_cpp` sees one.
+//! With `RosSettings` the workbench is a node of ROS 2 too, as `rmw_zenoh_cpp` sees one.
 //!
 //! Everything here needs the feature `zenoh`. Its licence is EPL-2.0 or Apache-2.0; it is used under Apache-2.0.
 #![forbid(unsafe_code)]
