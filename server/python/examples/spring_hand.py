@@ -1,4 +1,4 @@
-"""A simulated hand: a grip of 0.2 kg that a spring draws down. Run it: taut demo --device python:spring_hand.py,depth=0.04"""
+"""A simulated hand: a grip of 0.2 kg that a spring draws down in three seconds. Run it: taut demo --device python:spring_hand.py,depth=0.04"""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Device:
         if options:
             raise ValueError(f"the option is depth, not {', '.join(options)}")
         self.height = self.speed = self.force = 0.0  # m, m/s, N
-        self.then = time.monotonic()
+        self.opened = self.then = time.monotonic()
 
     def info(self) -> Info:
         return {
@@ -30,7 +30,8 @@ class Device:
         now = time.monotonic()
         step = min(now - self.then, 0.002)  # s: a pause does not throw the hand
         self.then = now
-        pulled = self.force + 100 * (-self.depth - self.height) - 8 * self.speed
+        sunk = self.depth * min((now - self.opened) / 3, 1)
+        pulled = self.force + 100 * (-sunk - self.height) - 8 * self.speed
         self.speed += pulled / 0.2 * step
         self.height += self.speed * step
         return {"position": (0, 0, self.height), "velocity": (0, 0, self.speed)}
