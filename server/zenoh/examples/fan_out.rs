@@ -221,7 +221,7 @@ fn typical_state() -> HotState {
 
 fn hello(rate: f64) -> Hello {
     let body = |name: &str| BodyDescription {
-        name: name.to_owned(),
+        name: name.to_owned().into(),
         mesh: MeshHash::of(b""),
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],

@@ -50,7 +50,7 @@ fn router(connect: &str) -> (Session, String) {
 
 fn hello() -> Hello {
     let body = BodyDescription {
-        name: "ball".to_owned(),
+        name: "ball".to_owned().into(),
         mesh: MeshHash::of(b""),
         pose: PoseF64::IDENTITY,
         colour: [1.0; 4],
