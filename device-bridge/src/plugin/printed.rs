@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{PipeReader, Read};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
@@ -14,16 +15,21 @@ const MAX_LINE: usize = 400;
 const MAX_LINES: usize = 20;
 /// Lines that are kept for an error.
 const LAST: usize = 8;
+/// For what a process that has ended has printed: what it started itself may print on.
+const READ_WITHIN: Duration = Duration::from_millis(500);
 
 /// The newest lines, and the thread that reads them until nobody can print any more.
 pub(super) struct Printed {
     last: Arc<Mutex<VecDeque<String>>>,
+    /// Closed when all is read.
+    all_read: Receiver<()>,
 }
 
 impl Printed {
     /// Reads `from`, which `name` prints to.
     pub(super) fn read(from: PipeReader, name: &str) -> Self {
         let last = Arc::default();
+        let (reading, all_read) = channel();
         let mut lines = Lines {
             name: name.to_owned(),
             line: Vec::with_capacity(MAX_LINE),
@@ -38,12 +44,14 @@ impl Printed {
             .spawn(move || {
                 leave_fifo(); // of the thread that starts it
                 lines.run(from);
+                drop(reading);
             });
-        Self { last }
+        Self { last, all_read }
     }
 
-    /// The newest lines as the end of a sentence; nothing where none was printed.
+    /// The newest lines of a process that has ended, as the end of a sentence; nothing where none was printed.
     pub(super) fn last_lines(&self) -> String {
+        let _ = self.all_read.recv_timeout(READ_WITHIN); // nothing is sent
         let lines = self.last.lock().map(|lines| lines.clone());
         let lines: Vec<String> = lines.unwrap_or_default().into();
         match lines.is_empty() {

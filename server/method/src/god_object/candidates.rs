@@ -55,15 +55,16 @@ impl GodObject {
             looked_at += collected.looked_at;
             self.looked_at[index] = collected.looked_at;
             self.set.gap_min = self.set.gap_min.min(collected.gap_min);
-            reduction.offer(at, &self.contacts, &collected);
-            if !conforms && reduction.conforms(at, index) {
+            let along = reduction.conforms(at, index);
+            reduction.offer(at, &self.contacts, &collected, along);
+            if !conforms && along {
                 reduction.offer_along(at, index, work);
             }
         }
         let looked_at = looked_at + self.given.looked_at;
         self.afford_look_ahead(distance, looked_at + u64::from(reduction.was_given_up()));
         // Known rows may be nearer than what a collection that was given up has found.
-        let gap_min = reduction.gap_min().min(self.given.gap_min);
+        let gap_min = reduction.gap_min(at, work).min(self.given.gap_min);
         self.set.gap_min = self.set.gap_min.min(gap_min);
     }
 

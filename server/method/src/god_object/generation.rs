@@ -55,10 +55,10 @@ impl GodObject {
                 &[]
             };
             reduction.move_to((&at, &self.surfaces(None)), witnesses, work);
-            let (moved, within) = (reduction.moved(self.radius), reduction.complete_within());
+            let (moved, within) = (reduction.moved(self.radius), reduction.served());
             // Where the work allows no more, a longer way is gone before the next collection.
             let reaches = moved + distance.min(LONGER_WAY * within) <= within;
-            self.set.gap_min = reduction.gap_min().min(self.given.gap_min);
+            self.set.gap_min = reduction.gap_min(&at, work).min(self.given.gap_min);
             if !reaches || reduction.is_outdated() {
                 self.collect_candidates(&mut reduction, &at, distance, work);
             }
@@ -157,8 +157,8 @@ impl GodObject {
         if let Some(at) = self.place() {
             let moved = reduction.moved(self.radius) > 0.0;
             // What was given up at this pose would be given up again.
-            let complete = reduction.was_given_up() || reduction.asked() >= published;
-            if moved || !complete {
+            let complete = !moved && (reduction.was_given_up() || reduction.asked() >= published);
+            if !complete {
                 self.collect_candidates(&mut reduction, &at, published, &mut report.work);
             }
         }

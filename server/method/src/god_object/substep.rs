@@ -11,7 +11,6 @@ use crate::collision::Motion;
 use crate::spatial::{
     Vector6, advance_pose, angular, at_reference_point, from_reference_point, linear, six,
 };
-use crate::surface::Friction;
 
 /// A sub-step that covers less than this share of its motion shows that the linear constraints reach too far.
 const TRUSTED_SHARE: f64 = 0.5;
@@ -113,10 +112,10 @@ impl GodObject {
             LEAST_STEP_SHARE * update.made
         };
         // What sticks creeps by as much as friction's answer is in error: that is no motion.
-        let error = self.friction.as_ref().map_or(0.0, Friction::error) * length;
+        let (moving, error) = self.motion_with_friction(&projected.acceleration);
         let settling = update.reversals > MAX_REVERSALS && !tight && !cut;
         let long_enough = !settling
-            && covered > self.settings.motion_tolerance.max(error)
+            && moving > self.settings.motion_tolerance.max(error)
             && (covered * update.step_memory.damping > little // false for NaN
                 || self.tips_over(&projected.acceleration, left, report));
         if !long_enough {

@@ -15,13 +15,15 @@ use crate::surface::FrictionProblem;
 
 impl GodObject {
     /// Whether the projected motion `first` of the wish `left` would be followed by one that is no shorter, by the rows that held the body,
-    /// as they are where it leads to, and friction there. One projection on at most six rows, and no search.
+    /// as they are where it leads to, and friction there: longer by more than friction may be off in either. One projection on at most six rows, and no
+    /// search.
     pub(super) fn tips_over(
         &mut self,
         first: &Vector6,
         left: &Vector6,
         report: &mut StepReport,
     ) -> bool {
+        let (_, first_error) = self.motion_with_friction(first);
         let start = self.pose_at_reference_point();
         let reached = advance_pose(&start, first, 1.0);
         let Some(metric) = self
@@ -64,7 +66,23 @@ impl GodObject {
             };
             second = friction.hold(&problem, project, second);
         }
-        second.status == ProjectionStatus::Solved
-            && self.motion_length(&second.acceleration) >= self.motion_length(first) // false for NaN
+        let longer = self.motion_length(&second.acceleration) - self.motion_length(first);
+        let (_, second_error) = self.motion_with_friction(&second.acceleration);
+        second.status == ProjectionStatus::Solved && longer >= first_error + second_error // false for NaN
+    }
+
+    /// How far the last projected motion `a` moves the body where friction lets it, and by how much it may be off with friction, m.
+    pub(super) fn motion_with_friction(&self, a: &Vector6) -> (f64, f64) {
+        let path = self.motion_length(a);
+        let Some(friction) = &self.friction else {
+            return (path, 0.0);
+        };
+        let body = &self.world.body;
+        let metric = body.metric(self.settings.rotation_metric, &self.pose);
+        metric.map_or((path, 0.0), |metric| {
+            let longest = |norm: f64| metric.longest_path(norm, self.radius);
+            let moving = longest(friction.motion_of(a, &metric));
+            (path.min(moving), longest(friction.error()))
+        })
     }
 }

@@ -75,6 +75,13 @@ impl Metric {
         }
     }
 
+    /// How far a motion of length `norm` (m kg^(1/2)) in the metric moves points at most `radius` (m) from the reference point, at most, m.
+    pub(crate) fn longest_path(&self, norm: f64, radius: f64) -> f64 {
+        norm * self
+            .inverse_root_mass
+            .hypot(radius * self.inverse_factor.norm())
+    }
+
     /// `M a`: the wrench (N, N m) that gives the acceleration `a`, or the momentum of a twist.
     #[inline]
     pub fn mass_matrix_times(&self, a: &Vector6) -> Vector6 {

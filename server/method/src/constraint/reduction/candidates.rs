@@ -132,6 +132,13 @@ impl Candidates {
         }
     }
 
+    /// The candidate with the least gap, and that; the first of several.
+    pub(super) fn nearest(&self) -> Option<(usize, f64)> {
+        let least = self.processor.dispatch(Least(&self.gap));
+        let place = self.gap.iter().position(|gap| *gap == least)?;
+        Some((place, least))
+    }
+
     /// The candidate with the least `max(g, g_0) + J a`, as the purpose sees it, and that.
     pub(super) fn least_clearance(
         &mut self,

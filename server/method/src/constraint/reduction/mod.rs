@@ -187,6 +187,8 @@ pub(crate) struct RowReduction {
     outdated: bool,
     /// How far the points of each obstacle may have gone since the candidates were collected, m.
     gone: Vec<f64>,
+    /// Distance within which pairs were candidates when they were collected, m: every one that trees find, or those along the surfaces.
+    served: f64,
 }
 
 impl RowReduction {
@@ -207,6 +209,7 @@ impl RowReduction {
             next_reach: vec![f64::INFINITY; world.obstacles.len()],
             outdated: false,
             gone: vec![0.0; world.obstacles.len()],
+            served: 0.0,
         }
     }
 
@@ -323,6 +326,11 @@ impl RowReduction {
         self.candidates.complete_within
     }
 
+    /// Distance within which motions of the god-object have their candidates, m. What is missing there stops a motion, and becomes a row so.
+    pub(crate) fn served(&self) -> f64 {
+        self.served
+    }
+
     /// Distance that was asked for when they were collected, m.
     pub(crate) fn asked(&self) -> f64 {
         self.asked
@@ -344,12 +352,28 @@ impl RowReduction {
             .any(|c| c.gap <= TOUCHING_REST_DISTANCES * rest_distance)
     }
 
-    /// Smallest gap of the rows that face and of the candidates, m; that of candidates to first order. Infinite when there are none.
-    pub(crate) fn gap_min(&self) -> f64 {
+    /// Smallest gap of the rows that face and of the candidates, m. Infinite when there are none.
+    pub(crate) fn gap_min(&mut self, at: &At, work: &mut Work) -> f64 {
         let facing = self.known.iter().filter(|row| !row.implied);
         let known = facing.map(|row| row.contact.gap);
-        let carried = self.candidates.gap.iter().map(|gap| gap.max(0.0));
-        known.chain(carried).fold(f64::INFINITY, f64::min)
+        let mut least = known.fold(f64::INFINITY, f64::min);
+        let carried = self.candidates.moved != Vector6::zeros();
+        for _ in 0..MAX_STALE {
+            let nearest = self.candidates.nearest();
+            let Some((k, gap)) = nearest.filter(|(_, gap)| *gap < least) else {
+                break;
+            };
+            if !carried {
+                return gap;
+            }
+            // To first order it is nearer: it is looked at as it is.
+            let contact = face(at, &self.candidates.contacts[k].features, false, work);
+            let exact = contact.map_or(f64::INFINITY, |contact| contact.gap);
+            self.candidates.gap[k] = exact;
+            self.outdated |= contact.is_none() && gap < at.rest_distance;
+            least = least.min(exact);
+        }
+        least
     }
 
     /// Forgets the candidates; those of the present pose are to be offered, within a distance asked for, m.
@@ -359,6 +383,7 @@ impl RowReduction {
         self.outdated = false;
         self.gone.fill(0.0);
         self.candidates.clear(&at.reference);
+        self.served = f64::INFINITY;
         self.overlay.begin();
     }
 
@@ -383,8 +408,14 @@ impl RowReduction {
         };
     }
 
-    /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m).
-    pub(crate) fn offer(&mut self, at: &At, contacts: &[Contact], collected: &Collected) {
+    /// Adds contacts of the present pose to choose from, world frame, complete within a distance (m); those `along` the surfaces are offered, too.
+    pub(crate) fn offer(
+        &mut self,
+        at: &At,
+        contacts: &[Contact],
+        collected: &Collected,
+        along: bool,
+    ) {
         let room = self.candidates.room();
         for contact in contacts.iter().take(room) {
             self.candidates
@@ -397,6 +428,12 @@ impl RowReduction {
         let touching = TOUCHING_REST_DISTANCES * at.rest_distance;
         self.truncated |= within < touching.min(self.asked);
         self.candidates.complete_within = self.candidates.complete_within.min(within);
+        let along = if along {
+            ALONG_REST_DISTANCES * at.rest_distance
+        } else {
+            0.0
+        };
+        self.served = self.served.min(within.max(along));
     }
 
     /// Adds a contact of the present pose to choose from where one of the motions violates it, world frame; whether it does.

@@ -9,7 +9,7 @@
 //! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
 
 use arrayvec::ArrayVec;
-use nalgebra::Matrix6;
+use nalgebra::{Cholesky, Const, Matrix6};
 
 use super::contact::{ConeContact, in_disc};
 use crate::spatial::Vector6;
@@ -105,12 +105,7 @@ impl ConeProblem {
                 row(&contact.tangents[1], contact.slip[1]);
             }
         }
-        let mut regular = gram;
-        let small = LEAST_NORM_REGULARISATION * gram.trace();
-        for i in 0..6 {
-            regular[(i, i)] += small;
-        }
-        let Some(factor) = regular.cholesky() else {
+        let Some(factor) = regular(&gram) else {
             return f64::INFINITY; // the contacts keep zero
         };
         // One step of refinement takes the regularisation out again where contacts hold.
@@ -142,6 +137,19 @@ impl ConeProblem {
         cut.norm() + missed
     }
 
+    /// The part of the whitened motion `y` that loaded contacts which stick leave free.
+    pub(super) fn free_part(&self, y: &Vector6) -> Vector6 {
+        let mut gram = Matrix6::zeros();
+        let loaded = |c: &&ConeContact| c.load > 0.0 && c.coefficient > 0.0;
+        for contact in self.contacts.iter().filter(loaded) {
+            for tangent in &contact.tangents {
+                gram.ger(1.0, tangent, tangent, 1.0);
+            }
+        }
+        let held = regular(&gram).map(|factor| factor.solve(&(gram * y)));
+        held.map_or(*y, |held| y - held)
+    }
+
     /// The whitened wrench of all contacts.
     pub(super) fn wrench(&self) -> Vector6 {
         self.contacts
@@ -155,4 +163,10 @@ impl ConeProblem {
             .iter()
             .fold(Vector6::zeros(), |sum, contact| sum + contact.grip_wrench())
     }
+}
+
+/// The factor of a sum of products of rows, where directions that no row has are regularised.
+fn regular(gram: &Matrix6<f64>) -> Option<Cholesky<f64, Const<6>>> {
+    let small = LEAST_NORM_REGULARISATION * gram.trace();
+    (gram + Matrix6::from_diagonal_element(small)).cholesky()
 }

@@ -42,6 +42,8 @@ pub struct Friction {
     /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
     last: Vector6,
     residual: f64,
+    /// Length in the metric that the residual is relative to, m kg^(1/2).
+    scale: f64,
     slid: bool,
     acts: bool,
 }
@@ -94,6 +96,7 @@ impl Friction {
             rows: ArrayVec::new(),
             last: Vector6::zeros(),
             residual: 0.0,
+            scale: 0.0,
             slid: true,
             acts: false,
         })
@@ -105,13 +108,23 @@ impl Friction {
         self.residual
     }
 
-    /// By how much the last answer may be off, relative to a_u: [`Self::residual`], or zero where the frictionless answer stands for one that was not found.
+    /// By how much the last answer may be off, in the metric, m kg^(1/2); zero where the frictionless answer stands for one that was not found.
     pub(crate) fn error(&self) -> f64 {
         if self.residual.is_finite() {
-            self.residual
+            self.residual * self.scale
         } else {
             0.0
         }
+    }
+
+    /// Length in the metric of that part of the last answer `a` which is motion: where no loaded contact has slipped, they hold the rest, and what it moves is
+    /// the error of the answer. m kg^(1/2).
+    pub(crate) fn motion_of(&self, a: &Vector6, metric: &Metric) -> f64 {
+        if self.slid || !self.acts {
+            return metric.norm(a);
+        }
+        let y = metric.whiten(a);
+        self.cone.free_part(&y).norm()
     }
 
     /// Whether a loaded contact has slipped in the last answer, or none was loaded: then sticking starts anew there.
@@ -147,6 +160,7 @@ impl Friction {
         if !usable {
             return frictionless;
         }
+        self.scale = scale;
         let mut held: Option<Projection> = None;
         for _ in 0..MAX_ROUNDS {
             let now = held.as_ref().unwrap_or(&frictionless);
