@@ -12,6 +12,7 @@ import taut
 from test_watch import PATIENCE, TOKEN, Session
 
 EXAMPLE = pathlib.Path(__file__).resolve().parents[1] / "examples/robot_loop.py"
+DOCUMENT = EXAMPLE.parents[3] / "docs/python.md"
 STILL = "t,x,y,z,qw,qx,qy,qz\n0,0,0,0.2,1,0,0,0\n1,0,0,0.2,1,0,0,0\n"
 
 
@@ -26,7 +27,7 @@ class Open(Session):
                 ('# path = "my-hand.csv"', 'path = "still.csv"'),
                 ("tremor = 5e-5", "tremor = 0.0"),
                 ('passivity = "observe" ', 'passivity = "control" '),
-                ("enabled = false                            # needs safety.passivity", "enabled = true #"),
+                ("enabled = false                            # needs safety.passivity", "enabled = true # "),
             ],
             {"still.csv": STILL},
         )
@@ -54,6 +55,8 @@ class Open(Session):
 
 class Push(unittest.TestCase):
     def test_the_example_closes_a_loop_and_when_it_is_killed_its_force_is_gone(self):
+        _, code = EXAMPLE.read_text().split("\n\n", 1)
+        self.assertIn(f"```python\n{code}```", DOCUMENT.read_text())
         with Open(3 * PATIENCE) as session, taut.watch(session.url, TOKEN) as states:
             arguments = [session.url, session.server, session.keys / "force.key", TOKEN]
             robot = subprocess.Popen([sys.executable, EXAMPLE, *arguments])

@@ -18,13 +18,13 @@ use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
 use taut_scene::{BuiltMotion, FidelityPlan, Scene, WrenchSource};
 
-use crate::loops::external_wrench::ExternalWrenchSettings;
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::head::HeadSource;
 use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
+use taut_bridge::ExternalWrenchSettings;
 
 /// Everything that a session is made of.
 pub struct SessionSetup {

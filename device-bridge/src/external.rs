@@ -1,6 +1,7 @@
 //! A wrench from outside (a robot's sensor, a simulation) on its way to the hand: judged, limited, and gone when it is old.
 //!
-//! What comes out is added to the contact's wrench before the device port, so every promise of the port holds of the sum.
+//! What comes out is added to the contact's wrench before the device port, so every promise of the port holds of the sum. Where the device is behind a bridge
+//! the server judges it and passes it on, and the bridge judges it again by its own clock and adds it: [`crate::edge::PassedWrench`].
 //!
 //! | name in code | unit | meaning |
 //! |--------------|------|---------|
@@ -18,8 +19,9 @@ use std::time::Duration;
 
 use god_object::nalgebra::UnitQuaternion;
 use god_object::spatial::{Pose, Vector6, angular, linear, six};
-use taut_bridge::{fade_share, within_limits};
 use taut_link::ForceOutput;
+
+use crate::port::{fade_share, within_limits};
 
 /// Most that the time of a value may be ahead of its arrival: clocks that agree differ by far less.
 pub const MAX_AHEAD: Duration = Duration::from_millis(20);
@@ -74,6 +76,21 @@ pub struct NewestWrench {
     pub sent: Option<SentWrench>,
     /// Session time at which something came that is no wrench; zero for never.
     pub spoiled: Duration,
+}
+
+/// The value that is felt now, for who adds it elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JudgedWrench {
+    /// Limited; N and N m. In the body's axes with [`WrenchAxes::Body`], else the scene's.
+    pub wrench: Vector6,
+    /// When it was measured, session time, as its sender told.
+    pub made: Duration,
+    /// By how much that may be too late.
+    pub uncertainty: Duration,
+    /// Counts the values that were taken.
+    pub count: u64,
+    /// How it is to be felt.
+    pub settings: ExternalWrenchSettings,
 }
 
 /// Where values come from: a reading end that never waits.
@@ -258,6 +275,41 @@ impl ExternalWrench {
         self.statistics.clone()
     }
 
+    /// Nothing is felt until another value comes, which ramps in.
+    pub(crate) fn stop(&mut self) -> Vector6 {
+        let _ = self.reader.news();
+        (self.newest, self.gain) = (None, 0.0);
+        self.statistics.tell(None, &Vector6::zeros());
+        Vector6::zeros()
+    }
+
+    pub(crate) fn counters(&self) -> &ExternalWrenchStatistics {
+        &self.statistics
+    }
+
+    /// The same by other settings from now on.
+    pub(crate) fn set_settings(&mut self, settings: ExternalWrenchSettings) {
+        self.settings = settings;
+    }
+
+    /// The value that the last tick felt; `None` where it felt none.
+    #[must_use]
+    pub fn judged(&self) -> Option<JudgedWrench> {
+        let newest = self.newest.filter(|_| self.statistics.is_felt())?;
+        let settings = self.settings;
+        let limited = within_limits(&newest.wrench, settings.max_force, settings.max_torque);
+        Some(JudgedWrench {
+            wrench: match settings.axes {
+                WrenchAxes::Fixed(turn) => turned(&turn, &limited),
+                WrenchAxes::Body => limited,
+            },
+            made: newest.told,
+            uncertainty: newest.told.saturating_sub(newest.made),
+            count: self.statistics.taken(),
+            settings,
+        })
+    }
+
     /// What is added to the contact's wrench at session time `now`, N and N m, scene axes; `body` is the body in the hand. Call it once a period.
     pub fn tick(&mut self, now: Duration, body: &Pose) -> Vector6 {
         let passed = now.saturating_sub(self.last_tick.replace(now).unwrap_or(now));
@@ -281,8 +333,7 @@ impl ExternalWrench {
             WrenchAxes::Fixed(turn) => turn,
             WrenchAxes::Body => body.rotation,
         };
-        let (force, torque) = (turn * linear(&limited), turn * angular(&limited));
-        let added = six(&force, &torque) * self.gain;
+        let added = turned(&turn, &limited) * self.gain;
         self.statistics.tell((by_age > 0.0).then_some(age), &added);
         added
     }
@@ -339,6 +390,11 @@ impl ExternalWrench {
     }
 }
 
+/// The wrench in the axes that `turn` leads to.
+fn turned(turn: &UnitQuaternion<f64>, wrench: &Vector6) -> Vector6 {
+    six(&(turn * linear(wrench)), &(turn * angular(wrench)))
+}
+
 #[cfg(test)]
-#[path = "external_wrench_tests.rs"]
+#[path = "external_tests.rs"]
 mod tests;
