@@ -218,8 +218,9 @@ impl DevicePort {
         let reading = self.sense(now);
         let command = command(&reading);
         if let Some(command) = &command {
+            let commanded = command.wrench + command.external;
             self.controller
-                .grant(command.obstacle_work, &command.wrench, self.slew.rendered());
+                .grant(command.obstacle_work, &commanded, self.slew.rendered());
         }
         let wrench = self.render(now, passed, command);
         self.device
