@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
-use taut_bridge::{Device, DeviceLimits, SafetySettings};
+use taut_bridge::{Device, DeviceLimits, ExternalWrenchSettings, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
@@ -24,7 +24,6 @@ use crate::session::head::HeadSource;
 use crate::session::monitor::MonitorSettings;
 use crate::session::observers::ObserverSettings;
 use crate::session::operator::OperatorSetup;
-use taut_bridge::ExternalWrenchSettings;
 
 /// Everything that a session is made of.
 pub struct SessionSetup {

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use god_object::Pose;
 use taut_bridge::{
-    ContactBound, DeviceChoice, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm,
-    SafetySettings, ValidationSettings, vrpn_settings,
+    ContactBound, DeviceChoice, ExternalWrenchSettings, InputChoice, MAX_EDGE_DELAY, Passivity,
+    PassivitySettings, Rearm, SafetySettings, ValidationSettings, WrenchAxes, vrpn_settings,
 };
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
@@ -32,7 +32,6 @@ use crate::session::setup::{
 };
 use crate::shared::contact_snapshot::MAX_MOVING;
 use crate::shared::failure::Failure;
-use taut_bridge::{ExternalWrenchSettings, WrenchAxes};
 
 /// Period of the haptics loop: the device's rate, 1 kHz.
 const HAPTICS_PERIOD: Duration = Duration::from_millis(1);
