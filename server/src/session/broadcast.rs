@@ -51,7 +51,7 @@ pub struct BridgeCommands {
     pub sets: EdgeSets,
     /// A force from outside, where the workbench takes one.
     pub passed: Option<PassedReader>,
-    /// Ticks in which there was none since the last, up to [`TOLD_NONE`].
+    /// Ticks in which there was none since the last, as far as they count.
     pub told_none: u32,
 }
 
