@@ -13,6 +13,7 @@
  *
  * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
  */
+#define _POSIX_C_SOURCE 200809L
 #include <dlfcn.h>
 #include <stdbool.h>
 #include <math.h>
@@ -21,6 +22,7 @@
 #include <string.h>
 
 #include "taut_device.h"
+#include "vendor.h"
 
 enum { DHD_TIMEGUARD = 1 };
 
@@ -48,15 +50,6 @@ struct device {
     bool has_wrist, turns;
     double force, torque, stiffness, rotational_stiffness;
 };
-
-/* All calls come from one thread. */
-static char text[256];
-
-static int fail(int code, const char *what, const char *why)
-{
-    snprintf(text, sizeof text, "%s: %s", what, why ? why : "no reason given");
-    return code;
-}
 
 static const char *last(void) { return dhd.ErrorGetLastStr ? dhd.ErrorGetLastStr() : NULL; }
 
@@ -99,17 +92,6 @@ static int load(const char *path)
         return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
     }
     return TAUT_DEVICE_OK;
-}
-
-/* The number of `value`, which must be within. */
-static bool number(const char *value, double low, double high, double *target)
-{
-    char *end;
-    double read = strtod(value, &end);
-    if (end == value || *end || !(read >= low && read <= high))
-        return false;
-    *target = read;
-    return true;
 }
 
 static int32_t device_close(void *opened)
@@ -201,38 +183,10 @@ static void turned(const double from[3], double to[3])
     to[2] = from[2];
 }
 
-/* w x y z of a rotation matrix, by the largest of the four. NaN stays NaN. */
-static void quaternion(double m[3][3], double q[4])
-{
-    double trace = m[0][0] + m[1][1] + m[2][2], largest = trace, norm = 0;
-    int at = -1;
-    for (int i = 0; i < 3; i++)
-        if (m[i][i] > largest) {
-            largest = m[i][i];
-            at = i;
-        }
-    if (at < 0) {
-        q[0] = 1 + trace;
-        q[1] = m[2][1] - m[1][2];
-        q[2] = m[0][2] - m[2][0];
-        q[3] = m[1][0] - m[0][1];
-    } else {
-        int b = (at + 1) % 3, c = (at + 2) % 3;
-        q[0] = m[c][b] - m[b][c];
-        q[1 + at] = 1 + m[at][at] - m[b][b] - m[c][c];
-        q[1 + b] = m[b][at] + m[at][b];
-        q[1 + c] = m[c][at] + m[at][c];
-    }
-    for (int i = 0; i < 4; i++)
-        norm += q[i] * q[i];
-    for (int i = 0; i < 4; i++)
-        q[i] /= sqrt(norm);
-}
-
 static int32_t device_read(void *opened, taut_device_sample *sample)
 {
     const struct device *device = opened;
-    double p[3], v[3], w[3], frame[3][3], columns[3][3], seen[3][3];
+    double p[3], v[3], w[3], frame[3][3];
     int result = dhd.GetPosition(&p[0], &p[1], &p[2], device->id);
     if (result < 0)
         return fail(TAUT_DEVICE_GONE, "dhdGetPosition", last());
@@ -245,16 +199,7 @@ static int32_t device_read(void *opened, taut_device_sample *sample)
     if (device->has_wrist) {
         if (dhd.GetOrientationFrame(frame, device->id) < 0)
             return fail(TAUT_DEVICE_GONE, "dhdGetOrientationFrame", last());
-        /* M R M^T: both indices go from the vendor's axes to ours. */
-        for (int row = 0; row < 3; row++)
-            turned(frame[row], columns[row]);
-        for (int column = 0; column < 3; column++) {
-            double from[3] = {columns[0][column], columns[1][column], columns[2][column]}, to[3];
-            turned(from, to);
-            for (int row = 0; row < 3; row++)
-                seen[row][column] = to[row];
-        }
-        quaternion(seen, sample->orientation);
+        turned_rotation(frame, sample->orientation);
         if (dhd.GetAngularVelocityRad && dhd.GetAngularVelocityRad(&w[0], &w[1], &w[2], device->id) >= 0) {
             turned(w, sample->angular_velocity);
             sample->measured |= TAUT_DEVICE_HAS_ANGULAR_VELOCITY;
@@ -271,12 +216,6 @@ static int32_t device_write(void *opened, const double wrench[6])
     /* Back to x towards the user, y right, z up. */
     int result = dhd.SetForceAndTorqueAndGripperForce(-wrench[1], wrench[0], wrench[2], -wrench[4], wrench[3], wrench[5], 0, device->id);
     return result < 0 ? fail(TAUT_DEVICE_GONE, "dhdSetForceAndTorqueAndGripperForce", last()) : TAUT_DEVICE_OK;
-}
-
-static void device_error_text(void *opened, char *to, size_t size)
-{
-    (void)opened;
-    snprintf(to, size, "%s", text);
 }
 
 const taut_device_table *taut_device_entry(void)

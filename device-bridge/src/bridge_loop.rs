@@ -9,12 +9,13 @@ use nalgebra::Vector6;
 use taut_link::proto::constraints::ConstraintSet;
 use taut_link::proto::input::{INPUT_AT_EDGE, INPUT_FAULT};
 use taut_link::proto::wrench::WRENCH_PAUSED;
-use taut_link::proto::{InputSample, PoseF64, SessionTime, WrenchCommand};
+use taut_link::proto::{InputSample, PassedForce, PoseF64, SessionTime, WrenchCommand};
 
 use crate::device::DeviceFault;
-use crate::edge::{BrokenSet, EdgeCoupler};
+use crate::edge::{BrokenSet, EdgeCoupler, PassedWrench};
+use crate::external::ExternalWrenchStatistics;
 use crate::own_stamps::OwnStamps;
-use crate::port::{Command, CommandSource, DevicePort, Events, Spell};
+use crate::port::{Command, CommandSource, DevicePort, Events, Passivity, Spell};
 use crate::report::Durations;
 
 /// The newest command, and when the device was read for what it comes from.
@@ -64,6 +65,10 @@ pub struct BridgeLoop {
     newest: Option<Newest>,
     /// The coupling, where it is here and not at the server.
     edge: Option<Box<EdgeCoupler>>,
+    /// A force from outside, where this port keeps its energy.
+    passed: Option<Box<PassedWrench>>,
+    /// One was refused, and that was told.
+    unkept: bool,
     /// Number of the set that was refused last.
     refused: Option<u64>,
     refusals: Spell,
@@ -73,7 +78,11 @@ impl BridgeLoop {
     /// A loop without a session.
     #[must_use]
     pub fn new(port: DevicePort) -> Self {
+        let settings = port.settings();
+        let keeps_energy = settings.passivity.mode == Passivity::Control;
         Self {
+            passed: keeps_energy.then(|| Box::new(PassedWrench::new(settings))),
+            unkept: false,
             port,
             stats: TickStats {
                 ticks: 0,
@@ -112,6 +121,11 @@ impl BridgeLoop {
         &self.stats
     }
 
+    /// What became of a force from outside; `None` where none is felt.
+    pub(crate) fn external(&self) -> Option<&ExternalWrenchStatistics> {
+        self.passed.as_ref().map(|passed| passed.statistics())
+    }
+
     /// The fault that the device is in.
     pub(crate) fn fault(&self) -> Option<DeviceFault> {
         self.port.fault()
@@ -124,6 +138,9 @@ impl BridgeLoop {
         self.stamps = OwnStamps::default();
         self.edge = edge.map(Box::new);
         self.refused = None;
+        if let Some(passed) = &mut self.passed {
+            passed.restart();
+        }
         self.port.restart(source);
     }
 
@@ -166,6 +183,22 @@ impl BridgeLoop {
         None
     }
 
+    /// Takes the newest force from outside, once or again, before the tick at `now`.
+    ///
+    /// Whether it is to be told that none is felt here, because this port does not keep the energy that one could give without end: once.
+    pub fn take_passed(
+        &mut self,
+        passed: &PassedForce,
+        now: Duration,
+        session: Option<SessionTime>,
+    ) -> bool {
+        match &mut self.passed {
+            Some(felt) => felt.take(passed, now, session),
+            None => return !std::mem::replace(&mut self.unkept, true),
+        }
+        false
+    }
+
     /// One tick at `now`. `session` is session time, `None` while the clock is not locked; `command` is the newest one, again and again
     /// until there is a newer one.
     pub fn tick(
@@ -181,13 +214,29 @@ impl BridgeLoop {
 
         let index = self.next_index;
         self.next_index += 1;
-        let (newest, edge) = (self.newest, &mut self.edge);
-        let report = self.port.tick(now, |reading| match edge {
-            Some(edge) => edge.step(now, &reading.sample).map(|felt| Command {
-                obstacle_work: felt.obstacle_work,
-                ..Command::on_set(felt.origin, felt.wrench)
-            }),
-            None => newest.map(|newest| command(&newest)),
+        let (newest, edge, passed) = (self.newest, &mut self.edge, &mut self.passed);
+        let paused = match (&edge, &newest) {
+            (Some(edge), _) => edge.is_paused(),
+            (None, Some(newest)) => newest.command.flags & WRENCH_PAUSED != 0,
+            (None, None) => true,
+        };
+        let report = self.port.tick(now, |reading| {
+            let command = match edge {
+                Some(edge) => edge.step(now, &reading.sample).map(|felt| Command {
+                    obstacle_work: felt.obstacle_work,
+                    ..Command::on_set(felt.origin, felt.wrench)
+                }),
+                None => newest.map(|newest| command(&newest)),
+            };
+            let external = match passed {
+                Some(passed) if paused => passed.stop(),
+                Some(passed) => passed.tick(now, &reading.sample.pose),
+                None => Vector6::zeros(),
+            };
+            command.map(|command| Command {
+                external,
+                ..command
+            })
         });
 
         let wrench = &report.wrench;

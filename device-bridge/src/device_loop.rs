@@ -30,6 +30,8 @@ pub(crate) enum Notice {
     Safety(SafetyEvent),
     /// A constraint set that is not used.
     Refused(BrokenSet),
+    /// A force from outside that is not felt, because the port does not keep its energy.
+    Unkept,
 }
 
 /// The device loop: the only thread that touches the device.
@@ -96,6 +98,11 @@ impl DeviceLoop {
                 && let Some(broken) = bridge.take_set(&set, now, session)
             {
                 self.notice(Notice::Refused(broken));
+            }
+            if let Some(passed) = self.link.latest_force()
+                && bridge.take_passed(&passed, now, session)
+            {
+                self.notice(Notice::Unkept);
             }
             match self.wishes.take() {
                 Some(ArmWish::Arm) => bridge.port_mut().ask_to_arm(),

@@ -10,6 +10,7 @@
 //! - Inputs without force: [`SpaceMouse`], [`VrpnDevice`]; [`DeviceChoice`] names them all.
 //! - [`DevicePort`]: the one place through which samples come in and wrenches go out, safe.
 //! - [`edge`]: the coupling beside the device, for a server at the far end of a slow network.
+//! - [`ExternalWrench`]: a force from a robot or a simulation, judged before it is added to the contact's.
 //! - [`EnergyObserver`]: what the coupling did to the hand.
 //! - [`console`], [`signals`]: people and the system, heard and told without waiting.
 //! - [`realtime`]: what a periodic loop asks of the operating system.
@@ -25,6 +26,7 @@ mod device;
 mod device_loop;
 mod devices;
 pub mod edge;
+mod external;
 pub mod haply;
 mod own_stamps;
 mod placement;
@@ -67,6 +69,10 @@ pub use devices::{
     PluginSettings, PolhemSettings, Progress, RecordedDevice, RemoteDevice, SimulatedDevice,
     SpidarDevice, SpidarPlacement, SpidarUartError, SpidarUartSettings, Trace, TraceError,
     TraceRow, Tremor, TremorMotion, UnknownHand, ViaPoint, haply_limits, min_jerk, string_grip,
+};
+pub use external::{
+    ExternalWrench, ExternalWrenchSettings, ExternalWrenchStatistics, JudgedWrench, MAX_AHEAD,
+    NewestWrench, Refused, SentWrench, WrenchAxes, WrenchReader,
 };
 pub use placement::Placement;
 pub use plugged::{PluggedPort, plugged_ports};

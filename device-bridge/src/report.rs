@@ -100,6 +100,10 @@ pub struct BridgeReport {
     /// Largest age of the device's reading that a force came from, or the constraint set that it rested on, ms: the force is gone when that is
     /// 120 ms, as long as the loop itself is on time.
     pub max_force_age_ms: f64,
+    /// Forces from outside that were taken.
+    pub external_wrenches: u64,
+    /// Largest age, since it was measured, of one of which anything was felt, ms.
+    pub max_external_age_ms: f64,
     /// Largest force rendered, N.
     pub max_force_n: f64,
     /// Largest torque rendered, N m.

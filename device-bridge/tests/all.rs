@@ -5,6 +5,7 @@ use assert_no_alloc::AllocDisabler;
 
 mod closed_loop;
 mod ends;
+mod external;
 mod haply;
 mod held_strings;
 mod inputs_without_allocation;

@@ -1,4 +1,4 @@
-//! Devices in shared libraries: the interface on a stand-in hand in C, and the DHD plug-in on a stand-in of the vendor's library. Both are built here by `cc`.
+//! Devices in shared libraries: the interface on a stand-in hand in C, and the plug-ins of vendors on stand-ins of their libraries. All are built here by `cc`.
 #![cfg(unix)]
 #![allow(
     unsafe_code,
@@ -39,7 +39,7 @@ fn built(folder: &Path, source: &Path, name: &str, define: &str) -> PathBuf {
         .arg(source)
         .arg("-o")
         .arg(&library)
-        .args(["-ldl", "-lm"]);
+        .args(["-ldl", "-lm", "-lpthread"]);
     let out = cc.output().expect("cc, as of the package build-essential");
     assert!(
         out.status.success(),
@@ -219,31 +219,100 @@ fn what_does_not_fit_is_named() {
     assert!(error(&hand).contains("no hand is plugged in"));
 }
 
-#[test]
-fn force_dimension_s_functions_are_called_as_published() {
+/// The plug-in of this name, built by the line of the document as a user types it in the repository, and chosen without options; beside it `strict.so`, the
+/// same source with every warning an error.
+fn documented(name: &str) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().expect("a folder");
-    // The line of the document, as a user types it in the repository.
     std::os::unix::fs::symlink(here(), folder.path().join("device-bridge")).expect("a link");
     let document = document();
+    let source = format!("plugins/{name}.c");
     let line = document
         .lines()
-        .find(|line| line.starts_with("cc ") && line.contains("plugins/dhd.c"))
+        .find(|line| line.starts_with("cc ") && line.contains(&source))
         .expect("how to build it");
     let mut shell = Process::new("sh");
     let status = shell.args(["-c", line]).current_dir(folder.path()).status();
     assert!(status.expect("a shell").success(), "{line}");
+    built(folder.path(), &here().join(source), "strict.so", "STRICT");
+    let plugin = folder.path().join(format!("taut_{name}.so"));
+    (folder, format!("plugin:{}", plugin.display()))
+}
+
+#[test]
+fn openhaptics_functions_are_called_as_published() {
+    let (folder, bare) = documented("hd");
+    let vendor = stand_in(folder.path(), "stand_in_hd.c", "HD");
+    let inside = Loaded::of(&vendor);
+    for (options, named) in [
+        (
+            "library=/no/libHD.so",
+            "cannot be loaded (install it; option library=PATH)",
+        ),
+        ("force=1e9", "out of range: force"),
+        ("colour=red", "there are library, name, force, stiffness"),
+        (
+            &format!("library={}/strict.so", folder.path().display()),
+            "it lacks: hdInitDevice",
+        ),
+    ] {
+        let said = opened(&format!("{bare},{options}")).err().expect(options);
+        assert!(said.contains(named), "{options}: {said}");
+    }
+    let choice = format!(
+        "{bare},library={},name=Left Device,force=8,stiffness=800",
+        vendor.display()
+    );
+    inside.set("mode", UNPLUGGED);
+    let said = opened(&choice).err().expect("none is plugged in");
+    assert!(said.contains("no device found"), "{said}");
+    inside.set("mode", GOOD);
+
+    // Where the workbench has it: right, away from the user, up; and turned about the axis to the right.
+    let mut device = opened(&format!("{choice},anchor=workbench")).expect("it is there");
+    assert_eq!(device.info().name, "3D Systems stand-in Touch");
+    let freedoms = (
+        device.info().sensed_degrees_of_freedom,
+        device.info().actuated_degrees_of_freedom,
+    );
+    assert_eq!(freedoms, (6, 3));
+    assert_eq!(device.info().limits.max_force, 8.0);
+    let begun = Instant::now();
+    let sample = loop {
+        match device.read(ms(1)) {
+            Ok(sample) => break sample,
+            Err(fault) => assert!(begun.elapsed() < PATIENCE, "{fault}"),
+        }
+    };
+    let at = sample.pose.translation.vector;
+    assert!(
+        (at.x - 0.03).abs() < 1e-12 && (at.y + 0.02).abs() < 1e-12,
+        "{at}"
+    );
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::x() * 2.5);
+    assert!(
+        sample.pose.rotation.angle_to(&turn) < 1e-9,
+        "{}",
+        sample.pose.rotation
+    );
+    assert_eq!(sample.buttons, 2);
+    drop(device);
+    inside.wait("it is closed", &|| inside.get("closes") > 0);
+
+    let modes = [
+        (HANGS, "was lost"),
+        (NOT_A_NUMBER, "not finite"),
+        (TOO_HOT, "was lost"),
+        (UNPLUGGED, "was lost"),
+        (NOT_CALIBRATED, "was lost"),
+    ];
+    goes_wrong(&choice, &inside, &modes);
+}
+
+#[test]
+fn force_dimension_s_functions_are_called_as_published() {
+    let (folder, bare) = documented("dhd");
     let vendor = stand_in(folder.path(), "stand_in_dhd.c", "DHD");
     let inside = Loaded::of(&vendor);
-    let plugin = folder.path().join("taut_dhd.so");
-    // The same source with every warning an error.
-    built(
-        folder.path(),
-        &here().join("plugins/dhd.c"),
-        "strict.so",
-        "STRICT",
-    );
-
-    let bare = format!("plugin:{}", plugin.display());
     for (options, named) in [
         (
             "library=/no/libdhd.so",

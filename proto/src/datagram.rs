@@ -2,7 +2,7 @@
 
 use crate::{
     Confirmation, ConstraintPart, DecodeError, EncodeError, ForceSample, HeadSample, HotState,
-    InputSample, Kind, WrenchCommand,
+    InputSample, Kind, PassedForce, WrenchCommand,
     barrier::{Arrive, Release},
     codec::{decode, encode_into},
     events::EventAck,
@@ -47,6 +47,8 @@ pub enum Payload {
     PathResponse(PathToken),
     /// A wrench from outside.
     Force(ForceSample),
+    /// The same on its way to the device.
+    PassedForce(PassedForce),
 }
 
 impl Payload {
@@ -68,6 +70,7 @@ impl Payload {
             Payload::PathChallenge(_) => Kind::PathChallenge,
             Payload::PathResponse(_) => Kind::PathResponse,
             Payload::Force(_) => Kind::Force,
+            Payload::PassedForce(_) => Kind::PassedForce,
         }
     }
 
@@ -86,6 +89,7 @@ impl Payload {
             Payload::Constraints(value) => encode_into(value, buffer),
             Payload::Head(value) => encode_into(value, buffer),
             Payload::Force(value) => encode_into(value, buffer),
+            Payload::PassedForce(value) => encode_into(value, buffer),
             Payload::Confirm(value) => encode_into(value, buffer),
             Payload::PathChallenge(value) | Payload::PathResponse(value) => {
                 encode_into(value, buffer)
@@ -112,6 +116,7 @@ impl Payload {
             Kind::PathChallenge => Payload::PathChallenge(decode(bytes)?),
             Kind::PathResponse => Payload::PathResponse(decode(bytes)?),
             Kind::Force => Payload::Force(decode(bytes)?),
+            Kind::PassedForce => Payload::PassedForce(decode(bytes)?),
         })
     }
 }

@@ -1,8 +1,9 @@
-//! FORCE payload: a wrench from outside for the hand to feel, upstream to the haptics loop.
+//! FORCE payload: a wrench from outside for the hand to feel, upstream to the haptics loop. PASSED_FORCE: the same on its way to the bridge that has the
+//! device, which judges its age by its own clock.
 
 use crate::{
     codec::wire_ranged,
-    range::{COUNT, FORCE, TIME},
+    range::{BITS, COUNT, FORCE, TIME},
 };
 
 /// One value of a sensor or of a simulation.
@@ -23,4 +24,30 @@ wire_ranged!(ForceSample {
     clock_uncertainty_ns in TIME,
     index in COUNT,
     wrench in FORCE
+});
+
+/// A wrench from outside that the server passes on to the device bridge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassedForce {
+    /// The value: time and uncertainty are the source's own, the number is the server's count of good ones, the wrench is within the workbench's limits, scene
+    /// axes unless [`FORCE_IN_BODY`].
+    pub sample: ForceSample,
+    /// Age up to which it is felt in full, ns; no more than the bridge's own port allows.
+    pub hold_ns: u64,
+    /// Time in which it then fades, ns; likewise.
+    pub ramp_out_ns: u64,
+    /// [`FORCE_NONE`], [`FORCE_IN_BODY`].
+    pub flags: u16,
+}
+
+/// [`PassedForce::flags`]: nothing is to be felt from now on, whatever came before.
+pub const FORCE_NONE: u16 = 1;
+/// [`PassedForce::flags`]: the axes are those of the body in the hand.
+pub const FORCE_IN_BODY: u16 = 2;
+
+wire_ranged!(PassedForce {
+    sample,
+    hold_ns in TIME,
+    ramp_out_ns in TIME,
+    flags in BITS
 });

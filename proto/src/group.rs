@@ -125,7 +125,8 @@ pub fn may_carry(kind: Kind, sender: u16) -> bool {
         | Kind::Confirm
         | Kind::PathChallenge
         | Kind::PathResponse
-        | Kind::Force => false,
+        | Kind::Force
+        | Kind::PassedForce => false,
     }
 }
 

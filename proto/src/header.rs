@@ -56,6 +56,8 @@ pub enum Kind {
     PathResponse,
     /// [`crate::ForceSample`], force source to server.
     Force,
+    /// [`crate::PassedForce`], server to device bridge.
+    PassedForce,
 }
 
 impl Kind {
@@ -76,6 +78,7 @@ impl Kind {
             Kind::PathChallenge => 13,
             Kind::PathResponse => 14,
             Kind::Force => 15,
+            Kind::PassedForce => 16,
         }
     }
 
@@ -96,6 +99,7 @@ impl Kind {
             13 => Ok(Kind::PathChallenge),
             14 => Ok(Kind::PathResponse),
             15 => Ok(Kind::Force),
+            16 => Ok(Kind::PassedForce),
             tag => Err(DecodeError::UnknownTag {
                 what: "datagram kind",
                 tag,

@@ -3,8 +3,8 @@
 //! No sockets, no clocks, no async: bytes and times are arguments. Two kinds of bytes exist.
 //!
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
-//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`force::ForceSample`], [`wrench::WrenchCommand`],
-//!   [`constraints::ConstraintPart`], [`barrier`], [`time`].
+//!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`force::ForceSample`], [`force::PassedForce`],
+//!   [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`barrier`], [`time`].
 //! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
 //!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
@@ -67,7 +67,7 @@ pub use coupling::{CouplingOffer, EdgeCoupling};
 pub use credential::{Credential, Holder, JoinKey};
 pub use datagram::Payload;
 pub use events::{EventInbox, EventOutbox, EventsTold};
-pub use force::ForceSample;
+pub use force::{ForceSample, PassedForce};
 pub use group::{Group, GroupMember, GroupOpener, GroupSealer};
 pub use head::HeadSample;
 pub use header::{Header, Kind};

@@ -258,6 +258,7 @@ pub fn numbers() -> impl Iterator<Item = &'static Number> {
         input::InputSample::NUMBERS,
         head::HeadSample::NUMBERS,
         force::ForceSample::NUMBERS,
+        force::PassedForce::NUMBERS,
         wrench::WrenchCommand::NUMBERS,
         constraints::SetHead::NUMBERS,
         constraints::ConstraintPart::NUMBERS,

@@ -32,6 +32,7 @@ mod setup;
 mod support;
 mod tracked_head;
 mod wrench_in;
+mod wrench_in_bridge;
 mod wrench_in_energy;
 
 /// Counts by thread: a test that forbids allocation forbids its own.

@@ -7,13 +7,13 @@ use assert_no_alloc::assert_no_alloc;
 use god_object::nalgebra::UnitQuaternion;
 use god_object::spatial::Vector6;
 use god_object::{GodObject, Pose};
-use taut::loops::external_wrench::{
-    ExternalWrench, ExternalWrenchSettings, NewestWrench, SentWrench, WrenchAxes, WrenchReader,
-};
 use taut::loops::wiring::WiredLoops;
 use taut_bridge::{
     Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, Passivity, PassivitySettings,
     SafetySettings,
+};
+use taut_bridge::{
+    ExternalWrench, ExternalWrenchSettings, NewestWrench, SentWrench, WrenchAxes, WrenchReader,
 };
 use taut_scene::Scene;
 

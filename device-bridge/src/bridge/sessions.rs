@@ -272,6 +272,10 @@ impl Run<'_> {
             packets_lost: totals.packets.lost,
             energy_injected_j: bridge.port().energy().injected(),
             energy_delivered_j: bridge.port().energy().delivered(),
+            external_wrenches: bridge.external().map_or(0, |seen| seen.taken()),
+            max_external_age_ms: bridge
+                .external()
+                .map_or(0.0, |seen| seen.largest_age().as_secs_f64() * 1e3),
             max_force_age_ms: stats.max_force_age.as_secs_f64() * 1e3,
             max_force_n: stats.max_force,
             max_torque_n_m: stats.max_torque,
@@ -297,6 +301,11 @@ fn tell(link: &ClientLink, notices: &Receiver<Notice>) {
         let (warning, text) = match notice {
             Notice::Safety(event) => (event.kind.is_warning(), event.to_string()),
             Notice::Refused(broken) => (true, broken.to_string()),
+            Notice::Unkept => (
+                true,
+                "a force from outside is not felt here: start this bridge with --passivity control"
+                    .to_owned(),
+            ),
         };
         let level = if warning {
             tracing::warn!("{text}");

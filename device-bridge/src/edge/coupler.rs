@@ -125,6 +125,12 @@ impl EdgeCoupler {
         self.made_ns
     }
 
+    /// Whether the server says that no force is to be given.
+    #[must_use]
+    pub fn is_paused(&self) -> bool {
+        self.paused
+    }
+
     /// The force for a device sample; `None` before the first set. `now` never runs back. A sample of the time of the one before is the same
     /// reading again.
     #[must_use]

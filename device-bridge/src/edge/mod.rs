@@ -11,6 +11,7 @@
 //! | `settings.rs`  | the method's settings, to and from the wire                              |
 //! | `sets.rs`      | constraint sets, to and from the wire                                    |
 //! | `coupler.rs`   | the coupling beside the device                                           |
+//! | `passed.rs`    | a wrench from outside, on its way to the bridge                          |
 //! | `ahead.rs`     | where the hand will be that the server sees late                        |
 //!
 //! Wire types end here, on both sides: this is the one place that knows them and the method's.
@@ -19,6 +20,7 @@
 mod ahead;
 mod coupler;
 mod offer;
+mod passed;
 mod sets;
 mod settings;
 mod work;
@@ -28,4 +30,5 @@ pub use ahead::{device_ahead, device_predicted, way_around};
 pub(crate) use coupler::tests::{floor, offer};
 pub use coupler::{EdgeCoupler, EdgeWrench};
 pub use offer::{OfferError, offer_of, world_of};
+pub use passed::{PassedWrench, pass_on};
 pub use sets::{BrokenSet, read_set, write_set};

@@ -6,7 +6,7 @@
 //! | answer   | code (1), length (4), and so many bytes: nothing, a sample, the device's information, or a text   |
 
 use super::Answer;
-use super::claims::{RawInfo, RawSample};
+use super::claims::{PluginInfo, RawInfo, RawSample, Worth};
 
 /// Bytes of a request.
 pub(super) const REQUEST: usize = 49;
@@ -72,6 +72,36 @@ pub(super) fn answer(code: u8, content: &[u8]) -> Option<Said> {
         )),
         _ => None,
     }
+}
+
+/// What may be used of an answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReadAnswer {
+    /// A sample of a device that measures an orientation: position, m, orientation w x y z, velocity, m/s.
+    Sample([f64; 3], [f64; 4], [f64; 3]),
+    /// What the device is.
+    Info(PluginInfo),
+    /// What went wrong.
+    Text(String),
+    /// An answer that brings nothing.
+    Nothing,
+}
+
+/// The answer at the front of `bytes`, and how many bytes it takes; `None` where there is none, or where nothing of it may be used: as the driver reads and
+/// judges what comes from the process, for those who feed it damage.
+#[must_use]
+pub fn read_answer(bytes: &[u8]) -> Option<(ReadAnswer, usize)> {
+    let (first, rest) = bytes.split_first_chunk::<HEAD>()?;
+    let (code, length) = head(*first)?;
+    let read = match answer(code, rest.get(..length)?)? {
+        Said::Answer(_, Some(sample)) if sample.worth(true) == Worth::Good => {
+            ReadAnswer::Sample(sample.position, sample.orientation, sample.velocity)
+        }
+        Said::Answer(..) => ReadAnswer::Nothing,
+        Said::Info(raw) => ReadAnswer::Info(PluginInfo::of(&raw).ok()?),
+        Said::Error(text) => ReadAnswer::Text(text),
+    };
+    Some((read, HEAD + length))
 }
 
 /// Takes numbers from the front of bytes, of which there are enough.

@@ -29,6 +29,8 @@ use std::sync::atomic::AtomicBool;
 
 pub use claims::{Claim, PluginInfo};
 pub use error::PluginError;
+#[cfg(unix)]
+pub use frame::{ReadAnswer, read_answer};
 pub use talker::Plugin;
 
 use claims::RawSample;

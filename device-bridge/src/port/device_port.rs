@@ -218,8 +218,9 @@ impl DevicePort {
         let reading = self.sense(now);
         let command = command(&reading);
         if let Some(command) = &command {
+            let commanded = command.wrench + command.external;
             self.controller
-                .grant(command.obstacle_work, &command.wrench, self.slew.rendered());
+                .grant(command.obstacle_work, &commanded, self.slew.rendered());
         }
         let wrench = self.render(now, passed, command);
         self.device
@@ -322,7 +323,14 @@ impl DevicePort {
         let gain = self.arming.gain();
         // Limited first too: a huge command would turn infinite, and a small share of it would be none of its limit.
         let settings = &self.settings;
-        let limited = clamp(&self.held, settings.max_force, settings.max_torque);
+        // What is held while a command is stale holds nothing from outside: that goes on to fade by its own age.
+        let external = command.map_or_else(Vector6::zeros, |command| command.external);
+        let asked = if is_finite(&external) {
+            self.held + external
+        } else {
+            self.held
+        };
+        let limited = clamp(&asked, settings.max_force, settings.max_torque);
         let shared = limited.wrench * gain;
         let damping = self.controller.step(
             self.work,
@@ -392,7 +400,8 @@ impl DevicePort {
         now: Duration,
         command: Option<Command>,
     ) -> (Situation, Option<Vector6<f64>>) {
-        let finite = command.is_none_or(|command| command.wrench.iter().all(|x| x.is_finite()));
+        let finite = command
+            .is_none_or(|command| is_finite(&command.wrench) && is_finite(&command.external));
         if self.spells.not_finite.begins(now, !finite) {
             self.teller.tell(EventKind::WrenchNotFinite, 0.0);
         }
@@ -457,6 +466,10 @@ impl DevicePort {
         };
         (situation, taken)
     }
+}
+
+fn is_finite(wrench: &Vector6<f64>) -> bool {
+    wrench.iter().all(|x| x.is_finite())
 }
 
 impl Drop for DevicePort {

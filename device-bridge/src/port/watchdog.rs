@@ -19,6 +19,8 @@ pub struct Command {
     pub full_until: Duration,
     /// Net work that moving obstacles have done on the hand since the source of commands began, J.
     pub obstacle_work: f64,
+    /// A wrench from outside beside it, as it is felt now: it has an age of its own and fades by itself ([`crate::ExternalWrench`]).
+    pub external: nalgebra::Vector6<f64>,
 }
 
 impl Command {
@@ -36,6 +38,7 @@ impl Command {
             constraint_age: Duration::ZERO,
             full_until: Duration::ZERO,
             obstacle_work: 0.0,
+            external: nalgebra::Vector6::zeros(),
         }
     }
 
@@ -144,11 +147,8 @@ mod tests {
 
     fn at(now_ms: u64, made_ms: u64, constraint_age_ms: u64) -> Freshness {
         let command = Command {
-            wrench: Vector6::zeros(),
-            origin: ms(made_ms),
             constraint_age: ms(constraint_age_ms),
-            full_until: Duration::ZERO,
-            obstacle_work: 0.0,
+            ..Command::fresh(ms(made_ms), Vector6::zeros())
         };
         freshness(ms(now_ms), &command, &SafetySettings::default())
     }

@@ -119,7 +119,9 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
     let mut stage = Stage::new(choice, Rearm::Automatic);
     for &(mode, named) in modes {
         stage.until_felt(inside);
-        assert!(inside.get("torque") > 0, "no torque");
+        if stage.port.info().actuated_degrees_of_freedom == 6 {
+            assert!(inside.get("torque") > 0, "no torque");
+        }
         inside.set("served", 0);
         inside.set("after", -1);
         let closes = inside.get("closes");

@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use taut_proto::{
-    Confirmation, ForceSample, HeadSample, InputSample, Payload, PoseF64, WrenchCommand,
+    Confirmation, ForceSample, HeadSample, InputSample, PassedForce, Payload, PoseF64,
+    WrenchCommand,
     confirmation::{MAX_CONFIRMED, SentState},
     events::EventAck,
     path::PathToken,
@@ -50,6 +51,12 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
         index: 44,
         wrench: [1.0, -0.5, 0.25, 0.0, 0.125, 0.0],
     };
+    let passed = PassedForce {
+        sample: force,
+        hold_ns: 20_000_000,
+        ramp_out_ns: 95_000_000,
+        flags: 2,
+    };
     let sent = |tick, state_hash| SentState { tick, state_hash };
     let confirmation = Confirmation {
         asked_ns: 17,
@@ -91,6 +98,7 @@ pub fn datagrams() -> Vec<(&'static str, Payload)> {
             Payload::PathResponse(PathToken { token: 0x0102 }),
         ),
         ("force", Payload::Force(force)),
+        ("passed_force", Payload::PassedForce(passed)),
     ]
 }
 
@@ -150,18 +158,28 @@ pub fn any_payload() -> impl Strategy<Value = Payload> {
             pose,
         })
     });
-    let force = ((far(), far(), far()), six()).prop_map(
-        |((sample_time_ns, clock_uncertainty_ns, index), wrench)| {
-            Payload::Force(ForceSample {
+    let sample = || {
+        ((far(), far(), far()), six()).prop_map(
+            |((sample_time_ns, clock_uncertainty_ns, index), wrench)| ForceSample {
                 sample_time_ns,
                 clock_uncertainty_ns,
                 index,
                 wrench,
+            },
+        )
+    };
+    let passed =
+        (sample(), far(), far(), any::<u16>()).prop_map(|(sample, hold_ns, ramp_out_ns, flags)| {
+            Payload::PassedForce(PassedForce {
+                sample,
+                hold_ns,
+                ramp_out_ns,
+                flags,
             })
-        },
-    );
+        });
     prop_oneof![
-        force,
+        sample().prop_map(Payload::Force),
+        passed,
         any_hot().prop_map(Payload::Hot),
         far().prop_map(|client_sent| Payload::TimeRequest(TimeRequest { client_sent })),
         response,

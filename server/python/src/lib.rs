@@ -3,6 +3,7 @@
 
 mod convert;
 mod files;
+mod push;
 mod simulation;
 
 use pyo3::prelude::*;
@@ -31,6 +32,7 @@ fn taut_module(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::Update>()?;
     module.add_class::<simulation::Force>()?;
     module.add_class::<files::FileReport>()?;
+    module.add_class::<push::PushWrench>()?;
     module.add_function(wrap_pyfunction!(files::check, module)?)?;
     module.add_function(wrap_pyfunction!(files::read_trace, module)?)?;
     module.add_function(wrap_pyfunction!(files::replay, module)?)

@@ -1,4 +1,4 @@
-"""The god-object method for Python: scenes, steps with numpy in and out, mesh checks, replay of traces, states of a session that runs elsewhere.
+"""The god-object method for Python: scenes, steps with numpy in and out, mesh checks, replay of traces, a session that runs elsewhere: its states, and a force for its hand.
 
 Poses are arrays of seven: x y z of the body's own origin in metres, and the unit quaternion qw qx qy qz, world from body.
 SI units and world axes throughout. Input that cannot be used raises TautError.
@@ -14,6 +14,7 @@ from ._taut import (
     Update,
     __version__,
     check,
+    push_wrench,
     read_trace,
     replay,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "Update",
     "__version__",
     "check",
+    "push_wrench",
     "read_trace",
     "replay",
     "watch",

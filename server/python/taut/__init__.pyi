@@ -132,3 +132,26 @@ class watch(Iterator[dict[str, Any]]):
     def __exit__(self, *_: object) -> None: ...
     def close(self) -> None:
         """Leaves. Iterating ends."""
+
+@final
+class push_wrench:
+    """A force for the hand of a session that runs elsewhere, as `taut push-wrench` gives it: a robot's sensor, a simulation.
+
+    `server` is HOST:PORT of a server with `[wrench_in]`; `key` the file of a credential of the role force, else the one that TAUT_KEY_FILE names; `node` a name
+    of its own in the workbench. It joins a server that was lost again by itself, until it is closed: `with taut.push_wrench(...) as hand`.
+    Threads may share it. TautError: the key, the server or its answer is no good.
+    """
+
+    server: str
+    sent: int
+    """Values sent so far."""
+    def __new__(cls, server: str, key: str | PathLike[str] | None = None, node: str = "force") -> Self: ...
+    def send(self, wrench: ArrayLike, age: float = 0.0) -> bool:
+        """Sends force (N), then torque (N m) on the hand at the reference point, in the axes that `[wrench_in]` names; `age` is the time since it was measured,
+        s, 0 to 1. Felt in full for 20 ms from its measurement on, then it fades, and is gone 115 ms after it (`max_age_ms` of the server): send at 50 Hz or more.
+        Waits for nothing. False: the server is away, and nothing was sent. TautError: no six finite numbers within 10^6, the server stopped, or it was closed.
+        """
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_: object) -> None: ...
+    def close(self) -> None:
+        """Leaves: what was sent last fades."""

@@ -18,16 +18,17 @@ PATIENCE = 60  # s; only a hang takes as long
 
 
 class Session:
-    """`taut serve` of a plain scene on free ports, with a token; ended by leaving the block."""
+    """`taut serve` of a plain scene on free ports, with a token; `changes` of the workbench file are old and new text, `files` lie beside it. Ended by leaving the block."""
 
-    def __init__(self, duration):
-        self.duration = duration
+    def __init__(self, duration, changes=(), files=None):
+        self.duration, self.changes, self.files = duration, changes, files or {}
 
     def __enter__(self):
         self.directory = tempfile.TemporaryDirectory()
-        place = pathlib.Path(self.directory.name)
+        place = self.place = pathlib.Path(self.directory.name)
         text = WORKBENCH.read_text()
         for old, new in [
+            *self.changes,
             ('scene = "peg-in-a-hole"', 'scene = "sphere-on-plane"'),
             ("quic_port = 4857", "quic_port = 0"),
             ("udp_port = 4858", "udp_port = 0"),
@@ -37,7 +38,8 @@ class Session:
             assert text.count(old) == 1, old
             text = text.replace(old, new)
         text = re.sub(r"(\[observers\].*\n)enabled = false", r"\1enabled = true", text)
-        (place / "workbench.toml").write_text(text)
+        for name, content in {**self.files, "workbench.toml": text}.items():
+            (place / name).write_text(content)
         (place / "observers.token").write_text(TOKEN + "\n")
         (place / "observers.token").chmod(0o600)
         program = os.environ["TAUT_PROGRAM"]
@@ -46,11 +48,14 @@ class Session:
         self.process = subprocess.Popen(
             [*serve, "--duration", str(self.duration)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
-        said = []
+        said, self.url, self.server = [], None, None
         for line in self.process.stderr:
             said.append(line)
+            if found := re.search(r"serving on (\S+) \(control\)", line):
+                self.server = found.group(1)
             if found := re.search(r"observers: (http://[^/]+)/", line):
                 self.url = found.group(1)
+            if self.url and self.server:
                 return self
         raise AssertionError("".join(said))
 

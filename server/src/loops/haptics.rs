@@ -9,15 +9,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use god_object::spatial::{Pose, Vector6, angular, linear};
-use taut_bridge::{ArmSwitch, ArmWish, Command, DevicePort, Felt, Reading, TickReport};
+use taut_bridge::{
+    ArmSwitch, ArmWish, Command, DevicePort, ExternalWrench, Felt, Reading, TickReport,
+};
 use taut_recording::{HapticsRecord, Tap};
 
-use super::external_wrench::ExternalWrench;
 use super::incidents::IncidentCounts;
 use super::shell::Waker;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::{Publisher, Subscriber};
 use crate::shared::felt_ticks::{FeltTick, FeltWriter};
+use crate::shared::passed_wrench::PassedWriter;
 use crate::shared::timing::Histogram;
 use crate::shared::wrench_command::WrenchCommand;
 
@@ -37,6 +39,8 @@ pub struct HapticsLoop {
     recording: Option<Tap<HapticsRecord>>,
     /// A force from outside, where the workbench takes one.
     external: Option<Box<ExternalWrench>>,
+    /// Who adds it instead, where the device is behind a bridge.
+    passed: Option<PassedWriter>,
     felt: Option<FeltWriter>,
     statistics: Arc<HapticsStatistics>,
 }
@@ -135,6 +139,7 @@ impl HapticsLoop {
             coupling_cpu_time: Duration::ZERO,
             recording: None,
             external: None,
+            passed: None,
             felt: None,
             statistics: Arc::default(),
         }
@@ -158,6 +163,13 @@ impl HapticsLoop {
     #[must_use]
     pub fn with_external(mut self, external: Option<ExternalWrench>) -> Self {
         self.external = external.map(Box::new);
+        self
+    }
+
+    /// The same, whose force from outside is added by the bridge of the device and not here.
+    #[must_use]
+    pub(crate) fn with_passed(mut self, passed: Option<PassedWriter>) -> Self {
+        self.passed = passed;
         self
     }
 
@@ -192,7 +204,7 @@ impl HapticsLoop {
         let (known, coupling) = (&mut self.newest_sample, &self.coupling);
         let has_motors = self.port.info().actuated_degrees_of_freedom > 0;
         let rendered = *self.port.rendered();
-        let external = &mut self.external;
+        let (external, passed) = (&mut self.external, &mut self.passed);
         let report = self.port.tick(now, |reading| {
             follow(state, known, reading, now);
             if external.is_some() {
@@ -209,7 +221,11 @@ impl HapticsLoop {
             let at_edge = reading.felt.is_some_and(|felt| felt.at_edge);
             let mut command = newest_command(wrench, has_motors && !at_edge);
             if let Some(external) = external {
-                command.wrench += external.tick(now, &state.pose);
+                let added = external.tick(now, &state.pose);
+                match passed {
+                    None => command.external = added,
+                    Some(passed) => passed.write(external.judged()),
+                }
             }
             Some(command)
         });

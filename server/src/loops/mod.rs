@@ -11,7 +11,6 @@
 
 pub mod checker;
 pub mod coupling;
-pub mod external_wrench;
 pub(crate) mod fidelity;
 pub mod god_object;
 pub mod haptics;

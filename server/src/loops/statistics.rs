@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use crate::loops::checker::CheckCounts;
 use crate::loops::coupling::CouplingStatistics;
-use crate::loops::external_wrench::ExternalWrenchStatistics;
 use crate::loops::god_object::GodObjectStatistics;
 use crate::loops::haptics::HapticsStatistics;
+use taut_bridge::ExternalWrenchStatistics;
 
 /// Handles on what each thread counts. Clones read the same counters.
 #[derive(Clone, Debug, Default)]

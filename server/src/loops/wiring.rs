@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use god_object::{Coupling, GodObject, Settings, World};
-use taut_bridge::{ArmSwitch, Device, DevicePort, SafetySettings};
+use taut_bridge::{ArmSwitch, Device, DevicePort, ExternalWrench, SafetySettings};
 use taut_recording::Taps;
 use taut_scene::BuiltMotion;
 
 use super::coupling::CouplingLoop;
-use super::external_wrench::ExternalWrench;
 use super::god_object::{GodObjectLoop, UpdateTaps};
 use super::haptics::HapticsLoop;
 use super::shell::Waker;
@@ -17,6 +16,7 @@ use crate::shared::contact_snapshot::ContactSnapshot;
 use crate::shared::device_state::DeviceState;
 use crate::shared::fanout::Subscriber;
 use crate::shared::felt_ticks::{self, FeltReader};
+use crate::shared::passed_wrench::PassedWriter;
 use crate::shared::wrench_command::WrenchCommand;
 use crate::shared::{contact_snapshot, device_state, shaded_acceleration, wrench_command};
 
@@ -168,6 +168,15 @@ impl WiredLoops {
                 ..self.statistics
             },
             haptics: self.haptics.with_external(external),
+            ..self
+        }
+    }
+
+    /// The same, whose force from outside goes to a bridge.
+    #[must_use]
+    pub(crate) fn with_passed(self, passed: Option<PassedWriter>) -> Self {
+        Self {
+            haptics: self.haptics.with_passed(passed),
             ..self
         }
     }

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use crate::loops::external_wrench::ExternalWrenchStatistics;
+use taut_bridge::ExternalWrenchStatistics;
 
 /// What became of the values of a force source.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

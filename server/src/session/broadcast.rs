@@ -9,6 +9,7 @@ use god_object::nalgebra::{Point3, Vector3};
 use god_object::spatial::{Pose, Vector6, angular, at_reference_point, linear, pose_difference};
 use god_object::{ConstraintSet, NonPenetrationConstraint};
 use taut_bridge::ArmingState;
+use taut_bridge::edge::pass_on;
 use taut_link::Broadcaster;
 use taut_proto::state::{
     BodyState, ContactState, EventRecord, HEAD_TRACKED, HeadState, MAX_CONTACTS, MAX_EVENTS,
@@ -25,6 +26,7 @@ use crate::session::observers::Outlets;
 use crate::shared::clock::{SessionClock, nanoseconds};
 use crate::shared::contact_snapshot::{ContactSnapshot, MovingObstacle};
 use crate::shared::device_state::{DeviceState, RECENT_EVENTS};
+use crate::shared::passed_wrench::PassedReader;
 use crate::shared::shutdown::Shutdown;
 use crate::shared::wrench_command::WrenchCommand;
 
@@ -37,6 +39,9 @@ const MAX_WAITING: usize = 64;
 /// Most events that one sample brings: contact, fault, every button, everything that the port keeps.
 const MAX_AT_ONCE: usize = 2 + BUTTONS as usize + RECENT_EVENTS;
 
+/// Ticks in which a bridge is told that there is no force from outside any more.
+const TOLD_NONE: u32 = 100;
+
 /// What goes to the bridge of a remote device: wrenches, newest wins, or constraint sets.
 #[derive(Debug)]
 pub struct BridgeCommands {
@@ -44,6 +49,28 @@ pub struct BridgeCommands {
     pub wrenches: triple_buffer::Output<WireWrench>,
     /// For a bridge that couples by itself.
     pub sets: EdgeSets,
+    /// A force from outside, where the workbench takes one.
+    pub passed: Option<PassedReader>,
+    /// Ticks in which there was none since the last, as far as they count.
+    pub told_none: u32,
+}
+
+impl BridgeCommands {
+    /// Sends the force from outside that is due; none while the port gives no force. That there is none any more is said some times over: a datagram may be lost.
+    fn pass_force(&mut self, armed: bool, broadcaster: &mut Broadcaster) {
+        let Some(passed) = &mut self.passed else {
+            return;
+        };
+        let judged = passed.read().as_ref().filter(|_| armed);
+        self.told_none = match judged {
+            Some(_) => 0,
+            None => self.told_none + 1,
+        };
+        if self.told_none <= TOLD_NONE {
+            broadcaster.send_force(&pass_on(judged));
+        }
+        self.told_none = self.told_none.min(TOLD_NONE);
+    }
 }
 
 /// Sends states, and the wrenches of a remote device, until the end is asked for.
@@ -59,10 +86,12 @@ pub fn run(
     // A state that comes late is followed by the next one; nothing is owed to anybody.
     let late = AtomicU64::new(0);
     run_at_deadlines(clock, beat, shutdown, &late, |now| {
-        if let Some(BridgeCommands { wrenches, sets }) = &mut bridge_commands {
+        if let Some(commands) = &mut bridge_commands {
+            let armed = states.is_armed();
+            commands.pass_force(armed, &mut broadcaster);
+            let BridgeCommands { wrenches, sets, .. } = commands;
             let fresh = wrenches.update();
             let command = wrenches.output_buffer();
-            let armed = states.is_armed();
             let at_edge = sets.tick(now, command, armed, states.contacts(), |part| {
                 broadcaster.send_constraints(part);
             });
@@ -77,6 +106,7 @@ pub fn run(
         }
     });
     if let Some(commands) = &mut bridge_commands {
+        commands.pass_force(false, &mut broadcaster);
         commands.sets.pause(&mut broadcaster);
         broadcaster.send_wrench(&WireWrench {
             time_ns: nanoseconds(clock.now()),

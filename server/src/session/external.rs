@@ -2,15 +2,15 @@
 
 use std::time::Duration;
 
+#[cfg(feature = "zenoh")]
+use taut_bridge::NewestWrench;
+use taut_bridge::{ExternalWrench, ExternalWrenchStatistics, WrenchReader};
 use taut_link::ServerLink;
 use taut_scene::{WrenchSource, Zenoh};
 
 #[cfg(feature = "zenoh")]
-use crate::loops::external_wrench::NewestWrench;
-use crate::loops::external_wrench::{ExternalWrench, ExternalWrenchStatistics, WrenchReader};
-#[cfg(feature = "zenoh")]
 use crate::session::ros_order::RosOrder;
-use crate::session::setup::{DeviceSource, ExternalSetup};
+use crate::session::setup::ExternalSetup;
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
 
@@ -26,7 +26,6 @@ pub(super) type Receiver = std::convert::Infallible;
 /// The haptics loop's end of the force source that the workbench names, and its receiver if that is none of the link's; if it names one.
 pub(super) fn connect(
     wanted: Option<ExternalSetup>,
-    device: &DeviceSource,
     link: &ServerLink,
     zenoh: &Zenoh,
     clock: SessionClock,
@@ -34,11 +33,6 @@ pub(super) fn connect(
     let Some(wanted) = wanted else {
         return Ok(None);
     };
-    if matches!(device, DeviceSource::Remote { .. }) {
-        return Err(Failure::bad_input(
-            "[wrench_in] does not go with a device behind a bridge; give the server its device (`taut serve --device`), or set wrench_in.enabled = false",
-        ));
-    }
     match &wanted.source {
         WrenchSource::Taut => {
             let output = link.force_input().ok_or_else(|| {

@@ -15,7 +15,7 @@ use std::time::Duration;
 use taut_zenoh::{Attachment, RosWrench};
 use triple_buffer::Input;
 
-use crate::loops::external_wrench::{ExternalWrenchStatistics, NewestWrench, SentWrench};
+use taut_bridge::{ExternalWrenchStatistics, NewestWrench, SentWrench};
 
 /// Most that two clocks go apart, as a share of the time.
 const DRIFT: f64 = 1e-4;

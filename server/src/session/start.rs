@@ -27,6 +27,7 @@ use crate::session::setup::content::own_colours;
 use crate::session::setup::{DeviceSource, SessionSetup};
 use crate::shared::clock::SessionClock;
 use crate::shared::failure::Failure;
+use crate::shared::passed_wrench::{self, PassedReader};
 use crate::shared::shutdown::Shutdown;
 
 use super::{Fidelity, Session, external};
@@ -99,9 +100,14 @@ impl Session {
         let link = runtime.block_on(taut_link::serve(options, setup.content))?;
         let is_remote = matches!(setup.device, DeviceSource::Remote { .. });
         let zenoh = &setup.observers.zenoh;
-        let external = external::connect(setup.external, &setup.device, &link, zenoh, clock)?;
+        let external = external::connect(setup.external, &link, zenoh, clock)?;
         let (external, receiver) = external.map_or((None, None), |(e, r)| (Some(e), r));
-        let (device, bridge_commands) = connect_device(setup.device, &link, &setup.settings)?;
+        let (passed_in, passed) = match external.is_some() && is_remote {
+            true => Some(passed_wrench::channel()).unzip(),
+            false => (None, None),
+        };
+        let (device, bridge_commands) =
+            connect_device(setup.device, &link, &setup.settings, passed)?;
         let [head, watched_head] = setup.head.start(link.head_inputs()).map_err(|error| {
             Failure::failed(format!("the head tracker cannot be listened to ({error})"))
         })?;
@@ -135,6 +141,7 @@ impl Session {
         )
         .with_motions(setup.motions.clone())
         .with_external(external)
+        .with_passed(passed_in)
         .with_arm_switch(kept.switch.clone());
         let switch = loops.arm_switch.clone();
         link.on_arm(move |arm| {
@@ -283,6 +290,7 @@ fn connect_device(
     source: DeviceSource,
     link: &ServerLink,
     settings: &Settings,
+    passed: Option<PassedReader>,
 ) -> Result<(Box<dyn Device>, Option<BridgeCommands>), Failure> {
     match source {
         DeviceSource::Local(device) => Ok((device, None)),
@@ -292,7 +300,13 @@ fn connect_device(
             })?;
             let (device, wrenches) = RemoteDevice::new(inputs, limits, max_age);
             let sets = EdgeSets::new(settings);
-            Ok((Box::new(device), Some(BridgeCommands { wrenches, sets })))
+            let commands = BridgeCommands {
+                wrenches,
+                sets,
+                passed,
+                told_none: 0,
+            };
+            Ok((Box::new(device), Some(commands)))
         }
     }
 }

@@ -32,7 +32,7 @@ pub struct Decoder {
 pub const FIXED_MEMORY: usize = 4 << 20;
 
 /// All of them.
-pub const DECODERS: [Decoder; 22] = [
+pub const DECODERS: [Decoder; 23] = [
     decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
     decoder("payload", wire::payload, wire::payload_seeds, 1),
     decoder("opener", wire::opener, wire::datagram_seeds, 1),
@@ -61,6 +61,12 @@ pub const DECODERS: [Decoder; 22] = [
         peripherals::space_mouse,
         peripherals::space_mouse_seeds,
         1,
+    ),
+    decoder(
+        "python_device",
+        peripherals::python_device,
+        peripherals::python_device_seeds,
+        8,
     ),
     decoder(
         "http_request",

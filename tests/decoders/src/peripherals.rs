@@ -1,7 +1,8 @@
-//! What comes from devices: VRPN servers and HID reports.
+//! What comes from devices: VRPN servers, HID reports, devices in Python.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
 
+use taut_bridge::plugin::{ReadAnswer, read_answer};
 use taut_bridge::{CapState, Report};
 use taut_vrpn::{
     Client, Event, Header, MAX_LISTED_SENDERS, MAX_PENDING_BYTES, PoseReport, SensorMapping,
@@ -74,6 +75,61 @@ pub(crate) fn space_mouse(bytes: &[u8]) {
             "{deflection}"
         );
     }
+}
+
+/// Answers of a device in Python, one after the other: what may be used of them is finite and a pose.
+pub(crate) fn python_device(bytes: &[u8]) {
+    let mut rest = bytes;
+    while let Some((read, length)) = read_answer(rest) {
+        rest = &rest[length..];
+        match read {
+            ReadAnswer::Sample(position, orientation, velocity) => {
+                let norm = orientation.iter().map(|q| q * q).sum::<f64>().sqrt();
+                assert!((norm - 1.0).abs() <= 1e-3, "{orientation:?}");
+                assert!(position.iter().all(|x| x.abs() <= 10.0), "{position:?}");
+                assert!(velocity.iter().all(|x| x.abs() <= 100.0), "{velocity:?}");
+            }
+            ReadAnswer::Info(info) => {
+                assert!(!info.name.is_empty() && !info.name.contains(char::is_control));
+                assert!((200.0..=1e5).contains(&info.rate_hz), "{info:?}");
+            }
+            ReadAnswer::Text(text) => assert!(text.len() <= 3 * length),
+            ReadAnswer::Nothing => {}
+        }
+    }
+}
+
+/// A device's information, a sample, nothing new, and a text, as `taut_host.py` packs them: one by one and in a row.
+pub(crate) fn python_device_seeds() -> Vec<Vec<u8>> {
+    let answer = |code: u8, content: &[u8]| {
+        let length = (content.len() as u32).to_le_bytes();
+        [&[code], &length[..], content].concat()
+    };
+    let numbers = |numbers: &[f64]| -> Vec<u8> {
+        numbers
+            .iter()
+            .flat_map(|number| number.to_le_bytes())
+            .collect()
+    };
+    let whole = |a: u32, b: u32| [a.to_le_bytes(), b.to_le_bytes()].concat();
+    let mut name = [0; 64];
+    name[..11].copy_from_slice(b"spring hand");
+    let limits = numbers(&[5.0, 0.1, 1000.0, 0.5, 1000.0]);
+    let info = [&name[..], &whole(6, 6), &limits].concat();
+    let sample = [
+        0.0, 0.0, -0.03, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.1, 0.0, 0.5, 0.0, 0.001,
+    ];
+    let sample = [numbers(&sample), whole(2, 1)].concat();
+    let mut seeds = vec![
+        answer(10, &info),
+        answer(0, &sample),
+        answer(1, &[]),
+        answer(11, b"ValueError: the option is depth"),
+    ];
+    let taken = |seed: &Vec<u8>| read_answer(seed).is_some_and(|(_, length)| length == seed.len());
+    assert!(seeds.iter().all(taken), "a seed that is none");
+    seeds.push(seeds.concat());
+    seeds
 }
 
 /// What observers must show in the checks.

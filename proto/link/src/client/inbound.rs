@@ -9,8 +9,8 @@ use std::{
     time::Instant,
 };
 use taut_proto::{
-    Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken, Payload,
-    Role, SessionTime,
+    Assembler, ClockFilter, ConstraintSet, DecodeError, EventInbox, EventsTold, PartTaken,
+    PassedForce, Payload, Role, SessionTime,
     confirmation::{Trust, Unconfirmed},
     path::PathToken,
     seal::{OpenError, Opened, Opener},
@@ -38,6 +38,8 @@ struct Inner {
     heard_ns: Option<u64>,
     wrench: Option<ReceivedWrench>,
     sets: Option<ReceivedSets>,
+    /// Number of its datagram, and a wrench from outside.
+    force: Option<(u64, PassedForce)>,
     events: EventInbox,
     /// Newest event that was acknowledged.
     acknowledged: Option<u32>,
@@ -77,6 +79,7 @@ impl Inbound {
                     assembler: Assembler::new(),
                     confirmed: None,
                 }),
+                force: None,
                 events: EventInbox::default(),
                 acknowledged: None,
                 grouped: Grouped::default(),
@@ -215,6 +218,10 @@ impl Inbound {
         self.lock().wrench
     }
 
+    pub(crate) fn latest_force(&self) -> Option<PassedForce> {
+        self.lock().force.map(|(_, force)| force)
+    }
+
     /// Copies the newest whole set into `out`, if `out` is older; when it was last confirmed. `None` before the first.
     pub(crate) fn newest_set(&self, out: &mut ConstraintSet) -> Option<Instant> {
         let inner = self.lock();
@@ -323,11 +330,18 @@ impl Inner {
                 },
                 None => counters.garbage.one(),
             },
+            // A bridge has constraint sets, and nobody else a hand to push.
+            Payload::PassedForce(force) if self.sets.is_some() => {
+                if self.force.is_none_or(|(last, _)| last < sequence) {
+                    self.force = Some((sequence, force));
+                }
+            }
             Payload::Heartbeat => {}
             // The server has no business sending these.
             Payload::Input(_)
             | Payload::Head(_)
             | Payload::Force(_)
+            | Payload::PassedForce(_)
             | Payload::TimeRequest(_)
             | Payload::Arrive(_)
             | Payload::PathChallenge(_) // under a group key: taken before under its own

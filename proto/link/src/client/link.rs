@@ -14,7 +14,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, ForceSample, HeadSample, InputSample, MeshBlob,
-    MeshHash, Payload, SceneDescription, SessionTime,
+    MeshHash, PassedForce, Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
     state::EventRecord,
 };
@@ -194,6 +194,11 @@ impl ClientLink {
     /// Newest command to the device; its `received` is the measure for the bridge's watchdog.
     pub fn latest_wrench(&self) -> Option<ReceivedWrench> {
         self.hot.inbound.latest_wrench()
+    }
+
+    /// Newest wrench from outside for the hand; `None` before the first, and unless [`crate::Role::Device`] joined.
+    pub fn latest_force(&self) -> Option<PassedForce> {
+        self.hot.inbound.latest_force()
     }
 
     /// Copies the newest whole constraint set into `out`, unless it is there already, and tells when it was completed or came again:

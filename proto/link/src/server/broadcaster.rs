@@ -6,7 +6,7 @@ use super::{
 };
 use std::sync::Arc;
 use taut_proto::{
-    Act, ConstraintPart, HotState, Kind, Payload, WrenchCommand,
+    Act, ConstraintPart, HotState, Kind, PassedForce, Payload, WrenchCommand,
     barrier::Newest,
     codec::encode_into,
     events::is_newer,
@@ -107,6 +107,11 @@ impl Broadcaster {
     /// Sends a part of a constraint set to the device bridge; `false` if there is none or sending failed.
     pub fn send_constraints(&mut self, part: ConstraintPart) -> bool {
         self.send_to_device(&Payload::Constraints(part))
+    }
+
+    /// Sends a wrench from outside to the device bridge; `false` if there is none or sending failed.
+    pub fn send_force(&mut self, force: &PassedForce) -> bool {
+        self.send_to_device(&Payload::PassedForce(*force))
     }
 
     fn send_to_device(&mut self, payload: &Payload) -> bool {

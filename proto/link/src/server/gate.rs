@@ -21,6 +21,7 @@ pub(crate) fn act_of_datagram(payload: &Payload) -> Option<Act> {
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_)
+        | Payload::PassedForce(_)
         | Payload::Confirm(_)
         | Payload::PathChallenge(_) => None,
     }

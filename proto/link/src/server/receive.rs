@@ -179,6 +179,7 @@ pub(crate) fn receive(
         | Payload::TimeResponse(_)
         | Payload::Wrench(_)
         | Payload::Constraints(_)
+        | Payload::PassedForce(_)
         | Payload::Confirm(_)
         | Payload::PathChallenge(_) => {}
     }

@@ -189,16 +189,11 @@ pub(super) fn beside(
         let at = section.get(key).map_or(section.at(), |node| &node.at);
         section.complain(at, text);
     };
-    if safety.passivity != Passivity::Control {
+    // A bridge keeps the energy itself, or feels nothing of it.
+    if device != Some(&Device::Remote) && safety.passivity != Passivity::Control {
         complain(
             "enabled",
             "[wrench_in] needs passivity = \"control\" in [safety]: who sends a force could give the hand energy without end otherwise".to_owned(),
-        );
-    }
-    if device == Some(&Device::Remote) {
-        complain(
-            "enabled",
-            "[wrench_in] adds its force at the server, and a device behind a bridge could feel it later than its age allows; give the server its device (`taut serve --device`), or set enabled = false".to_owned(),
         );
     }
     if let WrenchSource::Ros { .. } = &wanted.source

@@ -12,13 +12,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use god_object::{Pose, Settings, World};
-use taut_bridge::{Device, DeviceLimits, SafetySettings};
+use taut_bridge::{Device, DeviceLimits, ExternalWrenchSettings, SafetySettings};
 use taut_link::proto::barrier::MasterSettings;
 use taut_link::{AlsoKey, ClusterKey, Content, JoinPolicy, MulticastOptions};
 use taut_recording::Manifest;
 use taut_scene::{BuiltMotion, FidelityPlan, Scene, WrenchSource};
 
-use crate::loops::external_wrench::ExternalWrenchSettings;
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::head::HeadSource;

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use god_object::Pose;
 use taut_bridge::{
-    ContactBound, DeviceChoice, InputChoice, MAX_EDGE_DELAY, Passivity, PassivitySettings, Rearm,
-    SafetySettings, ValidationSettings, vrpn_settings,
+    ContactBound, DeviceChoice, ExternalWrenchSettings, InputChoice, MAX_EDGE_DELAY, Passivity,
+    PassivitySettings, Rearm, SafetySettings, ValidationSettings, WrenchAxes, vrpn_settings,
 };
 use taut_link::{AlsoKey, ClusterKey, MulticastOptions, read_key_file};
 use taut_recording::{FORMAT, Lost, Manifest, SceneOrigin, identity_of};
@@ -17,7 +17,6 @@ use taut_scene::{
     Workbench, WrenchFrame,
 };
 
-use crate::loops::external_wrench::{ExternalWrenchSettings, WrenchAxes};
 use crate::loops::realtime::RealtimePolicy;
 use crate::loops::shell::Phases;
 use crate::session::frames;
@@ -192,9 +191,10 @@ fn external(
     if !wanted.enabled {
         return Ok(None);
     }
-    if overrides.input.is_none() && workbench.device == Device::Remote {
+    let is_local = overrides.input.is_some() || workbench.device != Device::Remote;
+    if is_local && workbench.safety.passivity != taut_scene::Passivity::Control {
         return Err(Failure::bad_input(
-            "[wrench_in] does not go with a device behind a bridge; give the server its device (`taut serve --device`), or set wrench_in.enabled = false",
+            "[wrench_in] with a device of the server needs safety.passivity = \"control\": who sends a force could give the hand energy without end otherwise",
         ));
     }
     let seconds = |ms: f64| Duration::from_secs_f64(ms * 1e-3);

@@ -1,6 +1,7 @@
 //! A wrench from outside (a robot's sensor, a simulation) on its way to the hand: judged, limited, and gone when it is old.
 //!
-//! What comes out is added to the contact's wrench before the device port, so every promise of the port holds of the sum.
+//! What comes out is added to the contact's wrench before the device port, so every promise of the port holds of the sum. Where the device is behind a bridge
+//! the server judges it and passes it on, and the bridge judges it again by its own clock and adds it: [`crate::edge::PassedWrench`].
 //!
 //! | name in code | unit | meaning |
 //! |--------------|------|---------|
@@ -12,14 +13,19 @@
 //! A value that is no number or out of its range stops the force; what is old, repeated, out of order or ahead of time changes nothing. Pure: times are
 //! arguments. A tick neither allocates nor waits.
 
+mod statistics;
+
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use god_object::nalgebra::UnitQuaternion;
 use god_object::spatial::{Pose, Vector6, angular, linear, six};
-use taut_bridge::{fade_share, within_limits};
 use taut_link::ForceOutput;
+
+use crate::port::{fade_share, within_limits};
+
+pub use statistics::{ExternalWrenchStatistics, Refused};
 
 /// Most that the time of a value may be ahead of its arrival: clocks that agree differ by far less.
 pub const MAX_AHEAD: Duration = Duration::from_millis(20);
@@ -76,6 +82,21 @@ pub struct NewestWrench {
     pub spoiled: Duration,
 }
 
+/// The value that is felt now, for who adds it elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JudgedWrench {
+    /// Limited; N and N m. In the body's axes with [`WrenchAxes::Body`], else the scene's.
+    pub wrench: Vector6,
+    /// When it was measured, session time, as its sender told.
+    pub made: Duration,
+    /// By how much that may be too late.
+    pub uncertainty: Duration,
+    /// Counts the values that were taken.
+    pub count: u64,
+    /// How it is to be felt.
+    pub settings: ExternalWrenchSettings,
+}
+
 /// Where values come from: a reading end that never waits.
 pub enum WrenchReader {
     /// The sealed datagrams of a force source.
@@ -108,103 +129,6 @@ impl WrenchReader {
                     spoiled: ns(input.spoiled_ns),
                 })
             }
-        }
-    }
-}
-
-/// Why a value is not felt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
-    /// Older than may be felt when it came.
-    Old,
-    /// Its time is that of no clock that is known, or ahead of it.
-    NotOnClock,
-    /// Its time is not after that of the value before.
-    WentBack,
-    /// It was no wrench.
-    Spoiled,
-}
-
-impl Refused {
-    /// All, with their names in metrics.
-    pub const NAMED: [(&'static str, Self); 4] = [
-        ("old", Self::Old),
-        ("not-on-clock", Self::NotOnClock),
-        ("went-back", Self::WentBack),
-        ("no-wrench", Self::Spoiled),
-    ];
-}
-
-/// What is known of it outside the loop. One writer: the haptics thread.
-#[derive(Debug, Default)]
-pub struct ExternalWrenchStatistics {
-    taken: AtomicU64,
-    refused: [AtomicU64; Refused::NAMED.len()],
-    /// Of a receiver that has no counters of its own; it writes them.
-    pub lost: AtomicU64,
-    /// The same of values that came again, too late, or without what tells their time.
-    pub dropped: AtomicU64,
-    /// Of the value that is felt now, ns; the most that it ever was while felt.
-    age_ns: AtomicU64,
-    largest_age_ns: AtomicU64,
-    felt: AtomicBool,
-    /// Norms of force and torque that are added now, as bits of an `f64`.
-    added_bits: [AtomicU64; 2],
-}
-
-impl ExternalWrenchStatistics {
-    /// Values that were felt.
-    #[must_use]
-    pub fn taken(&self) -> u64 {
-        self.taken.load(Ordering::Relaxed)
-    }
-
-    /// Values that were not, by the reason's name.
-    #[must_use]
-    pub fn refused(&self) -> [(&'static str, u64); Refused::NAMED.len()] {
-        Refused::NAMED.map(|(name, why)| (name, self.refused[why as usize].load(Ordering::Relaxed)))
-    }
-
-    /// Age of the value that is felt now; `None` while none is.
-    #[must_use]
-    pub fn age(&self) -> Option<Duration> {
-        self.is_felt()
-            .then(|| Duration::from_nanos(self.age_ns.load(Ordering::Relaxed)))
-    }
-
-    /// The most that the age of a value was while anything of it was felt.
-    #[must_use]
-    pub fn largest_age(&self) -> Duration {
-        Duration::from_nanos(self.largest_age_ns.load(Ordering::Relaxed))
-    }
-
-    /// Whether anything of it goes to the device port now.
-    #[must_use]
-    pub fn is_felt(&self) -> bool {
-        self.felt.load(Ordering::Relaxed)
-    }
-
-    /// Norms of the force, N, and the torque, N m, that are added now.
-    #[must_use]
-    pub fn added(&self) -> [f64; 2] {
-        let value = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
-        [value(&self.added_bits[0]), value(&self.added_bits[1])]
-    }
-
-    fn refuse(&self, why: Refused) {
-        self.refused[why as usize].fetch_add(1, Ordering::Relaxed);
-    }
-
-    fn tell(&self, age: Option<Duration>, added: &Vector6) {
-        self.felt.store(age.is_some(), Ordering::Relaxed);
-        if let Some(age) = age {
-            let age = u64::try_from(age.as_nanos()).unwrap_or(u64::MAX);
-            self.age_ns.store(age, Ordering::Relaxed);
-            self.largest_age_ns.fetch_max(age, Ordering::Relaxed);
-        }
-        let norms = [linear(added).norm(), angular(added).norm()];
-        for (bits, norm) in self.added_bits.iter().zip(norms) {
-            bits.store(norm.to_bits(), Ordering::Relaxed);
         }
     }
 }
@@ -258,6 +182,41 @@ impl ExternalWrench {
         self.statistics.clone()
     }
 
+    /// Nothing is felt until another value comes, which ramps in.
+    pub(crate) fn stop(&mut self) -> Vector6 {
+        let _ = self.reader.news();
+        (self.newest, self.gain) = (None, 0.0);
+        self.statistics.tell(None, &Vector6::zeros());
+        Vector6::zeros()
+    }
+
+    pub(crate) fn counters(&self) -> &ExternalWrenchStatistics {
+        &self.statistics
+    }
+
+    /// The same by other settings from now on.
+    pub(crate) fn set_settings(&mut self, settings: ExternalWrenchSettings) {
+        self.settings = settings;
+    }
+
+    /// The value that the last tick felt; `None` where it felt none.
+    #[must_use]
+    pub fn judged(&self) -> Option<JudgedWrench> {
+        let newest = self.newest.filter(|_| self.statistics.is_felt())?;
+        let settings = self.settings;
+        let limited = within_limits(&newest.wrench, settings.max_force, settings.max_torque);
+        Some(JudgedWrench {
+            wrench: match settings.axes {
+                WrenchAxes::Fixed(turn) => turned(&turn, &limited),
+                WrenchAxes::Body => limited,
+            },
+            made: newest.told,
+            uncertainty: newest.told.saturating_sub(newest.made),
+            count: self.statistics.taken(),
+            settings,
+        })
+    }
+
     /// What is added to the contact's wrench at session time `now`, N and N m, scene axes; `body` is the body in the hand. Call it once a period.
     pub fn tick(&mut self, now: Duration, body: &Pose) -> Vector6 {
         let passed = now.saturating_sub(self.last_tick.replace(now).unwrap_or(now));
@@ -281,8 +240,7 @@ impl ExternalWrench {
             WrenchAxes::Fixed(turn) => turn,
             WrenchAxes::Body => body.rotation,
         };
-        let (force, torque) = (turn * linear(&limited), turn * angular(&limited));
-        let added = six(&force, &torque) * self.gain;
+        let added = turned(&turn, &limited) * self.gain;
         self.statistics.tell((by_age > 0.0).then_some(age), &added);
         added
     }
@@ -339,6 +297,10 @@ impl ExternalWrench {
     }
 }
 
+/// The wrench in the axes that `turn` leads to.
+fn turned(turn: &UnitQuaternion<f64>, wrench: &Vector6) -> Vector6 {
+    six(&(turn * linear(wrench)), &(turn * angular(wrench)))
+}
+
 #[cfg(test)]
-#[path = "external_wrench_tests.rs"]
 mod tests;

@@ -1,0 +1,348 @@
+/*
+ * 3D Systems' devices (Touch, Touch X, Phantom) as a plug-in of taut, by OpenHaptics' device library (HD), which is loaded at run time.
+ *
+ *   cc -std=c11 -O2 -shared -fPIC -I include -o taut_hd.so plugins/hd.c -ldl -lm -lpthread
+ *   taut bridge --device plugin:/path/taut_hd.so,library=/usr/lib/libHD.so,force=1,...
+ *
+ * Options: library (default libHD.so), name (of the device in the vendor's configuration, default its first), force (N, 1), stiffness (N/m, 300): what the
+ * device renders, from its data sheet. The defaults are small on purpose.
+ *
+ * The library has a servo thread of its own, 1 kHz: reading and writing happen in its callback, between hdBeginFrame and hdEndFrame. A force that is older than
+ * 20 ms there is zero, whatever the rest of the program does. Six degrees of freedom are sensed, three rendered: torques at the gimbal are not.
+ *
+ * Names, order of arguments, numbers and units are those of the published header (hdDefines.h 3.0) and of public programs that use it: mm, mm/s, N; a transform
+ * is 16 numbers, column by column. Axes there: x right, y up, z towards the user. Here: x right, y away, z up.
+ *
+ * No device was at hand, and not the vendor's library.
+ */
+#define _POSIX_C_SOURCE 200809L
+#include <dlfcn.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "taut_device.h"
+#include "vendor.h"
+
+enum {
+    HD_CURRENT_BUTTONS = 0x2000,
+    HD_CURRENT_VELOCITY = 0x2051,
+    HD_CURRENT_TRANSFORM = 0x2052,
+    HD_DEVICE_MODEL_TYPE = 0x2501,
+    HD_CURRENT_FORCE = 0x2700,
+    HD_FORCE_OUTPUT = 0x4000,
+    HD_CALIBRATION_NEEDS_MANUAL_INPUT = 0x5002,
+    HD_CALLBACK_DONE = 0,
+    HD_CALLBACK_CONTINUE = 1,
+    HD_DEFAULT_PRIORITY = 32767,
+    /* Errors below are none, above those of a force that was too large or motors that are warm: the library limits them itself. */
+    HD_FIRST_FORCE_ERROR = 0x0200,
+    HD_FORCE_ERROR = 0x0204,
+};
+#define HD_INVALID_HANDLE 0xffffffffu
+#define OLDEST 0.02 /* s: of a force, and of a frame */
+
+typedef struct {
+    unsigned code;
+    int internal;
+    unsigned device;
+} hd_error;
+
+/* The functions of the vendor's library. The last two may be missing. */
+static struct {
+    void *library;
+    unsigned (*InitDevice)(const char *);
+    void (*DisableDevice)(unsigned);
+    void (*BeginFrame)(unsigned);
+    void (*EndFrame)(unsigned);
+    void (*Enable)(unsigned);
+    void (*GetDoublev)(unsigned, double *);
+    void (*GetIntegerv)(unsigned, int *);
+    void (*SetDoublev)(unsigned, const double *);
+    hd_error (*GetError)(void);
+    const char *(*GetErrorString)(unsigned);
+    unsigned long (*ScheduleAsynchronous)(unsigned (*)(void *), void *, unsigned short);
+    void (*StartScheduler)(void);
+    void (*StopScheduler)(void);
+    void (*Unschedule)(unsigned long);
+    const char *(*GetString)(unsigned);
+    unsigned (*CheckCalibration)(void);
+} hd;
+
+struct device {
+    unsigned handle;
+    unsigned long callback;
+    double force, stiffness;
+    char name[64];
+    /* What the servo thread and this one share; held for the copying of some numbers. */
+    pthread_mutex_t lock;
+    double transform[16], velocity[3], seen; /* seen: when, s */
+    int buttons;
+    bool uncalibrated, closing, closed;
+    unsigned error;
+    unsigned long long frames, taken;
+    double wanted[3], written; /* N in the vendor's axes; when, s */
+};
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+static void *symbol(const char *name, const char **missing)
+{
+    void *found = dlsym(hd.library, name);
+    if (!found && missing && !*missing)
+        *missing = name;
+    return found;
+}
+
+/* A pointer to a function from dlsym's pointer to data, as POSIX has it. */
+#define FIND(name, missing) (*(void **)&hd.name = symbol("hd" #name, missing))
+
+static int load(const char *path)
+{
+    const char *missing = NULL;
+    if (hd.library)
+        return TAUT_DEVICE_OK;
+    hd.library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!hd.library)
+        return fail(TAUT_DEVICE_FAILED, "OpenHaptics' library cannot be loaded (install it; option library=PATH)", dlerror());
+    FIND(InitDevice, &missing);
+    FIND(DisableDevice, &missing);
+    FIND(BeginFrame, &missing);
+    FIND(EndFrame, &missing);
+    FIND(Enable, &missing);
+    FIND(GetDoublev, &missing);
+    FIND(GetIntegerv, &missing);
+    FIND(SetDoublev, &missing);
+    FIND(GetError, &missing);
+    FIND(GetErrorString, &missing);
+    FIND(ScheduleAsynchronous, &missing);
+    FIND(StartScheduler, &missing);
+    FIND(StopScheduler, &missing);
+    FIND(Unschedule, &missing);
+    FIND(GetString, NULL);
+    FIND(CheckCalibration, NULL);
+    if (missing) {
+        dlclose(hd.library);
+        hd.library = NULL;
+        return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
+    }
+    return TAUT_DEVICE_OK;
+}
+
+/* The newest error that ends a session; 0 for none. */
+static unsigned failed(void)
+{
+    unsigned code = hd.GetError().code;
+    return code >= HD_FIRST_FORCE_ERROR && code < HD_FORCE_ERROR ? 0 : code;
+}
+
+/* A millisecond of the vendor's servo thread. */
+static unsigned servo(void *shared)
+{
+    struct device *device = shared;
+    double transform[16], velocity[3], force[3] = {0, 0, 0};
+    int buttons = 0;
+    bool uncalibrated, closing;
+    unsigned error;
+
+    hd.BeginFrame(device->handle);
+    uncalibrated = hd.CheckCalibration && hd.CheckCalibration() == HD_CALIBRATION_NEEDS_MANUAL_INPUT;
+    for (int i = 0; i < 16; i++)
+        transform[i] = NAN; /* what is not set is no pose */
+    hd.GetDoublev(HD_CURRENT_TRANSFORM, transform);
+    hd.GetDoublev(HD_CURRENT_VELOCITY, velocity);
+    hd.GetIntegerv(HD_CURRENT_BUTTONS, &buttons);
+    pthread_mutex_lock(&device->lock);
+    closing = device->closing;
+    if (!closing && !uncalibrated && now() - device->written <= OLDEST)
+        memcpy(force, device->wanted, sizeof force);
+    pthread_mutex_unlock(&device->lock);
+    hd.SetDoublev(HD_CURRENT_FORCE, force);
+    hd.EndFrame(device->handle);
+    error = failed();
+
+    pthread_mutex_lock(&device->lock);
+    memcpy(device->transform, transform, sizeof transform);
+    memcpy(device->velocity, velocity, sizeof velocity);
+    device->buttons = buttons;
+    device->uncalibrated = uncalibrated;
+    device->error = error ? error : device->error;
+    device->seen = now();
+    device->frames++;
+    device->closed = closing;
+    pthread_mutex_unlock(&device->lock);
+    return closing ? HD_CALLBACK_DONE : HD_CALLBACK_CONTINUE;
+}
+
+static int32_t device_close(void *opened)
+{
+    struct device *device = opened;
+    double begun = now();
+    bool closed = false;
+    /* The servo thread writes the zero; one that stands still does not, and its stop is all there is. */
+    while (!closed && now() - begun < 0.1) {
+        struct timespec wait = {0, 1000000};
+        pthread_mutex_lock(&device->lock);
+        device->closing = true;
+        closed = device->closed;
+        pthread_mutex_unlock(&device->lock);
+        nanosleep(&wait, NULL);
+    }
+    hd.StopScheduler();
+    hd.Unschedule(device->callback);
+    hd.DisableDevice(device->handle);
+    if (!closed) /* it may come back: what it uses stays */
+        return fail(TAUT_DEVICE_FAILED, "hdStopScheduler", "the servo thread stood still: nobody could write the zero");
+    pthread_mutex_destroy(&device->lock);
+    free(device);
+    return TAUT_DEVICE_OK;
+}
+
+static int32_t device_open(const char *options, void **opened)
+{
+    struct device *device;
+    double force = 1.0, stiffness = 300.0;
+    char copy[1024], *library = "libHD.so", *name = NULL, *rest = NULL;
+    const char *model;
+    unsigned error;
+    int code;
+
+    if (strlen(options) >= sizeof copy)
+        return fail(TAUT_DEVICE_FAILED, "options", "they are too long");
+    strcpy(copy, options);
+    for (char *option = strtok_r(copy, ",", &rest); option; option = strtok_r(NULL, ",", &rest)) {
+        char *value = strchr(option, '=');
+        bool good;
+        if (!value)
+            return fail(TAUT_DEVICE_FAILED, "write NAME=VALUE instead of", option);
+        *value++ = 0;
+        if (!strcmp(option, "library"))
+            good = *(library = value) != 0;
+        else if (!strcmp(option, "name"))
+            good = *(name = value) != 0;
+        else if (!strcmp(option, "force"))
+            good = number(value, 0.1, 40, &force);
+        else if (!strcmp(option, "stiffness"))
+            good = number(value, 1, 1e4, &stiffness);
+        else
+            return fail(TAUT_DEVICE_FAILED, "no such option; there are library, name, force, stiffness", option);
+        if (!good)
+            return fail(TAUT_DEVICE_FAILED, "no value for this option, or out of range", option);
+    }
+    if ((code = load(library)) != TAUT_DEVICE_OK)
+        return code;
+    device = calloc(1, sizeof *device);
+    if (!device || pthread_mutex_init(&device->lock, NULL)) {
+        free(device);
+        return fail(TAUT_DEVICE_FAILED, "hdInitDevice", "no memory");
+    }
+    device->force = force;
+    device->stiffness = stiffness;
+    device->handle = hd.InitDevice(name);
+    error = failed();
+    if (device->handle == HD_INVALID_HANDLE || error) {
+        free(device);
+        return fail(TAUT_DEVICE_GONE, "no device of 3D Systems can be opened (is it set up with the vendor's tool, under that name?)", hd.GetErrorString(error));
+    }
+    model = hd.GetString ? hd.GetString(HD_DEVICE_MODEL_TYPE) : NULL;
+    snprintf(device->name, sizeof device->name, "3D Systems %s", model ? model : "device");
+    hd.Enable(HD_FORCE_OUTPUT);
+    device->written = now() - 1;
+    device->seen = now();
+    device->callback = hd.ScheduleAsynchronous(servo, device, HD_DEFAULT_PRIORITY);
+    hd.StartScheduler();
+    if ((error = failed())) {
+        code = fail(TAUT_DEVICE_FAILED, "hdStartScheduler", hd.GetErrorString(error));
+        device_close(device);
+        return code;
+    }
+    *opened = device;
+    return TAUT_DEVICE_OK;
+}
+
+static int32_t device_info(void *opened, taut_device_info *info)
+{
+    const struct device *device = opened;
+    memcpy(info->name, device->name, sizeof info->name);
+    info->sensed_degrees_of_freedom = 6;
+    info->actuated_degrees_of_freedom = 3;
+    info->max_force = device->force;
+    info->max_stiffness = device->stiffness;
+    info->rate = 1000;
+    return TAUT_DEVICE_OK;
+}
+
+/* From the vendor's axes to x right, y away from the user, z up. */
+static void turned(const double from[3], double to[3])
+{
+    to[0] = from[0];
+    to[1] = -from[2];
+    to[2] = from[1];
+}
+
+static int32_t device_read(void *opened, taut_device_sample *sample)
+{
+    struct device *device = opened;
+    double transform[16], velocity[3], p[3], frame[3][3];
+    bool uncalibrated, is_new;
+    unsigned error;
+
+    pthread_mutex_lock(&device->lock);
+    memcpy(transform, device->transform, sizeof transform);
+    memcpy(velocity, device->velocity, sizeof velocity);
+    sample->buttons = (uint32_t)device->buttons & 0xffffu;
+    sample->age = now() - device->seen;
+    uncalibrated = device->uncalibrated;
+    error = device->error;
+    is_new = device->frames != device->taken;
+    device->taken = device->frames;
+    pthread_mutex_unlock(&device->lock);
+    if (error)
+        return fail(TAUT_DEVICE_GONE, "the device", hd.GetErrorString(error));
+    if (!is_new || sample->age > OLDEST)
+        return TAUT_DEVICE_NOTHING_NEW;
+    if (uncalibrated)
+        return fail(TAUT_DEVICE_NOT_READY, "not calibrated", "put the stylus into its inkwell");
+    for (int i = 0; i < 3; i++) {
+        p[i] = transform[12 + i] * 1e-3;
+        velocity[i] *= 1e-3;
+    }
+    turned(p, sample->position);
+    turned(velocity, sample->velocity);
+    /* `transform` holds column after column. */
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 3; column++)
+            frame[row][column] = transform[4 * column + row];
+    turned_rotation(frame, sample->orientation);
+    return TAUT_DEVICE_OK;
+}
+
+static int32_t device_write(void *opened, const double wrench[6])
+{
+    struct device *device = opened;
+    pthread_mutex_lock(&device->lock);
+    /* Back to x right, y up, z towards the user. */
+    device->wanted[0] = wrench[0];
+    device->wanted[1] = wrench[2];
+    device->wanted[2] = -wrench[1];
+    device->written = now();
+    pthread_mutex_unlock(&device->lock);
+    return TAUT_DEVICE_OK;
+}
+
+const taut_device_table *taut_device_entry(void)
+{
+    static const taut_device_table table = {
+        TAUT_DEVICE_VERSION, sizeof table, device_open, device_info, device_read, device_write, device_close, device_error_text,
+    };
+    return &table;
+}
