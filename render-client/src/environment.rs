@@ -54,11 +54,10 @@ impl Environment {
     }
 
     fn new(light: Sphere) -> Self {
-        let coarse = |columns| light.halved_to(columns);
         let mut levels = vec![cube(FACE, |direction| light.at(direction))];
         for (level, columns) in (1..LEVELS).zip(SUMMED) {
             let roughness = level as f32 / (LEVELS - 1) as f32;
-            let samples = coarse(columns).samples();
+            let samples = light.halved_to(columns).samples();
             levels.push(cube(FACE >> level, |direction| {
                 blurred(&samples, direction, roughness)
             }));
@@ -116,7 +115,7 @@ impl Sphere {
         self.columns / 2
     }
 
-    /// Unit vector to the middle of a part.
+    /// To the middle of a part.
     fn direction(&self, place: usize) -> Vector3<f32> {
         let (column, row) = (place % self.columns, place / self.columns);
         let azimuth = TAU * ((column as f32 + 0.5) / self.columns as f32 - 0.5);
