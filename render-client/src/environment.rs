@@ -5,7 +5,7 @@
 //!
 //! * Matt: irradiance over pi as nine coefficients of spherical harmonics.
 //!   Source: Ramamoorthi, Hanrahan 2001, "An efficient representation for irradiance environment maps".
-//! * Mirrored: a cube map of [`LEVELS`] roughnesses, each the mean of the light weighted by the lobe of GGX about its direction; its
+//! * Mirrored: a cube map of five roughnesses, each the mean of the light weighted by the lobe of GGX about its direction; its
 //!   other factor is fitted in frame.wgsl. Source: Karis 2013, "Real shading in Unreal Engine 4" (split sum).
 
 use std::f32::consts::{PI, TAU};
