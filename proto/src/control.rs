@@ -16,7 +16,7 @@
 //! `Refused`. There is no challenge:
 //! both proofs are over the exporter of this very TLS connection, which is fresh, so an old or relayed proof does not verify.
 //! After that the server sends `Group` on the control stream at join and whenever the membership changes, to all but devices, and `Events` at join and whenever there are some.
-//! A mesh is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
+//! A mesh, or the panorama of the light, is asked for on a stream of its own: `MeshRequest`, then `MeshHeader` and the raw bytes of the blob.
 
 pub use crate::role::Role;
 

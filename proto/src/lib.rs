@@ -5,7 +5,8 @@
 //! * **Datagrams** (hot plane, lossy, newest wins): [`header`] + payload + tag, sealed by [`seal`].
 //!   Payloads: [`state::HotState`], [`input::InputSample`], [`head::HeadSample`], [`force::ForceSample`], [`force::PassedForce`],
 //!   [`wrench::WrenchCommand`], [`constraints::ConstraintPart`], [`barrier`], [`time`].
-//! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`].
+//! * **Control messages** (QUIC streams, reliable): [`control::ControlMessage`]; meshes travel as [`mesh_blob::MeshBlob`], the light around them as
+//!   [`panorama::Panorama`].
 //!
 //! Who may join is proven by [`proof`] with a secret from [`key`] or [`credential`]; what he may do then is in [`role`].
 //!
@@ -37,6 +38,7 @@ pub mod mesh_blob;
 pub mod multicast;
 mod octahedral;
 pub mod pace;
+pub mod panorama;
 pub mod path;
 pub mod pin;
 pub mod pose;
@@ -74,6 +76,7 @@ pub use header::{Header, Kind};
 pub use input::InputSample;
 pub use key::ClusterKey;
 pub use mesh_blob::{Finish, MeshBlob, MeshHash};
+pub use panorama::Panorama;
 pub use pin::ServerPin;
 pub use pose::{PoseF32, PoseF64};
 pub use revocation::{JoinPolicy, Revoked};

@@ -44,6 +44,8 @@ pub struct SceneDescription {
     pub nearest_disparity: f64,
     /// What is drawn besides the scene.
     pub show: ShowOptions,
+    /// The light around the scene, by the hash of its [`crate::Panorama`]; `None` is the studio that every node knows.
+    pub environment: Option<MeshHash>,
 }
 
 impl SceneDescription {
@@ -67,6 +69,7 @@ impl SceneDescription {
             separation_scale: 1.0,
             nearest_disparity: 0.0,
             show: ShowOptions::default(),
+            environment: None,
         }
     }
 }
@@ -177,8 +180,8 @@ pub struct WindowDescription {
     pub fullscreen: bool,
 }
 
-/// What is drawn besides the scene; nothing by default: the user sees the god-object only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What is drawn besides the scene, and with what effort; nothing besides by default: the user sees the god-object only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShowOptions {
     /// The device pose, translucent.
     pub ghost: bool,
@@ -188,6 +191,20 @@ pub struct ShowOptions {
     pub force: bool,
     /// Lines of text about the node: its link, its frames, the age of what it draws.
     pub hud: bool,
+    /// Surfaces mirror what is around them; without, they only get its light.
+    pub reflections: bool,
+}
+
+impl Default for ShowOptions {
+    fn default() -> Self {
+        Self {
+            ghost: false,
+            contacts: false,
+            force: false,
+            hud: false,
+            reflections: true,
+        }
+    }
 }
 
 wire_ranged!(SceneDescription {
@@ -207,6 +224,7 @@ wire_ranged!(SceneDescription {
     separation_scale in SHARE,
     nearest_disparity in ANGLE,
     show,
+    environment,
 });
 wire_ranged!(BodyDescription {
     name,
@@ -246,6 +264,7 @@ wire_ranged!(ShowOptions {
     ghost,
     contacts,
     force,
-    hud
+    hud,
+    reflections
 });
 wire_tag!(Stereo, "stereo mode" { Mono = 0, SideBySide = 1, TopBottom = 2, Anaglyph = 3, TwoWindows = 4 });

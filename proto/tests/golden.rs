@@ -5,7 +5,7 @@
 
 use crate::samples::*;
 use taut_proto::{
-    Finish, MeshBlob,
+    Finish, MeshBlob, Panorama,
     header::MAX_DATAGRAM_BYTES,
     mesh_blob::{MeshHash, Positions},
     seal::{KEY_MATERIAL_BYTES, Opener, Sealer},
@@ -52,6 +52,12 @@ fn made() -> Vec<(String, String)> {
     let finished = finished.unwrap_or_else(|error| panic!("{error}"));
     let blob = finished.encode().unwrap_or_else(|error| panic!("{error}"));
     lines.push(("mesh/triangle-with-finish".to_owned(), hex(&blob)));
+    let panorama = Panorama::from_fn(|column, row| [column as f32, row as f32, 0.5]).encode();
+    lines.push((
+        "panorama/hash".to_owned(),
+        MeshHash::of(&panorama).to_string(),
+    ));
+    lines.push(("panorama/first-texels".to_owned(), hex(&panorama[..16])));
     lines
 }
 

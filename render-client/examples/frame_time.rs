@@ -2,16 +2,16 @@
 //! `cargo run --release -p taut-render --example frame_time`.
 //!
 //! One obstacle of 27 thousand to 1.7 million triangles and a small god-object, one eye. `still` is a
-//! frame in which nothing moved, `hand` one in which the god-object did, `all` one in which the
-//! obstacle did, too, and all shadows are drawn again. Rows are drawn in turns, so that a machine that
-//! other programs use does not favour one of them.
+//! frame in which nothing moved, `plain` the same without reflections, `hand` one in which the god-object did, `all` one in which the
+//! obstacle did, too, and all shadows are drawn again. Told is the processor time of all threads: with
+//! software drawing all of the cost, whatever else the machine does. Rows are drawn in turns.
 
 #[allow(dead_code, unused_imports, reason = "the tests use the rest")]
 #[path = "../tests/support/mod.rs"]
 mod support;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Similarity3};
 use support::{peg_in_hole, state};
@@ -32,6 +32,8 @@ const PIXELS: (u32, u32) = (960, 640);
 #[derive(Clone, Copy)]
 enum Moves {
     Nothing,
+    /// The same without reflections.
+    Plain,
     Hand,
     All,
 }
@@ -59,11 +61,11 @@ fn main() -> anyhow::Result<()> {
         let canvas = Canvas::new(gpu, stage);
         canvas.gpu().finish()?;
         let ready = start.elapsed().as_secs_f64();
-        rows.push((triangles, ready, canvas, [vec![], vec![], vec![]]));
+        rows.push((triangles, ready, canvas, [vec![], vec![], vec![], vec![]]));
     }
     for frame in 0..FRAMES {
         for (_, _, canvas, times) in &mut rows {
-            for (moves, times) in [Moves::Nothing, Moves::Hand, Moves::All]
+            for (moves, times) in [Moves::Nothing, Moves::Plain, Moves::Hand, Moves::All]
                 .into_iter()
                 .zip(times)
             {
@@ -71,8 +73,10 @@ fn main() -> anyhow::Result<()> {
             }
         }
     }
-    println!("triangles   ready      on the card   still             hand              all");
-    let mut first: Option<[f64; 3]> = None;
+    println!(
+        "triangles   ready      on the card   still             plain             hand              all"
+    );
+    let mut first: Option<[f64; 4]> = None;
     for (triangles, ready, canvas, times) in &mut rows {
         let median = times.each_mut().map(|times| {
             times.sort_by(f64::total_cmp);
@@ -81,14 +85,21 @@ fn main() -> anyhow::Result<()> {
         let first = *first.get_or_insert(median);
         let cell = |i: usize| format!("{:7.1} ms x {:<5.1}", median[i], median[i] / first[i]);
         println!(
-            "{triangles:9}   {ready:6.2} s   {:8.1} MB   {}  {}  {}",
+            "{triangles:9}   {ready:6.2} s   {:8.1} MB   {}  {}  {}  {}",
             canvas.renderer().mesh_bytes() as f64 * 1e-6,
             cell(0),
             cell(1),
             cell(2),
+            cell(3),
         );
     }
     Ok(())
+}
+
+/// Processor time of all threads of this process.
+fn processor_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }
 
 /// Draws a frame twice, so that the first brings everything to where it is, and times the second.
@@ -97,7 +108,7 @@ fn frame_ms(canvas: &mut Canvas, moves: Moves, frame: usize) -> anyhow::Result<f
     let mut time = 0.0;
     for k in 0..2 {
         let hand = match moves {
-            Moves::Nothing => 0.0,
+            Moves::Nothing | Moves::Plain => 0.0,
             Moves::Hand | Moves::All => step(k),
         };
         let mut latched = state(Isometry3::translation(0.0, -0.05 - hand, 0.0));
@@ -105,9 +116,13 @@ fn frame_ms(canvas: &mut Canvas, moves: Moves, frame: usize) -> anyhow::Result<f
             let pose = Isometry3::translation(0.0, step(k), 0.0);
             latched.state.bodies = vec![(0, pose)];
         }
-        let start = Instant::now();
-        canvas.draw(&latched, Show::default(), false)?;
-        time = start.elapsed().as_secs_f64() * 1e3;
+        let start = processor_time();
+        let show = Show {
+            reflections: !matches!(moves, Moves::Plain),
+            ..Show::default()
+        };
+        canvas.draw(&latched, show, false)?;
+        time = (processor_time() - start).as_secs_f64() * 1e3;
     }
     Ok(time)
 }

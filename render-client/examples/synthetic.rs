@@ -25,6 +25,7 @@ fn main() -> anyhow::Result<()> {
                 contacts: true,
                 force: true,
                 hud: true,
+                reflections: true,
             },
         ),
         ("sbs", Stereo::SideBySide, Show::default()),

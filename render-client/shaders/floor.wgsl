@@ -41,7 +41,7 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let line = max(0.35 * lines(place, 0.2 * frame.grid.x, 0.012 * frame.grid.x), lines(place, frame.grid.x, 0.028 * frame.grid.x));
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
-    let light = MATT_SHARE * colour * falling_light(in.position, normal).rgb;
+    let light = colour * falling_light(in.position, normal).rgb;
     let alpha = 1.0 - smoothstep(0.35, 1.0, from_middle);
     return vec4(shown(light), alpha * near_share(in.clip));
 }

@@ -8,19 +8,23 @@ struct Frame {
     eye: vec4<f32>,          // xyz; w: 1 when the state is stale
     key: vec4<f32>,          // unit, to the light; w: size of a shadow texel, m
     floor: vec4<f32>,        // centre; w: radius, m
-    grid: vec4<f32>,         // x: spacing of the lines, m; y, z: nearer is not drawn, farther is drawn whole, m
+    grid: vec4<f32>,         // x: spacing of the lines, m; y, z: nearer is not drawn, farther is drawn whole, m; w: 1 with reflections
+    irradiance: array<vec4<f32>, 9>, // over pi: factors of 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy of the normal
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
 
-const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.40; // a light colour facing it stays below the bend of the tone curve
-const FILL_COLOUR = vec3<f32>(0.62, 0.76, 1.0) * 0.26;
-const FILL_DIRECTION = vec3<f32>(0.80, -0.52, 0.30); // unit, to the light: low, from the right
-const SKY_COLOUR = vec3<f32>(0.44, 0.52, 0.64) * 0.62;
-const MATT_SHARE = 0.80;         // of the light, the rest goes into the shine
-const GROUND_COLOUR = vec3<f32>(0.30, 0.27, 0.25) * 0.40;
+@group(0) @binding(3) var environment: texture_cube<f32>;
+@group(0) @binding(4) var environment_sampler: sampler;
+
+const PI = 3.14159265;
+const KEY_COLOUR = vec3<f32>(1.0, 0.955, 0.88) * 1.10; // over pi; a light colour facing it stays below the bend of the tone curve
+const MOST_SHINE = 1.1;          // of the lamp: beyond it there is nothing but white
+const ROUGHEST_LEVEL = 4.0;      // of the environment
+const NARROWEST = 0.07;          // alpha of the sharpest highlight: a narrower one, of a lamp without size, falls between the pixels
+const DIELECTRIC = vec3<f32>(0.04); // share of light that plastic and glass mirror head-on
 
 // Share of the key light that reaches a point: 2 x 2 samples, each filtered over 2 x 2 texels.
 fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
@@ -39,11 +43,28 @@ fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
     return 0.25 * lit;
 }
 
-// Light from all around: less of it near the floor, which hides half of the surroundings.
-fn ambient(position: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
+// Share of the surroundings that is seen in a direction: near the floor it hides half of them.
+fn open_share(position: vec3<f32>, direction: vec3<f32>) -> f32 {
     let height = (position.z - frame.floor.z) / (0.28 * frame.floor.w);
-    let open = mix(0.55, 1.0, smoothstep(0.0, 1.0, height + 0.5 * max(normal.z, 0.0)));
-    return open * mix(GROUND_COLOUR, SKY_COLOUR, 0.5 + 0.5 * normal.z);
+    return mix(0.55, 1.0, smoothstep(0.0, 1.0, height + 0.5 * max(direction.z, 0.0)));
+}
+
+// Light of the surroundings that falls on a surface, over pi.
+fn ambient(position: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
+    let light = frame.irradiance[0] + frame.irradiance[1] * n.y + frame.irradiance[2] * n.z + frame.irradiance[3] * n.x
+        + frame.irradiance[4] * (n.x * n.y) + frame.irradiance[5] * (n.y * n.z) + frame.irradiance[6] * (3.0 * n.z * n.z - 1.0)
+        + frame.irradiance[7] * (n.x * n.z) + frame.irradiance[8] * (n.x * n.x - n.y * n.y);
+    return open_share(position, n) * max(light.rgb, vec3(0.0));
+}
+
+// Light of the surroundings that a surface of this roughness mirrors from about a direction. Without reflections it is that which a
+// matt surface would get from there.
+fn mirrored_light(position: vec3<f32>, direction: vec3<f32>, roughness: f32) -> vec3<f32> {
+    if frame.grid.w == 0.0 {
+        return ambient(position, direction);
+    }
+    let light = textureSampleLevel(environment, environment_sampler, direction, roughness * ROUGHEST_LEVEL).rgb;
+    return open_share(position, direction) * light;
 }
 
 // The key light is strongest over the middle of the scene.
@@ -52,38 +73,51 @@ fn key_pool(position: vec3<f32>) -> f32 {
     return mix(0.25, 1.0, 1.0 - smoothstep(0.12, 0.85, away));
 }
 
-// Light that falls on a surface; its share of the key light, for the highlight, in w.
+// Light that falls on a surface, over pi; its share of the key light, for the highlight, in w.
 fn falling_light(position: vec3<f32>, normal: vec3<f32>) -> vec4<f32> {
     let to_key = dot(normal, frame.key.xyz);
     let key_share = lit_by_key(position, normal) * smoothstep(0.0, 0.12, to_key) * key_pool(position);
-    let light = ambient(position, normal)
-        + KEY_COLOUR * (key_share * max(to_key, 0.0))
-        + FILL_COLOUR * max(dot(normal, FILL_DIRECTION), 0.0);
-    return vec4(light, key_share);
+    return vec4(ambient(position, normal) + KEY_COLOUR * (key_share * max(to_key, 0.0)), key_share);
 }
 
-// Light leaving a surface towards the eye. `gloss`: x strength, y exponent of the highlight, w share of a metal.
-fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, gloss: vec4<f32>) -> vec3<f32> {
+// Share of even light from all around that a surface mirrors, by the cosine to the eye: a fit of the split sum's second factor.
+// Source: Karis 2014, "Physically based shading on mobile".
+fn mirrored_share(head_on: vec3<f32>, roughness: f32, cosine: f32) -> vec3<f32> {
+    let r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
+    let grazing = min(r.x * r.x, exp2(-9.28 * cosine)) * r.x + r.y;
+    return head_on * (r.z - 1.04 * grazing) + vec3(r.w + 1.04 * grazing);
+}
+
+// What a surface mirrors of a lamp in the direction `to_lamp` that gives it light of 1: microfacets of GGX, whose shadowing is Hammon's,
+// and Schlick's reflectance.
+// Source: Walter et al. 2007, "Microfacet models for refraction"; Hammon 2017, "PBR diffuse lighting for GGX+Smith microsurfaces".
+fn highlight(normal: vec3<f32>, to_eye: vec3<f32>, to_lamp: vec3<f32>, head_on: vec3<f32>, roughness: f32) -> vec3<f32> {
+    let alpha = max(roughness * roughness, NARROWEST);
+    let between = normalize(to_lamp + to_eye);
+    let facing = max(dot(normal, between), 0.0);
+    let spread = facing * facing * (alpha * alpha - 1.0) + 1.0;
+    let lamp = max(dot(normal, to_lamp), 0.0);
+    let eye = max(dot(normal, to_eye), 1e-3);
+    let visible = 0.5 / mix(2.0 * lamp * eye + 1e-4, lamp + eye, alpha);
+    let reflected = head_on + (1.0 - head_on) * pow(1.0 - max(dot(to_eye, between), 0.0), 5.0);
+    return reflected * (alpha * alpha * visible * lamp / (spread * spread)); // pi of the lobe is in the light
+}
+
+struct Leaving {
+    matt: vec3<f32>,
+    shine: vec3<f32>,
+}
+
+// Light leaving a surface towards the eye. `finish`: x roughness, z share of a metal.
+fn surface_light(position: vec3<f32>, normal: vec3<f32>, colour: vec3<f32>, finish: vec4<f32>) -> Leaving {
     let to_eye = normalize(frame.eye.xyz - position);
     let falling = falling_light(position, normal);
-    let away = 1.0 - max(dot(normal, to_eye), 0.0);
-    let rim = away * away * away * away;
-    let highlight = pow(max(dot(normal, normalize(frame.key.xyz + to_eye)), 0.0), gloss.y);
-    let shine = KEY_COLOUR * (falling.w * highlight) + SKY_COLOUR * (0.9 * rim);
-    let dielectric = MATT_SHARE * colour * falling.rgb + gloss.x * shine;
-    if gloss.w == 0.0 {
-        return dielectric;
-    }
-    // A metal has no colour below its surface: it reflects what is around it in its own, the blurrier the broader its highlight.
-    let mirrored = reflect(-to_eye, normal);
-    let sky = ambient(position, mirrored);
-    let lamp = smoothstep(0.2, 1.0, dot(mirrored, frame.key.xyz));
-    // Half of the sky's blue: the rest would turn gold to olive.
-    let around = 1.8 * mix(sky, vec3(dot(sky, vec3(0.3333))), 0.5) + KEY_COLOUR * (0.5 * lamp * falling.w);
-    let blur = 1.0 / (1.0 + 0.05 * gloss.y);
-    let metal = colour * (mix(around, falling.rgb, blur) + gloss.x * KEY_COLOUR * (falling.w * highlight))
-        + SKY_COLOUR * (0.5 * rim);
-    return mix(dielectric, metal, gloss.w);
+    let head_on = mix(DIELECTRIC, colour, finish.z);
+    let mirrored = mirrored_share(head_on, finish.x, max(dot(normal, to_eye), 0.0));
+    let around = mirrored * mirrored_light(position, reflect(-to_eye, normal), finish.x);
+    var lamp = KEY_COLOUR * falling.w * highlight(normal, to_eye, frame.key.xyz, head_on, finish.x);
+    lamp *= min(1.0, MOST_SHINE / max(max(lamp.r, lamp.g), max(lamp.b, 1e-4)));
+    return Leaving(colour * falling.rgb * (1.0 - mirrored) * (1.0 - finish.z), around + lamp);
 }
 
 // Keeps bright parts from clipping and their hue from turning: about linear below 0.6.

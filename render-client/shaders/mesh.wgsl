@@ -6,7 +6,7 @@ struct Instance {
     @location(4) model_z: vec4<f32>,
     @location(5) model_w: vec4<f32>,
     @location(6) colour: vec4<f32>,
-    @location(7) gloss: vec4<f32>,   // x strength, y exponent, z own light, w share of a metal
+    @location(7) finish: vec4<f32>,  // x roughness, y own light, z share of a metal
 }
 
 struct Fragment {
@@ -14,7 +14,7 @@ struct Fragment {
     @location(0) position: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) colour: vec4<f32>,
-    @location(3) gloss: vec4<f32>,
+    @location(3) @interpolate(flat) finish: vec4<f32>,
 }
 
 // A unit vector out of its place on the octahedron |x| + |y| + |z| = 1, folded out to a square.
@@ -41,24 +41,27 @@ fn vertex(@location(0) position: vec3<f32>, @location(1) folded: vec2<f32>, inst
     fragment.position = place.xyz;
     fragment.normal = (model * vec4(normal / squares, 0.0)).xyz;
     fragment.colour = instance.colour;
-    fragment.gloss = instance.gloss;
+    fragment.finish = instance.finish;
     return fragment;
 }
 
+// The colour of a fragment; in w how much of what is behind a translucent body its shine covers.
 fn seen(in: Fragment) -> vec4<f32> {
-    let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.gloss);
-    return vec4(shown(mix(light, in.colour.rgb, in.gloss.z)), 1.0);
+    let light = surface_light(in.position, normalize(in.normal), in.colour.rgb, in.finish);
+    let colour = shown(mix(light.matt + light.shine, in.colour.rgb, in.finish.y));
+    return vec4(colour, clamp(max(light.shine.r, max(light.shine.g, light.shine.b)), 0.0, 1.0));
 }
 
 @fragment
 fn fragment(in: Fragment) -> @location(0) vec4<f32> {
-    return seen(in);
+    return vec4(seen(in).rgb, 1.0);
 }
 
 // The same of a body through which others are seen.
 @fragment
 fn translucent(in: Fragment) -> @location(0) vec4<f32> {
-    return vec4(seen(in).rgb, in.colour.a * near_share(in.clip));
+    let colour = seen(in);
+    return vec4(colour.rgb, mix(in.colour.a, 1.0, colour.w) * near_share(in.clip));
 }
 
 // The same where near things fade away: dithered, so that they still hide what is behind them.
@@ -68,5 +71,5 @@ fn fading(in: Fragment) -> @location(0) vec4<f32> {
     if near_share(in.clip) <= 0.999 * dither(in.clip.xy) {
         discard;
     }
-    return seen(in);
+    return vec4(seen(in).rgb, 1.0);
 }

@@ -56,7 +56,7 @@ impl Calibration {
         };
         let mesh = Arc::new(speck()?);
         let meshes = vec![mesh; 1 + workbench.obstacles.len()];
-        let mut stage = description::stage(workbench, found, &meshes, &overrides)?;
+        let mut stage = description::stage(workbench, found, &meshes, None, &overrides)?;
         for screen in &mut stage.screens {
             let correction = screen.correction.take().unwrap_or_default();
             let mesh = correction.mesh(0);

@@ -377,7 +377,7 @@ fn listed(list: &[ShowArg]) -> Show {
         ghost: list.contains(&ShowArg::Ghost),
         contacts: list.contains(&ShowArg::Contacts),
         force: list.contains(&ShowArg::Force),
-        hud: false,
+        ..Show::default()
     }
 }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Similarity3};
 use taut_proto::scene::{BodyDescription, NodeDescription, SceneDescription, ScreenDescription};
-use taut_proto::{MeshBlob, PoseF64, scene};
+use taut_proto::{MeshBlob, Panorama, PoseF64, scene};
 
 use crate::comfort::Comfort;
 use crate::correction::Correction;
+use crate::environment::Environment;
 use crate::error::RenderError;
 use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
 use crate::stereo::Stereo;
@@ -56,11 +57,12 @@ pub(crate) fn find_node<'a>(
     })
 }
 
-/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle.
+/// The stage of one node; `meshes[0]` is the god-object's, then one per obstacle. `panorama` is the light that the scene names.
 pub(crate) fn stage(
     description: &SceneDescription,
     node: &NodeDescription,
     meshes: &[Arc<MeshBlob>],
+    panorama: Option<&Panorama>,
     overrides: &Overrides,
 ) -> Result<Stage, RenderError> {
     let bad = |what: String| RenderError::BadScene { what };
@@ -140,6 +142,7 @@ pub(crate) fn stage(
             .enumerate()
             .map(obstacle)
             .collect::<Result<_, _>>()?,
+        environment: Environment::of(panorama),
         meshes: drawn.into_iter().map(|(mesh, _)| Arc::new(mesh)).collect(),
     })
 }
@@ -151,6 +154,7 @@ pub(crate) fn show(options: &scene::ShowOptions) -> Show {
         contacts: options.contacts,
         force: options.force,
         hud: options.hud,
+        reflections: options.reflections,
     }
 }
 

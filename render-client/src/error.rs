@@ -129,6 +129,9 @@ pub enum RenderError {
         /// What is wrong.
         what: String,
     },
+    /// A film cannot be made of its pictures.
+    #[error("the film cannot be written: {0}; ask for fewer or smaller pictures")]
+    Film(#[from] png::EncodingError),
     /// The operating system refuses a thread, a runtime or a signal handler.
     #[error("the operating system gave no {what}: {reason}; close other programs and try again")]
     System {
@@ -163,7 +166,10 @@ impl RenderError {
                 _ => 2,
             },
             Self::NoGpu | Self::Gpu { .. } | Self::NoDisplay { .. } => 1,
-            Self::Picture { .. } | Self::ServerLost { .. } | Self::System { .. } => 1,
+            Self::Film(_)
+            | Self::Picture { .. }
+            | Self::ServerLost { .. }
+            | Self::System { .. } => 1,
         }
     }
 }

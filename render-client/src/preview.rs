@@ -11,10 +11,11 @@ use std::sync::Arc;
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use taut_proto::scene::{self, BodyDescription, NodeDescription, WindowDescription};
-use taut_proto::{MeshBlob, SceneDescription};
+use taut_proto::{MeshBlob, Panorama, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
+use crate::film::film;
 use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
 use crate::stage::{Bounds, Show, Stage, StageBody};
 use crate::stereo::Stereo;
@@ -41,6 +42,8 @@ pub struct PreviewScene {
     pub bodies: Vec<(BodyDescription, Arc<MeshBlob>)>,
     /// Places in `bodies` of those without an end, such as half-spaces: drawn as far as their mesh goes, and not brought into view.
     pub endless: Vec<usize>,
+    /// The light around it; `None` is a studio.
+    pub environment: Option<Arc<Panorama>>,
     /// Turns the scene's frame so that z is up.
     pub upright: UnitQuaternion<f64>,
 }
@@ -132,6 +135,13 @@ impl Preview {
             .map_err(|error| self.gpu.broken(&error))?;
         Ok(bytes.into_inner())
     }
+
+    /// All views as the bytes of an animated PNG that browsers play, one turn in `seconds`.
+    pub fn film(&self, seconds: f64) -> Result<Vec<u8>, RenderError> {
+        film(self.cameras.len() as u32, seconds, |view| {
+            self.picture(view)
+        })
+    }
 }
 
 /// The stage of the scene in its own frame, without screens.
@@ -158,7 +168,8 @@ fn stage_of(scene: &PreviewScene) -> Result<Stage, RenderError> {
         monitors: Vec::new(),
     };
     let meshes: Vec<Arc<MeshBlob>> = scene.bodies.iter().map(|(_, mesh)| mesh.clone()).collect();
-    description::stage(&description, &node, &meshes, &Overrides::default())
+    let light = scene.environment.as_deref();
+    description::stage(&description, &node, &meshes, light, &Overrides::default())
 }
 
 /// The bodies that are brought into view: those with an end; all that are seen if there is no other.

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
 use taut_link::{
-    ClientLink, ClientOptions, FrameGate, MeshCounters, ReceivedState, RejoinPolicy, Renewal,
-    SessionEnd, SupervisedLink,
+    ClientLink, ClientOptions, FrameGate, LinkError, MeshCounters, ReceivedState, RejoinPolicy,
+    Renewal, SessionEnd, SupervisedLink,
 };
 use taut_proto::state::HEAD_TRACKED;
 use taut_proto::{ClientStats, HotState, Role, SceneDescription};
@@ -289,25 +289,30 @@ async fn prepare(
     }
     // A node that the workbench does not know needs no meshes to say so.
     description::find_node(&described, &node)?;
+    // A server that goes while it hands out its meshes is lost like one that goes later.
+    let lost = |error: LinkError| match link.is_closed() {
+        Some(reason) => RenderError::ServerLost {
+            server: server.clone(),
+            reason,
+        },
+        None => error.into(),
+    };
     let mut meshes = Vec::with_capacity(1 + described.obstacles.len());
     for body in std::iter::once(&described.god_object).chain(&described.obstacles) {
-        let fetched = link.mesh(body.mesh).await;
-        // A server that goes while it hands out its meshes is lost like one that goes later.
-        meshes.push(fetched.map_err(|error| match link.is_closed() {
-            Some(reason) => RenderError::ServerLost {
-                server: server.clone(),
-                reason,
-            },
-            None => error.into(),
-        })?);
+        meshes.push(link.mesh(body.mesh).await.map_err(lost)?);
     }
+    let panorama = match described.environment {
+        Some(hash) => Some(link.panorama(hash).await.map_err(lost)?),
+        None => None,
+    };
     // The meshes of a large scene are copied for longer than the network's thread may be busy.
     let built = tokio::task::spawn_blocking(move || {
         let node = description::find_node(&described, &node)?;
-        let stage = description::stage(&described, node, &meshes, &overrides)?;
+        let stage = description::stage(&described, node, &meshes, panorama.as_ref(), &overrides)?;
         let show = overrides.show;
         let mut show = show.unwrap_or_else(|| description::show(&described.show));
         show.hud |= described.show.hud || overrides.hud;
+        show.reflections = described.show.reflections;
         Ok(Prepared {
             stage: Some((stage, show)),
             description: described,

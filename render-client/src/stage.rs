@@ -12,6 +12,7 @@ use taut_proto::Finish;
 use crate::calibration::Chart;
 use crate::comfort::Comfort;
 use crate::correction::Correction;
+use crate::environment::Environment;
 use crate::stereo::Stereo;
 use crate::view::{ClipPlanes, Screen};
 
@@ -38,6 +39,8 @@ pub struct Stage {
     pub reference_point: Point3<f64>,
     /// All others.
     pub obstacles: Vec<StageBody>,
+    /// The light around them.
+    pub environment: Arc<Environment>,
 }
 
 /// One screen of a node.
@@ -87,8 +90,8 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// What is drawn besides god-object and obstacles. The paper shows the user the god-object only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What is drawn besides god-object and obstacles, and with what effort. The paper shows the user the god-object only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Show {
     /// The device pose as a translucent copy of the god-object.
     pub ghost: bool,
@@ -98,6 +101,20 @@ pub struct Show {
     pub force: bool,
     /// Text about the node.
     pub hud: bool,
+    /// Surfaces mirror what is around them; without, they only get its light.
+    pub reflections: bool,
+}
+
+impl Default for Show {
+    fn default() -> Self {
+        Self {
+            ghost: false,
+            contacts: false,
+            force: false,
+            hud: false,
+            reflections: true,
+        }
+    }
 }
 
 /// A sphere around something.

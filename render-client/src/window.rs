@@ -1,7 +1,7 @@
 //! Draws in windows: one for each picture of each screen of the node.
 //!
 //! All windows of a frame show the same state and are submitted together. Keys: Esc ends, F covers
-//! the monitor, G, C, V and H show or hide the device ghost, the contacts, the force and the HUD. A window that
+//! the monitor, G, C, V, H and M show or hide the device ghost, the contacts, the force, the HUD and reflections. A window that
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 mod display;
@@ -187,6 +187,7 @@ impl App<'_> {
             KeyCode::KeyC => self.show.contacts = !self.show.contacts,
             KeyCode::KeyV => self.show.force = !self.show.force,
             KeyCode::KeyH => self.show.hud = !self.show.hud,
+            KeyCode::KeyM => self.show.reflections = !self.show.reflections,
             KeyCode::KeyP | KeyCode::KeyR => self.let_go_or_return(code),
             _ => {}
         }

@@ -9,9 +9,11 @@ use std::time::Duration;
 use crate::perceptual::{difference, halved};
 use crate::support::{canvas, peg_in_hole, state};
 use image::{RgbImage, RgbaImage};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Similarity3};
+use taut_proto::Finish;
 use taut_render::node_status::{FrameMode, LinkHealth, NodeStatus};
-use taut_render::stage::{Show, Stage};
+use taut_render::renderer::shapes;
+use taut_render::stage::{Show, Stage, StageBody};
 use taut_render::stereo::Stereo;
 use taut_render::timeline::Latched;
 
@@ -19,7 +21,7 @@ use taut_render::timeline::Latched;
 const PIXELS: (u32, u32) = (240, 160);
 
 /// Names of the golden pictures, in the order in which [`pictures`] draws them.
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 10] = [
     "front-left",
     "front-right",
     "table-left",
@@ -28,6 +30,8 @@ const NAMES: [&str; 8] = [
     "hud",
     "link-lost",
     "stale",
+    "materials",
+    "materials-plain",
 ];
 
 fn half_way_in() -> Latched {
@@ -72,6 +76,38 @@ fn wall(stereo: Stereo) -> Stage {
     stage
 }
 
+/// Gold, blue plastic, and glass before a plate of matt red.
+fn materials() -> Stage {
+    let mut stage = wall(Stereo::Mono);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.8);
+    stage.workbench_from_scene = Similarity3::identity();
+    stage.meshes = vec![
+        shapes::sphere(0.18, 64).into(),
+        shapes::cuboid([0.8, 0.02, 0.14]).into(),
+    ];
+    let body = |mesh, x: f64, y: f64, colour, (roughness, metallic, opacity)| StageBody {
+        id: mesh as u16,
+        mesh,
+        pose: Isometry3::translation(x, y, 0.6),
+        colour,
+        opacity,
+        finish: Some(Finish {
+            roughness,
+            metallic,
+        }),
+        ..stage.god_object
+    };
+    let gold = body(0, -0.45, 0.0, [0.9, 0.65, 0.2], (0.2, 1.0, 1.0));
+    let others = [
+        body(0, 0.0, 0.0, [0.05, 0.15, 0.6], (0.3, 0.0, 1.0)),
+        body(0, 0.45, 0.0, [0.6, 0.8, 0.85], (0.05, 0.0, 0.3)),
+        body(1, 0.0, 0.3, [0.6, 0.08, 0.05], (1.0, 0.0, 1.0)),
+    ];
+    stage.obstacles = others.to_vec();
+    stage.god_object = gold;
+    stage
+}
+
 fn status(link: LinkHealth) -> NodeStatus {
     NodeStatus {
         node: "left".to_owned(),
@@ -105,6 +141,14 @@ fn pictures() -> Option<Vec<RgbImage>> {
     };
     drawn.extend(over(&stale, Show::default(), lost)?);
     drawn.extend(over(&stale, Show::default(), LinkHealth::Connected)?);
+    for reflections in [true, false] {
+        let show = Show {
+            reflections,
+            ..Show::default()
+        };
+        let at = state(materials().god_object.pose);
+        drawn.extend(draw(materials(), &at, show, &NodeStatus::default())?);
+    }
     Some(drawn.iter().map(halved).collect())
 }
 

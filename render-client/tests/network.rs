@@ -18,7 +18,7 @@ use taut_proto::scene::{
     BodyDescription, NodeDescription, ScreenDescription, Stereo, WindowDescription,
 };
 use taut_proto::state::ToolState;
-use taut_proto::{HotState, MeshBlob, MeshHash, PoseF32, PoseF64, SceneDescription};
+use taut_proto::{HotState, MeshBlob, MeshHash, Panorama, PoseF32, PoseF64, SceneDescription};
 use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::TriangleMesh;
@@ -111,6 +111,7 @@ fn content() -> Content {
     Content {
         description,
         meshes: meshes.to_vec(),
+        panorama: None,
     }
 }
 
@@ -121,6 +122,10 @@ impl Server {
 
     /// With a barrier of frames, if `frames` says how they go.
     fn start_with(frames: Option<MasterSettings>) -> Self {
+        Self::serving(frames, content())
+    }
+
+    fn serving(frames: Option<MasterSettings>, content: Content) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let key = create_key_file(&folder.path().join("key")).expect("a key");
         let runtime = tokio::runtime::Runtime::new().expect("a runtime");
@@ -128,7 +133,7 @@ impl Server {
             frames,
             ..ServerOptions::loopback(key)
         };
-        let link = runtime.block_on(serve(options, content())).expect("serves");
+        let link = runtime.block_on(serve(options, content)).expect("serves");
         let stop = Arc::new(AtomicBool::new(false));
         let (mut broadcaster, clock) = (link.broadcaster(), link.clock());
         let stopped = Arc::clone(&stop);
@@ -285,6 +290,33 @@ fn a_node_draws_what_it_is_told_over_either_transport_and_reports_it() {
         assert!(orange > 30, "{orange} orange pixels");
         server.stop();
     }
+}
+
+#[test]
+fn a_node_draws_in_the_light_that_the_server_names() {
+    if !can_draw() {
+        return;
+    }
+    let redness = |light: Option<Panorama>| {
+        let mut content = content();
+        let hash = |light: &Panorama| MeshHash::of(&light.encode());
+        content.description.environment = light.as_ref().map(hash);
+        content.panorama = light;
+        let server = Server::serving(None, content);
+        let mut args = server.args("both");
+        (args.frames, args.out) = (Some(1), Some(server.pictures()));
+        taut_render::run(args).expect("draws");
+        let path = server.pictures().join("both-table-00001.png");
+        let picture = image::open(path).expect("a picture").to_rgba8();
+        let sum = |part: usize| -> f64 { picture.pixels().map(|p| f64::from(p.0[part])).sum() };
+        server.stop();
+        sum(0) / sum(2)
+    };
+    let (studio, red) = (
+        redness(None),
+        redness(Some(Panorama::from_fn(|_, _| [1.0, 0.1, 0.02]))),
+    );
+    assert!(red > 1.3 * studio, "{red} {studio}");
 }
 
 #[test]

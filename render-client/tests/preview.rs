@@ -42,6 +42,7 @@ fn scene(bodies: Vec<(BodyDescription, Arc<MeshBlob>)>) -> PreviewScene {
         name: "test".to_owned(),
         bodies,
         endless: Vec::new(),
+        environment: None,
         upright: UnitQuaternion::identity(),
     }
 }

@@ -424,7 +424,7 @@ const MOST_VIEWS: i64 = 3600;
 /// `taut preview`.
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "The eye is before the scene, to its right and above, as near as shows all of it. Bodies are where they start. A half-space is drawn\nas a plate, and is not brought into view. An existing file is replaced.\n\nExamples:\n  taut preview peg-in-a-hole --out peg.png\n  taut preview my-scene.toml --out turn.png --orbit 36 --size 800x600"
+    after_help = "The eye is before the scene, to its right and above, as near as shows all of it. Bodies are where they start. A half-space is drawn\nas a plate, and is not brought into view. An existing file is replaced.\n\nExamples:\n  taut preview peg-in-a-hole --out peg.png\n  taut preview my-scene.toml --out turn.png --orbit 36 --size 800x600\n  taut preview my-scene.toml --out film.png --film 6 --size 480x360"
 )]
 pub struct PreviewArgs {
     /// A shipped scene by its name, or a scene file
@@ -439,6 +439,9 @@ pub struct PreviewArgs {
     /// Draw so many pictures of a turn around the scene instead, FILE-01.png and so on
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_VIEWS))]
     pub orbit: Option<u32>,
+    /// Write them into one file that browsers play, an animated PNG of one turn in S seconds (without --orbit: of 36 pictures)
+    #[arg(long, value_name = "S", value_parser = film_seconds)]
+    pub film: Option<f64>,
     /// Graphics adapter by number or part of its name (default: the best; `taut doctor` lists them)
     #[arg(long, value_name = "NAME|INDEX")]
     pub gpu: Option<String>,
@@ -746,6 +749,11 @@ fn png_file(text: &str) -> Result<PathBuf, String> {
     } else {
         Err("name a file that ends in .png".to_owned())
     }
+}
+
+fn film_seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|s| (0.1..=60.0).contains(s));
+    seconds.ok_or_else(|| "give seconds, from 0.1 to 60".to_owned())
 }
 
 fn picture_size(text: &str) -> Result<(u32, u32), String> {

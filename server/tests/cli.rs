@@ -480,6 +480,7 @@ fn a_preview_that_cannot_be_is_refused_before_anything_is_written() {
     usage(&[&out, "--size", "640"], "such as 1280x960");
     usage(&[&out, "--size", "0x640"], "from 1 to 8192");
     usage(&[&out, "--orbit", "0"], "1..=3600");
+    usage(&[&out, "--film", "0"], "from 0.1 to 60");
     usage(&[&out, "--gpu", "no-such-card"], "no");
     assert!(!place.path("out.png").exists());
 }

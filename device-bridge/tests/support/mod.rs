@@ -56,6 +56,7 @@ fn content() -> Content {
             },
         ),
         meshes: vec![mesh],
+        panorama: None,
     }
 }
 

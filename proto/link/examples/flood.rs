@@ -434,5 +434,6 @@ fn content() -> Result<Content, Failure> {
     Ok(Content {
         description,
         meshes: vec![mesh],
+        panorama: None,
     })
 }

@@ -4,7 +4,7 @@ use crate::support::*;
 use std::time::Duration;
 use taut_link::{ClientOptions, LinkError, LinkEvent, Role, ServerOptions, Transport, serve};
 use taut_proto::{
-    ClientStats, MeshHash, WrenchCommand,
+    ClientStats, MeshHash, Panorama, WrenchCommand,
     control::{LogLevel, RefusalCode},
     stats::DrawnState,
 };
@@ -380,6 +380,36 @@ async fn content_without_its_meshes_is_not_served() {
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("served without a mesh"),
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_light_around_the_scene_comes_by_its_hash_and_is_not_served_without() {
+    let light = Panorama::from_fn(|column, row| [column as f32, row as f32, 1.0]);
+    let hash = MeshHash::of(&light.encode());
+    let mut content = content();
+    content.description.environment = Some(hash);
+    match serve(ServerOptions::loopback(key('a')), content.clone()).await {
+        Err(LinkError::Content { reason }) => assert!(reason.contains("panorama"), "{reason}"),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("served without its light"),
+    }
+    content.panorama = Some(light.clone());
+    let server = match serve(ServerOptions::loopback(key('a')), content).await {
+        Ok(server) => server,
+        Err(error) => panic!("{error}"),
+    };
+    let client = client(&server, Role::Render, "left").await;
+    assert_eq!(client.description().environment, Some(hash));
+    match client.panorama(hash).await {
+        Ok(found) => assert_eq!(found, light),
+        Err(error) => panic!("{error}"),
+    }
+    // A mesh is no light.
+    let mesh = client.description().god_object.mesh;
+    assert!(matches!(
+        client.panorama(mesh).await,
+        Err(LinkError::BadMesh { .. })
+    ));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -63,7 +63,9 @@ pub fn scene() -> SceneDescription {
             contacts: false,
             force: true,
             hud: true,
+            reflections: false,
         },
+        environment: Some(MeshHash { bytes: [3; 32] }),
     }
 }
 
@@ -151,7 +153,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
     let numbers = (
         prop::array::uniform6(1e-9..=1.0_f64),
         prop::array::uniform3(finite64()),
-        any::<(u32, bool, bool, bool, bool)>(),
+        any::<(u32, [bool; 5], Option<[u8; 32]>)>(),
     );
     (".{0,40}", body(), lists, (pose64(), pose64()), numbers).prop_map(
         |(
@@ -159,7 +161,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
             god_object,
             (obstacles, screens, nodes),
             (scene_origin, viewer),
-            (scalars, reference_point, (revision, ghost, contacts, force, hud)),
+            (scalars, reference_point, (revision, shown, environment)),
         )| {
             let [
                 display_scale,
@@ -169,6 +171,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                 separation_scale,
                 nearest_disparity,
             ] = scalars;
+            let [ghost, contacts, force, hud, reflections] = shown;
             SceneDescription {
                 name: name.into(),
                 revision,
@@ -190,7 +193,9 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                     contacts,
                     force,
                     hud,
+                    reflections,
                 },
+                environment: environment.map(|bytes| MeshHash { bytes }),
             }
         },
     )

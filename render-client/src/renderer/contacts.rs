@@ -1,6 +1,7 @@
 //! The contact points as red dots.
 
 use nalgebra::Matrix4;
+use taut_proto::Finish;
 
 use super::mesh::{Instance, Material};
 use crate::stage::Stage;
@@ -14,10 +15,11 @@ const DOT_SIZE: f64 = 0.055;
 
 const MATERIAL: Material = Material {
     colour: [0.85, 0.03, 0.02, 1.0],
-    gloss: 0.3,
-    sharpness: 40.0,
+    finish: Finish {
+        roughness: 0.4,
+        metallic: 0.0,
+    },
     own_light: 0.35,
-    metallic: 0.0,
 };
 
 /// A dot per contact; `radius` is that of the god-object in the workbench, in metres.

@@ -6,7 +6,8 @@ mod corrected;
 use nalgebra::{Isometry3, Point3};
 
 use super::anaglyph::Anaglyph;
-use super::frame::{Floor, FrameUniform, KeyLight};
+use super::environment::EnvironmentMap;
+use super::frame::{Floor, FrameUniform, KeyLight, Light};
 use super::gpu::Gpu;
 use super::mesh::{Batch, Instance, MeshBuffers};
 use super::overlay::OverlayPipeline;
@@ -31,6 +32,7 @@ pub struct Renderer {
     anaglyph: Anaglyph,
     warp: WarpPipeline,
     shadow: ShadowMap,
+    environment: EnvironmentMap,
     meshes: Vec<MeshBuffers>,
     mesh_bounds: Vec<Bounds>,
     god_object_box: (Point3<f64>, Point3<f64>),
@@ -67,6 +69,7 @@ struct Pipelines {
 struct Plan {
     light: KeyLight,
     stale: bool,
+    reflections: bool,
     /// Opaque bodies, which cast shadows: the god-object, if it is one, then obstacles.
     casters: Vec<Batch>,
     /// How many of the first of these are the god-object's: 1 or 0.
@@ -124,6 +127,7 @@ impl Renderer {
             anaglyph: Anaglyph::new(device, format),
             warp: WarpPipeline::new(device, format),
             shadow: ShadowMap::new(device),
+            environment: EnvironmentMap::new(gpu, &stage.environment),
             meshes,
             mesh_bounds,
             god_object_box: {
@@ -141,6 +145,7 @@ impl Renderer {
             plan: Plan {
                 light: KeyLight::fit(&bodies, ShadowMap::TEXELS),
                 stale: true,
+                reflections: true,
                 casters: Vec::new(),
                 moving: 0,
                 translucent: Vec::new(),
@@ -156,10 +161,12 @@ impl Renderer {
             output,
             layout,
             shadow,
+            environment,
             anaglyph,
             ..
         } = self;
-        PictureTarget::new(gpu, picture, size, *output, layout, shadow, anaglyph)
+        let maps = (shadow, environment);
+        PictureTarget::new(gpu, picture, size, *output, layout, maps, anaglyph)
     }
 
     /// Size of all meshes on the graphics card, in bytes.
@@ -223,6 +230,7 @@ impl Renderer {
         self.plan = Plan {
             light: KeyLight::fit(&bounds, ShadowMap::TEXELS),
             stale: latched.stale,
+            reflections: show.reflections,
             casters,
             moving,
             translucent,
@@ -329,13 +337,17 @@ impl Renderer {
     ) -> Option<Point3<f64>> {
         let eye = eyes.position(view.eye);
         let clip = screen.clip_from_workbench(&eye, &self.clip_planes)?;
-        let Plan { light, stale, .. } = &self.plan;
         let separation = match view.eye {
             Eye::Middle => 0.0,
             Eye::Left | Eye::Right => (eyes.right - eyes.left).norm(),
         };
         let fade = self.comfort.near_fade(separation, screen.distance(&eye));
-        let uniform = FrameUniform::new(&clip, &eye, light, &self.floor, *stale, &fade);
+        let light = Light {
+            key: &self.plan.light,
+            irradiance: &self.environment.irradiance,
+            reflections: self.plan.reflections,
+        };
+        let uniform = FrameUniform::new(&clip, &eye, &light, &self.floor, self.plan.stale, &fade);
         gpu.queue
             .write_buffer(&view.uniform, 0, bytemuck::bytes_of(&uniform));
         Some(eye)

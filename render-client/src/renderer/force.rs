@@ -4,6 +4,7 @@
 //! box, so that the body does not hide it.
 
 use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion, Vector3};
+use taut_proto::Finish;
 
 use super::mesh::{Instance, Material};
 use crate::stage::Stage;
@@ -22,10 +23,11 @@ const LEAST_FORCE: f64 = 0.02;
 
 const MATERIAL: Material = Material {
     colour: [0.95, 0.62, 0.02, 1.0],
-    gloss: 0.25,
-    sharpness: 40.0,
+    finish: Finish {
+        roughness: 0.4,
+        metallic: 0.0,
+    },
     own_light: 0.25,
-    metallic: 0.0,
 };
 
 /// The arrow for `force` (newtons, scene axes) on the god-object at `pose` (scene frame), whose

@@ -17,6 +17,16 @@ pub(crate) struct FrameUniform {
     key: [f32; 4],
     floor: [f32; 4],
     grid: [f32; 4],
+    irradiance: [[f32; 4]; 9],
+}
+
+/// What lights a picture.
+pub(crate) struct Light<'a> {
+    pub(crate) key: &'a KeyLight,
+    /// Of the surroundings.
+    pub(crate) irradiance: &'a [[f32; 4]; 9],
+    /// Surfaces mirror the surroundings.
+    pub(crate) reflections: bool,
 }
 
 /// The key light: directional, its shadow map fitted to a sphere.
@@ -112,7 +122,7 @@ impl FrameUniform {
     pub(crate) fn new(
         clip_from_workbench: &Matrix4<f64>,
         eye: &Point3<f64>,
-        key: &KeyLight,
+        light: &Light<'_>,
         floor: &Floor,
         stale: bool,
         fade: &NearFade,
@@ -125,16 +135,17 @@ impl FrameUniform {
         Self {
             clip_from_workbench: columns(clip_from_workbench),
             workbench_from_clip: columns(&inverse),
-            shadow_from_workbench: columns(&key.shadow_from_workbench),
+            shadow_from_workbench: columns(&light.key.shadow_from_workbench),
             eye: vector(&eye.coords, f64::from(u8::from(stale))),
-            key: vector(&key.to_light, key.texel),
+            key: vector(&light.key.to_light, light.key.texel),
             floor: vector(&floor.center.coords, floor.radius),
             grid: [
                 floor.spacing as f32,
                 fade.nothing as f32,
                 fade.everything as f32,
-                0.0,
+                f32::from(u8::from(light.reflections)),
             ],
+            irradiance: *light.irradiance,
         }
     }
 }

@@ -2,6 +2,7 @@
 //! two is what the coupling turns into force.
 
 use nalgebra::Isometry3;
+use taut_proto::Finish;
 
 use super::god_object::workbench_from_mesh;
 use super::mesh::{Instance, Material, buffer_layouts};
@@ -10,10 +11,11 @@ use crate::stage::Stage;
 
 const MATERIAL: Material = Material {
     colour: [0.02, 0.50, 0.64, 0.16],
-    gloss: 0.0,
-    sharpness: 1.0,
+    finish: Finish {
+        roughness: 1.0,
+        metallic: 0.0,
+    },
     own_light: 0.0,
-    metallic: 0.0,
 };
 
 /// The ghost at the device's pose, scene frame.

@@ -1,16 +1,14 @@
 //! The god-object: the body in the user's hand where the constraints let it be.
 
 use nalgebra::{Isometry3, Matrix4};
+use taut_proto::Finish;
 
 use super::mesh::{Instance, Material};
 use crate::stage::{Stage, StageBody};
 
 /// Glossier than what stands.
-const USUAL: Material = Material {
-    colour: [0.0; 4],
-    gloss: 0.5,
-    sharpness: 36.0,
-    own_light: 0.0,
+const USUAL: Finish = Finish {
+    roughness: 0.3,
     metallic: 0.0,
 };
 

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Matrix4;
+use taut_proto::Finish;
 
 use super::pipeline::{FrameLayout, Layer, Output, PipelineParts, filled};
 use crate::normals::shade;
@@ -22,7 +23,7 @@ struct Vertex {
 pub(crate) struct Instance {
     model: [[f32; 4]; 4],
     colour: [f32; 4],
-    gloss: [f32; 4],
+    finish: [f32; 4],
 }
 
 /// How a surface takes light.
@@ -30,49 +31,21 @@ pub(crate) struct Instance {
 pub(crate) struct Material {
     /// Linear red, green, blue; opacity.
     pub(crate) colour: [f32; 4],
-    /// Strength of the highlight.
-    pub(crate) gloss: f32,
-    /// Exponent of the highlight: higher is narrower.
-    pub(crate) sharpness: f32,
+    pub(crate) finish: Finish,
     /// Share of the colour shown as it is, without lighting, in [0, 1].
     pub(crate) own_light: f32,
-    /// Share of a metal: reflects in its own colour, and nothing from below its surface.
-    pub(crate) metallic: f32,
 }
 
 impl Material {
     /// The body's colour and finish; `usual` reflects where it has no finish.
-    pub(crate) fn of(body: &StageBody, usual: Self) -> Self {
+    pub(crate) fn of(body: &StageBody, usual: Finish) -> Self {
         let [red, green, blue] = body.colour;
-        let colour = [red, green, blue, body.opacity];
-        let Some(finish) = body.finish else {
-            return Self { colour, ..usual };
-        };
-        let sharpness = sharpness(finish.roughness);
-        let reflectance = DIELECTRIC + (1.0 - DIELECTRIC) * finish.metallic;
         Self {
-            colour,
-            gloss: (reflectance * (sharpness + 8.0) / 8.0).min(MOST_GLOSS),
-            sharpness,
+            colour: [red, green, blue, body.opacity],
+            finish: body.finish.unwrap_or(usual),
             own_light: 0.0,
-            metallic: finish.metallic,
         }
     }
-}
-
-/// Share of light that a dielectric reflects head-on: that of plastic and glass.
-const DIELECTRIC: f32 = 0.04;
-/// Strongest highlight: beyond it there is nothing but white.
-const MOST_GLOSS: f32 = 1.0;
-/// Narrowest highlight: a narrower one, of a light without size, falls between the pixels.
-const SHARPEST: f32 = 400.0;
-
-/// Blinn-Phong's exponent for a roughness in [0, 1]: 2 / alpha^2 - 2 with alpha = roughness^2.
-///
-/// Source: Karis 2013, "Specular BRDF reference"; the factor (n + 8) / 8 above is Akenine-Möller et al., "Real-Time Rendering", 9.8.
-fn sharpness(roughness: f32) -> f32 {
-    let alpha = roughness * roughness;
-    (2.0 / (alpha * alpha).max(f32::MIN_POSITIVE) - 2.0).clamp(1.0, SHARPEST)
 }
 
 /// A mesh on the graphics card.
@@ -98,11 +71,11 @@ impl Instance {
         Self {
             model: workbench_from_mesh.cast::<f32>().into(),
             colour: material.colour,
-            gloss: [
-                material.gloss,
-                material.sharpness,
+            finish: [
+                material.finish.roughness,
                 material.own_light,
-                material.metallic,
+                material.finish.metallic,
+                0.0,
             ],
         }
     }

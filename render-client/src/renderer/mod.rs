@@ -5,6 +5,7 @@ mod background;
 mod chart;
 mod contacts;
 mod draw;
+mod environment;
 mod floor;
 mod force;
 mod frame;

@@ -1,17 +1,15 @@
 //! The obstacles that the god-object touches.
 
 use nalgebra::Isometry3;
+use taut_proto::Finish;
 
 use super::god_object::workbench_from_mesh;
 use super::mesh::{Instance, Material};
 use crate::stage::{Stage, StageBody};
 
 /// Satin.
-const USUAL: Material = Material {
-    colour: [0.0; 4],
-    gloss: 0.16,
-    sharpness: 28.0,
-    own_light: 0.0,
+const USUAL: Finish = Finish {
+    roughness: 0.5,
     metallic: 0.0,
 };
 

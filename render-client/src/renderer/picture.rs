@@ -2,6 +2,7 @@
 
 use super::anaglyph::Anaglyph;
 use super::chart::ChartDrawing;
+use super::environment::EnvironmentMap;
 use super::gpu::Gpu;
 use super::overlay::OverlayQuads;
 use super::pipeline::{DEPTH, FrameLayout, Output, attachment};
@@ -46,7 +47,7 @@ impl PictureTarget {
         size: (u32, u32),
         output: Output,
         layout: &FrameLayout,
-        shadow: &ShadowMap,
+        (shadow, environment): (&ShadowMap, &EnvironmentMap),
         anaglyph: &Anaglyph,
     ) -> Self {
         let device = &gpu.device;
@@ -64,7 +65,7 @@ impl PictureTarget {
             .views
             .iter()
             .map(|&(eye, part)| {
-                let (uniform, group) = layout.view(device, &shadow.view, &shadow.sampler);
+                let (uniform, group) = layout.view(device, shadow, environment);
                 let sampled = wgpu::TextureUsages::TEXTURE_BINDING;
                 let own = || view_of(attachment(device, "eye", size, single, sampled));
                 ViewTarget {

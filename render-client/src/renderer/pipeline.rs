@@ -2,7 +2,9 @@
 
 use wgpu::util::DeviceExt;
 
+use super::environment::EnvironmentMap;
 use super::frame::FrameUniform;
+use super::shadow::ShadowMap;
 
 /// Format of all depth textures.
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -63,6 +65,12 @@ impl FrameLayout {
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled: false,
         };
+        let environment = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::Cube,
+            multisampled: false,
+        };
+        let filtering = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let comparison = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison);
         let group = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("frame"),
@@ -70,6 +78,8 @@ impl FrameLayout {
                 entry(0, wgpu::ShaderStages::VERTEX_FRAGMENT, uniform),
                 entry(1, wgpu::ShaderStages::FRAGMENT, shadow_map),
                 entry(2, wgpu::ShaderStages::FRAGMENT, comparison),
+                entry(3, wgpu::ShaderStages::FRAGMENT, environment),
+                entry(4, wgpu::ShaderStages::FRAGMENT, filtering),
             ],
         });
         let pipeline = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -84,8 +94,8 @@ impl FrameLayout {
     pub(crate) fn view(
         &self,
         device: &wgpu::Device,
-        shadow_map: &wgpu::TextureView,
-        shadow_sampler: &wgpu::Sampler,
+        shadow: &ShadowMap,
+        environment: &EnvironmentMap,
     ) -> (wgpu::Buffer, wgpu::BindGroup) {
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("frame"),
@@ -99,8 +109,10 @@ impl FrameLayout {
             layout: &self.group,
             entries: &[
                 entry(0, buffer.as_entire_binding()),
-                entry(1, wgpu::BindingResource::TextureView(shadow_map)),
-                entry(2, wgpu::BindingResource::Sampler(shadow_sampler)),
+                entry(1, wgpu::BindingResource::TextureView(&shadow.view)),
+                entry(2, wgpu::BindingResource::Sampler(&shadow.sampler)),
+                entry(3, wgpu::BindingResource::TextureView(&environment.view)),
+                entry(4, wgpu::BindingResource::Sampler(&environment.sampler)),
             ],
         });
         (buffer, group)

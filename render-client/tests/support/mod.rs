@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use taut_render::canvas::Canvas;
 use taut_render::comfort::Comfort;
+use taut_render::environment::Environment;
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::stereo::Stereo;
@@ -69,6 +70,7 @@ pub(crate) fn peg_in_hole(pixels: (u32, u32), stereo: Stereo) -> Stage {
         god_object: body(u16::MAX, 0, ORANGE),
         reference_point: Point3::origin(),
         obstacles: vec![body(0, 1, GREY_BLUE)],
+        environment: Environment::of(None),
     }
 }
 

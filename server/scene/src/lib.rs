@@ -7,6 +7,7 @@
 mod appearance;
 mod check;
 mod document;
+mod environment_file;
 pub mod fidelity;
 mod files;
 mod height_map_file;

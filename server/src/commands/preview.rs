@@ -16,14 +16,18 @@ use crate::commands::finished_file::FinishedFile;
 use crate::session::setup::content::bodies;
 use crate::shared::failure::{EXIT_BAD_INPUT, Failure};
 
+/// Pictures of a film that does not say how many: 10 degrees from one to the next.
+const FILM_VIEWS: u32 = 36;
 /// Name of the picture beside an imported scene.
 const PICTURE_FILE: &str = "picture.png";
 
 /// Draws what the command line asks for; the files written.
 pub(super) fn run(args: &PreviewArgs) -> Result<Vec<String>, Failure> {
     let paths: Vec<PathBuf> = match args.orbit {
-        None => vec![args.out.clone()],
-        Some(views) => (1..=views).map(|n| numbered(&args.out, n, views)).collect(),
+        Some(views) if args.film.is_none() => {
+            (1..=views).map(|n| numbered(&args.out, n, views)).collect()
+        }
+        _ => vec![args.out.clone()],
     };
     check_place(&args.out)?;
     let choice = args
@@ -31,10 +35,15 @@ pub(super) fn run(args: &PreviewArgs) -> Result<Vec<String>, Failure> {
         .as_ref()
         .map_or_else(GpuChoice::default, GpuChoice::named);
     let size = args.size.unwrap_or(PREVIEW_SIZE);
-    let preview = preview(&args.scene, &choice, size, args.orbit.unwrap_or(1))?;
+    let usual = args.film.map_or(1, |_| FILM_VIEWS);
+    let preview = preview(&args.scene, &choice, size, args.orbit.unwrap_or(usual))?;
     let mut written = Vec::new();
     for (view, path) in (0..).zip(&paths) {
-        write(path, &preview.png(view).map_err(failure)?)?;
+        let bytes = match args.film {
+            Some(seconds) => preview.film(seconds),
+            None => preview.png(view),
+        };
+        write(path, &bytes.map_err(failure)?)?;
         written.push(path.display().to_string());
     }
     Ok(written)
@@ -96,6 +105,7 @@ fn described(built: &BuiltScene) -> Result<PreviewScene, Failure> {
         name: built.name.clone(),
         bodies: bodies.collect::<Result<_, _>>()?,
         endless: endless.collect(),
+        environment: built.environment.clone().map(Arc::new),
         upright: built.view.rotation.unwrap_or_else(UnitQuaternion::identity),
     })
 }

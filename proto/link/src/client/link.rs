@@ -14,7 +14,7 @@ use std::{
 };
 use taut_proto::{
     ClientStats, ConstraintSet, CouplingOffer, ForceSample, HeadSample, InputSample, MeshBlob,
-    MeshHash, PassedForce, Payload, SceneDescription, SessionTime,
+    MeshHash, Panorama, PassedForce, Payload, SceneDescription, SessionTime,
     control::{ArmRequest, Bye, ControlMessage, LogEvent, LogLevel},
     state::EventRecord,
 };
@@ -119,6 +119,16 @@ impl ClientLink {
     pub async fn mesh(&self, hash: MeshHash) -> Result<Arc<MeshBlob>, LinkError> {
         self.meshes
             .get(&self.hot.connection, self.hot.version, &self.server, hash)
+            .await
+    }
+
+    /// The light around the scene, of `hash`, as [`Self::mesh`].
+    ///
+    /// # Errors
+    /// The server does not have it, or is gone.
+    pub async fn panorama(&self, hash: MeshHash) -> Result<Panorama, LinkError> {
+        self.meshes
+            .panorama(&self.hot.connection, self.hot.version, &self.server, hash)
             .await
     }
 

@@ -1,4 +1,4 @@
-//! Meshes by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
+//! Meshes and panoramas by hash: from memory, from the cache on disk, or from the server on a stream of their own; checked against their hash, and kept
 //! for the next who asks, in this session or in a later one.
 
 use super::mesh_cache::MeshCache;
@@ -14,13 +14,16 @@ use std::{
 };
 use taut_cache::Cached;
 use taut_proto::{
-    MeshBlob, MeshHash, SceneDescription, VersionRange,
+    DecodeError, MeshBlob, MeshHash, Panorama, SceneDescription, VersionRange,
     control::{ControlMessage, MeshHeader, MeshRequest},
     mesh_blob::MAX_MESH_BYTES,
 };
 
 /// Most bytes of the message before a mesh.
 const MAX_HEADER_BYTES: usize = 256;
+
+/// What a blob of bytes is decoded by.
+type Decode<T> = fn(&[u8]) -> Result<T, DecodeError>;
 
 /// The meshes that a client has. Outlives its sessions.
 #[derive(Default)]
@@ -62,30 +65,53 @@ impl Meshes {
         if let Some(mesh) = self.lock().get(&hash) {
             return Ok(mesh.clone());
         }
-        let mesh = match self.read_cached(hash).await {
-            Some(mesh) => mesh,
-            None => {
-                self.fetch_checked(connection, version, server, hash)
-                    .await?
-            }
-        };
-        let mesh = Arc::new(mesh);
+        let mesh = self.load(connection, version, server, hash, MeshBlob::decode);
+        let mesh = Arc::new(mesh.await?);
         self.lock().insert(hash, mesh.clone());
         Ok(mesh)
     }
 
-    async fn read_cached(&self, hash: MeshHash) -> Option<MeshBlob> {
+    /// The panorama of `hash`, from the cache on disk or from the server.
+    pub(crate) async fn panorama(
+        &self,
+        connection: &Connection,
+        version: u8,
+        server: &str,
+        hash: MeshHash,
+    ) -> Result<Panorama, LinkError> {
+        self.load(connection, version, server, hash, Panorama::decode)
+            .await
+    }
+
+    async fn load<T: Send + 'static>(
+        &self,
+        connection: &Connection,
+        version: u8,
+        server: &str,
+        hash: MeshHash,
+        decode: Decode<T>,
+    ) -> Result<T, LinkError> {
+        match self.read_cached(hash, decode).await {
+            Some(found) => Ok(found),
+            None => {
+                self.fetch_checked(connection, version, server, hash, decode)
+                    .await
+            }
+        }
+    }
+
+    async fn read_cached<T: Send + 'static>(&self, hash: MeshHash, decode: Decode<T>) -> Option<T> {
         let cache = self.cache.clone()?;
         // Reading, hashing and decoding a large mesh takes milliseconds that the network's tasks must not wait.
         let read = tokio::task::spawn_blocking(move || match cache.read(hash) {
-            Cached::Bytes(bytes) => match MeshBlob::decode(&bytes) {
+            Cached::Bytes(bytes) => match decode(&bytes) {
                 Ok(mesh) => (Some((mesh, bytes.len())), false),
                 Err(_) => (None, true), // right, but of another release: it is fetched and replaced
             },
             Cached::Missing => (None, false),
             Cached::Damaged => (None, true),
         });
-        let (found, damaged) = read.await.unwrap_or_default();
+        let (found, damaged) = read.await.unwrap_or((None, false));
         if damaged {
             self.counters.damaged.one();
             tracing::warn!("mesh {hash} in the cache was damaged; fetching it again");
@@ -96,13 +122,14 @@ impl Meshes {
         Some(mesh)
     }
 
-    async fn fetch_checked(
+    async fn fetch_checked<T: Send + 'static>(
         &self,
         connection: &Connection,
         version: u8,
         server: &str,
         hash: MeshHash,
-    ) -> Result<MeshBlob, LinkError> {
+        decode: Decode<T>,
+    ) -> Result<T, LinkError> {
         let bytes = fetch(connection, version, server, hash).await?;
         self.counters.fetched.one();
         self.counters.fetched_bytes.add(bytes.len() as u64);
@@ -111,7 +138,7 @@ impl Meshes {
             if MeshHash::of(&bytes) != hash {
                 return Err("its bytes have another hash".to_owned());
             }
-            let mesh = MeshBlob::decode(&bytes).map_err(|error| error.to_string())?;
+            let mesh = decode(&bytes).map_err(|error| error.to_string())?;
             Ok((
                 mesh,
                 cache.and_then(|cache| cache.write(hash, &bytes).err()),

@@ -423,7 +423,7 @@ async fn serve_mesh(shared: &Shared, version: u8, mut send: SendStream, mut recv
     };
     // Everything else goes first. Fails only if the stream is gone, and then writing fails, too.
     let _ = send.set_priority(MESH_PRIORITY);
-    let mesh = shared.content.meshes.get(&request.hash);
+    let mesh = shared.content.blobs.get(&request.hash);
     let header = MeshHeader {
         hash: request.hash,
         length: mesh.map_or(0, |bytes| bytes.len() as u32), // MAX_MESH_BYTES is far below 2^32

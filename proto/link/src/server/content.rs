@@ -1,8 +1,10 @@
-//! What clients fetch at join: the scene description, and meshes by hash.
+//! What clients fetch at join: the scene description, and meshes and light by hash.
 
 use crate::LinkError;
 use std::{collections::HashMap, sync::Arc};
-use taut_proto::{CouplingOffer, MeshBlob, MeshHash, SceneDescription, control::ControlMessage};
+use taut_proto::{
+    CouplingOffer, MeshBlob, MeshHash, Panorama, SceneDescription, control::ControlMessage,
+};
 
 /// What clients fetch at join.
 #[derive(Clone, Debug)]
@@ -11,6 +13,8 @@ pub struct Content {
     pub description: SceneDescription,
     /// Every mesh that the description names.
     pub meshes: Vec<MeshBlob>,
+    /// The light that the description names, if it names any.
+    pub panorama: Option<Panorama>,
 }
 
 /// The same as bytes, made once.
@@ -19,7 +23,8 @@ pub(crate) struct EncodedContent {
     pub(crate) scene: Vec<u8>,
     /// The framed message about coupling, for the device bridge.
     pub(crate) coupling: Vec<u8>,
-    pub(crate) meshes: HashMap<MeshHash, Arc<[u8]>>,
+    /// Meshes, and the panorama.
+    pub(crate) blobs: HashMap<MeshHash, Arc<[u8]>>,
     /// Names of the workbench's render nodes.
     pub(crate) nodes: Vec<String>,
 }
@@ -36,22 +41,33 @@ impl Content {
         })
     }
 
-    /// Encodes everything; an error if the description names a mesh that is not there.
+    /// Encodes everything; an error if the description names what is not there.
     pub(crate) fn encode(self, coupling: CouplingOffer) -> Result<EncodedContent, LinkError> {
         let refuse = |reason: String| LinkError::Content { reason };
-        let mut meshes = HashMap::new();
+        let mut blobs: HashMap<MeshHash, Arc<[u8]>> = HashMap::new();
         for mesh in &self.meshes {
             let bytes = mesh.encode().map_err(|error| refuse(error.to_string()))?;
-            meshes.insert(MeshHash::of(&bytes), Arc::from(bytes));
+            blobs.insert(MeshHash::of(&bytes), Arc::from(bytes));
+        }
+        if let Some(panorama) = &self.panorama {
+            let bytes = panorama.encode();
+            blobs.insert(MeshHash::of(&bytes), Arc::from(bytes));
         }
         let described = [&self.description.god_object];
         for body in described.into_iter().chain(&self.description.obstacles) {
-            if !meshes.contains_key(&body.mesh) {
+            if !blobs.contains_key(&body.mesh) {
                 return Err(refuse(format!(
                     "body \"{}\" names mesh {}, which is not among its meshes; add it",
                     body.name, body.mesh
                 )));
             }
+        }
+        if let Some(hash) = self.description.environment
+            && !blobs.contains_key(&hash)
+        {
+            return Err(refuse(format!(
+                "the scene's light is {hash}, which is not its panorama; add it"
+            )));
         }
         let nodes = self
             .description
@@ -68,7 +84,7 @@ impl Content {
         Ok(EncodedContent {
             scene,
             coupling,
-            meshes,
+            blobs,
             nodes,
         })
     }

@@ -80,6 +80,7 @@ pub fn content() -> Content {
     Content {
         description,
         meshes,
+        panorama: None,
     }
 }
 

@@ -6,6 +6,7 @@ use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
+use taut_proto::Panorama;
 
 use super::auto_fidelity::AutoFidelity;
 use super::load::{Scene, unusable};
@@ -112,6 +113,8 @@ pub struct BuiltScene {
     pub simplified: Vec<Simplified>,
     /// How the scene stands on the workbench.
     pub view: View,
+    /// The light around it; `None` is a studio.
+    pub environment: Option<Panorama>,
     /// Longest side of the box around the god-object, m.
     pub size: f64,
     /// What fidelity was chosen for the scene, if it asks for that.
@@ -134,6 +137,10 @@ impl Scene {
             .map(|o| self.mesh(&o.shape, &o.shape_at, &mut problems))
             .unzip();
         let (scenery, scenery_lost) = self.built_scenery(&mut problems);
+        let environment = self.environment().unwrap_or_else(|problem| {
+            problems.push(problem);
+            None
+        });
         let hand_path = self.hand_path().unwrap_or_else(|error| {
             problems.extend(error.into_problems());
             None
@@ -244,6 +251,7 @@ impl Scene {
             lost_looks: lost_looks.into_iter().collect(),
             simplified,
             view: spec.view,
+            environment,
             size,
             fidelity: auto.map(|auto| auto.plan),
         })

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use god_object::{HeightMapTexture, Mesh, Texture, TextureCoordinates, UvHeightMapTexture};
+use taut_proto::Panorama;
 
 use super::build::GOD_OBJECT_NAME;
 use super::parse::{SceneSpec, parse};
@@ -14,6 +15,7 @@ use super::spec::{
 };
 use crate::check::MeshFigures;
 use crate::document::{At, Document, Node, Value};
+use crate::environment_file::read_environment;
 use crate::files::{MAX_TOML_BYTES, data_dirs, read_text};
 use crate::height_map_file::read_height_map;
 use crate::mesh_file::{
@@ -294,7 +296,15 @@ impl Scene {
         self.origin == Origin::Shipped && shipped_file(name).is_some()
     }
 
-    /// Meshes, height maps and traces, as written and where; some may be named twice.
+    /// The light around the scene, if it names any.
+    pub(super) fn environment(&self) -> Result<Option<Panorama>, Problem> {
+        let Some(spec) = &self.spec.environment else {
+            return Ok(None);
+        };
+        read_environment(&self.locate(&spec.path, &spec.at)?).map(Some)
+    }
+
+    /// Meshes, height maps, traces and light, as written and where; some may be named twice.
     pub(crate) fn file_names(&self) -> Vec<(&str, &At)> {
         let held = &self.spec.god_object;
         let mut names: Vec<(&str, &At)> = Vec::new();
@@ -309,6 +319,11 @@ impl Scene {
                     .map(|motion| (motion.trace.as_str(), &motion.at)),
             );
         }
+        for seen in &self.spec.scenery {
+            names.extend(seen.shape.file().map(|name| (name, &seen.shape_at)));
+        }
+        let light = self.spec.environment.as_ref();
+        names.extend(light.map(|light| (light.path.as_str(), &light.at)));
         names.extend(
             self.spec
                 .hand

@@ -8,8 +8,8 @@ use nalgebra::Point3;
 use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, LimitSpec, MassSpec,
-    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
+    AdaptationSpec, BodySpec, CouplingSpec, EnvironmentSpec, HandPathSpec, HandPreset, LimitSpec,
+    MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;
@@ -33,6 +33,7 @@ pub(super) struct SceneSpec {
     pub(super) method: MethodSpec,
     pub(super) hand: Option<HandPathSpec>,
     pub(super) view: View,
+    pub(super) environment: Option<EnvironmentSpec>,
     pub(super) fidelity: Option<FidelitySpec>,
 }
 
@@ -57,7 +58,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
     let limits = root.section("limits").map(limits).unwrap_or_default();
     let method = root.section("method").map(method).unwrap_or_default();
     let hand = root.section("hand").and_then(hand);
-    let view = root.section("view").map(view).unwrap_or_default();
+    let (view, environment) = root.section("view").map(view).unwrap_or_default();
     let fidelity = fidelity(&root);
     root.finish();
     let mut found = problems.into_inner();
@@ -81,6 +82,7 @@ pub(super) fn parse(document: &Document) -> Result<SceneSpec, FileError> {
         method,
         hand,
         view,
+        environment,
         fidelity,
     })
 }
@@ -303,16 +305,22 @@ fn hand(section: Section<'_>) -> Option<HandPathSpec> {
     })
 }
 
-fn view(section: Section<'_>) -> View {
+fn view(section: Section<'_>) -> (View, Option<EnvironmentSpec>) {
     let display_scale = section.number_or("display_scale", Range::Positive, 1.0);
     let origin = section
         .numbers::<3>("origin", Range::Finite)
         .map(Point3::from);
     let rotation = rotation_of(&section);
+    let environment = section.get("environment").zip(section.text("environment"));
+    let environment = environment.map(|(node, path)| EnvironmentSpec {
+        path: path.to_owned(),
+        at: node.at.clone(),
+    });
     section.finish();
-    View {
+    let view = View {
         display_scale,
         origin,
         rotation,
-    }
+    };
+    (view, environment)
 }

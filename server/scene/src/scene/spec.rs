@@ -325,6 +325,14 @@ pub struct HandPathSpec {
     pub(crate) at: At,
 }
 
+/// `[view] environment`: the light around the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EnvironmentSpec {
+    /// An equirectangular .hdr, relative to the scene file, else to the data directory.
+    pub(super) path: String,
+    pub(super) at: At,
+}
+
 /// `[view]`: how the scene stands on the workbench.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {

@@ -340,8 +340,8 @@ impl Default for Safety {
     }
 }
 
-/// What render nodes draw beside the god-object and the obstacles.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What render nodes draw beside the god-object and the obstacles, and with what effort.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Show {
     /// The device's own pose, translucent.
     pub ghost: bool,
@@ -351,4 +351,18 @@ pub struct Show {
     pub force: bool,
     /// Lines of text about the node.
     pub hud: bool,
+    /// Surfaces mirror what is around them.
+    pub reflections: bool,
+}
+
+impl Default for Show {
+    fn default() -> Self {
+        Self {
+            ghost: false,
+            contacts: false,
+            force: false,
+            hud: false,
+            reflections: true,
+        }
+    }
 }

@@ -78,5 +78,6 @@ pub(super) fn show(section: &Section<'_>) -> Show {
         contacts: wanted("contacts"),
         force: wanted("force"),
         hud: wanted("hud"),
+        reflections: section.boolean("reflections").unwrap_or(true),
     }
 }

@@ -303,3 +303,19 @@ fn scenery_is_seen_and_never_touched() {
         "{twice}"
     );
 }
+
+#[test]
+fn the_files_of_a_scene_are_those_of_its_scenery_and_of_its_light_too() {
+    let folder = Folder::new();
+    folder.write("seen.ply", "");
+    folder.write("hall.hdr", "");
+    let text = "name = \"x\"\n[god_object]\nmass = 1.0\nshape = { sphere = { radius = 0.01 } }\n\
+        [[scenery]]\nname = \"s\"\nshape = { mesh = \"seen.ply\" }\n[view]\nenvironment = \"hall.hdr\"\n";
+    let scene = Scene::parse("s.toml", text, folder.0.path()).unwrap();
+    let files = scene.files().unwrap();
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["seen.ply", "hall.hdr"]);
+    // What is no picture is named with its file when the scene is built.
+    let faults = format!("{:?}", scene.build().unwrap_err().problems());
+    assert!(faults.contains("cannot be read as the light"), "{faults}");
+}

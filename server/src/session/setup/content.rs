@@ -94,11 +94,16 @@ pub(super) fn content(
         reference_point: array(&scene.reference_point()),
         scene_origin: PoseF64::from_isometry(workbench_from_scene),
         display_scale: scene.view.display_scale,
+        environment: scene
+            .environment
+            .as_ref()
+            .map(|light| MeshHash::of(&light.encode())),
         ..of_workbench(&scene.name, god_object, workbench)
     };
     Ok(Content {
         description,
         meshes: meshes.into_iter().map(|(_, blob)| blob).collect(),
+        panorama: scene.environment.clone(),
     })
 }
 
@@ -123,6 +128,7 @@ pub(crate) fn of_workbench(
             contacts: workbench.show.contacts,
             force: workbench.show.force,
             hud: workbench.show.hud,
+            reflections: workbench.show.reflections,
         },
         ..SceneDescription::of_body(name, god_object)
     }

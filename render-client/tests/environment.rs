@@ -1,0 +1,112 @@
+//! The light around the scene, seen in what mirrors it. Skipped, said aloud, without an adapter.
+
+use crate::support::{canvas, peg_in_hole, state};
+use image::RgbaImage;
+use nalgebra::{Isometry3, Similarity3};
+use taut_proto::{Finish, Panorama};
+use taut_render::environment::Environment;
+use taut_render::renderer::shapes;
+use taut_render::stage::{Show, Stage};
+use taut_render::stereo::Stereo;
+
+const PIXELS: (u32, u32) = (360, 240);
+
+/// Red to the right of the viewer, green to the left, blue above, dark elsewhere.
+fn coloured() -> Panorama {
+    Panorama::from_fn(|column, row| match (column, row) {
+        (_, 0..32) => [0.0, 0.0, 1.0],
+        (160..224, 32..96) => [1.0, 0.0, 0.0],
+        (32..96, 32..96) => [0.0, 1.0, 0.0],
+        _ => [0.0; 3],
+    })
+}
+
+/// A white ball before the wall, of one finish, in coloured light.
+fn ball(finish: Finish, turned: f64) -> Stage {
+    let mut stage = peg_in_hole(PIXELS, Stereo::Mono);
+    stage.screens.truncate(1);
+    stage.head = Isometry3::translation(0.0, -1.2, 0.6);
+    let around = nalgebra::Vector3::z() * turned;
+    stage.workbench_from_scene = Similarity3::new(nalgebra::Vector3::zeros(), around, 1.0);
+    stage.meshes = vec![shapes::sphere(0.2, 64).into()];
+    stage.obstacles.clear();
+    stage.god_object.colour = [1.0; 3];
+    stage.god_object.finish = Some(finish);
+    stage.environment = Environment::of(Some(&coloured()));
+    stage
+}
+
+fn draw(stage: Stage, reflections: bool) -> Option<RgbaImage> {
+    let mut canvas = canvas(stage)?;
+    let show = Show {
+        reflections,
+        ..Show::default()
+    };
+    let at = state(Isometry3::translation(0.0, 0.0, 0.6));
+    canvas.draw(&at, show, true).expect("drawn");
+    Some(canvas.images().expect("read back").remove(0).1)
+}
+
+/// Colour of the ball so far right of and above its middle, in its radii (40 pixels).
+fn at(image: &RgbaImage, across: f32, up: f32) -> [i32; 3] {
+    let (x, y) = (180.0 + 40.0 * across, 120.0 - 40.0 * up);
+    let [red, green, blue, _] = image.get_pixel(x as u32, y as u32).0;
+    [red, green, blue].map(i32::from)
+}
+
+fn finish(roughness: f32, metallic: f32) -> Finish {
+    Finish {
+        roughness,
+        metallic,
+    }
+}
+
+#[test]
+fn a_mirror_shows_what_stands_where_however_the_scene_is_turned() {
+    for turned in [0.0, 1.3] {
+        let Some(picture) = draw(ball(finish(0.0, 1.0), turned), true) else {
+            return;
+        };
+        // Where the surface is turned by 45 degrees from the eye, it mirrors what is to that side.
+        let [red, green, blue] = at(&picture, 0.68, 0.0);
+        assert!(red > 60 + green.max(blue), "{red} {green} {blue}");
+        let [red, green, blue] = at(&picture, -0.68, 0.0);
+        assert!(green > 60 + red.max(blue), "{red} {green} {blue}");
+        let [red, green, blue] = at(&picture, 0.0, 0.75);
+        assert!(blue > 60 + red.max(green), "{red} {green} {blue}");
+    }
+}
+
+#[test]
+fn a_rough_metal_mixes_what_a_smooth_one_shows_apart() {
+    let redness = |roughness, reflections| {
+        let picture = draw(ball(finish(roughness, 1.0), 0.0), reflections)?;
+        let [red, green, blue] = at(&picture, 0.68, 0.0);
+        Some(red - green.max(blue))
+    };
+    let Some(smooth) = redness(0.0, true) else {
+        return;
+    };
+    let (satin, rough) = (redness(0.5, true), redness(1.0, true));
+    assert!(
+        satin < Some(smooth) && rough < satin,
+        "{smooth} {satin:?} {rough:?}"
+    );
+    // Without reflections even a smooth one has what a rough one gets.
+    let plain = redness(0.0, false);
+    assert!(
+        plain < Some(smooth - 30) && plain > Some(0),
+        "{smooth} {plain:?}"
+    );
+}
+
+#[test]
+fn matt_surfaces_take_the_colour_of_the_light_that_they_face() {
+    let Some(picture) = draw(ball(finish(1.0, 0.0), 0.0), true) else {
+        return;
+    };
+    let [red, green, _] = at(&picture, 0.85, 0.0);
+    assert!(red > green + 20, "{red} {green}");
+    let [red, green, _] = at(&picture, -0.85, -0.1);
+    assert!(green > red, "{red} {green}");
+}
