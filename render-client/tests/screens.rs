@@ -307,7 +307,8 @@ fn views_that_share_a_picture_stay_in_their_parts_and_are_those_of_two_windows()
         let shared = &pictures(stereo).expect("drawn before")[0];
         for (own, (x, y)) in apart.iter().zip(places) {
             let part = image::imageops::crop_imm(shared, x, y, 180, 120).to_image();
-            assert_eq!(largest_difference(own, &part), 0, "{stereo:?}");
+            // One step of eight bits: places of a picture are rounded otherwise farther down.
+            assert!(largest_difference(own, &part) <= 1, "{stereo:?}");
         }
     }
 }
