@@ -59,6 +59,8 @@ struct Foot {
     face: u32,
     /// Above the face's plane, m.
     gap: f64,
+    /// How far inside each side it lies, as [`inside_of`].
+    inside: [f64; 3],
     /// The side that it is beyond as seen from either face at it, when it is.
     side: Option<usize>,
 }
@@ -232,24 +234,37 @@ fn look_at_vertex(
 ) {
     work.feature_pairs += 1;
     // Also one that does not stand out: where an edge lies along a face, its ends may be far from where the walk is.
-    let Some(a) = facing.body.vertex_owner(v) else {
-        return;
-    };
-    let corners = facing.body.triangles()[a as usize];
-    let Some(i) = corners.iter().position(|w| *w == v) else {
-        return;
-    };
-    let pair = Pair {
-        a,
-        b: foot.face,
-        x: [*x; 3],
-        y: facing.obstacle.corners(foot.face),
-    };
     let contact = match foot.side {
-        None => facing.vertex_face(&pair, i),
-        Some(j) => facing.vertex_edge(&pair, i, j),
+        None => facing.vertex_over(v, x, foot.face, foot.gap, || {
+            let [opposite_2, opposite_0, opposite_1] = foot.inside;
+            let sum = opposite_0 + opposite_1 + opposite_2;
+            [opposite_0, opposite_1, opposite_2].map(|area| area / sum)
+        }),
+        Some(j) => at_vertex(facing, v, x, foot.face, |pair, i| {
+            facing.vertex_edge(pair, i, j)
+        }),
     };
     contact.map(found);
+}
+
+/// Looks at a vertex of the body, at `x`, as the corner of a triangle.
+fn at_vertex(
+    facing: &Facing,
+    v: u32,
+    x: &Point3<f64>,
+    face: u32,
+    look: impl FnOnce(&Pair, usize) -> Option<Contact>,
+) -> Option<Contact> {
+    let a = facing.body.vertex_owner(v)?;
+    let corners = facing.body.triangles()[a as usize];
+    let i = corners.iter().position(|w| *w == v)?;
+    let pair = Pair {
+        a,
+        b: face,
+        x: [*x; 3],
+        y: facing.obstacle.corners(face),
+    };
+    look(&pair, i)
 }
 
 /// An edge of the body across one of the obstacle.
@@ -282,6 +297,7 @@ fn foot_of(mesh: &Mesh, start_face: u32, x: &Point3<f64>, work: &mut Work) -> Op
             return Some(Foot {
                 face,
                 gap,
+                inside,
                 side: None,
             });
         };
@@ -292,6 +308,7 @@ fn foot_of(mesh: &Mesh, start_face: u32, x: &Point3<f64>, work: &mut Work) -> Op
             return Some(Foot {
                 face,
                 gap,
+                inside,
                 side: Some(k),
             });
         }
@@ -315,6 +332,9 @@ fn for_crossings(
         let corners = mesh.corners(face);
         let normal = mesh.face_normal(face);
         let there = inside_of(&corners, normal, end);
+        if there.iter().all(|inside| *inside >= 0.0) {
+            return;
+        }
         let here = inside_of(&corners, normal, x);
         let edges = mesh.triangle_edges(face);
         let mut first = (f64::INFINITY, NONE);

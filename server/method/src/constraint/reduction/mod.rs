@@ -43,7 +43,7 @@ use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind}
 use crate::spatial::{Pose, Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
-use neighbours::{Sides, for_neighbours};
+use neighbours::{Arrival, Sides, for_neighbours};
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
@@ -538,7 +538,7 @@ impl RowReduction {
             if finished || !violation.is_finite() {
                 let turns_a_corner = purpose == Purpose::Motion
                     && rounds < MAX_ROUNDS
-                    && self.add_neighbours((at, surfaces), &projection, work);
+                    && self.add_neighbours((at, surfaces), answer, work);
                 if turns_a_corner {
                     continue;
                 }
@@ -548,44 +548,47 @@ impl RowReduction {
         }
     }
 
-    /// Adds the pairs that those of active rows turn into, where the motion violates them by more than the tolerance; whether there are any.
+    /// Adds the pairs that those of rows which touch turn into, where the motion violates them by more than the tolerance; whether there are any. Also of
+    /// rows that the motion leaves: what lies in a groove leaves one of its sides for the other.
     fn add_neighbours(
         &mut self,
         (at, surfaces): (&At, &dyn Surfaces),
-        projection: &Projection,
+        motion: &Vector6,
         work: &mut Work,
     ) -> bool {
         let before = self.known.len();
-        for row in &projection.active {
-            let Some(row) = self.known.get(row.row as usize) else {
+        for k in 0..before {
+            let Contact {
+                features: pair,
+                gap,
+                ..
+            } = self.known[k].contact;
+            if gap > TOUCHING_REST_DISTANCES * at.rest_distance {
                 continue;
-            };
-            let pair = row.contact.features;
-            let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
-            for_neighbours(
-                &at.world.body.mesh,
-                &obstacle.mesh,
-                &pair,
-                Sides::Reentrant,
-                |features| {
-                    if self.known.len() == MAX_ROWS || self.knows(&features) {
-                        return;
+            }
+            let obstacle = &at.world.obstacles[usize::from(pair.obstacle)].mesh;
+            let body = &at.world.body.mesh;
+            let arrival = Arrival::of(at, &pair, motion);
+            for_neighbours(body, obstacle, &pair, Sides::Reentrant, |features| {
+                let clear = arrival
+                    .over(body, obstacle, &features)
+                    .is_some_and(|clearance| clearance >= at.rest_distance - at.tolerance);
+                if clear || self.known.len() == MAX_ROWS || self.knows(&features) {
+                    return;
+                }
+                let Some(contact) = face(at, &features, true, work) else {
+                    return;
+                };
+                let row = jacobian(&contact, &at.center());
+                let violation = at.rest_distance - contact.gap - row.dot(motion);
+                if violation > at.tolerance {
+                    self.add((at, surfaces), &contact);
+                    if let Some(row) = self.known.last_mut() {
+                        // It does not face yet.
+                        row.implied = true;
                     }
-                    let Some(contact) = face(at, &features, true, work) else {
-                        return;
-                    };
-                    let row = jacobian(&contact, &at.center());
-                    let violation =
-                        at.rest_distance - contact.gap - row.dot(&projection.acceleration);
-                    if violation > at.tolerance {
-                        self.add((at, surfaces), &contact);
-                        if let Some(row) = self.known.last_mut() {
-                            // It does not face yet.
-                            row.implied = true;
-                        }
-                    }
-                },
-            );
+                }
+            });
         }
         self.known.len() > before
     }

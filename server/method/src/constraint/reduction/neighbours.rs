@@ -4,10 +4,13 @@
 //! find the other wall by running into it, and the next would run back into the first: to and fro, because no projection knew both.
 
 use arrayvec::ArrayVec;
+use nalgebra::Point3;
 
+use super::At;
 use crate::constraint::reentrant::for_faces;
 use crate::constraint::{Feature, FeaturePair};
 use crate::geometry::Mesh;
+use crate::spatial::{Vector6, angular, linear};
 
 /// Most neighbours of one feature: faces across the sides of a face and across theirs, or edges that go on at either end of an edge.
 const MAX_NEIGHBOURS: usize = 9;
@@ -20,6 +23,44 @@ pub(super) enum Sides {
     /// Those that do not stand out: across them the row of the neighbour is implied before it faces.
     Reentrant,
     All,
+}
+
+/// Where a vertex of a pair of vertex and face arrives by a motion of the body, to first order, in the frame of the face's mesh.
+pub(super) enum Arrival {
+    AtObstacle(Point3<f64>),
+    AtBody(Point3<f64>),
+    /// The pair is none of vertex and face.
+    Unknown,
+}
+
+impl Arrival {
+    pub(super) fn of(at: &At, pair: &FeaturePair, motion: &Vector6) -> Self {
+        let (mesh, pose) = at.obstacle(usize::from(pair.obstacle));
+        let way = |p: &Point3<f64>| linear(motion) + angular(motion).cross(&(p - at.center()));
+        match (pair.on_body, pair.on_obstacle) {
+            (Feature::Vertex(v), Feature::Face(_)) => {
+                let x = at.pose * at.world.body.mesh.vertices()[v as usize];
+                Self::AtObstacle(pose.inverse_transform_point(&(x + way(&x))))
+            }
+            (Feature::Face(_), Feature::Vertex(w)) => {
+                let y = pose * mesh.vertices()[w as usize];
+                Self::AtBody(at.pose.inverse_transform_point(&(y - way(&y))))
+            }
+            _ => Self::Unknown,
+        }
+    }
+
+    /// How far it is then outside the face that a neighbour of the pair has, m.
+    pub(super) fn over(&self, body: &Mesh, obstacle: &Mesh, features: &FeaturePair) -> Option<f64> {
+        let outside = |mesh: &Mesh, face: u32, x: &Point3<f64>| {
+            mesh.face_normal(face).dot(&(x - mesh.corners(face)[0]))
+        };
+        match (self, features.on_body, features.on_obstacle) {
+            (Self::AtObstacle(x), _, Feature::Face(t)) => Some(outside(obstacle, t, x)),
+            (Self::AtBody(y), Feature::Face(t), _) => Some(outside(body, t, y)),
+            _ => None,
+        }
+    }
 }
 
 /// Calls `each` for the pairs of one of the features with a neighbour of the other.
