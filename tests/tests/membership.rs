@@ -235,10 +235,8 @@ fn when_the_server_is_killed_the_force_is_gone_and_everybody_comes_back_to_the_n
             set_made_ns: 0,
         });
     }
-    assert_eq!(
-        old.counters().packets_sent,
-        before.packets_sent + OLD_DATAGRAMS
-    );
+    // It says hello now and then, too.
+    assert!(old.counters().packets_sent >= before.packets_sent + OLD_DATAGRAMS);
 
     bridge.interrupt();
     let ended = bridge.end(END_LIMIT);
