@@ -9,6 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::ioctl_fionbio;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use crate::realtime::monotonic_now;
@@ -90,9 +91,10 @@ impl<T> Drop for PseudoTerminal<T> {
 
 /// The device's end, and the path of the driver's.
 ///
-/// No other process inherits it: one that did would keep the cable in.
+/// No other process inherits it: one that did would keep the cable in. It never waits: what nobody takes from a serial line is lost.
 fn open() -> std::io::Result<(File, String)> {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    ioctl_fionbio(&master, true)?;
     grantpt(&master)?;
     unlockpt(&master)?;
     let path = ptsname(&master, Vec::new())?;
@@ -123,15 +125,13 @@ fn answer<T: FarEnd>(mut master: File, device: &Mutex<T>, end: &AtomicBool) {
             continue;
         }
         let Ok(count) = master.read(&mut bytes) else {
-            thread::sleep(LOOK); // the other end was closed meanwhile
+            thread::sleep(Duration::from_millis(1)); // the other end was closed, or its bytes were taken back, meanwhile
             continue;
         };
         out.clear();
         let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
         device.take(monotonic_now(), &bytes[..count], &mut out);
         drop(device);
-        if master.write_all(&out).is_err() {
-            thread::sleep(LOOK);
-        }
+        let _ = master.write_all(&out);
     }
 }

@@ -129,7 +129,8 @@ fn a_force_reaches_the_hand_of_a_bridge_is_as_old_as_its_way_and_gone_with_its_s
         // The port's damping of a hand that yields, or swings back on a busy machine, is in it, too.
         let bounds = 0.3 * most_felt..most_felt + 0.25;
         assert!(bounds.contains(&largest), "{what}");
-        assert_eq!(last, 0.0, "{what}");
+        // As that of a hand that still swings, of which a busy machine has missed ticks.
+        assert!(last < 0.1, "{last} N at the end; {what}");
         assert!(report.external_wrenches > 100, "{what}");
         assert!(report.max_external_age_ms < 115.0, "{what}");
         if delay_us > 0 {
