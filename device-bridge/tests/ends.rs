@@ -8,6 +8,7 @@ use std::io::{PipeReader, PipeWriter, Read, Write, pipe};
 use std::net::UdpSocket;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::support::{PATIENCE, Workbench};
@@ -252,6 +253,7 @@ impl Drop for Pressing {
 struct Stopped {
     reader: Option<PipeReader>,
     writer: PipeWriter,
+    goes_on: Arc<AtomicBool>,
 }
 
 impl Stopped {
@@ -260,6 +262,7 @@ impl Stopped {
         Self {
             reader: Some(reader),
             writer,
+            goes_on: Arc::default(),
         }
     }
 
@@ -267,9 +270,9 @@ impl Stopped {
     fn stop(&self) {
         let mut writer = self.writer.try_clone().expect("a handle");
         let (told, filling) = std::sync::mpsc::channel();
+        let goes_on = Arc::clone(&self.goes_on);
         let filler = std::thread::Builder::new().spawn(move || {
-            // Ends when the reader is gone.
-            while writer.write_all(&[b'\n'; 512]).is_ok() {
+            while !goes_on.load(Ordering::Relaxed) && writer.write_all(&[b'\n'; 512]).is_ok() {
                 let _ = told.send(());
             }
         });
@@ -277,8 +280,9 @@ impl Stopped {
         while filling.recv_timeout(Duration::from_millis(300)).is_ok() {}
     }
 
-    /// Somebody reads again.
+    /// Somebody reads again, until the last writer is gone; nobody fills it any more.
     fn go_on(&mut self) {
+        self.goes_on.store(true, Ordering::Relaxed);
         let mut reader = self.reader.take().expect("stopped");
         let _ = std::thread::Builder::new().spawn(move || {
             let mut bytes = [0; 4096];
