@@ -139,13 +139,13 @@ impl InputChoice {
             Self::Plugin(settings) => Box::new(settings.open(placement, priority)?),
             #[cfg(unix)]
             Self::Polhem(settings) => {
-                let board = crate::polhem::PolhemBoard::open(&settings.path, priority)?;
+                let board = crate::polhem::start(&settings.path, priority)?;
                 Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
             }
             #[cfg(unix)]
             Self::Wooden(settings) => {
                 let path = settings.path.clone();
-                let board = crate::wooden::WoodenBoard::open(path, settings.model, priority)?;
+                let board = crate::wooden::start(path, settings.model, priority)?;
                 Box::new(ArmDevice::new(Box::new(board), settings.arm(), placement))
             }
             #[cfg(not(unix))]

@@ -13,8 +13,9 @@ use crate::choice::ForceDevice;
 use crate::device::DeviceLimits;
 use crate::devices::Anchor;
 use crate::devices::arm::{ArmDevice, ArmPort, ArmSettings, ArmState};
+use crate::devices::wire_thread::ArmThread;
 use crate::haply::{
-    EVENTS_PORT, ExchangeSettings, HaplyClient, HaplyError, ServiceAddress, ServiceEvents,
+    self, EVENTS_PORT, ExchangeSettings, HaplyError, ServiceAddress, ServiceEvents,
     workspace_centre,
 };
 use crate::placement::Placement;
@@ -69,7 +70,7 @@ pub struct HaplySettings {
 
 /// The client, and who listens beside it: dropped in this order, so that the force goes first.
 struct Connected {
-    client: HaplyClient,
+    client: ArmThread,
     _events: Option<ServiceEvents>,
 }
 
@@ -92,7 +93,7 @@ impl HaplySettings {
     /// # Errors
     /// [`HaplyError`]: it is not there, or too old. An arm that is not there yet is waited for.
     pub fn open(&self, placement: Placement, priority: u8) -> Result<ArmDevice, HaplyError> {
-        let client = HaplyClient::start(self.address.clone(), self.exchange.clone(), priority)?;
+        let client = haply::start(self.address.clone(), self.exchange.clone(), priority)?;
         let events = self.events_port.map(|port| {
             // Without the thread nothing is told, and all else goes on.
             ServiceEvents::listen(&self.address.host, port).ok()
@@ -134,6 +135,6 @@ impl ArmPort for Connected {
     }
 
     fn push(&mut self, force: [f64; 3]) {
-        self.client.push(force);
+        self.client.command(force);
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod arm;
 pub(crate) mod glide;
 pub(crate) mod haply;
+pub(crate) mod held_arm;
 pub(crate) mod held_strings;
 pub(crate) mod led;
 pub(crate) mod plugin;
@@ -15,6 +16,7 @@ pub(crate) mod space_mouse;
 pub(crate) mod spidar;
 pub(crate) mod spidar_uart;
 pub(crate) mod vrpn;
+pub(crate) mod wire_thread;
 #[cfg(unix)]
 pub(crate) mod wooden;
 

@@ -1,17 +1,9 @@
 //! The thread that speaks to the service: a message a millisecond, an answer to each, and another connection when one is lost.
 //!
-//! | thread       | does                                                                                             |
-//! |--------------|--------------------------------------------------------------------------------------------------|
-//! | `taut-haply` | sockets, JSON; hands on the newest state, takes the newest force                                  |
-//! | the device's | [`HaplyClient::newest`], [`HaplyClient::push`]: no lock, no system call, no allocation              |
-//!
-//! What keeps a force from outliving its reason: the service renders a force for its message alone; this thread sends one only while the
-//! device's loop writes, and none from 20 ms after its last write on; a service that does not answer is told zero, and given up 100 ms later; the last
-//! message of a connection says zero.
+//! What keeps a force from outliving its reason, beside what [`WireThread`] does: the service renders a force for its message alone; one that does not
+//! answer is told zero, and given up 100 ms later; the last message of a connection says zero.
 
 use std::net::{TcpStream, ToSocketAddrs};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -22,23 +14,20 @@ use super::exchange::{Exchange, ExchangeSettings};
 use super::message::{MessageError, Said};
 use super::version::{VersionError, service_version};
 use crate::devices::ArmState;
-use crate::realtime::{self, Ticker, monotonic_now};
+use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
+use crate::realtime::{Ticker, monotonic_now};
 use taut_kinds::ServiceAddress;
 
 /// From message to message.
 const PERIOD: Duration = Duration::from_millis(1);
 /// Where in the millisecond a message goes out: just after the device's loop, whose force it carries.
 const PHASE: Duration = Duration::from_micros(350);
-/// From the last write of the device's loop on no force is sent any more.
-const FORCE_HOLDS: Duration = Duration::from_millis(20);
 /// An answer that takes longer makes the next message one without force.
 const ANSWER_WITHIN: Duration = Duration::from_millis(20);
 /// An answer that takes longer than this many times [`ANSWER_WITHIN`] ends the connection.
 const WAITS: u32 = 5;
 /// Until the service has taken the connection and told its inventory.
 const GREETING_WITHIN: Duration = Duration::from_secs(1);
-/// Between two calls.
-const RETRY: Duration = Duration::from_millis(200);
 /// Largest message that is taken, bytes.
 const MAX_MESSAGE: usize = 1 << 20;
 /// Messages that say nothing sensible, one after the other, that end a connection.
@@ -46,15 +35,6 @@ const MAX_NONSENSE: u32 = 20;
 
 /// Messages by which a service is looked at.
 const LOOKS: usize = 200;
-
-/// What the device's loop wants rendered.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PushedForce {
-    /// Counts the writes.
-    pub writes: u64,
-    /// N, the device's axes.
-    pub force: [f64; 3],
-}
 
 /// Why a service cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -112,105 +92,30 @@ impl From<tungstenite::Error> for Lost {
     }
 }
 
-/// A service under a thread of its own. Dropping it leaves no force.
-pub struct HaplyClient {
-    newest: triple_buffer::Output<ArmState>,
-    force: triple_buffer::Input<PushedForce>,
-    pushed: PushedForce,
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
-}
-
-impl HaplyClient {
-    /// Connects, and goes on for as long as this lives. `priority` asks for real time, 0 does not.
-    ///
-    /// # Errors
-    /// [`HaplyError`]: the service is not there now, or too old. One that goes later is waited for.
-    pub fn start(
-        address: ServiceAddress,
-        settings: ExchangeSettings,
-        priority: u8,
-    ) -> Result<Self, HaplyError> {
-        let first = connect(&address).map_err(|lost| HaplyError::NoService {
-            address: address.clone(),
-            cause: lost.to_string(),
-        })?;
-        match service_version(&address) {
-            Ok(_) => {}
-            Err(error @ VersionError::TooOld { .. }) => return Err(error.into()),
-            Err(unknown) => tracing::warn!("{unknown}; one before 3.5 would render no force"),
-        }
-        let (state, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
-        let (force, taken) = triple_buffer::TripleBuffer::new(&PushedForce::default()).split();
-        let end = Arc::new(AtomicBool::new(false));
-        let mut talker = Talker {
-            address,
-            settings,
-            out: state,
-            force: taken,
-            held: ForceHold::default(),
-            end: Arc::clone(&end),
-        };
-        let thread = thread::Builder::new()
-            .name("taut-haply".to_owned())
-            .spawn(move || {
-                if priority > 0 {
-                    let grant = realtime::request_fifo(priority);
-                    if !grant.is_granted() {
-                        tracing::warn!("{grant}: messages to the Inverse service may be late");
-                    }
-                }
-                talker.run(first);
-            })
-            .map_err(HaplyError::Thread)?;
-        Ok(Self {
-            newest,
-            force,
-            pushed: PushedForce::default(),
-            end,
-            thread: Some(thread),
-        })
+/// Connects, and goes on under a thread of its own. `priority` asks for real time, 0 does not.
+///
+/// # Errors
+/// [`HaplyError`]: the service is not there now, or too old. One that goes later is waited for.
+pub(crate) fn start(
+    address: ServiceAddress,
+    settings: ExchangeSettings,
+    priority: u8,
+) -> Result<ArmThread, HaplyError> {
+    let first = connect(&address).map_err(|lost| HaplyError::NoService {
+        address: address.clone(),
+        cause: lost.to_string(),
+    })?;
+    match service_version(&address) {
+        Ok(_) => {}
+        Err(error @ VersionError::TooOld { .. }) => return Err(error.into()),
+        Err(unknown) => tracing::warn!("{unknown}; one before 3.5 would render no force"),
     }
-
-    /// What the device said last.
-    pub fn newest(&mut self) -> &ArmState {
-        self.newest.read()
-    }
-
-    /// Wants `force` (N, the device's axes) until the next call, but not for longer than 20 ms.
-    pub fn push(&mut self, force: [f64; 3]) {
-        self.pushed.writes += 1;
-        self.pushed.force = force;
-        self.force.write(self.pushed);
-    }
-}
-
-impl Drop for HaplyClient {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            // If it broke down, the connection went with it, and the force with that.
-            let _ = thread.join();
-        }
-    }
-}
-
-/// A force is sent only while somebody goes on writing it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ForceHold {
-    writes: u64,
-    written: Duration,
-}
-
-impl ForceHold {
-    /// The force to be sent at `now`; none where nobody has written within [`FORCE_HOLDS`].
-    pub(crate) fn take(&mut self, now: Duration, pushed: &PushedForce) -> Option<[f64; 3]> {
-        if pushed.writes != self.writes {
-            (self.writes, self.written) = (pushed.writes, now);
-        }
-        let wanted = pushed.writes > 0 && now.saturating_sub(self.written) < FORCE_HOLDS;
-        wanted.then_some(pushed.force)
-    }
+    let talker = Talker {
+        address,
+        settings,
+        opened: Some(first),
+    };
+    WireThread::start("taut-haply", priority, talker).map_err(HaplyError::Thread)
 }
 
 type Socket = WebSocket<TcpStream>;
@@ -219,56 +124,38 @@ type Socket = WebSocket<TcpStream>;
 struct Talker {
     address: ServiceAddress,
     settings: ExchangeSettings,
-    out: triple_buffer::Input<ArmState>,
-    force: triple_buffer::Output<PushedForce>,
-    held: ForceHold,
-    end: Arc<AtomicBool>,
+    /// For the first session.
+    opened: Option<Socket>,
+}
+
+impl Wire for Talker {
+    type State = ArmState;
+    type Command = [f64; 3];
+    type Lost = Lost;
+
+    fn name(&self) -> String {
+        format!("the Inverse service at {}", self.address)
+    }
+
+    fn session(&mut self, line: &mut ArmLine) -> Result<(), Lost> {
+        let opened = self.opened.take();
+        let mut socket = opened.map_or_else(|| connect(&self.address), Ok)?;
+        let mut exchange = Exchange::new(self.settings.clone(), line.state);
+        let ended = self.speak(&mut socket, &mut exchange, line);
+        line.state = *exchange.state();
+        said_last(&mut socket, &mut exchange);
+        ended
+    }
 }
 
 impl Talker {
-    /// Speaks, and calls again, until the end.
-    fn run(&mut self, first: Socket) {
-        let mut state = ArmState::default();
-        let mut next = Some(first);
-        let mut told = String::new();
-        while !self.is_over() {
-            let lost = match next.take().map_or_else(|| connect(&self.address), Ok) {
-                Ok(mut socket) => {
-                    let mut exchange = Exchange::new(self.settings.clone(), state);
-                    let lost = self.speak(&mut socket, &mut exchange);
-                    state = *exchange.state();
-                    said_last(&mut socket, &mut exchange);
-                    match lost {
-                        Ok(()) => return,
-                        Err(lost) => {
-                            told.clear();
-                            lost
-                        }
-                    }
-                }
-                Err(lost) => lost,
-            };
-            state.is_usable = false;
-            self.out.write(state);
-            // A service that stays away is told of once.
-            let text = lost.to_string();
-            if text != told {
-                tracing::warn!(
-                    "the Inverse service at {} was lost: {text}; trying again until it is there",
-                    self.address
-                );
-                told = text;
-            }
-            thread::sleep(RETRY);
-        }
-    }
-
-    fn is_over(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
-    }
-
     /// A message a millisecond, until the end or until the connection is lost.
-    fn speak(&mut self, socket: &mut Socket, exchange: &mut Exchange) -> Result<(), Lost> {
+    fn speak(
+        &self,
+        socket: &mut Socket,
+        exchange: &mut Exchange,
+        line: &mut ArmLine,
+    ) -> Result<(), Lost> {
         let greeting = next_text(socket)?.ok_or(Lost::NoInventory)?;
         exchange.hear(&greeting).map_err(Lost::Nonsense)?;
         socket.get_ref().set_read_timeout(Some(ANSWER_WITHIN))?;
@@ -276,13 +163,11 @@ impl Talker {
         let mut why = None;
         let mut nonsense = 0;
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
-        while !self.is_over() {
+        while !line.is_over() {
             ticker.wait();
             drain(socket)?;
-            let pushed = *self.force.read();
-            let force = self.held.take(monotonic_now(), &pushed);
-            send(socket, exchange.say(force))?;
-            let answer = self.answer(socket, exchange)?;
+            send(socket, exchange.say(line.command(monotonic_now())))?;
+            let answer = answer(socket, exchange, line)?;
             match exchange.hear(&answer) {
                 Ok(()) => nonsense = 0,
                 Err(error) => {
@@ -296,8 +181,8 @@ impl Talker {
                     continue;
                 }
             }
-            let state = *exchange.state();
-            self.out.write(state);
+            line.state = *exchange.state();
+            line.publish();
             if why != exchange.unusable() {
                 why = exchange.unusable();
                 match why {
@@ -308,22 +193,22 @@ impl Talker {
         }
         Ok(())
     }
+}
 
-    /// Waits for the answer; one that is late gets a message without force after it, and one that never comes ends the connection.
-    fn answer(&self, socket: &mut Socket, exchange: &mut Exchange) -> Result<String, Lost> {
-        for wait in 0..WAITS {
-            if let Some(text) = next_text(socket)? {
-                return Ok(text);
-            }
-            if self.is_over() {
-                break;
-            }
-            if wait == 0 {
-                send(socket, exchange.say(Some([0.0; 3])))?;
-            }
+/// Waits for the answer; one that is late gets a message without force after it, and one that never comes ends the connection.
+fn answer(socket: &mut Socket, exchange: &mut Exchange, line: &ArmLine) -> Result<String, Lost> {
+    for wait in 0..WAITS {
+        if let Some(text) = next_text(socket)? {
+            return Ok(text);
         }
-        Err(Lost::NoAnswer)
+        if line.is_over() {
+            break;
+        }
+        if wait == 0 {
+            send(socket, exchange.say(Some([0.0; 3])))?;
+        }
     }
+    Err(Lost::NoAnswer)
 }
 
 /// What a service has, and how fast it answers.
@@ -444,24 +329,4 @@ fn is_late(error: &std::io::Error) -> bool {
         error.kind(),
         std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_force_that_nobody_writes_any_more_is_not_sent() {
-        let ms = Duration::from_millis;
-        let mut held = ForceHold::default();
-        let mut pushed = PushedForce::default();
-        assert_eq!(held.take(ms(5), &pushed), None, "nobody has written yet");
-        (pushed.writes, pushed.force) = (1, [0.0, 0.0, 2.0]);
-        for time in 10..30 {
-            assert_eq!(held.take(ms(time), &pushed), Some(pushed.force), "{time}");
-        }
-        assert_eq!(held.take(ms(30), &pushed), None);
-        pushed.writes = 2;
-        assert_eq!(held.take(ms(31), &pushed), Some(pushed.force));
-    }
 }

@@ -24,8 +24,8 @@ mod service;
 mod simulated;
 mod version;
 
-pub(crate) use client::ForceHold;
-pub use client::{HaplyClient, HaplyError, HaplyFound, PushedForce, look};
+pub(crate) use client::start;
+pub use client::{HaplyError, HaplyFound, look};
 pub use events::EVENTS_PORT;
 pub(crate) use events::ServiceEvents;
 pub use exchange::{Exchange, ExchangeSettings, Unusable};

@@ -6,18 +6,17 @@
 use std::collections::HashMap;
 use std::time::Duration;
 
-use nalgebra::{Isometry3, Point3, Vector3, Vector6};
+use nalgebra::{Point3, Vector3};
 use serde_json::{Value, json};
-use taut_plant::{Grip, Hand, MinJerkPath, Plant, Tremor, ViaPoint};
+use taut_plant::{Grip, Hand, MinJerkPath, Tremor};
 
 use crate::device::Pose;
+use crate::devices::held_arm::{HeldArm, down_and_up};
 
 /// Middle of the arm's workspace in its own axes, m. Assumed.
 pub(crate) const WORKSPACE_CENTRE: [f64; 3] = [0.0, -0.1, 0.16];
 /// Silence after which a session's force is none. Assumed: the documentation says that it ends, not when.
 const IDLE_AFTER: Duration = Duration::from_millis(50);
-/// Most that is simulated in one call.
-const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 /// Largest force along an axis that is taken, N; more is limited to the arm's largest.
 const LARGEST_COMMAND: f64 = 1e3;
 /// Largest message that is read, bytes.
@@ -50,29 +49,6 @@ impl SimulatedSettings {
             with_grip: true,
         }
     }
-
-    fn path(&self) -> MinJerkPath {
-        if let Some(path) = &self.path {
-            return path.clone();
-        }
-        let at = |time_s, down| ViaPoint {
-            time_s,
-            pose: Pose::translation(
-                WORKSPACE_CENTRE[0],
-                WORKSPACE_CENTRE[1],
-                WORKSPACE_CENTRE[2] - down,
-            ),
-        };
-        let points = vec![
-            at(0.0, 0.0),
-            at(2.0, 0.06),
-            at(4.0, 0.06),
-            at(6.0, 0.0),
-            at(8.0, 0.0),
-        ];
-        // Growing times: it cannot be refused.
-        MinJerkPath::new(points, true).unwrap_or_else(|_| MinJerkPath::hold(Isometry3::identity()))
-    }
 }
 
 /// A session's force.
@@ -84,13 +60,10 @@ struct Push {
 
 /// A service with one arm.
 pub struct SimulatedInverse {
-    plant: Plant,
+    arm: HeldArm,
     with_grip: bool,
     plugged: bool,
     pushes: HashMap<u64, Push>,
-    epoch: Option<Duration>,
-    elapsed: Duration,
-    largest_force: f64,
     messages: u64,
 }
 
@@ -98,18 +71,14 @@ impl SimulatedInverse {
     /// At rest where the hand's path begins.
     #[must_use]
     pub fn new(settings: &SimulatedSettings) -> Self {
-        let mut plant = Plant::new(settings.grip, settings.hand, settings.path());
-        if let Some(tremor) = &settings.tremor {
-            plant = plant.with_tremor(tremor.clone());
-        }
+        let path = settings.path.clone();
+        let path = path.unwrap_or_else(|| down_and_up(WORKSPACE_CENTRE.into()));
+        let tremor = settings.tremor.clone();
         Self {
-            plant,
+            arm: HeldArm::new(settings.grip, settings.hand, path, tremor),
             with_grip: settings.with_grip,
             plugged: true,
             pushes: HashMap::new(),
-            epoch: None,
-            elapsed: Duration::ZERO,
-            largest_force: 0.0,
             messages: 0,
         }
     }
@@ -119,22 +88,22 @@ impl SimulatedInverse {
         self.plugged = plugged;
     }
 
-    /// What the motors render now, N.
+    /// What the motors render, N.
     #[must_use]
     pub fn rendered(&self) -> Vector3<f64> {
-        self.plant.rendered_wrench().fixed_rows::<3>(0).into()
+        self.arm.rendered()
     }
 
     /// Where the cursor truly is, the arm's axes.
     #[must_use]
     pub fn true_pose(&self) -> Pose {
-        *self.plant.pose()
+        *self.arm.plant.pose()
     }
 
     /// Largest norm of a rendered force so far, N.
     #[must_use]
     pub fn largest_force(&self) -> f64 {
-        self.largest_force
+        self.arm.largest_force()
     }
 
     /// Messages answered so far.
@@ -176,44 +145,28 @@ impl SimulatedInverse {
 
     /// Goes on to `now`.
     pub fn advance(&mut self, now: Duration) {
-        let epoch = *self.epoch.get_or_insert(now);
-        let passed = now.saturating_sub(epoch);
-        let due = passed.saturating_sub(self.elapsed);
-        self.elapsed = self.elapsed.max(passed);
+        let due = self.arm.due(now);
+        let ends = self.pushes.values().map(|push| push.said + IDLE_AFTER);
         // A force that has grown too old ended where it did.
-        let oldest = self
-            .pushes
-            .values()
-            .map(|push| push.said + IDLE_AFTER)
-            .min();
-        if let Some(end) = oldest.filter(|end| *end <= now) {
-            let until = end.saturating_sub(epoch).saturating_sub(self.elapsed - due);
-            self.plant
-                .advance(self.plant.time() + until.min(due).min(LONGEST_SILENCE));
-            self.command(now);
-            let rest = due.saturating_sub(until);
-            self.plant
-                .advance(self.plant.time() + rest.min(LONGEST_SILENCE));
-        } else {
-            self.plant
-                .advance(self.plant.time() + due.min(LONGEST_SILENCE));
-        }
-        self.largest_force = self.largest_force.max(self.rendered().norm());
+        let without = ends
+            .min()
+            .map_or(Duration::ZERO, |end| now.saturating_sub(end).min(due));
+        self.arm.go_on(due - without);
+        self.command(now);
+        self.arm.go_on(without);
     }
 
     fn command(&mut self, now: Duration) {
         self.pushes.retain(|_, push| now < push.said + IDLE_AFTER);
         let sum: Vector3<f64> = self.pushes.values().map(|push| push.force).sum();
         let sum = if self.plugged { sum } else { Vector3::zeros() };
-        self.plant
-            .command(&Vector6::new(sum.x, sum.y, sum.z, 0.0, 0.0, 0.0));
-        self.largest_force = self.largest_force.max(self.rendered().norm());
+        self.arm.push(now, &sum);
     }
 
     fn state(&self, session: u64, full: bool) -> String {
         let mut arms = Vec::new();
         let mut grips = Vec::new();
-        let pose = self.plant.measured_pose();
+        let pose = self.arm.plant.measured_pose();
         if self.plugged {
             let mut arm = json!({
                 "device_id": "51A3",
@@ -257,7 +210,7 @@ impl SimulatedInverse {
     }
 
     fn arm_state(&self, pose: &Pose) -> Value {
-        let velocity: Vector3<f64> = self.plant.velocity().fixed_rows::<3>(0).into();
+        let velocity: Vector3<f64> = self.arm.plant.velocity().fixed_rows::<3>(0).into();
         let commanded = !self.pushes.is_empty();
         json!({
             "cursor_position": xyz(&pose.translation.vector),

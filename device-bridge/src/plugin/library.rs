@@ -6,6 +6,8 @@
 
 use std::ffi::{CString, c_char, c_void};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use libloading::Library;
 
@@ -53,7 +55,10 @@ impl LibraryOpener {
 }
 
 impl Opener for LibraryOpener {
-    fn open(&mut self) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError> {
+    fn open(
+        &mut self,
+        _end: &Arc<AtomicBool>,
+    ) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError> {
         let library = match self.loaded.take() {
             Some(library) => library,
             None => PluginLibrary::load(&self.path)?,

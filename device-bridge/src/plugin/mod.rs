@@ -88,7 +88,11 @@ trait OpenDevice {
 
 /// What opens a device, again after it was gone.
 trait Opener: Send {
-    fn open(&mut self) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError>;
+    /// Gives up, where it can, once `end` is true.
+    fn open(
+        &mut self,
+        end: &Arc<AtomicBool>,
+    ) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError>;
 }
 
 impl Language {
@@ -97,7 +101,6 @@ impl Language {
         path: &Path,
         options: &str,
         priority: u8,
-        end: &Arc<AtomicBool>,
     ) -> Result<Box<dyn Opener>, PluginError> {
         match self {
             Self::C => Ok(Box::new(library::LibraryOpener::new(path, options))),
@@ -107,7 +110,6 @@ impl Language {
                 path,
                 options,
                 priority,
-                end,
             )?)),
             #[cfg(not(unix))]
             Self::Python { .. } => Err(PluginError::NotHere),

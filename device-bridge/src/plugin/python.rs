@@ -39,7 +39,6 @@ pub(super) struct PythonFile {
     path: PathBuf,
     options: Vec<String>,
     priority: u8,
-    end: Arc<AtomicBool>,
 }
 
 impl PythonFile {
@@ -48,7 +47,6 @@ impl PythonFile {
         path: &Path,
         options: &str,
         priority: u8,
-        end: &Arc<AtomicBool>,
     ) -> Result<Self, PluginError> {
         let options = options.split(',').filter(|option| !option.is_empty());
         let options: Vec<String> = options.map(str::to_owned).collect();
@@ -63,11 +61,10 @@ impl PythonFile {
             })?,
             options,
             priority,
-            end: Arc::clone(end),
         })
     }
 
-    fn start(&self) -> Result<Process, PluginError> {
+    fn start(&self, end: &Arc<AtomicBool>) -> Result<Process, PluginError> {
         let failed = |error: std::io::Error| PluginError::Interpreter {
             interpreter: self.interpreter.clone(),
             cause: error.to_string(),
@@ -95,15 +92,18 @@ impl PythonFile {
             link,
             printed: Printed::read(printed, &name.to_string_lossy()),
             wrong: String::new(),
-            end: Arc::clone(&self.end),
+            end: Arc::clone(end),
             is_over: false,
         })
     }
 }
 
 impl Opener for PythonFile {
-    fn open(&mut self) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError> {
-        let mut process = self.start()?;
+    fn open(
+        &mut self,
+        end: &Arc<AtomicBool>,
+    ) -> Result<(Box<dyn OpenDevice + '_>, PluginInfo), PluginError> {
+        let mut process = self.start(end)?;
         match process.listen(OPEN_WITHIN, true) {
             Some(Said::Info(raw)) => {
                 let info = PluginInfo::of(&raw).map_err(|claim| PluginError::Info {

@@ -1,19 +1,14 @@
-//! The thread on the serial port: a force out and a pose in once a millisecond, and the board opened again when it is gone.
-//!
-//! As with every force device here no force outlives its reason: zero is sent when the device's loop has not written for 20 ms, and at every end.
+//! The board on the serial port: a force out and a pose in once a millisecond.
 
 use std::io::{Read, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
 use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::frame::{Frame, LINE, force_frame};
-use crate::devices::{ArmPort, ArmState};
-use crate::haply::{ForceHold, PushedForce};
-use crate::realtime::{self, Ticker, monotonic_now};
+use super::frame::{Frame, LINE as LINE_BYTES, force_frame};
+use crate::devices::ArmState;
+use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
+use crate::realtime::{Ticker, monotonic_now};
 use crate::spidar_uart::Counters;
 
 /// Nominal: the board is on USB, which has no baud.
@@ -28,12 +23,10 @@ const ANSWER_WITHIN: Duration = Duration::from_millis(3);
 const GIVEN_UP: Duration = Duration::from_millis(300);
 /// Lines of zero force at an end, in case one is lost.
 const LAST_LINES: u32 = 3;
-/// Between two attempts.
-const RETRY: Duration = Duration::from_millis(200);
 /// What a line's lengths and angles are rounded to where they are judged: 10 um, 0.1 mrad.
 const JUDGED: (f64, f64) = (1e-5, 1e-4);
 /// Most bytes without a line's end.
-const MAX_BUFFER: usize = 16 * LINE;
+const MAX_BUFFER: usize = 16 * LINE_BYTES;
 
 /// Why there is no board.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -55,77 +48,20 @@ pub enum PolhemError {
     Thread(String),
 }
 
-/// A board under a thread of its own. Dropping it leaves no force.
-pub struct PolhemBoard {
-    newest: triple_buffer::Output<ArmState>,
-    force: triple_buffer::Input<PushedForce>,
-    pushed: PushedForce,
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
-}
-
-impl PolhemBoard {
-    /// Opens the port; a board that says nothing yet is waited for. `priority` asks for real time, 0 does not.
-    ///
-    /// # Errors
-    /// [`PolhemError`].
-    pub fn open(path: &str, priority: u8) -> Result<Self, PolhemError> {
-        let port = open(path)?;
-        let (state, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
-        let (force, taken) = triple_buffer::TripleBuffer::new(&PushedForce::default()).split();
-        let end = Arc::new(AtomicBool::new(false));
-        let mut line = Line {
-            path: path.to_owned(),
-            out: state,
-            force: taken,
-            held: ForceHold::default(),
-            judge: Counters::new(JUDGED.0),
-            state: ArmState::default(),
-            before: None,
-            buffer: Vec::with_capacity(MAX_BUFFER),
-            end: Arc::clone(&end),
-        };
-        let thread = thread::Builder::new()
-            .name("taut-polhem".to_owned())
-            .spawn(move || {
-                if priority > 0 {
-                    let grant = realtime::request_fifo(priority);
-                    if !grant.is_granted() {
-                        tracing::warn!("{grant}: lines of the Polhem board may be late");
-                    }
-                }
-                line.run(port);
-            })
-            .map_err(|error| PolhemError::Thread(error.to_string()))?;
-        Ok(Self {
-            newest,
-            force,
-            pushed: PushedForce::default(),
-            end,
-            thread: Some(thread),
-        })
-    }
-}
-
-impl ArmPort for PolhemBoard {
-    fn newest(&mut self) -> ArmState {
-        *self.newest.read()
-    }
-
-    fn push(&mut self, force: [f64; 3]) {
-        self.pushed.writes += 1;
-        self.pushed.force = force;
-        self.force.write(self.pushed);
-    }
-}
-
-impl Drop for PolhemBoard {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // it panics nowhere
-        }
-    }
+/// Opens the port; a board that says nothing yet is waited for. `priority` asks for real time, 0 does not.
+///
+/// # Errors
+/// [`PolhemError`].
+pub(crate) fn start(path: &str, priority: u8) -> Result<ArmThread, PolhemError> {
+    let serial = Serial {
+        path: path.to_owned(),
+        opened: Some(open(path)?),
+        judge: Counters::new(JUDGED.0),
+        before: None,
+        buffer: Vec::with_capacity(MAX_BUFFER),
+    };
+    let thread = WireThread::start("taut-polhem", priority, serial);
+    thread.map_err(|error| PolhemError::Thread(error.to_string()))
 }
 
 type Port = Box<dyn SerialPort>;
@@ -141,52 +77,37 @@ fn open(path: &str) -> Result<Port, PolhemError> {
 }
 
 /// The thread's own.
-struct Line {
+struct Serial {
     path: String,
-    out: triple_buffer::Input<ArmState>,
-    force: triple_buffer::Output<PushedForce>,
-    held: ForceHold,
+    /// For the first session.
+    opened: Option<Port>,
     judge: Counters,
-    state: ArmState,
     /// Position and time of the line believed before, for the velocity.
     before: Option<([f64; 3], Duration)>,
     buffer: Vec<u8>,
-    end: Arc<AtomicBool>,
 }
 
-impl Line {
-    fn run(&mut self, first: Port) {
-        let mut next = Some(first);
-        let mut told = String::new();
-        while !self.is_over() {
-            let lost = match next.take().map_or_else(|| open(&self.path), Ok) {
-                Ok(mut port) => {
-                    let lost = self.turn(&mut port);
-                    self.let_go(&mut port);
-                    match lost {
-                        Ok(()) => return,
-                        Err(error) => error.to_string(),
-                    }
-                }
-                Err(error) => error.to_string(),
-            };
-            self.state.is_usable = false;
-            self.out.write(self.state);
-            if lost != told {
-                tracing::warn!(
-                    "the Polhem board on {} is gone: {lost}; looking for it",
-                    self.path
-                );
-                told = lost;
-            }
-            thread::sleep(RETRY);
-        }
+impl Wire for Serial {
+    type State = ArmState;
+    type Command = [f64; 3];
+    type Lost = String;
+
+    fn name(&self) -> String {
+        format!("the Polhem board on {}", self.path)
     }
 
-    fn is_over(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
+    fn session(&mut self, line: &mut ArmLine) -> Result<(), String> {
+        let opened = self.opened.take();
+        let mut port = opened
+            .map_or_else(|| open(&self.path), Ok)
+            .map_err(|error| error.to_string())?;
+        let ended = self.turn(&mut port, line);
+        self.let_go(&mut port);
+        ended.map_err(|error| error.to_string())
     }
+}
 
+impl Serial {
     /// Zero, as far as the line still takes it: said until it is answered, because a port that is closed may drop what it has not sent.
     fn let_go(&mut self, port: &mut Port) {
         for _ in 0..LAST_LINES {
@@ -199,19 +120,17 @@ impl Line {
         }
     }
 
-    fn turn(&mut self, port: &mut Port) -> std::io::Result<()> {
+    fn turn(&mut self, port: &mut Port, line: &mut ArmLine) -> std::io::Result<()> {
         self.buffer.clear();
         let mut believed = monotonic_now();
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
-        while !self.is_over() {
+        while !line.is_over() {
             ticker.wait();
-            let now = monotonic_now();
-            let pushed = *self.force.read();
-            let force = self.held.take(now, &pushed).unwrap_or([0.0; 3]);
+            let force = line.command(monotonic_now()).unwrap_or_default();
             port.write_all(&force_frame(&force))?;
             if let Some(frame) = self.newest_frame(port)? {
                 let now = monotonic_now();
-                if self.take(now, &frame) {
+                if self.take(now, &frame, line) {
                     believed = now;
                 } else if self.judge.were_reset() {
                     return Err(std::io::Error::other(
@@ -228,7 +147,7 @@ impl Line {
 
     /// The newest whole line; what is no line is dropped.
     fn newest_frame(&mut self, port: &mut Port) -> std::io::Result<Option<Frame>> {
-        let mut chunk = [0; 4 * LINE];
+        let mut chunk = [0; 4 * LINE_BYTES];
         match port.read(&mut chunk) {
             Ok(0) => return Err(std::io::ErrorKind::UnexpectedEof.into()),
             Ok(bytes) => self.buffer.extend(&chunk[..bytes]),
@@ -247,7 +166,7 @@ impl Line {
     }
 
     /// Whether the frame is believed; if so it is handed on.
-    fn take(&mut self, now: Duration, frame: &Frame) -> bool {
+    fn take(&mut self, now: Duration, frame: &Frame, line: &mut ArmLine) -> bool {
         let [x, y, z] = frame.position.map(|part| (part / JUDGED.0) as i16); // wraps nowhere within 0.3 m, and saturates
         let [a, b, c, d] = frame.angles.map(|part| (part / JUDGED.1) as i16);
         if self.judge.take(now, &[x, y, z, a, b, c, d, 0]).is_none() {
@@ -259,8 +178,8 @@ impl Line {
         });
         self.before = Some((frame.position, now));
         let q = frame.orientation();
-        self.state = ArmState {
-            reports: self.state.reports + 1,
+        line.state = ArmState {
+            reports: line.state.reports + 1,
             is_usable: true,
             position: frame.position,
             velocity,
@@ -268,7 +187,7 @@ impl Line {
             turning: None,
             buttons: 0,
         };
-        self.out.write(self.state);
+        line.publish();
         true
     }
 }

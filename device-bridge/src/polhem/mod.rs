@@ -13,6 +13,7 @@ mod board;
 mod frame;
 mod simulated;
 
-pub use board::{PolhemBoard, PolhemError};
+pub use board::PolhemError;
+pub(crate) use board::start;
 pub use frame::{BrokenFrame, Frame, force_frame, read_force};
 pub use simulated::SimulatedPolhem;

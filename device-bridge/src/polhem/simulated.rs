@@ -2,71 +2,45 @@
 
 use std::time::Duration;
 
-use nalgebra::{UnitQuaternion, Vector3, Vector6};
-use taut_plant::{Hand, MinJerkPath, Plant, Tremor, ViaPoint};
+use nalgebra::{UnitQuaternion, Vector3};
+use taut_plant::{Hand, MinJerkPath, Tremor};
 
 use super::frame::{Frame, LINE, read_force};
-use crate::device::Pose;
+use crate::devices::held_arm::{HeldArm, down_and_up};
 use crate::pseudo_terminal::FarEnd;
 
 /// Silence after which the motors are off: the older board's 0.5 s, assumed of this one.
 const MOTORS_OFF: Duration = Duration::from_millis(500);
-/// Most that is simulated in one call.
-const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 
 /// An arm on its board.
 pub struct SimulatedPolhem {
-    plant: Plant,
+    arm: HeldArm,
     line: Vec<u8>,
-    epoch: Option<Duration>,
-    elapsed: Duration,
-    commanded: Duration,
     lines: u64,
-    largest_force: f64,
 }
 
 impl SimulatedPolhem {
     /// At rest where the hand's path begins; without a path 60 mm down and up again, for ever.
     #[must_use]
     pub fn new(hand: Hand, path: Option<MinJerkPath>, tremor: Option<Tremor>) -> Self {
-        let at = |time_s, down: f64| ViaPoint {
-            time_s,
-            pose: Pose::translation(0.01, 0.02, 0.03 - down),
-        };
-        let points = vec![
-            at(0.0, 0.0),
-            at(2.0, 0.06),
-            at(4.0, 0.06),
-            at(6.0, 0.0),
-            at(8.0, 0.0),
-        ];
-        let path = path.or_else(|| MinJerkPath::new(points, true).ok());
-        let path = path.unwrap_or_else(|| MinJerkPath::hold(Pose::identity())); // growing times: never
-        let mut plant = Plant::new(crate::devices::polhem_grip(), hand, path);
-        if let Some(tremor) = tremor {
-            plant = plant.with_tremor(tremor);
-        }
+        let path = path.unwrap_or_else(|| down_and_up(Vector3::new(0.01, 0.02, 0.03)));
         Self {
-            plant,
+            arm: HeldArm::new(crate::devices::polhem_grip(), hand, path, tremor),
             line: Vec::with_capacity(LINE),
-            epoch: None,
-            elapsed: Duration::ZERO,
-            commanded: Duration::ZERO,
             lines: 0,
-            largest_force: 0.0,
         }
     }
 
     /// What the motors render, N.
     #[must_use]
     pub fn rendered(&self) -> Vector3<f64> {
-        self.plant.rendered_wrench().fixed_rows::<3>(0).into()
+        self.arm.rendered()
     }
 
     /// Largest norm of a rendered force so far, N.
     #[must_use]
     pub fn largest_force(&self) -> f64 {
-        self.largest_force
+        self.arm.largest_force()
     }
 
     /// Lines taken so far.
@@ -75,27 +49,13 @@ impl SimulatedPolhem {
         self.lines
     }
 
-    fn advance(&mut self, now: Duration) {
-        let epoch = *self.epoch.get_or_insert(now);
-        let passed = now.saturating_sub(epoch);
-        let due = passed.saturating_sub(self.elapsed);
-        self.elapsed = self.elapsed.max(passed);
-        if now.saturating_sub(self.commanded) > MOTORS_OFF {
-            self.plant.command(&Vector6::zeros());
-        }
-        self.plant
-            .advance(self.plant.time() + due.min(LONGEST_SILENCE));
-    }
-
     fn obey(&mut self, now: Duration, out: &mut Vec<u8>) {
-        self.advance(now);
+        self.arm.advance(now, MOTORS_OFF);
         self.lines += 1;
-        if let Some([x, y, z]) = read_force(&self.line) {
-            self.commanded = now;
-            self.plant.command(&Vector6::new(x, y, z, 0.0, 0.0, 0.0));
-            self.largest_force = self.largest_force.max(self.rendered().norm());
+        if let Some(force) = read_force(&self.line) {
+            self.arm.push(now, &force.into());
         }
-        let pose = self.plant.measured_pose();
+        let pose = self.arm.plant.measured_pose();
         let frame = Frame {
             position: pose.translation.vector.into(),
             angles: angles(&pose.rotation),

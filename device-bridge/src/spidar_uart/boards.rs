@@ -1,12 +1,9 @@
-//! The thread on the serial port: a cycle a millisecond, and the boards looked for again when they are gone.
+//! The boards on the serial port: a cycle a millisecond.
 //!
-//! What keeps a current from outliving its reason, since no board is known to let go by itself: this thread sends zero currents whenever the
-//! device's loop has not written for 20 ms or no answer was believed for 20 ms, at every end that it sees, and first of all after the boards were found.
+//! What keeps a current from outliving its reason, beside what [`WireThread`] does, since no board is known to let go by itself: zero currents are sent
+//! whenever no answer was believed for 20 ms, and first of all after the boards were found.
 
 use std::io::{Read, Write};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
@@ -16,7 +13,8 @@ use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHard
 use super::counters::Counters;
 use super::cycle::{BrokenCycle, Cycle};
 use super::packet::{BoardInfo, INFO, INFO_ANSWER, INFO_PADDING, MAX_BOARDS, header};
-use crate::realtime::{self, Ticker, monotonic_now};
+use crate::devices::wire_thread::{HOLDS, Line, Wire, WireState, WireThread};
+use crate::realtime::{Ticker, monotonic_now};
 
 /// Of the boards.
 const BAUD: u32 = 2_000_000;
@@ -35,14 +33,12 @@ const FOUND_WITHIN: [Duration; 6] = [
     Duration::from_millis(200),
     Duration::from_millis(200),
 ];
-/// Without a write of the device's loop, or without an answer, for this long all currents are zero.
-const HOLDS: Duration = Duration::from_millis(20);
 /// Without a believed answer for this long the line is opened anew.
 const GIVEN_UP: Duration = Duration::from_millis(300);
-/// Between two attempts.
-const RETRY: Duration = Duration::from_millis(200);
-/// For the first attempt: all of the above at each number of a board, and the first counts.
-const OPEN_WITHIN: Duration = Duration::from_secs(8);
+/// For the first counts, once the boards are found.
+const COUNTS_WITHIN: Duration = Duration::from_secs(5);
+/// Between two looks for them.
+const LOOK: Duration = Duration::from_millis(1);
 /// Cycles of zero currents at an end, in case one is lost.
 const LAST_CYCLES: u32 = 3;
 /// Digits per volt of the boards' converter, and its largest.
@@ -91,22 +87,18 @@ struct Counted {
     is_there: bool,
 }
 
-/// What the device's loop wants.
-#[derive(Clone, Copy, Debug, Default)]
-struct Wanted {
-    writes: u64,
-    digits: [i16; STRINGS],
+impl WireState for Counted {
+    fn lose(&mut self) {
+        self.is_there = false;
+    }
 }
 
 /// Motor boards on a serial line. Dropping it leaves no current.
 pub struct SpidarBoards {
-    counted: triple_buffer::Output<Counted>,
-    wanted: triple_buffer::Input<Wanted>,
-    newest: Wanted,
+    /// Commands are digits of the boards' converters.
+    thread: WireThread<Counted, [i16; STRINGS]>,
     digits_per_newton: PerString,
     seen: (u64, Duration),
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
 }
 
 impl SpidarBoards {
@@ -116,54 +108,35 @@ impl SpidarBoards {
     /// [`BoardsError`].
     pub fn open(path: &str, geometry: &Geometry, priority: u8) -> Result<Self, BoardsError> {
         let digits_per_newton = digits_per_newton(geometry)?;
-        let (output, counted) = triple_buffer::TripleBuffer::new(&Counted::default()).split();
-        let (wanted, taken) = triple_buffer::TripleBuffer::new(&Wanted::default()).split();
-        let end = Arc::new(AtomicBool::new(false));
-        let (ready, readied) = sync_channel(1);
         let count = geometry
             .metres_per_count
             .iter()
             .fold(f64::INFINITY, |least, count| least.min(count.abs()));
-        let mut line = Line {
+        let mut serial = Serial {
             path: path.to_owned(),
-            out: output,
-            wanted: taken,
+            found: None,
             counters: Counters::new(count),
-            counted: Counted::default(),
-            writes: (0, Duration::ZERO),
-            end: Arc::clone(&end),
             bytes: Vec::with_capacity(256),
             heard: Vec::with_capacity(512),
         };
-        let thread = thread::Builder::new()
-            .name("taut-spidar".to_owned())
-            .spawn(move || {
-                if priority > 0 {
-                    let grant = realtime::request_fifo(priority);
-                    if !grant.is_granted() {
-                        tracing::warn!("{grant}: cycles of the motor boards may be late");
-                    }
-                }
-                line.run(&ready);
-            })
-            .map_err(|error| BoardsError::Thread(error.to_string()))?;
-        let boards = Self {
-            counted,
-            wanted,
-            newest: Wanted::default(),
+        serial.found = Some(serial.find()?);
+        let thread = WireThread::start("taut-spidar", priority, serial);
+        let mut thread = thread.map_err(|error| BoardsError::Thread(error.to_string()))?;
+        let until = monotonic_now() + COUNTS_WITHIN;
+        while thread.newest().readings == 0 {
+            if monotonic_now() > until {
+                return Err(BoardsError::Motors {
+                    path: path.to_owned(),
+                    motors: STRINGS,
+                });
+            }
+            thread::sleep(LOOK);
+        }
+        Ok(Self {
+            thread,
             digits_per_newton,
             seen: (0, Duration::ZERO),
-            end,
-            thread: Some(thread),
-        };
-        match readied.recv_timeout(OPEN_WITHIN) {
-            Ok(Ok(())) => Ok(boards),
-            Ok(Err(error)) => Err(error),
-            Err(_) => Err(BoardsError::Motors {
-                path: path.to_owned(),
-                motors: STRINGS,
-            }),
-        }
+        })
     }
 }
 
@@ -182,7 +155,7 @@ pub(crate) fn digit(tension: f64, per_newton: f64) -> i16 {
 
 impl StringHardware for SpidarBoards {
     fn read_counts(&mut self, now: Duration) -> Result<Reading, StringFault> {
-        let counted = *self.counted.read();
+        let counted = *self.thread.newest();
         if counted.readings != self.seen.0 {
             self.seen = (counted.readings, now);
         }
@@ -199,79 +172,44 @@ impl StringHardware for SpidarBoards {
     }
 
     fn write_tensions(&mut self, _now: Duration, tensions: &PerString) {
-        self.newest.writes += 1;
-        self.newest.digits = std::array::from_fn(|i| digit(tensions[i], self.digits_per_newton[i]));
-        self.wanted.write(self.newest);
-    }
-}
-
-impl Drop for SpidarBoards {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // it panics nowhere
-        }
+        let digits = std::array::from_fn(|i| digit(tensions[i], self.digits_per_newton[i]));
+        self.thread.command(digits);
     }
 }
 
 type Port = Box<dyn SerialPort>;
 
+type BoardLine = Line<Counted, [i16; STRINGS]>;
+
 /// The thread's own.
-struct Line {
+struct Serial {
     path: String,
-    out: triple_buffer::Input<Counted>,
-    wanted: triple_buffer::Output<Wanted>,
+    /// For the first session.
+    found: Option<(Port, Cycle)>,
     counters: Counters,
-    counted: Counted,
-    /// Writes of the device's loop, and when the last was seen.
-    writes: (u64, Duration),
-    end: Arc<AtomicBool>,
     bytes: Vec<u8>,
     heard: Vec<u8>,
 }
 
-impl Line {
-    fn run(&mut self, ready: &SyncSender<Result<(), BoardsError>>) {
-        let mut told = String::new();
-        let mut is_first = true;
-        while !self.is_over() {
-            let lost = match self.find() {
-                Ok((mut port, cycle)) => {
-                    told.clear();
-                    let lost = self.turn(&mut port, &cycle, ready);
-                    is_first = false;
-                    self.let_go(&mut port, &cycle);
-                    lost.err().map(|error| error.to_string())
-                }
-                Err(error) => {
-                    if is_first {
-                        let _ = ready.try_send(Err(error));
-                        return;
-                    }
-                    Some(error.to_string())
-                }
-            };
-            self.counted.is_there = false;
-            self.out.write(self.counted);
-            if let Some(text) = lost
-                && text != told
-            {
-                tracing::warn!(
-                    "the motor boards on {} are gone: {text}; looking for them",
-                    self.path
-                );
-                told = text;
-            }
-            if !self.is_over() {
-                thread::sleep(RETRY);
-            }
-        }
+impl Wire for Serial {
+    type State = Counted;
+    type Command = [i16; STRINGS];
+    type Lost = String;
+
+    fn name(&self) -> String {
+        format!("the line of the motor boards on {}", self.path)
     }
 
-    fn is_over(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
+    fn session(&mut self, line: &mut BoardLine) -> Result<(), String> {
+        let found = self.found.take().map_or_else(|| self.find(), Ok);
+        let (mut port, cycle) = found.map_err(|error| error.to_string())?;
+        let ended = self.turn(&mut port, &cycle, line);
+        self.let_go(&mut port, &cycle);
+        ended.map_err(|error| error.to_string())
     }
+}
 
+impl Serial {
     /// Opens the port and looks for the boards.
     fn find(&mut self) -> Result<(Port, Cycle), BoardsError> {
         let path = self.path.clone();
@@ -337,30 +275,27 @@ impl Line {
         &mut self,
         port: &mut Port,
         cycle: &Cycle,
-        ready: &SyncSender<Result<(), BoardsError>>,
+        line: &mut BoardLine,
     ) -> std::io::Result<()> {
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
         let mut believed = monotonic_now();
         port.clear(ClearBuffer::Input)?;
-        while !self.is_over() {
+        while !line.is_over() {
             ticker.wait();
             let now = monotonic_now();
-            let wanted = *self.wanted.read();
-            if wanted.writes != self.writes.0 {
-                self.writes = (wanted.writes, now);
-            }
-            let trusted = now.saturating_sub(believed) < HOLDS
-                && now.saturating_sub(self.writes.1) < HOLDS
-                && wanted.writes > 0;
-            let digits = if trusted { wanted.digits } else { [0; STRINGS] };
+            let is_believed = now.saturating_sub(believed) < HOLDS;
+            let digits = line.command(now).filter(|_| is_believed);
+            let digits = digits.unwrap_or_default();
             match self.exchange(port, cycle, &digits)? {
                 Ok(raw) => {
                     if let Some(counts) = self.counters.take(monotonic_now(), &raw) {
                         believed = monotonic_now();
-                        self.counted.readings += 1;
-                        (self.counted.counts, self.counted.is_there) = (counts, true);
-                        self.out.write(self.counted);
-                        let _ = ready.try_send(Ok(()));
+                        line.state = Counted {
+                            readings: line.state.readings + 1,
+                            counts,
+                            is_there: true,
+                        };
+                        line.publish();
                     } else if self.counters.were_reset() {
                         return Err(std::io::Error::other(
                             "they began to count anew, so that the calibration is lost; hold the grip at the centre and start again",

@@ -1,11 +1,6 @@
-//! The thread: currents out and encoders in once a millisecond, and the board opened again when it is gone.
-//!
-//! As with every force device here no force outlives its reason: zero is sent when the device's loop has not written for 20 ms, and at every end; and the
-//! firmware turns the motors off 0.5 s after the last report.
+//! The board: currents out and encoders in once a millisecond. Its firmware turns the motors off 0.5 s after the last report.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
@@ -14,9 +9,9 @@ use nalgebra::Vector3;
 use super::kinematics::WoodenModel;
 use super::line::{ReportLine, open};
 use super::report::{BoardReport, HostReport};
-use crate::devices::{ArmPort, ArmState};
-use crate::haply::{ForceHold, PushedForce};
-use crate::realtime::{self, Ticker, monotonic_now};
+use crate::devices::ArmState;
+use crate::devices::wire_thread::{ArmLine, ArmThread, Wire, WireThread};
+use crate::realtime::{Ticker, monotonic_now};
 use crate::spidar_uart::Counters;
 
 /// From report to report.
@@ -31,8 +26,6 @@ const MAX_READ: usize = 16;
 const SETTLE: Duration = Duration::from_millis(50);
 /// Without a believed report for this long the board is opened anew.
 const GIVEN_UP: Duration = Duration::from_millis(300);
-/// Between two attempts.
-const RETRY: Duration = Duration::from_millis(200);
 
 /// Why there is no board.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -49,150 +42,81 @@ pub enum WoodenError {
     Thread(String),
 }
 
-/// A board under a thread of its own. Dropping it leaves no force.
-pub struct WoodenBoard {
-    newest: triple_buffer::Output<ArmState>,
-    force: triple_buffer::Input<PushedForce>,
-    pushed: PushedForce,
-    end: Arc<AtomicBool>,
-    thread: Option<thread::JoinHandle<()>>,
-}
-
-impl WoodenBoard {
-    /// Opens the board at `path`, or the first on USB, and sets its counters: the arm is taken to be at its home. `priority` asks for real time, 0 does not.
-    ///
-    /// # Errors
-    /// [`WoodenError`].
-    pub fn open(
-        path: Option<PathBuf>,
-        model: WoodenModel,
-        priority: u8,
-    ) -> Result<Self, WoodenError> {
-        let mut line = open(path.as_deref()).map_err(WoodenError::Line)?;
-        line.write(&HostReport::SetCounters(model.home).bytes())
-            .map_err(WoodenError::Line)?;
-        tracing::info!("calibrated: the arm was taken to be at its home");
-        let (state, newest) = triple_buffer::TripleBuffer::new(&ArmState::default()).split();
-        let (force, taken) = triple_buffer::TripleBuffer::new(&PushedForce::default()).split();
-        let end = Arc::new(AtomicBool::new(false));
-        let mut talker = Talker {
-            path,
-            model,
-            out: state,
-            force: taken,
-            held: ForceHold::default(),
-            judge: Counters::new(model.metres_per_count()),
-            state: ArmState::default(),
-            encoders: model.home,
-            before: None,
-            end: Arc::clone(&end),
-        };
-        let thread = thread::Builder::new()
-            .name("taut-wooden".to_owned())
-            .spawn(move || {
-                if priority > 0 {
-                    let grant = realtime::request_fifo(priority);
-                    if !grant.is_granted() {
-                        tracing::warn!("{grant}: reports to the WoodenHaptics board may be late");
-                    }
-                }
-                thread::sleep(SETTLE);
-                talker.run(line);
-            })
-            .map_err(|error| WoodenError::Thread(error.to_string()))?;
-        Ok(Self {
-            newest,
-            force,
-            pushed: PushedForce::default(),
-            end,
-            thread: Some(thread),
-        })
-    }
-}
-
-impl ArmPort for WoodenBoard {
-    fn newest(&mut self) -> ArmState {
-        *self.newest.read()
-    }
-
-    fn push(&mut self, force: [f64; 3]) {
-        self.pushed.writes += 1;
-        self.pushed.force = force;
-        self.force.write(self.pushed);
-    }
-}
-
-impl Drop for WoodenBoard {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // it panics nowhere
-        }
-    }
+/// Opens the board at `path`, or the first on USB, and sets its counters: the arm is taken to be at its home. `priority` asks for real time, 0 does not.
+///
+/// # Errors
+/// [`WoodenError`].
+pub(crate) fn start(
+    path: Option<PathBuf>,
+    model: WoodenModel,
+    priority: u8,
+) -> Result<ArmThread, WoodenError> {
+    let mut line = open(path.as_deref()).map_err(WoodenError::Line)?;
+    line.write(&HostReport::SetCounters(model.home).bytes())
+        .map_err(WoodenError::Line)?;
+    tracing::info!("calibrated: the arm was taken to be at its home");
+    let talker = Talker {
+        path,
+        opened: Some(line),
+        model,
+        judge: Counters::new(model.metres_per_count()),
+        encoders: model.home,
+        before: None,
+    };
+    let thread = WireThread::start("taut-wooden", priority, talker);
+    thread.map_err(|error| WoodenError::Thread(error.to_string()))
 }
 
 /// The thread's own.
 struct Talker {
     path: Option<PathBuf>,
+    /// For the first session.
+    opened: Option<Box<dyn ReportLine>>,
     model: WoodenModel,
-    out: triple_buffer::Input<ArmState>,
-    force: triple_buffer::Output<PushedForce>,
-    held: ForceHold,
     judge: Counters,
-    state: ArmState,
     /// The newest that were believed.
     encoders: [i16; 6],
     before: Option<(Vector3<f64>, Duration)>,
-    end: Arc<AtomicBool>,
+}
+
+impl Wire for Talker {
+    type State = ArmState;
+    type Command = [f64; 3];
+    type Lost = String;
+
+    fn name(&self) -> String {
+        "the WoodenHaptics board".to_owned()
+    }
+
+    fn session(&mut self, line: &mut ArmLine) -> Result<(), String> {
+        let mut board = match self.opened.take() {
+            Some(board) => {
+                thread::sleep(SETTLE);
+                board
+            }
+            None => open(self.path.as_deref())?,
+        };
+        // Of what was on its way from before nothing is believed.
+        let ended = drained(board.as_mut()).and_then(|()| self.turn(board.as_mut(), line));
+        let _ = board.write(&HostReport::Currents([0; 3]).bytes()); // gone as well, if it is not taken
+        ended
+    }
 }
 
 impl Talker {
-    fn run(&mut self, first: Box<dyn ReportLine>) {
-        let mut next = Some(first);
-        let mut told = String::new();
-        while !self.is_over() {
-            let lost = match next.take().map_or_else(|| open(self.path.as_deref()), Ok) {
-                Ok(mut line) => {
-                    // Of what was on its way from before nothing is believed.
-                    let lost = drained(line.as_mut()).and_then(|()| self.turn(line.as_mut()));
-                    let _ = line.write(&HostReport::Currents([0; 3]).bytes()); // gone as well, if it is not taken
-                    match lost {
-                        Ok(()) => return,
-                        Err(lost) => lost,
-                    }
-                }
-                Err(lost) => lost,
-            };
-            self.state.is_usable = false;
-            self.out.write(self.state);
-            if lost != told {
-                tracing::warn!("the WoodenHaptics board is gone: {lost}; looking for it");
-                told = lost;
-            }
-            thread::sleep(RETRY);
-        }
-    }
-
-    fn is_over(&self) -> bool {
-        self.end.load(Ordering::Relaxed)
-    }
-
-    fn turn(&mut self, line: &mut dyn ReportLine) -> Result<(), String> {
+    fn turn(&mut self, board: &mut dyn ReportLine, line: &mut ArmLine) -> Result<(), String> {
         let mut believed = monotonic_now();
         let mut ticker = Ticker::at_phase(PERIOD, PHASE);
-        while !self.is_over() {
+        while !line.is_over() {
             ticker.wait();
-            let pushed = *self.force.read();
-            let force = self
-                .held
-                .take(monotonic_now(), &pushed)
-                .filter(|_| self.state.is_usable);
+            let command = line.command(monotonic_now());
+            let force = command.filter(|_| line.state.is_usable);
             let force = Vector3::from(force.unwrap_or_default());
             let currents = self.model.currents(&self.encoders, &force);
-            line.write(&HostReport::Currents(currents).bytes())?;
-            if let Some(report) = newest_report(line)? {
+            board.write(&HostReport::Currents(currents).bytes())?;
+            if let Some(report) = newest_report(board)? {
                 let now = monotonic_now();
-                if self.take(now, &report) {
+                if self.take(now, &report, line) {
                     believed = now;
                 } else if self.judge.were_reset() {
                     return Err(
@@ -209,7 +133,7 @@ impl Talker {
     }
 
     /// Whether the report is believed; if so it is handed on.
-    fn take(&mut self, now: Duration, report: &BoardReport) -> bool {
+    fn take(&mut self, now: Duration, report: &BoardReport, line: &mut ArmLine) -> bool {
         let [a, b, c, d, e, f] = report.encoders;
         if self.judge.take(now, &[a, b, c, d, e, f, 0, 0]).is_none() {
             return false;
@@ -220,8 +144,8 @@ impl Talker {
             (position - before) / now.saturating_sub(then).as_secs_f64().max(1e-4)
         });
         self.before = Some((position, now));
-        self.state = ArmState {
-            reports: self.state.reports + 1,
+        line.state = ArmState {
+            reports: line.state.reports + 1,
             is_usable: true,
             position: position.into(),
             velocity: velocity.into(),
@@ -232,7 +156,7 @@ impl Talker {
             turning: None,
             buttons: 0,
         };
-        self.out.write(self.state);
+        line.publish();
         true
     }
 }

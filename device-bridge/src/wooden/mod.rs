@@ -5,7 +5,7 @@
 //! | `report.rs`     | the reports: 14 bytes in, 15 out                                          |
 //! | `kinematics.rs` | from encoders to a pose, from a force to currents; the published models  |
 //! | `line.rs`       | hidraw, or a socket in its place                                         |
-//! | `board.rs`      | the thread: [`WoodenBoard`]                                              |
+//! | `board.rs`      | the thread: under its thread                                              |
 //! | `simulated.rs`  | the board's side, with arm and hand                                      |
 //!
 //! Facts: `haptikfabrikenapi` with its firmware (LGPL), read for facts. No board was at hand.
@@ -19,7 +19,8 @@ mod simulated;
 #[cfg(feature = "hid")]
 pub(crate) use line::IDS;
 
-pub use board::{WoodenBoard, WoodenError};
+pub use board::WoodenError;
+pub(crate) use board::start;
 pub use kinematics::{MODELS as WOODEN_MODELS, WoodenModel};
 pub use line::{ReportLine, SocketLine};
 pub use report::{BoardReport, HostReport};

@@ -7,32 +7,26 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use nalgebra::{Vector3, Vector6};
-use taut_plant::{Hand, MinJerkPath, Plant, Tremor, ViaPoint};
+use nalgebra::Vector3;
+use taut_plant::{Hand, MinJerkPath, Tremor};
 
 use super::kinematics::WoodenModel;
 use super::report::{BoardReport, HostReport};
-use crate::device::Pose;
+use crate::devices::held_arm::{HeldArm, led_through};
 use crate::realtime::monotonic_now;
 
 /// The firmware turns the motors off so long after the last report.
 const MOTORS_OFF: Duration = Duration::from_millis(500);
-/// Most that is simulated in one call.
-const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 /// How often a thread that waits looks for the end.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// An arm on its board.
 pub struct SimulatedWooden {
     model: WoodenModel,
-    plant: Plant,
+    arm: HeldArm,
     /// What a host that set the counters added to them.
     offsets: [i16; 6],
-    epoch: Option<Duration>,
-    elapsed: Duration,
-    commanded: Duration,
     reports: u64,
-    largest_force: f64,
 }
 
 impl SimulatedWooden {
@@ -46,48 +40,35 @@ impl SimulatedWooden {
         tremor: Option<Tremor>,
     ) -> Self {
         let home = model.position(&model.home);
-        let at = |time_s, place: Vector3<f64>| ViaPoint {
-            time_s,
-            pose: Pose::translation(place.x, place.y, place.z),
-        };
         let down = Vector3::new(0.0, 0.0, -0.04);
-        let zero = Vector3::zeros();
-        let points = vec![
-            at(0.0, home),
-            at(1.0, home),
-            at(2.5, zero),
-            at(4.0, down),
-            at(6.0, down),
-            at(7.0, zero),
+        let middle = Vector3::zeros();
+        let points = [
+            (0.0, home),
+            (1.0, home),
+            (2.5, middle),
+            (4.0, down),
+            (6.0, down),
+            (7.0, middle),
         ];
-        let path = path.or_else(|| MinJerkPath::new(points, false).ok());
-        let path = path.unwrap_or_else(|| MinJerkPath::hold(Pose::identity())); // growing times: never
-        let mut plant = Plant::new(crate::devices::polhem_grip(), hand, path);
-        if let Some(tremor) = tremor {
-            plant = plant.with_tremor(tremor);
-        }
+        let path = path.unwrap_or_else(|| led_through(&points, false));
         Self {
             model,
-            plant,
+            arm: HeldArm::new(crate::devices::polhem_grip(), hand, path, tremor),
             offsets: [0; 6],
-            epoch: None,
-            elapsed: Duration::ZERO,
-            commanded: Duration::ZERO,
             reports: 0,
-            largest_force: 0.0,
         }
     }
 
     /// What the motors render, N.
     #[must_use]
     pub fn rendered(&self) -> Vector3<f64> {
-        self.plant.rendered_wrench().fixed_rows::<3>(0).into()
+        self.arm.rendered()
     }
 
     /// Largest norm of a rendered force so far, N.
     #[must_use]
     pub fn largest_force(&self) -> f64 {
-        self.largest_force
+        self.arm.largest_force()
     }
 
     /// Reports taken so far.
@@ -98,16 +79,13 @@ impl SimulatedWooden {
 
     /// Takes a report of the host at `now`; the board's.
     pub fn take(&mut self, now: Duration, report: &[u8]) -> [u8; 14] {
-        self.advance(now);
+        self.arm.advance(now, MOTORS_OFF);
         self.reports += 1;
         let encoders = self.encoders();
         match HostReport::parse(report) {
             Some(HostReport::Currents(currents)) => {
-                self.commanded = now;
                 let force = self.model.force(&encoders, &currents).unwrap_or_default();
-                self.plant
-                    .command(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0));
-                self.largest_force = self.largest_force.max(self.rendered().norm());
+                self.arm.push(now, &force);
             }
             Some(HostReport::SetCounters(counters)) => {
                 self.offsets = std::array::from_fn(|i| counters[i].wrapping_sub(encoders[i]));
@@ -123,20 +101,8 @@ impl SimulatedWooden {
     }
 
     fn encoders(&self) -> [i16; 6] {
-        let place = self.plant.measured_pose().translation.vector;
+        let place = self.arm.plant.measured_pose().translation.vector;
         self.model.encoders(&place).unwrap_or(self.model.home)
-    }
-
-    fn advance(&mut self, now: Duration) {
-        let epoch = *self.epoch.get_or_insert(now);
-        let passed = now.saturating_sub(epoch);
-        let due = passed.saturating_sub(self.elapsed);
-        self.elapsed = self.elapsed.max(passed);
-        if now.saturating_sub(self.commanded) > MOTORS_OFF {
-            self.plant.command(&Vector6::zeros());
-        }
-        self.plant
-            .advance(self.plant.time() + due.min(LONGEST_SILENCE));
     }
 }
 

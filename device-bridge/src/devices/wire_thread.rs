@@ -1,0 +1,321 @@
+//! The thread on a device's wire, one mechanism for every driver that has one: the newest state out, the newest command in, and the device
+//! opened again when it is gone.
+//!
+//! | thread       | does                                                                                          |
+//! |--------------|-----------------------------------------------------------------------------------------------|
+//! | the driver's | sockets, ports, libraries: [`Wire::session`], again and again until the end                     |
+//! | the device's | [`WireThread::newest`], [`WireThread::command`]: no lock, no system call, no allocation            |
+//!
+//! No command outlives its reason: from [`HOLDS`] after the last write of the device's loop on [`Line::command`] has none, and a session's last
+//! word is zero.
+
+use std::fmt::Display;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use super::arm::{ArmPort, ArmState};
+use crate::realtime::{self, monotonic_now};
+
+/// From the last write of the device's loop on nothing is commanded any more.
+pub(crate) const HOLDS: Duration = Duration::from_millis(20);
+/// Between two sessions.
+const RETRY: Duration = Duration::from_millis(200);
+/// A device that was there for longer and is gone is told of again.
+const HELD_ON: Duration = Duration::from_secs(1);
+/// For the last word. A driver that hangs longer is left to itself.
+const CLOSE_WITHIN: Duration = Duration::from_secs(2);
+/// How often a thread that waits for an end looks for it.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// A driver's side of the thread.
+pub(crate) trait Wire: Send + 'static {
+    /// What the device says.
+    type State: WireState;
+    /// What it is commanded.
+    type Command: Copy + Default + Send + 'static;
+    /// Why a session ended before the end.
+    type Lost: Display;
+
+    /// For people, with its place: "the Polhem board on /dev/ttyUSB0".
+    fn name(&self) -> String;
+
+    /// Opens the device and exchanges commands for states until [`Line::is_over`], or until it is lost; at either end zero is the last word.
+    fn session(&mut self, line: &mut Line<Self::State, Self::Command>) -> Result<(), Self::Lost>;
+}
+
+/// A state that says whether the device is there.
+pub(crate) trait WireState: Copy + Default + Send + 'static {
+    /// The device is gone.
+    fn lose(&mut self);
+}
+
+impl WireState for ArmState {
+    fn lose(&mut self) {
+        self.is_usable = false;
+    }
+}
+
+/// A command, and how many were written before it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Written<C> {
+    writes: u64,
+    command: C,
+}
+
+/// The driver's end of the exchange.
+pub(crate) struct Line<S: Send, C: Send> {
+    /// What was said last; handed on by [`Self::publish`].
+    pub(crate) state: S,
+    out: triple_buffer::Input<S>,
+    wanted: triple_buffer::Output<Written<C>>,
+    /// Writes of the device's loop, and when the last was seen.
+    seen: (u64, Duration),
+    end: Arc<AtomicBool>,
+}
+
+impl<S: WireState, C: Copy + Send> Line<S, C> {
+    /// Whether the device's loop has done with the device.
+    pub(crate) fn is_over(&self) -> bool {
+        self.end.load(Ordering::Relaxed)
+    }
+
+    /// What [`Self::is_over`] looks at, for who waits elsewhere.
+    pub(crate) fn end(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.end)
+    }
+
+    /// Hands the state on.
+    pub(crate) fn publish(&mut self) {
+        self.out.write(self.state);
+    }
+
+    /// What is commanded at `now`; `None` where nobody has written within [`HOLDS`].
+    pub(crate) fn command(&mut self, now: Duration) -> Option<C> {
+        let wanted = *self.wanted.read();
+        if wanted.writes != self.seen.0 {
+            self.seen = (wanted.writes, now);
+        }
+        let is_fresh = wanted.writes > 0 && now.saturating_sub(self.seen.1) < HOLDS;
+        is_fresh.then_some(wanted.command)
+    }
+}
+
+/// The end of a driver of an arm with three motors: a force in the arm's own axes, N.
+pub(crate) type ArmLine = Line<ArmState, [f64; 3]>;
+/// An arm with three motors under a thread of its own.
+pub(crate) type ArmThread = WireThread<ArmState, [f64; 3]>;
+
+/// A device under a thread of its own. Dropping it ends the thread, whose last word is zero.
+pub(crate) struct WireThread<S: Send, C: Send> {
+    newest: triple_buffer::Output<S>,
+    wanted: triple_buffer::Input<Written<C>>,
+    next: Written<C>,
+    name: String,
+    end: Arc<AtomicBool>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl<S: WireState, C: Copy + Default + Send + 'static> WireThread<S, C> {
+    /// Runs `wire` in a thread called `thread`. `priority` asks for real time, 0 does not.
+    ///
+    /// # Errors
+    /// The system has no thread.
+    pub(crate) fn start<W>(thread: &str, priority: u8, wire: W) -> std::io::Result<Self>
+    where
+        W: Wire<State = S, Command = C>,
+    {
+        let (out, newest) = triple_buffer::TripleBuffer::new(&S::default()).split();
+        let (wanted, taken) = triple_buffer::TripleBuffer::new(&Written::default()).split();
+        let end = Arc::new(AtomicBool::new(false));
+        let line = Line {
+            state: S::default(),
+            out,
+            wanted: taken,
+            seen: (0, Duration::ZERO),
+            end: Arc::clone(&end),
+        };
+        let name = wire.name();
+        let thread = thread::Builder::new()
+            .name(thread.to_owned())
+            .spawn(move || {
+                ask_for_real_time(priority, &wire.name());
+                run(wire, line);
+            })?;
+        Ok(Self {
+            newest,
+            wanted,
+            next: Written::default(),
+            name,
+            end,
+            thread: Some(thread),
+        })
+    }
+
+    /// What the device said last.
+    pub(crate) fn newest(&mut self) -> &S {
+        self.newest.read()
+    }
+
+    /// Wants `command` until the next call, but for no longer than [`HOLDS`].
+    pub(crate) fn command(&mut self, command: C) {
+        self.next = Written {
+            writes: self.next.writes + 1,
+            command,
+        };
+        self.wanted.write(self.next);
+    }
+}
+
+impl<S: Send, C: Send> Drop for WireThread<S, C> {
+    fn drop(&mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        let until = monotonic_now() + CLOSE_WITHIN;
+        while !thread.is_finished() {
+            if monotonic_now() > until {
+                tracing::error!(
+                    "{} hangs and cannot be closed: switch the device off, it may still push",
+                    self.name
+                );
+                return;
+            }
+            thread::sleep(LOOK);
+        }
+        let _ = thread.join(); // if it broke down, its wire went with it, and the force with that
+    }
+}
+
+impl ArmPort for ArmThread {
+    fn newest(&mut self) -> ArmState {
+        *self.newest()
+    }
+
+    fn push(&mut self, force: [f64; 3]) {
+        self.command(force);
+    }
+}
+
+/// Asks for real time for this thread, unless `priority` is 0, and tells where it is refused.
+pub(crate) fn ask_for_real_time(priority: u8, name: &str) {
+    if priority > 0 {
+        let grant = realtime::request_fifo(priority);
+        if !grant.is_granted() {
+            tracing::warn!("{grant}: what is said to {name} may be late");
+        }
+    }
+}
+
+fn run<W: Wire>(mut wire: W, mut line: Line<W::State, W::Command>) {
+    let mut told = String::new();
+    while !line.is_over() {
+        let begun = monotonic_now();
+        let Err(lost) = wire.session(&mut line) else {
+            return;
+        };
+        line.state.lose();
+        line.publish();
+        // One that is lost at once, again and again, is told once.
+        let held_on = monotonic_now().saturating_sub(begun) > HELD_ON;
+        let lost = lost.to_string();
+        if lost != told || held_on {
+            tracing::warn!("{} is gone: {lost}; looking for it", wire.name());
+            told = lost;
+        }
+        if !line.is_over() {
+            thread::sleep(RETRY);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, Sender, channel};
+
+    use super::*;
+
+    /// Tells every command that it is given, and is lost once.
+    struct Scripted {
+        commands: Sender<Option<f64>>,
+        lost: bool,
+    }
+
+    impl WireState for u32 {
+        fn lose(&mut self) {
+            *self = u32::MAX;
+        }
+    }
+
+    impl Wire for Scripted {
+        type State = u32;
+        type Command = f64;
+        type Lost = &'static str;
+
+        fn name(&self) -> String {
+            "the scripted wire".to_owned()
+        }
+
+        fn session(&mut self, line: &mut Line<u32, f64>) -> Result<(), &'static str> {
+            while !line.is_over() {
+                let command = line.command(monotonic_now());
+                let _ = self.commands.send(command);
+                if command == Some(-1.0) && !std::mem::replace(&mut self.lost, true) {
+                    return Err("told to");
+                }
+                line.state = 1;
+                line.publish();
+                thread::sleep(LOOK);
+            }
+            let _ = self.commands.send(Some(0.0));
+            Ok(())
+        }
+    }
+
+    fn started() -> (WireThread<u32, f64>, Receiver<Option<f64>>) {
+        let (commands, said) = channel();
+        let wire = Scripted {
+            commands,
+            lost: false,
+        };
+        let thread = WireThread::start("scripted", 0, wire).expect("a thread");
+        (thread, said)
+    }
+
+    fn wait_for(said: &Receiver<Option<f64>>, wanted: Option<f64>) {
+        while said.recv_timeout(Duration::from_secs(60)).expect("said") != wanted {}
+    }
+
+    #[test]
+    fn a_command_is_not_held_when_nobody_writes_any_more() {
+        let (mut thread, said) = started();
+        wait_for(&said, None);
+        thread.command(2.0);
+        wait_for(&said, Some(2.0));
+        wait_for(&said, None);
+    }
+
+    #[test]
+    fn a_lost_device_is_not_there_until_it_is_opened_again() {
+        let (mut thread, said) = started();
+        thread.command(-1.0);
+        wait_for(&said, Some(-1.0));
+        while *thread.newest() != u32::MAX {
+            thread::sleep(LOOK);
+        }
+        while *thread.newest() != 1 {
+            thread::sleep(LOOK);
+        }
+    }
+
+    #[test]
+    fn zero_is_the_last_word() {
+        let (mut thread, said) = started();
+        thread.command(3.0);
+        wait_for(&said, Some(3.0));
+        drop(thread);
+        assert_eq!(said.iter().last(), Some(Some(0.0)));
+    }
+}
