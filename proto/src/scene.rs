@@ -43,7 +43,7 @@ pub struct SceneDescription {
     /// Most that anything may stand out towards the viewer, as an angle between the eyes, rad; 0 is no limit.
     pub nearest_disparity: f64,
     /// What is drawn besides the scene.
-    pub show: ShowOptions,
+    pub show: Show,
     /// The light around the scene, by the hash of its [`crate::Panorama`]; `None` is the studio that every node knows.
     pub environment: Option<MeshHash>,
 }
@@ -68,7 +68,7 @@ impl SceneDescription {
             far: 10.0,
             separation_scale: 1.0,
             nearest_disparity: 0.0,
-            show: ShowOptions::default(),
+            show: Show::default(),
             environment: None,
         }
     }
@@ -155,18 +155,48 @@ pub struct NodeDescription {
 }
 
 /// How two eyes reach a screen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stereo {
-    /// One eye, between the two.
+    /// One view from between the eyes.
+    #[default]
     Mono,
-    /// Left half for the left eye.
+    /// Left half of the picture for the left eye.
     SideBySide,
-    /// Upper half for the left eye.
+    /// Upper half of the picture for the left eye.
     TopBottom,
-    /// Red for the left eye, cyan for the right.
+    /// Both eyes over each other, red for the left and cyan for the right.
     Anaglyph,
-    /// A window per eye.
+    /// A window for each eye: two projectors or two outputs.
     TwoWindows,
+}
+
+impl Stereo {
+    /// All, with their names in files and on command lines.
+    pub const NAMED: [(&'static str, Self); 5] = [
+        ("mono", Self::Mono),
+        ("side-by-side", Self::SideBySide),
+        ("top-bottom", Self::TopBottom),
+        ("anaglyph", Self::Anaglyph),
+        ("two-windows", Self::TwoWindows),
+    ];
+
+    /// Size of the picture, in pixels, that gives each eye `width` × `height`.
+    pub fn picture_size(self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self {
+            Self::SideBySide => (2 * width, height),
+            Self::TopBottom => (width, 2 * height),
+            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
+        }
+    }
+
+    /// Size of one eye's view, in pixels, in a picture of `width` × `height`; an odd pixel is left out.
+    pub fn view_size(self, (width, height): (u32, u32)) -> (u32, u32) {
+        match self {
+            Self::SideBySide => ((width / 2).max(1), height),
+            Self::TopBottom => (width, (height / 2).max(1)),
+            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
+        }
+    }
 }
 
 /// A window.
@@ -180,14 +210,14 @@ pub struct WindowDescription {
     pub fullscreen: bool,
 }
 
-/// What is drawn besides the scene, and with what effort; nothing besides by default: the user sees the god-object only.
+/// What is drawn besides the scene, and with what effort; nothing besides by default: the paper shows the user the god-object only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ShowOptions {
-    /// The device pose, translucent.
+pub struct Show {
+    /// The device pose as a translucent copy of the god-object.
     pub ghost: bool,
-    /// Contact points and normals.
+    /// Contact points as dots.
     pub contacts: bool,
-    /// The force.
+    /// The force on the hand as an arrow.
     pub force: bool,
     /// Lines of text about the node: its link, its frames, the age of what it draws.
     pub hud: bool,
@@ -195,7 +225,7 @@ pub struct ShowOptions {
     pub reflections: bool,
 }
 
-impl Default for ShowOptions {
+impl Default for Show {
     fn default() -> Self {
         Self {
             ghost: false,
@@ -260,7 +290,7 @@ wire_ranged!(WindowDescription {
     height in PIXELS,
     fullscreen
 });
-wire_ranged!(ShowOptions {
+wire_ranged!(Show {
     ghost,
     contacts,
     force,

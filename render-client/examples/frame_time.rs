@@ -15,10 +15,10 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Isometry3, Similarity3};
 use support::{peg_in_hole, state};
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
 use taut_render::canvas::Canvas;
 use taut_render::renderer::{Gpu, shapes};
-use taut_render::stage::Show;
-use taut_render::stereo::Stereo;
 
 /// Meridians of the spheres.
 const SEGMENTS: [u32; 3] = [166, 412, 1304];

@@ -8,8 +8,8 @@ mod support;
 use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use taut_render::stage::Show;
-use taut_render::stereo::Stereo;
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
 use taut_render::timeline::Contact;
 
 fn main() -> anyhow::Result<()> {

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::BodyDescription;
+use taut_proto::scene::Show;
 use taut_proto::{MeshBlob, MeshHash, PoseF64, SceneDescription};
 
 use crate::calibration::Chart;
@@ -16,7 +17,7 @@ use crate::error::RenderError;
 use crate::headless::plain;
 use crate::preview::at_start;
 use crate::renderer::{Gpu, GpuChoice};
-use crate::stage::{Show, Stage};
+use crate::stage::Stage;
 use crate::window::still;
 
 /// Size of the body that the scene of a calibration has and that is not drawn, m.

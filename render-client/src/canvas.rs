@@ -1,12 +1,13 @@
 //! A node's screens drawn off-screen.
 
 use image::RgbaImage;
+use taut_proto::scene::Show;
 
 use crate::error::RenderError;
 use crate::hud::Overlay;
 use crate::node_status::NodeStatus;
 use crate::renderer::{Corrected, Gpu, OffScreen, PictureTarget, Renderer};
-use crate::stage::{Show, Stage, StageScreen};
+use crate::stage::{Stage, StageScreen};
 use crate::stereo::Picture;
 use crate::timeline::Latched;
 use crate::view::Eyes;
@@ -57,7 +58,7 @@ impl Canvas {
             let most = gpu.device.limits().max_texture_dimension_2d;
             let (width, height) = screen.stereo.picture_size(screen.pixels);
             let size = (width.clamp(1, most), height.clamp(1, most));
-            let pictures = screen.stereo.pictures();
+            let pictures = Picture::of(screen.stereo);
             sheets.extend(pictures.iter().enumerate().map(|(place, picture)| Sheet {
                 screen: index,
                 name: format!("{}{}", screen.name, picture.suffix),

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use taut_bridge::realtime::keep_cores_awake;
 use taut_link::{ClientOptions, Role, Transport, read_join_key};
+use taut_proto::scene::{Show, Stereo};
 
 use crate::canvas::Canvas;
 use crate::description::Overrides;
@@ -14,9 +16,7 @@ use crate::hand::Hand;
 use crate::membership::MembershipArgs;
 use crate::renderer::{Gpu, GpuChoice};
 use crate::session::Session;
-use crate::stage::Show;
 use crate::statistics::{Ended, RenderReport, Statistics};
-use crate::stereo::Stereo;
 use crate::timeline::Timeline;
 use crate::{headless, window};
 
@@ -77,8 +77,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     pub show: Option<Vec<ShowArg>>,
     /// Show the two eyes in this way, whatever the server says.
-    #[arg(long, value_name = "MODE", value_enum)]
-    pub stereo: Option<StereoArg>,
+    #[arg(long, value_name = "MODE", value_parser = stereo_modes())]
+    pub stereo: Option<Stereo>,
     /// Width of a view in pixels [default: the window of the workbench file; 480 off-screen without --out].
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16384))]
     pub width: Option<u32>,
@@ -144,21 +144,6 @@ pub enum ShowArg {
     None,
 }
 
-/// Stereo modes by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StereoArg {
-    /// One view from between the eyes.
-    Mono,
-    /// Left half for the left eye.
-    SideBySide,
-    /// Upper half for the left eye.
-    TopBottom,
-    /// Red and cyan glasses.
-    Anaglyph,
-    /// A window (or image) per eye.
-    TwoWindows,
-}
-
 /// Joins the server and draws until told, asked or forced to end.
 ///
 /// Blocks, and in windows wants the main thread; must not be called from within an async runtime,
@@ -205,7 +190,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let overrides = Overrides {
         width: args.width,
         height: args.height,
-        stereo: args.stereo.map(Stereo::from),
+        stereo: args.stereo,
         headless: args.headless,
         pictures: args.out.is_some(),
         show: args.show.as_deref().map(listed),
@@ -390,16 +375,11 @@ impl From<TransportArg> for Transport {
     }
 }
 
-impl From<StereoArg> for Stereo {
-    fn from(arg: StereoArg) -> Self {
-        match arg {
-            StereoArg::Mono => Self::Mono,
-            StereoArg::SideBySide => Self::SideBySide,
-            StereoArg::TopBottom => Self::TopBottom,
-            StereoArg::Anaglyph => Self::Anaglyph,
-            StereoArg::TwoWindows => Self::TwoWindows,
-        }
-    }
+/// The stereo modes, by the names that workbench files give them.
+fn stereo_modes() -> impl TypedValueParser<Value = Stereo> {
+    let mode = |name: String| Stereo::NAMED.iter().find(|named| named.0 == name);
+    PossibleValuesParser::new(Stereo::NAMED.map(|(name, _)| name))
+        .map(move |name| mode(name).map_or_else(Stereo::default, |named| named.1))
 }
 
 #[cfg(test)]

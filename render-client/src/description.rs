@@ -4,15 +4,16 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Point3, Similarity3};
-use taut_proto::scene::{BodyDescription, NodeDescription, SceneDescription, ScreenDescription};
-use taut_proto::{MeshBlob, Panorama, PoseF64, scene};
+use taut_proto::scene::{
+    BodyDescription, NodeDescription, SceneDescription, ScreenDescription, Show, Stereo,
+};
+use taut_proto::{MeshBlob, Panorama, PoseF64};
 
 use crate::comfort::Comfort;
 use crate::correction::Correction;
 use crate::environment::Environment;
 use crate::error::RenderError;
-use crate::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
-use crate::stereo::Stereo;
+use crate::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use crate::view::{ClipPlanes, Screen};
 
 /// Id of the god-object among the bodies; obstacles are numbered from 0.
@@ -147,17 +148,6 @@ pub(crate) fn stage(
     })
 }
 
-/// What the server shows besides god-object and obstacles.
-pub(crate) fn show(options: &scene::ShowOptions) -> Show {
-    Show {
-        ghost: options.ghost,
-        contacts: options.contacts,
-        force: options.force,
-        hud: options.hud,
-        reflections: options.reflections,
-    }
-}
-
 fn stage_screen(
     described: &ScreenDescription,
     node: &NodeDescription,
@@ -175,13 +165,7 @@ fn stage_screen(
             source,
         }
     })?;
-    let stereo = overrides.stereo.unwrap_or(match node.stereo {
-        scene::Stereo::Mono => Stereo::Mono,
-        scene::Stereo::SideBySide => Stereo::SideBySide,
-        scene::Stereo::TopBottom => Stereo::TopBottom,
-        scene::Stereo::Anaglyph => Stereo::Anaglyph,
-        scene::Stereo::TwoWindows => Stereo::TwoWindows,
-    });
+    let stereo = overrides.stereo.unwrap_or(node.stereo);
     let aspect = f64::from(node.window.width.max(1)) / f64::from(node.window.height.max(1));
     let correction = Correction::read(&described.output, &overrides.screen_files, aspect)?;
     if let Some(correction) = &correction {
@@ -260,7 +244,7 @@ mod tests {
         let node = NodeDescription {
             name: "front".into(),
             screens: Vec::new(),
-            stereo: scene::Stereo::Mono,
+            stereo: Stereo::Mono,
             window: WindowDescription {
                 width,
                 height,

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use taut_proto::scene::Show;
+
 use crate::canvas::Canvas;
 use crate::error::RenderError;
 use crate::node_status::LinkHealth;
 use crate::pacing::Pacer;
 use crate::session::{Session, Turn};
-use crate::stage::Show;
 use crate::statistics::{Ended, Statistics};
 use crate::timeline::Timeline;
 

@@ -197,7 +197,8 @@ fn place(pointed: &Pointed<'_>, [left, top, width, height]: &[f64; 4], at: (f64,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stereo::Stereo;
+    use crate::stereo::Picture;
+    use taut_proto::scene::Stereo;
 
     #[test]
     fn a_pixel_belongs_to_the_view_that_is_drawn_there() {
@@ -211,7 +212,7 @@ mod tests {
             left: Point3::new(-0.03, -1.0, 0.5),
             right: Point3::new(0.03, -1.0, 0.5),
         };
-        let pictures = Stereo::SideBySide.pictures();
+        let pictures = Picture::of(Stereo::SideBySide);
         let pointed = Pointed {
             screen: &screen,
             picture: &pictures[0],

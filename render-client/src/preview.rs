@@ -10,15 +10,15 @@ use std::sync::Arc;
 
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
-use taut_proto::scene::{self, BodyDescription, NodeDescription, WindowDescription};
+use taut_proto::scene::{BodyDescription, NodeDescription, Show, Stereo, WindowDescription};
 use taut_proto::{MeshBlob, Panorama, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
 use crate::film::film;
 use crate::renderer::{Gpu, OffScreen, PictureTarget, Renderer};
-use crate::stage::{Bounds, Show, Stage, StageBody};
-use crate::stereo::Stereo;
+use crate::stage::{Bounds, Stage, StageBody};
+use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
 use crate::view::{Eyes, Screen};
 
@@ -101,7 +101,7 @@ impl Preview {
 
         let mut renderer = Renderer::new(&gpu, &stage, OffScreen::FORMAT);
         renderer.set_state(&gpu, &stage, &at_start(&stage), Show::default());
-        let whole = &Stereo::Mono.pictures()[0];
+        let whole = &Picture::of(Stereo::Mono)[0];
         Ok(Self {
             target: renderer.picture(&gpu, whole, size),
             image: OffScreen::new(&gpu, size),
@@ -159,7 +159,7 @@ fn stage_of(scene: &PreviewScene) -> Result<Stage, RenderError> {
     let node = NodeDescription {
         name: "preview".into(),
         screens: Vec::new(),
-        stereo: scene::Stereo::Mono,
+        stereo: Stereo::Mono,
         window: WindowDescription {
             width: 1,
             height: 1,

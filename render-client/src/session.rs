@@ -9,13 +9,14 @@ use taut_link::{
     ClientLink, ClientOptions, FrameGate, LinkError, MeshCounters, ReceivedState, RejoinPolicy,
     Renewal, SessionEnd, SupervisedLink,
 };
+use taut_proto::scene::Show;
 use taut_proto::state::HEAD_TRACKED;
 use taut_proto::{ClientStats, HotState, Role, SceneDescription};
 
 use crate::description::{self, Overrides};
 use crate::error::RenderError;
 use crate::node_status::LinkHealth;
-use crate::stage::{Show, Stage};
+use crate::stage::Stage;
 use crate::timeline::{Contact, Head, State, Timeline};
 
 /// Distance between two looks for a signal while joining.
@@ -310,7 +311,7 @@ async fn prepare(
         let node = description::find_node(&described, &node)?;
         let stage = description::stage(&described, node, &meshes, panorama.as_ref(), &overrides)?;
         let show = overrides.show;
-        let mut show = show.unwrap_or_else(|| description::show(&described.show));
+        let mut show = show.unwrap_or(described.show);
         show.hud |= described.show.hud || overrides.hud;
         show.reflections = described.show.reflections;
         Ok(Prepared {

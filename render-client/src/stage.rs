@@ -8,12 +8,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3};
 use taut_proto::Finish;
+use taut_proto::scene::Stereo;
 
 use crate::calibration::Chart;
 use crate::comfort::Comfort;
 use crate::correction::Correction;
 use crate::environment::Environment;
-use crate::stereo::Stereo;
 use crate::view::{ClipPlanes, Screen};
 
 /// Everything that stays the same over a session.
@@ -88,33 +88,6 @@ pub struct TriangleMesh {
     pub vertices: Vec<[f32; 3]>,
     /// Three places in `vertices` each.
     pub triangles: Vec<[u32; 3]>,
-}
-
-/// What is drawn besides god-object and obstacles, and with what effort. The paper shows the user the god-object only.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Show {
-    /// The device pose as a translucent copy of the god-object.
-    pub ghost: bool,
-    /// Contact points as dots.
-    pub contacts: bool,
-    /// The force on the hand as an arrow.
-    pub force: bool,
-    /// Text about the node.
-    pub hud: bool,
-    /// Surfaces mirror what is around them; without, they only get its light.
-    pub reflections: bool,
-}
-
-impl Default for Show {
-    fn default() -> Self {
-        Self {
-            ghost: false,
-            contacts: false,
-            force: false,
-            hud: false,
-            reflections: true,
-        }
-    }
 }
 
 /// A sphere around something.

@@ -1,22 +1,8 @@
 //! How the two eyes' views share the pictures (windows or images) of one screen.
 
-use crate::view::Eye;
+use taut_proto::scene::Stereo;
 
-/// A stereo mode.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stereo {
-    /// One view from between the eyes.
-    #[default]
-    Mono,
-    /// Left eye in the left half of the picture, right eye in the right half.
-    SideBySide,
-    /// Left eye in the upper half of the picture, right eye in the lower half.
-    TopBottom,
-    /// Both eyes over each other, told apart by red and cyan glasses.
-    Anaglyph,
-    /// A picture of its own for each eye: two projectors or two outputs.
-    TwoWindows,
-}
+use crate::view::Eye;
 
 /// A part of a picture in fractions of its size, origin at the upper left.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,59 +40,41 @@ impl Part {
     };
 }
 
-impl Stereo {
+impl Picture {
     /// The pictures that one screen needs.
-    pub fn pictures(self) -> Vec<Picture> {
+    pub fn of(stereo: Stereo) -> Vec<Self> {
         let half = |x, y, width, height| Part {
             x,
             y,
             width,
             height,
         };
-        let picture = |suffix, views| Picture {
+        let picture = |suffix, views| Self {
             suffix,
             views,
-            anaglyph: self == Self::Anaglyph,
+            anaglyph: stereo == Stereo::Anaglyph,
         };
-        match self {
-            Self::Mono => vec![picture("", vec![(Eye::Middle, WHOLE)])],
-            Self::SideBySide => vec![picture(
+        match stereo {
+            Stereo::Mono => vec![picture("", vec![(Eye::Middle, WHOLE)])],
+            Stereo::SideBySide => vec![picture(
                 "",
                 vec![
                     (Eye::Left, half(0.0, 0.0, 0.5, 1.0)),
                     (Eye::Right, half(0.5, 0.0, 0.5, 1.0)),
                 ],
             )],
-            Self::TopBottom => vec![picture(
+            Stereo::TopBottom => vec![picture(
                 "",
                 vec![
                     (Eye::Left, half(0.0, 0.0, 1.0, 0.5)),
                     (Eye::Right, half(0.0, 0.5, 1.0, 0.5)),
                 ],
             )],
-            Self::Anaglyph => vec![picture("", vec![(Eye::Left, WHOLE), (Eye::Right, WHOLE)])],
-            Self::TwoWindows => vec![
+            Stereo::Anaglyph => vec![picture("", vec![(Eye::Left, WHOLE), (Eye::Right, WHOLE)])],
+            Stereo::TwoWindows => vec![
                 picture("-left", vec![(Eye::Left, WHOLE)]),
                 picture("-right", vec![(Eye::Right, WHOLE)]),
             ],
-        }
-    }
-
-    /// Size of the picture, in pixels, that gives each eye `width` × `height`.
-    pub fn picture_size(self, (width, height): (u32, u32)) -> (u32, u32) {
-        match self {
-            Self::SideBySide => (2 * width, height),
-            Self::TopBottom => (width, 2 * height),
-            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
-        }
-    }
-
-    /// Size of one eye's view, in pixels, in a picture of `width` × `height`; an odd pixel is left out.
-    pub fn view_size(self, (width, height): (u32, u32)) -> (u32, u32) {
-        match self {
-            Self::SideBySide => ((width / 2).max(1), height),
-            Self::TopBottom => (width, (height / 2).max(1)),
-            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
         }
     }
 }
@@ -115,20 +83,12 @@ impl Stereo {
 mod tests {
     use super::*;
 
-    const ALL: [Stereo; 5] = [
-        Stereo::Mono,
-        Stereo::SideBySide,
-        Stereo::TopBottom,
-        Stereo::Anaglyph,
-        Stereo::TwoWindows,
-    ];
-
     #[test]
     fn every_view_gets_the_size_asked_for() {
-        for mode in ALL {
+        for (_, mode) in Stereo::NAMED {
             assert_eq!(mode.picture_size(mode.view_size((960, 640))), (960, 640));
             let (width, height) = mode.picture_size((480, 320));
-            for (_, part) in mode.pictures().iter().flat_map(|p| &p.views) {
+            for (_, part) in Picture::of(mode).iter().flat_map(|p| &p.views) {
                 assert_eq!(
                     (part.width * width as f32, part.height * height as f32),
                     (480.0, 320.0)
@@ -139,8 +99,8 @@ mod tests {
 
     #[test]
     fn every_stereo_mode_shows_each_eye_once() {
-        for mode in &ALL[1..] {
-            let pictures = mode.pictures();
+        for (_, mode) in &Stereo::NAMED[1..] {
+            let pictures = Picture::of(*mode);
             let eyes: Vec<Eye> = pictures
                 .iter()
                 .flat_map(|p| &p.views)

@@ -10,6 +10,7 @@ pub(crate) mod still;
 use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
+use taut_proto::scene::Show;
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
@@ -26,7 +27,7 @@ use crate::mouse::{Mouse, Pointed};
 use crate::pacing::Pacer;
 use crate::renderer::{Gpu, GpuChoice};
 use crate::session::{Session, Turn};
-use crate::stage::{Show, Stage};
+use crate::stage::Stage;
 use crate::statistics::{Ended, Statistics};
 use crate::timeline::Timeline;
 use crate::view::Eyes;

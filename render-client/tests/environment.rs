@@ -1,13 +1,15 @@
 //! The light around the scene, seen in what mirrors it. Skipped, said aloud, without an adapter.
 
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
+
 use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Similarity3};
 use taut_proto::{Finish, Panorama};
 use taut_render::environment::Environment;
 use taut_render::renderer::shapes;
-use taut_render::stage::{Show, Stage};
-use taut_render::stereo::Stereo;
+use taut_render::stage::Stage;
 
 const PIXELS: (u32, u32) = (360, 240);
 

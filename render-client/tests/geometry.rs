@@ -1,12 +1,14 @@
 //! One world on two screens and in two eyes: by the projection matrices, and in rendered pictures.
 
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
+
 use crate::support::{canvas, l_shape, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use taut_render::renderer::shapes;
-use taut_render::stage::{Show, Stage};
-use taut_render::stereo::Stereo;
+use taut_render::stage::Stage;
 use taut_render::view::{ClipPlanes, Eye, Eyes, Screen, project};
 
 const PLANES: ClipPlanes = ClipPlanes {

@@ -6,6 +6,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
+
 use crate::perceptual::{difference, halved};
 use crate::support::{canvas, peg_in_hole, state};
 use image::{RgbImage, RgbaImage};
@@ -13,8 +16,7 @@ use nalgebra::{Isometry3, Similarity3};
 use taut_proto::Finish;
 use taut_render::node_status::{FrameMode, LinkHealth, NodeStatus};
 use taut_render::renderer::shapes;
-use taut_render::stage::{Show, Stage, StageBody};
-use taut_render::stereo::Stereo;
+use taut_render::stage::{Stage, StageBody};
 use taut_render::timeline::Latched;
 
 /// Pixels of a view as drawn.

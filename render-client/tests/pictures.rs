@@ -1,11 +1,13 @@
 //! What the pictures show, measured in their pixels. Skipped, said aloud, without an adapter.
 
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
+
 use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Point3, Similarity3, Vector3};
 use taut_render::renderer::shapes;
-use taut_render::stage::{Show, Stage, StageBody, StageScreen, TriangleMesh};
-use taut_render::stereo::Stereo;
+use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
 use taut_render::timeline::{Contact, Latched};
 use taut_render::view::{ClipPlanes, Eye, Eyes, project};
 

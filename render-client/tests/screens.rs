@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use taut_proto::scene::Show;
+use taut_proto::scene::Stereo;
+
 use crate::support::{canvas, peg_in_hole, state};
 use image::RgbaImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Similarity3, Vector3};
 use taut_render::calibration::Chart;
 use taut_render::correction::Correction;
 use taut_render::renderer::shapes;
-use taut_render::stage::{Show, Stage};
-use taut_render::stereo::Stereo;
+use taut_render::stage::Stage;
 use taut_render::view::{Eye, Eyes, Screen};
 use taut_screens::{Mask, OutputMesh, read_surface, read_warp};
 

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use taut_proto::{
     MeshHash, PoseF64, SceneDescription, Untrusted,
     scene::{
-        BodyDescription, NodeDescription, OutputDescription, ScreenDescription, ShowOptions,
-        Stereo, WindowDescription,
+        BodyDescription, NodeDescription, OutputDescription, ScreenDescription, Show, Stereo,
+        WindowDescription,
     },
 };
 
@@ -58,7 +58,7 @@ pub fn scene() -> SceneDescription {
         far: 8.0,
         separation_scale: 0.75,
         nearest_disparity: 0.0625,
-        show: ShowOptions {
+        show: Show {
             ghost: true,
             contacts: false,
             force: true,
@@ -188,7 +188,7 @@ pub fn any_scene() -> impl Strategy<Value = SceneDescription> {
                 far,
                 separation_scale,
                 nearest_disparity,
-                show: ShowOptions {
+                show: Show {
                     ghost,
                     contacts,
                     force,

@@ -4,6 +4,7 @@
 mod corrected;
 
 use nalgebra::{Isometry3, Point3};
+use taut_proto::scene::Show;
 
 use super::anaglyph::Anaglyph;
 use super::environment::EnvironmentMap;
@@ -18,7 +19,7 @@ use super::warp::WarpPipeline;
 use super::{background, contacts, floor, force, ghost, god_object, mesh, obstacles, shapes};
 use crate::comfort::Comfort;
 use crate::hud::Overlay;
-use crate::stage::{Bounds, Show, Stage, StageBody};
+use crate::stage::{Bounds, Stage, StageBody};
 use crate::stereo::Picture;
 use crate::timeline::{Latched, State};
 use crate::view::{ClipPlanes, Eye, Eyes, Screen};

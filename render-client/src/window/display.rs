@@ -57,7 +57,7 @@ impl Display {
         let mut opened = Vec::new();
         let mut below = 0;
         for (index, screen) in stage.screens.iter().enumerate() {
-            for (eye, picture) in screen.stereo.pictures().into_iter().enumerate() {
+            for (eye, picture) in Picture::of(screen.stereo).into_iter().enumerate() {
                 let (width, height) = screen.pixels;
                 // On one monitor the windows stand in a column, the first screen above.
                 let place = monitor::of_window(opened.len(), &plan.monitors, &names)?;

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use taut_proto::scene::Show;
 use winit::application::ApplicationHandler;
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
@@ -14,7 +15,7 @@ use crate::calibrate::CalibrationWindows;
 use crate::canvas::eyes_of;
 use crate::error::RenderError;
 use crate::preview::at_start;
-use crate::stage::{Show, Stage};
+use crate::stage::Stage;
 
 /// Shows the stage at its start until the user or a signal ends it.
 pub(crate) fn show(

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Similarity3, Translation3, UnitQuaternion, Vector3};
+use taut_proto::scene::Stereo;
 use taut_render::canvas::Canvas;
 use taut_render::comfort::Comfort;
 use taut_render::environment::Environment;
 use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody, StageScreen, TriangleMesh};
-use taut_render::stereo::Stereo;
 use taut_render::timeline::{Latched, State};
 use taut_render::view::{ClipPlanes, Screen};
 

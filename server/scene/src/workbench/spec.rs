@@ -8,6 +8,7 @@ use god_object::Pose;
 use nalgebra::Point3;
 use taut_kinds::Chosen;
 use taut_proto::JoinPolicy;
+pub use taut_proto::scene::{Show, Stereo};
 
 use super::output::ScreenOutput;
 use crate::scene::HandPreset;
@@ -25,42 +26,6 @@ pub struct Screen {
     pub upper_left: Point3<f64>,
     /// What is done to its picture.
     pub output: ScreenOutput,
-}
-
-/// How a node shows two eyes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stereo {
-    /// One view from between the eyes.
-    #[default]
-    Mono,
-    /// Left eye in the left half.
-    SideBySide,
-    /// Left eye in the upper half.
-    TopBottom,
-    /// Red and cyan.
-    Anaglyph,
-    /// A window for each eye.
-    TwoWindows,
-}
-
-impl Stereo {
-    /// All, with their names in files.
-    pub const NAMED: [(&'static str, Self); 5] = [
-        ("mono", Self::Mono),
-        ("side-by-side", Self::SideBySide),
-        ("top-bottom", Self::TopBottom),
-        ("anaglyph", Self::Anaglyph),
-        ("two-windows", Self::TwoWindows),
-    ];
-
-    /// Size of one eye's view, in pixels, in a window of this size.
-    pub fn view_size(self, (width, height): (u32, u32)) -> (u32, u32) {
-        match self {
-            Self::SideBySide => (width / 2, height),
-            Self::TopBottom => (width, height / 2),
-            Self::Mono | Self::Anaglyph | Self::TwoWindows => (width, height),
-        }
-    }
 }
 
 /// A node's windows: one per screen, or two with a window per eye.
@@ -336,33 +301,6 @@ impl Default for Safety {
             dead_man: None,
             arm_button: None,
             passivity: Passivity::Observe,
-        }
-    }
-}
-
-/// What render nodes draw beside the god-object and the obstacles, and with what effort.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Show {
-    /// The device's own pose, translucent.
-    pub ghost: bool,
-    /// Contact points.
-    pub contacts: bool,
-    /// The force arrow.
-    pub force: bool,
-    /// Lines of text about the node.
-    pub hud: bool,
-    /// Surfaces mirror what is around them.
-    pub reflections: bool,
-}
-
-impl Default for Show {
-    fn default() -> Self {
-        Self {
-            ghost: false,
-            contacts: false,
-            force: false,
-            hud: false,
-            reflections: true,
         }
     }
 }

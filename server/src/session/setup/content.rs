@@ -5,8 +5,7 @@ use god_object::nalgebra::Point3;
 use taut_link::Content;
 use taut_proto::mesh_blob::Positions;
 use taut_proto::scene::{
-    BodyDescription, NodeDescription, OutputDescription, ScreenDescription, ShowOptions, Stereo,
-    WindowDescription,
+    BodyDescription, NodeDescription, OutputDescription, ScreenDescription, WindowDescription,
 };
 use taut_proto::{Finish, MeshBlob, MeshHash, PoseF64, SceneDescription};
 use taut_scene::{BuiltBody, BuiltScene, Workbench, srgb};
@@ -123,13 +122,7 @@ pub(crate) fn of_workbench(
         far: viewer.far,
         separation_scale: viewer.separation_scale,
         nearest_disparity: viewer.nearest_disparity,
-        show: ShowOptions {
-            ghost: workbench.show.ghost,
-            contacts: workbench.show.contacts,
-            force: workbench.show.force,
-            hud: workbench.show.hud,
-            reflections: workbench.show.reflections,
-        },
+        show: workbench.show,
         ..SceneDescription::of_body(name, god_object)
     }
 }
@@ -194,13 +187,7 @@ fn node(node: &taut_scene::Node) -> NodeDescription {
             .iter()
             .map(|name| name.as_str().into())
             .collect(),
-        stereo: match node.stereo {
-            taut_scene::Stereo::Mono => Stereo::Mono,
-            taut_scene::Stereo::SideBySide => Stereo::SideBySide,
-            taut_scene::Stereo::TopBottom => Stereo::TopBottom,
-            taut_scene::Stereo::Anaglyph => Stereo::Anaglyph,
-            taut_scene::Stereo::TwoWindows => Stereo::TwoWindows,
-        },
+        stereo: node.stereo,
         window: WindowDescription {
             width: node.window.width,
             height: node.window.height,
