@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
-use taut_link::MeshCounters;
+use taut_link::{Distribution, MeshCounters};
 use taut_proto::ClientStats;
 use taut_proto::stats::DrawnState;
 
@@ -16,23 +16,10 @@ pub(crate) const REPORT_PERIOD: Duration = Duration::from_secs(1);
 /// Longest age told apart, in microseconds; older counts as this.
 const MAX_AGE_US: u64 = 60_000_000;
 
+const MS_PER_US: f64 = 1e-3;
+
 /// Most drawn states named in one report.
 const MAX_DRAWN: usize = 64;
-
-/// Median, upper percentiles and maximum of a quantity, in milliseconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Distribution {
-    /// Half of the values are below.
-    pub p50: f64,
-    /// 99 of 100 are below.
-    pub p99: f64,
-    /// 999 of 1000 are below.
-    pub p999: f64,
-    /// The largest.
-    pub max: f64,
-    /// How many there were.
-    pub count: u64,
-}
 
 /// Why a node stopped drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -268,8 +255,8 @@ impl Statistics {
     /// Ages when taken and when drawn.
     pub(crate) fn ages(&self) -> (Distribution, Distribution) {
         (
-            distribution(&self.ages.taken),
-            distribution(&self.ages.drawn),
+            Distribution::of(&self.ages.taken, MS_PER_US),
+            Distribution::of(&self.ages.drawn, MS_PER_US),
         )
     }
 }
@@ -284,17 +271,6 @@ fn smoothed(fps: f64, seconds: f64) -> f64 {
 fn histogram() -> Histogram<u64> {
     // Three significant figures over a fixed range: constants that hdrhistogram takes.
     Histogram::new_with_bounds(1, MAX_AGE_US, 3).unwrap_or_else(|_| unreachable!("constant bounds"))
-}
-
-fn distribution(histogram: &Histogram<u64>) -> Distribution {
-    let ms = |us: u64| us as f64 / 1000.0;
-    Distribution {
-        p50: ms(histogram.value_at_quantile(0.5)),
-        p99: ms(histogram.value_at_quantile(0.99)),
-        p999: ms(histogram.value_at_quantile(0.999)),
-        max: ms(histogram.max()),
-        count: histogram.len(),
-    }
 }
 
 impl std::fmt::Display for RenderReport {

@@ -14,11 +14,12 @@ use std::time::Duration;
 use god_object::Vector6;
 use god_object::nalgebra::Vector3;
 use taut::loops::realtime::thread_cpu_time;
-use taut::shared::timing::{Distribution, Histogram};
+use taut::shared::timing::Histogram;
 use taut_bridge::realtime::{
     CLEAR_OF_KERNEL_TICK, first_on_beat, keep_cores_awake, lock_memory, monotonic_now,
     request_fifo, sleep_until,
 };
+use taut_link::Distribution;
 use taut_spidar::{
     ForwardKinematics, Geometry, Pose, StringMatrix, TensionSettings, TensionSolver,
 };

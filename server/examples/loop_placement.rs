@@ -19,8 +19,8 @@ use taut::report::SessionReport;
 use taut::report::terminal::Terminal;
 use taut::session::Session;
 use taut::session::setup::workbench::{Overrides, session_setup};
-use taut::shared::timing::Distribution;
 use taut_link::ClusterKey;
+use taut_link::Distribution;
 use taut_scene::{Device, Workbench};
 
 /// Larger than the caches.

@@ -129,8 +129,9 @@ fn a_force_reaches_the_hand_of_a_bridge_is_as_old_as_its_way_and_gone_with_its_s
         // The port's damping of a hand that yields, or swings back on a busy machine, is in it, too.
         let bounds = 0.3 * most_felt..most_felt + 0.25;
         assert!(bounds.contains(&largest), "{what}");
-        // As that of a hand that still swings, of which a busy machine has missed ticks.
-        assert!(last < 0.1, "{last} N at the end; {what}");
+        // Zero, but for that of a hand that still swings after missed ticks.
+        let damped = if report.missed_periods > 0 { 0.1 } else { 0.0 };
+        assert!(last <= damped, "{last} N at the end; {what}");
         assert!(report.external_wrenches > 100, "{what}");
         assert!(report.max_external_age_ms < 115.0, "{what}");
         if delay_us > 0 {

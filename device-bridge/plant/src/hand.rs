@@ -117,18 +117,19 @@ pub enum HandPreset {
 }
 
 impl HandPreset {
-    /// Every preset, weakest first.
-    pub const ALL: [Self; 4] = [Self::Released, Self::Light, Self::Firm, Self::Arm];
+    /// Every preset, weakest first, with its name in files and on the command line.
+    pub const NAMED: [(&'static str, Self); 4] = [
+        ("released", Self::Released),
+        ("light", Self::Light),
+        ("firm", Self::Firm),
+        ("arm", Self::Arm),
+    ];
 
     /// The preset's name in files and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Released => "released",
-            Self::Light => "light",
-            Self::Firm => "firm",
-            Self::Arm => "arm",
-        }
+        let named = Self::NAMED.iter().find(|(_, preset)| *preset == self);
+        named.map_or("", |(name, _)| name)
     }
 }
 
@@ -158,10 +159,11 @@ impl FromStr for HandPreset {
     type Err = UnknownHand;
 
     fn from_str(text: &str) -> Result<Self, UnknownHand> {
-        Self::ALL
-            .into_iter()
-            .find(|preset| preset.name() == text)
-            .ok_or_else(|| UnknownHand(text.to_owned()))
+        let named = Self::NAMED.iter().find(|(name, _)| *name == text);
+        named.map_or_else(
+            || Err(UnknownHand(text.to_owned())),
+            |(_, preset)| Ok(*preset),
+        )
     }
 }
 
@@ -171,13 +173,14 @@ mod tests {
 
     #[test]
     fn presets_are_found_by_their_names_and_grow_stronger() {
-        for pair in HandPreset::ALL.windows(2) {
-            let (weaker, stronger) = (Hand::from(pair[0]), Hand::from(pair[1]));
+        for pair in HandPreset::NAMED.windows(2) {
+            let (weaker, stronger) = (Hand::from(pair[0].1), Hand::from(pair[1].1));
             assert!(weaker.mass < stronger.mass && weaker.damping < stronger.damping);
             assert!(weaker.rotational_stiffness < stronger.rotational_stiffness);
         }
-        for preset in HandPreset::ALL {
-            assert_eq!(preset.to_string().parse(), Ok(preset));
+        for (name, preset) in HandPreset::NAMED {
+            assert_eq!(preset.to_string(), name);
+            assert_eq!(name.parse(), Ok(preset));
         }
         assert!("fist".parse::<HandPreset>().is_err());
         assert!(!Hand::RELEASED.holds() && Hand::LIGHT.holds());

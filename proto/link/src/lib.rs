@@ -16,6 +16,7 @@ pub mod binding;
 pub mod client;
 pub mod clock;
 pub mod counters;
+mod distribution;
 pub mod error;
 mod framing;
 pub mod key_file;
@@ -35,6 +36,7 @@ pub use client::{
 };
 pub use clock::SessionClock;
 pub use counters::{ClientCounters, Counters, MeshCounters};
+pub use distribution::Distribution;
 pub use error::LinkError;
 pub use key_file::{
     check_secret_file, create_key_file, keep_memory_private, read_join_key, read_key_file,
@@ -44,7 +46,7 @@ pub use multicast::MulticastOptions;
 pub use server::{
     AlsoKey, Broadcaster, ClientStatus, Content, DeviceInput, DeviceReceiver, FloodLimits,
     ForceInput, ForceOutput, FrameMaster, FrameReport, HEAD_READERS, HeadInput, HeadOutput,
-    LinkEvent, ServerLink, ServerOptions, Spread, serve,
+    LinkEvent, ServerLink, ServerOptions, serve,
 };
 pub use taut_proto as proto;
 pub use taut_proto::{

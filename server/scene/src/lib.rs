@@ -36,11 +36,12 @@ pub use problem::{FileError, Problem};
 pub use runner::{Onlooker, Runner, numbers_of_pose, pose_of_numbers};
 pub use scene::{
     AdaptationSpec, BodySpec, BuiltBody, BuiltHand, BuiltMotion, BuiltScene, CouplingSpec,
-    EditedKey, GOD_OBJECT_NAME, HandPathSpec, HandPreset, HeightMapMapping, HeightMapSpec,
-    LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES,
-    Scene, SceneSource, ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
+    EditedKey, GOD_OBJECT_NAME, HandPathSpec, HeightMapMapping, HeightMapSpec, LimitSpec, MassSpec,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, SHIPPED_SCENES, Scene, SceneSource,
+    ScenerySpec, Shape, ShippedScene, View, shipped_scene_text,
 };
 pub use simplify::{Simplified, simplify};
+pub use taut_plant::HandPreset;
 pub use taut_recording::{NORM_TOLERANCE, unit_quaternion};
 pub use trace::{
     DeviceTrace, MAX_TRACE_TIME, REPLAY_COLUMNS, ReplayRow, ReplayWriter, TIMING_COLUMNS,

@@ -35,6 +35,7 @@ mod setup;
 mod signals;
 pub mod track;
 
+use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -149,16 +150,30 @@ fn end_session(
     }
 }
 
+/// A report on standard output, for programs or for people.
+fn tell<R: Serialize + Display>(report: &R, json: bool) -> Result<()> {
+    if json {
+        print_json(report)
+    } else {
+        print(report.to_string())
+    }
+}
+
+/// The runtime of a command that only speaks over the network.
+fn network(threads: usize) -> Result<tokio::runtime::Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(threads)
+        .enable_all()
+        .build()
+        .context("the network's threads cannot be started")
+}
+
 fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
     if let Some(directory) = &args.recording {
         return recorded_command(directory, args);
     }
     let report: ReplayReport = replay::run(args)?;
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.to_string())?;
-    }
+    tell(&report, args.json)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -166,11 +181,7 @@ fn replay_command(args: &ReplayArgs) -> Result<ExitCode> {
 fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
     let interrupted = Shutdown::by_signals()?;
     let report = replay::recorded::run(directory, args.out.as_deref(), args.timings, &interrupted)?;
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.to_string())?;
-    }
+    tell(&report, args.json)?;
     Ok(if report.first_difference.is_none() {
         ExitCode::SUCCESS
     } else {
@@ -179,11 +190,7 @@ fn recorded_command(directory: &Path, args: &ReplayArgs) -> Result<ExitCode> {
 }
 
 fn record_command(args: &RecordArgs) -> Result<ExitCode> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()
-        .context("the network's threads cannot be started")?;
+    let runtime = network(2)?;
     let rows = runtime.block_on(record::run(args))?;
     print(format!("{}: {rows} samples", args.out.display()))?;
     Ok(ExitCode::SUCCESS)
@@ -191,20 +198,12 @@ fn record_command(args: &RecordArgs) -> Result<ExitCode> {
 
 fn export_command(args: &ExportArgs) -> Result<ExitCode> {
     let report = export::run(args)?;
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.to_string())?;
-    }
+    tell(&report, args.json)?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn arm_command(args: &ArmArgs) -> Result<ExitCode> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .context("the network's threads cannot be started")?;
+    let runtime = network(1)?;
     print(runtime.block_on(arm::run(args))?)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -228,30 +227,18 @@ fn check_command(args: &CheckArgs) -> Result<ExitCode> {
 
 fn import_command(args: &ImportArgs) -> Result<ExitCode> {
     let report = import::run(args)?;
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.to_string())?;
-    }
+    tell(&report, args.json)?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn doctor_command(args: &DoctorArgs) -> Result<ExitCode> {
     if let Some(device) = &args.device {
         let report = doctor::device::examine(device, args.out.as_deref())?;
-        if args.json {
-            print_json(&report)?;
-        } else {
-            print(report.to_string())?;
-        }
+        tell(&report, args.json)?;
         return Ok(ExitCode::SUCCESS);
     }
     let report = doctor::examine().context("this machine cannot be examined")?;
-    if args.json {
-        print_json(&report)?;
-    } else {
-        print(report.to_string())?;
-    }
+    tell(&report, args.json)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -261,11 +248,7 @@ fn keys_command(args: &KeysArgs) -> Result<ExitCode> {
 }
 
 fn track_command(args: &TrackArgs) -> Result<ExitCode> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .context("the network's threads cannot be started")?;
+    let runtime = network(1)?;
     let sent = runtime.block_on(track::run(args))?;
     print(format!(
         "{sent} readings of the head sent to {}",
@@ -275,11 +258,7 @@ fn track_command(args: &TrackArgs) -> Result<ExitCode> {
 }
 
 fn push_wrench_command(args: &PushWrenchArgs) -> Result<ExitCode> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .context("the network's threads cannot be started")?;
+    let runtime = network(1)?;
     let sent = runtime.block_on(push_wrench::run(args))?;
     print(format!("{sent} wrenches sent to {}", args.server))?;
     Ok(ExitCode::SUCCESS)

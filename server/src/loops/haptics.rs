@@ -350,13 +350,13 @@ fn newest_command(wrench: &mut Subscriber<WrenchCommand>, is_felt: bool) -> Comm
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::timing::Distribution;
     use crate::shared::{device_state, wrench_command};
     use god_object::nalgebra::Point3;
     use god_object::spatial::Vector6;
     use taut_bridge::{
         Device, DeviceFault, DeviceInfo, DeviceLimits, DeviceSample, SafetySettings,
     };
+    use taut_link::Distribution;
 
     const TENSIONS: Duration = Duration::from_micros(40);
 

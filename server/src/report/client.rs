@@ -1,8 +1,7 @@
 //! What one client of the cluster reported.
 
 use serde::{Deserialize, Serialize};
-
-use crate::shared::timing::Distribution;
+use taut_link::Distribution;
 
 /// What one client of the cluster reported.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -3,10 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use taut_link::{FrameReport, Spread};
+use taut_link::{Distribution, FrameReport};
 
 use crate::report::client::ClientReport;
-use crate::shared::timing::Distribution;
 
 const MILLISECONDS_PER_MICROSECOND: f64 = 1e-3;
 
@@ -39,7 +38,7 @@ impl FramesReport {
     pub fn new(measured: &FrameReport, clients: &mut [ClientReport]) -> Self {
         for client in clients {
             let own = measured.nodes.iter().find(|(node, _)| *node == client.node);
-            client.swap_skew_us = own.and_then(|(_, skew)| distribution(skew, 1.0));
+            client.swap_skew_us = own.and_then(|(_, skew)| known(*skew, 1.0));
             client.free_running = measured.free_running.contains(&client.node);
         }
         let counts = &measured.counts;
@@ -50,9 +49,9 @@ impl FramesReport {
             mismatches: counts.mismatches,
             evicted: counts.evicted,
             freed: counts.freed,
-            swap_skew_us: distribution(&measured.skew, 1.0),
-            overhead_us: distribution(&measured.overhead, 1.0),
-            pose_age_ms: distribution(&measured.age, MILLISECONDS_PER_MICROSECOND),
+            swap_skew_us: known(measured.skew, 1.0),
+            overhead_us: known(measured.overhead, 1.0),
+            pose_age_ms: known(measured.age, MILLISECONDS_PER_MICROSECOND),
         }
     }
 }
@@ -82,14 +81,8 @@ impl fmt::Display for FramesReport {
     }
 }
 
-fn distribution(us: &Spread, scale: f64) -> Option<Distribution> {
-    (us.count > 0).then_some(Distribution {
-        p50: scale * us.p50,
-        p99: scale * us.p99,
-        p999: scale * us.p999,
-        max: scale * us.max,
-        count: us.count,
-    })
+fn known(us: Distribution, scale: f64) -> Option<Distribution> {
+    (us.count > 0).then(|| us.scaled(scale))
 }
 
 #[cfg(test)]
@@ -98,7 +91,7 @@ mod tests {
 
     #[test]
     fn each_client_gets_its_own_skew_and_the_session_the_frames() {
-        let spread = |p50| Spread {
+        let spread = |p50| Distribution {
             p50,
             p99: 2.0 * p50,
             p999: 3.0 * p50,

@@ -15,12 +15,11 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::{ConstGauge, Gauge};
 use prometheus_client::registry::{Registry, Unit};
 use serde::Serialize;
-use taut_link::ClientStatus;
+use taut_link::{ClientStatus, Distribution};
 
 use crate::report::SessionReport;
 use crate::report::external::ExternalWrenchReport;
 use crate::shared::failure::Failure;
-use crate::shared::timing::Distribution;
 
 /// Time between two measurements.
 pub(crate) const PERIOD: Duration = Duration::from_secs(1);

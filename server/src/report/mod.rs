@@ -1,6 +1,6 @@
 //! The end reports that `--json` prints. Their keys are an interface: they may grow, and keep their meaning.
 //!
-//! A name carries its unit; a [`Distribution`](crate::shared::timing::Distribution) is `{ p50, p99, p999, max, count }`.
+//! A name carries its unit; a [`Distribution`](taut_link::Distribution) is `{ p50, p99, p999, max, count }`.
 
 mod client;
 pub mod external;

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use taut_link::Distribution;
 
 use crate::loops::fidelity::FidelityReport;
-use crate::shared::timing::Distribution;
 
 /// What `taut replay` measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

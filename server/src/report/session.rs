@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use taut_link::Distribution;
 
 use crate::loops::fidelity::FidelityReport;
 use crate::loops::realtime::RealtimeReport;
@@ -10,7 +11,7 @@ use crate::report::client::ClientReport;
 use crate::report::external::ExternalWrenchReport;
 use crate::report::frames::FramesReport;
 use crate::report::replay::write_obstacles;
-use crate::shared::timing::{Bin, Distribution};
+use crate::shared::timing::Bin;
 
 /// What `taut demo` and `taut serve` measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

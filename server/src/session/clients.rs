@@ -4,10 +4,10 @@
 //! largest of the seconds' 99th percentiles, and the largest of all for p99.9 and max.
 
 use taut_link::proto::barrier::MAX_MEMBERS;
-use taut_link::{ClientStats, ClientStatus, LinkEvent, Role, Transport};
+use taut_link::{ClientStats, ClientStatus, Distribution, LinkEvent, Role, Transport};
 
 use crate::report::ClientReport;
-use crate::shared::timing::{Distribution, Histogram};
+use crate::shared::timing::Histogram;
 
 /// Names that are remembered: as many as may be in at once, and those who left last. Beyond it the one that was heard of longest ago is forgotten.
 const MAX_REMEMBERED: usize = 256;

@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use taut_link::Distribution;
 
 /// Buckets per doubling.
 const SUB_BUCKETS: usize = 64;
@@ -19,34 +20,6 @@ const SUB_BUCKET_BITS: u32 = SUB_BUCKETS.trailing_zeros();
 const DOUBLINGS: usize = 35;
 const BUCKETS: usize = SUB_BUCKETS * (DOUBLINGS + 1);
 const MICROSECONDS_PER_NANOSECOND: f64 = 1e-3;
-
-/// p50, p99, p99.9 and largest of a distribution, in the unit that its name carries.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Distribution {
-    /// Median.
-    pub p50: f64,
-    /// 99th percentile.
-    pub p99: f64,
-    /// 99.9th percentile.
-    pub p999: f64,
-    /// The largest value, exact.
-    pub max: f64,
-    /// How many values there were.
-    pub count: u64,
-}
-
-impl Distribution {
-    /// The same values in another unit.
-    fn scaled(self, factor: f64) -> Self {
-        Self {
-            p50: self.p50 * factor,
-            p99: self.p99 * factor,
-            p999: self.p999 * factor,
-            max: self.max * factor,
-            count: self.count,
-        }
-    }
-}
 
 /// How many values lie in a range.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -3,26 +3,13 @@
 use hdrhistogram::Histogram;
 use taut_proto::barrier::{Counts, FrameSkew, NodeState};
 
+use crate::distribution::Distribution;
+
 /// Longest time told apart, ns: a minute.
 const LONGEST_NS: u64 = 60_000_000_000;
 /// Nodes told apart by name; more are not recorded one by one.
 const MAX_NODES: usize = 64;
-const NS_PER_US: f64 = 1e3;
-
-/// Percentiles of a time, µs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// Median.
-    pub p50: f64,
-    /// 99 of 100 are below.
-    pub p99: f64,
-    /// 999 of 1000 are below.
-    pub p999: f64,
-    /// The largest.
-    pub max: f64,
-    /// How many there were.
-    pub count: u64,
-}
+const US_PER_NS: f64 = 1e-3;
 
 /// How frames went since the server started. Swap times are as true as the nodes' clocks.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,13 +17,13 @@ pub struct FrameReport {
     /// Counts of the barrier.
     pub counts: Counts,
     /// Last swap call less first, of each frame that at least two nodes told of, µs.
-    pub skew: Spread,
+    pub skew: Distribution,
     /// From the moment at which a frame could be shown to the last swap call, µs.
-    pub overhead: Spread,
+    pub overhead: Distribution,
     /// Age of the state at the last swap call, µs.
-    pub age: Spread,
+    pub age: Distribution,
     /// Each node by name: its swap call less the first of the same frame, µs.
-    pub nodes: Vec<(String, Spread)>,
+    pub nodes: Vec<(String, Distribution)>,
     /// Nodes that swap on their own now, by name.
     pub free_running: Vec<String>,
 }
@@ -112,14 +99,15 @@ impl Recorder {
     }
 
     pub(crate) fn report(&self, counts: Counts) -> FrameReport {
+        let us = |times| Distribution::of(times, US_PER_NS);
         let nodes = self.nodes.iter();
         FrameReport {
             counts,
-            skew: spread(&self.skew),
-            overhead: spread(&self.overhead),
-            age: spread(&self.age),
+            skew: us(&self.skew),
+            overhead: us(&self.overhead),
+            age: us(&self.age),
             nodes: nodes
-                .map(|(node, times)| (node.clone(), spread(times)))
+                .map(|(node, times)| (node.clone(), us(times)))
                 .collect(),
             free_running: self.free_running.clone(),
         }
@@ -129,18 +117,4 @@ impl Recorder {
 fn histogram() -> Histogram<u64> {
     // Two significant figures over a fixed range: constants that hdrhistogram takes.
     Histogram::new_with_bounds(1, LONGEST_NS, 2).unwrap_or_else(|_| unreachable!("constant bounds"))
-}
-
-fn spread(times: &Histogram<u64>) -> Spread {
-    let us = |ns: u64| ns as f64 / NS_PER_US;
-    if times.is_empty() {
-        return Spread::default();
-    }
-    Spread {
-        p50: us(times.value_at_quantile(0.5)),
-        p99: us(times.value_at_quantile(0.99)),
-        p999: us(times.value_at_quantile(0.999)),
-        max: us(times.max()),
-        count: times.len(),
-    }
 }

@@ -33,7 +33,7 @@ pub use device_input::DeviceInput;
 pub use device_receiver::DeviceReceiver;
 pub use force_input::{ForceInput, ForceOutput};
 pub use frame_master::FrameMaster;
-pub use frame_report::{FrameReport, Spread};
+pub use frame_report::FrameReport;
 pub use head_input::{HEAD_READERS, HeadInput, HeadOutput};
 pub use joining::FloodLimits;
 pub use link::{ServerLink, serve};

@@ -6,11 +6,12 @@ use god_object::geometry::mass_properties;
 use god_object::spatial::{advance_pose, pose_difference};
 use god_object::{Body, GodObject, Mesh, Obstacle, Pose, Primitive, Settings, Texture, World};
 use nalgebra::{Matrix3, Point3, Vector3};
+use taut_plant::HandPreset;
 use taut_proto::Panorama;
 
 use super::auto_fidelity::AutoFidelity;
 use super::load::{Scene, unusable};
-use super::spec::{AdaptationSpec, HandPreset, MassSpec, ReferencePoint, Shape, View};
+use super::spec::{AdaptationSpec, MassSpec, ReferencePoint, Shape, View};
 use crate::appearance::Appearance;
 use crate::check::MeshFigures;
 use crate::document::At;

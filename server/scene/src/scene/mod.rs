@@ -17,7 +17,7 @@ pub use load::{Scene, SceneSource};
 pub(crate) use parse_shape::{LENGTH_UNITS, pose_of};
 pub use shipped::{SHIPPED_SCENES, ShippedScene, shipped_scene_text};
 pub use spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HandPreset, HeightMapMapping,
-    HeightMapSpec, LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint,
-    ScenerySpec, Shape, View,
+    AdaptationSpec, BodySpec, CouplingSpec, HandPathSpec, HeightMapMapping, HeightMapSpec,
+    LimitSpec, MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, Shape,
+    View,
 };

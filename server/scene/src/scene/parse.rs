@@ -4,12 +4,13 @@ use std::cell::RefCell;
 
 use god_object::{Adaptation, RotationMetric, SolverKind};
 use nalgebra::Point3;
+use taut_plant::HandPreset;
 
 use super::parse_look::{appearance, scenery};
 use super::parse_shape::{pose, rotation_of, shape, surface};
 use super::spec::{
-    AdaptationSpec, BodySpec, CouplingSpec, EnvironmentSpec, HandPathSpec, HandPreset, LimitSpec,
-    MassSpec, MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
+    AdaptationSpec, BodySpec, CouplingSpec, EnvironmentSpec, HandPathSpec, LimitSpec, MassSpec,
+    MethodSpec, MotionSpec, ObstacleSpec, ReferencePoint, ScenerySpec, View,
 };
 use crate::document::{Document, Range, Section, Value};
 use crate::fidelity::FidelitySpec;

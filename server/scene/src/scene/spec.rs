@@ -2,6 +2,7 @@
 
 use god_object::{Pose, Primitive, RotationMetric, SolverKind, Surface};
 use nalgebra::{Point3, UnitQuaternion};
+use taut_plant::HandPreset;
 
 use crate::appearance::Appearance;
 use crate::document::At;
@@ -277,40 +278,6 @@ pub struct MethodSpec {
     pub work_budget: Option<u64>,
     /// Solver of the projections.
     pub solver: Option<SolverKind>,
-}
-
-/// How the simulated hand holds the grip.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum HandPreset {
-    /// No hand.
-    Released,
-    /// A light pinch.
-    #[default]
-    Light,
-    /// A firm grip.
-    Firm,
-    /// The whole arm.
-    Arm,
-}
-
-impl HandPreset {
-    /// All, with their names in files.
-    pub const NAMED: [(&'static str, Self); 4] = [
-        ("released", Self::Released),
-        ("light", Self::Light),
-        ("firm", Self::Firm),
-        ("arm", Self::Arm),
-    ];
-
-    /// The name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Released => "released",
-            Self::Light => "light",
-            Self::Firm => "firm",
-            Self::Arm => "arm",
-        }
-    }
 }
 
 /// `[hand]`: what the simulated hand intends.

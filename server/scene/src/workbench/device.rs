@@ -1,11 +1,12 @@
 //! The device in the user's hand: the kinds and keys of [`taut_kinds::KINDS`], out of the file.
 
 use taut_kinds::{Chosen, KINDS, Key, Kind, KindId, Takes, Value};
+use taut_plant::HandPreset;
 
 use super::parts::Files;
 use super::spec::Device;
 use crate::document::{Range, Section};
-use crate::scene::{HandPreset, pose_of};
+use crate::scene::pose_of;
 
 pub(super) fn device(section: &Section<'_>, files: &Files<'_>) -> Option<Device> {
     if !section.has("kind") {

@@ -1,7 +1,8 @@
 //! `[dynamics]`: what a real device is, as its maker or a measurement says, so that a session can judge what stiffness it bears.
 
+use taut_plant::HandPreset;
+
 use crate::document::{Range, Section};
-use crate::scene::HandPreset;
 
 /// Longest delay or lag that a device may declare, s.
 const LONGEST: f64 = 0.1;

@@ -7,11 +7,11 @@ use std::time::SystemTime;
 use god_object::Pose;
 use nalgebra::Point3;
 use taut_kinds::Chosen;
+use taut_plant::HandPreset;
 use taut_proto::JoinPolicy;
 pub use taut_proto::scene::{Show, Stereo};
 
 use super::output::ScreenOutput;
-use crate::scene::HandPreset;
 
 /// A flat screen by three of its corners, m, workbench frame.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,8 +14,9 @@ use taut_bridge::realtime::{
 };
 use taut_bridge::{HidPort, ReportPort, SourceError};
 use taut_kinds::{KINDS, Kind};
+use taut_link::Distribution;
 
-use crate::shared::timing::{Distribution, Histogram};
+use crate::shared::timing::Histogram;
 
 /// Period of the haptics loop, whose deadlines the measurement keeps.
 const PERIOD: Duration = Duration::from_millis(1);

@@ -110,7 +110,7 @@ fn hand_and_intention(
             .map_err(|error| Failure::BadInput(format!("{named}: {error}")))?,
         None => MinJerkPath::sway(scene.start, SWAY.0, SWAY.1),
     };
-    Ok((impedance(preset), intention))
+    Ok((preset.into(), intention))
 }
 
 fn simulated(
@@ -173,14 +173,4 @@ fn via_points(trace: &DeviceTrace) -> Vec<ViaPoint> {
         pose: sample.pose,
     };
     trace.samples().iter().map(point).collect()
-}
-
-/// The hand of this name.
-pub(crate) fn impedance(preset: HandPreset) -> Hand {
-    match preset {
-        HandPreset::Released => Hand::RELEASED,
-        HandPreset::Light => Hand::LIGHT,
-        HandPreset::Firm => Hand::FIRM,
-        HandPreset::Arm => Hand::ARM,
-    }
 }

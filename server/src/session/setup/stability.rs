@@ -16,7 +16,6 @@ use taut_plant::stability::{DeclaredAxis, SampledLoop};
 use taut_scene::{Device, DeviceDynamics, HandPreset};
 use taut_spidar::Geometry;
 
-use crate::session::setup::devices::impedance;
 use crate::shared::failure::Failure;
 
 /// Period of the haptics loop, s.
@@ -130,7 +129,7 @@ pub(super) fn judge(
     body: &Body,
     allow_unstable: bool,
 ) -> Result<Vec<String>, Failure> {
-    let hand = impedance(device.hand);
+    let hand = Hand::from(device.hand);
     let mut warnings = Vec::new();
     let [along, about] = stiffnesses(settings, body);
     for (stiffness, unit, what) in [

@@ -225,7 +225,7 @@ pub fn run() -> Vec<Row> {
 fn sweep() -> Row {
     let mut worst = 0.0_f64;
     let mut cases = 0;
-    for hand in HandPreset::ALL {
+    for (_, hand) in HandPreset::NAMED {
         for (damping, virtual_damping) in [(0.5, 0.0), (0.5, 10.0), (2.0, 2.0), (5.0, 10.0)] {
             for delay in DELAYS {
                 let case = Case {
