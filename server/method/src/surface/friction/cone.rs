@@ -1,4 +1,4 @@
-//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method, else block Gauss-Seidel sweeps.
+//! The cone problem of all touching contacts: full stick where the cones allow it, else Newton's method.
 //!
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
@@ -17,10 +17,6 @@ use crate::spatial::Vector6;
 /// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else; and each costs in
 /// every step.
 pub(super) const MAX_CONE_CONTACTS: usize = 12;
-/// Most sweeps over the single contacts where the Newton iteration came to its limit.
-const MAX_SWEEPS: usize = 8;
-/// A sweep that changes the correction by less than this share of its length is the last.
-const SWEEP_TOLERANCE: f64 = 1e-8;
 /// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
 const LEAST_NORM_REGULARISATION: f64 = 1e-11;
 /// Share of full stick's correction that the cones may cut before it is relaxed: rounding.
@@ -37,7 +33,7 @@ pub(super) struct ConeProblem {
 pub(super) struct ConeAnswer {
     /// `L^T (a - a_u)`.
     pub(super) correction: Vector6,
-    /// Slip and penetration that are left, or length of the last sweep's change, relative to `scale`; 0 where full stick was the answer.
+    /// Slip and penetration that are left, or what the cones cut of full stick, relative to `scale`; 0 where full stick was the answer.
     pub(super) residual: f64,
 }
 
@@ -45,8 +41,7 @@ impl ConeProblem {
     /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0; `starts` are corrections that may be
     /// near the answer.
     ///
-    /// Where the Newton iteration comes to its limit, sweeps go on from full stick, cut to the cones: multipliers that keep the cones whatever is
-    /// left, and a residual that says how much that is.
+    /// Where the Newton iteration comes to its limit, full stick cut to the cones stays, and a residual that says how much was cut.
     pub(super) fn solve(&mut self, scale: f64, starts: [Vector6; 2]) -> ConeAnswer {
         let cut = self.start_from_stick();
         let stick = self.wrench();
@@ -58,35 +53,11 @@ impl ConeProblem {
         }
         let residual = self
             .balance(scale, &[starts[0], starts[1], stick])
-            .unwrap_or_else(|| self.sweep(scale));
+            .unwrap_or(cut / scale);
         ConeAnswer {
             correction: self.wrench(),
             residual,
         }
-    }
-
-    /// Block Gauss-Seidel. Returns the length of the last sweep's change, relative to `scale`.
-    pub(super) fn sweep(&mut self, scale: f64) -> f64 {
-        let mut y = self.wrench();
-        let mut residual = f64::INFINITY;
-        for sweep in 0..MAX_SWEEPS {
-            // Forwards and backwards in turn, so that the order of the rows shows as little as it can.
-            let mut change: f64 = 0.0;
-            if sweep % 2 == 0 {
-                for contact in &mut self.contacts {
-                    change = change.max(contact.relax(&mut y));
-                }
-            } else {
-                for contact in self.contacts.iter_mut().rev() {
-                    change = change.max(contact.relax(&mut y));
-                }
-            }
-            residual = change / scale;
-            if residual <= SWEEP_TOLERANCE {
-                break;
-            }
-        }
-        residual
     }
 
     /// Gives every contact its share of what full stick needs, cut to its cone. Returns the length of what was cut.

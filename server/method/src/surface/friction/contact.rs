@@ -81,27 +81,6 @@ impl ConeContact {
     pub(super) fn wrench(&self) -> Vector6 {
         self.normal * self.load + self.grip_wrench()
     }
-
-    /// One block of Gauss-Seidel: solves this contact with the others held. Returns the length of the change of `y`.
-    #[inline]
-    pub(super) fn relax(&mut self, y: &mut Vector6) -> f64 {
-        let before = self.load;
-        let penetration = self.slack + self.normal.dot(y);
-        self.load = (before - penetration * self.normal_step).max(0.0);
-        let mut change = self.normal * (self.load - before);
-        *y += change;
-        if self.coefficient > 0.0 {
-            let slip = self.slip_at(y);
-            let wished = [0, 1].map(|i| self.grip[i] - slip[i] * self.tangent_step);
-            let grip = in_disc(wished, self.limit());
-            let tangential = self.tangents[0] * (grip[0] - self.grip[0])
-                + self.tangents[1] * (grip[1] - self.grip[1]);
-            self.grip = grip;
-            *y += tangential;
-            change += tangential;
-        }
-        change.norm()
-    }
 }
 
 /// The point of the disc of this radius nearest to `v`.

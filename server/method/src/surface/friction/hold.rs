@@ -162,6 +162,8 @@ impl Friction {
         }
         self.scale = scale;
         let mut held: Option<Projection> = None;
+        self.rows.clear();
+        self.cone.contacts.clear();
         for _ in 0..MAX_ROUNDS {
             let now = held.as_ref().unwrap_or(&frictionless);
             if !self.gather(problem, now) {
@@ -192,6 +194,9 @@ impl Friction {
 
     /// Fills the cone problem with the contacts that touch at `now`. False when none of them is frictional.
     fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
+        let contacts = self.rows.iter().zip(&self.cone.contacts);
+        let loaded = contacts.filter(|(_, contact)| contact.load > 0.0);
+        let loaded: ArrayVec<u32, MAX_CONE_CONTACTS> = loaded.map(|(row, _)| *row).collect();
         self.cone.contacts.clear();
         self.rows.clear();
         self.touched.clear();
@@ -200,9 +205,13 @@ impl Friction {
             self.coefficients.get(obstacle).copied().unwrap_or(0.0)
         };
         let mut frictional = false;
+        let (metric, touching) = (problem.metric, self.touching);
+        // What touched with friction a moment ago most likely does so again.
+        let before = problem.unconstrained + metric.unwhiten(&self.last);
         let rows = problem.rows.iter().zip(problem.constraints);
         for (index, (row, constraint)) in rows.enumerate() {
-            let touches = row.slack(&now.acceleration) <= self.touching;
+            let slack = row.slack(&now.acceleration).min(row.slack(&before));
+            let touches = slack <= touching;
             if touches && self.touched.len() < self.touched.capacity() {
                 self.touched.push(index as u32);
                 frictional |= coefficient_of(constraint) > 0.0;
@@ -212,7 +221,6 @@ impl Friction {
             return false;
         }
 
-        let metric = problem.metric;
         let (at_now, wished) = (
             metric.whiten(&(now.acceleration - problem.unconstrained)),
             problem.unconstrained - problem.stuck_at,
@@ -224,7 +232,9 @@ impl Friction {
             let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
             let normal = metric.whiten_row(&row.jacobian);
             // Touching is touching: the contact's own slack at `now` is taken as none.
-            let slack = -normal.dot(&at_now);
+            let gap = row.slack(&now.acceleration);
+            let gap = if gap <= touching { 0.0 } else { gap };
+            let slack = gap - normal.dot(&at_now);
             ConeContact::new(
                 coefficient_of(constraint),
                 normal,
@@ -244,12 +254,13 @@ impl Friction {
                 self.rows.push(index);
             }
         };
-        // More contacts than the cone problem takes: those that carry the load, then every n-th of the others.
+        // More contacts than the cone problem takes: those that carry the load here and in the round before, then every n-th of the others.
         let count = self.touched.len();
         let stride = if count <= MAX_CONE_CONTACTS {
             1
         } else {
             now.active.iter().for_each(|active| add(active.row));
+            loaded.iter().for_each(|row| add(*row));
             count.div_ceil(MAX_CONE_CONTACTS - now.active.len())
         };
         self.touched
