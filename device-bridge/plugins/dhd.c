@@ -14,7 +14,6 @@
  * No device was at hand. Not known: whether the controller lets go when its program is gone, and how long a call takes over USB.
  */
 #define _POSIX_C_SOURCE 200809L
-#include <dlfcn.h>
 #include <stdbool.h>
 #include <math.h>
 #include <stdio.h>
@@ -53,16 +52,8 @@ struct device {
 
 static const char *last(void) { return dhd.ErrorGetLastStr ? dhd.ErrorGetLastStr() : NULL; }
 
-static void *symbol(const char *name, const char **missing)
-{
-    void *found = dlsym(dhd.library, name);
-    if (!found && missing && !*missing)
-        *missing = name;
-    return found;
-}
-
 /* A pointer to a function from dlsym's pointer to data, as POSIX has it. */
-#define FIND(name, missing) (*(void **)&dhd.name = symbol("dhd" #name, missing))
+#define FIND(name, missing) (*(void **)&dhd.name = symbol(dhd.library, "dhd" #name, missing))
 
 static int load(const char *path)
 {
@@ -86,12 +77,7 @@ static int load(const char *path)
     FIND(HasActiveWrist, NULL);
     FIND(GetAngularVelocityRad, NULL);
     FIND(GetButtonMask, NULL);
-    if (missing) {
-        dlclose(dhd.library);
-        dhd.library = NULL;
-        return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
-    }
-    return TAUT_DEVICE_OK;
+    return complete(&dhd.library, missing);
 }
 
 static int32_t device_close(void *opened)

@@ -16,7 +16,6 @@
  * No device was at hand, and not the vendor's library.
  */
 #define _POSIX_C_SOURCE 200809L
-#include <dlfcn.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdbool.h>
@@ -95,16 +94,8 @@ static double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-static void *symbol(const char *name, const char **missing)
-{
-    void *found = dlsym(hd.library, name);
-    if (!found && missing && !*missing)
-        *missing = name;
-    return found;
-}
-
 /* A pointer to a function from dlsym's pointer to data, as POSIX has it. */
-#define FIND(name, missing) (*(void **)&hd.name = symbol("hd" #name, missing))
+#define FIND(name, missing) (*(void **)&hd.name = symbol(hd.library, "hd" #name, missing))
 
 static int load(const char *path)
 {
@@ -130,12 +121,7 @@ static int load(const char *path)
     FIND(Unschedule, &missing);
     FIND(GetString, NULL);
     FIND(CheckCalibration, NULL);
-    if (missing) {
-        dlclose(hd.library);
-        hd.library = NULL;
-        return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
-    }
-    return TAUT_DEVICE_OK;
+    return complete(&hd.library, missing);
 }
 
 /* The newest error that ends a session; 0 for none. */

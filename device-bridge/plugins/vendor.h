@@ -2,6 +2,7 @@
 #ifndef TAUT_VENDOR_H
 #define TAUT_VENDOR_H
 
+#include <dlfcn.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -33,6 +34,25 @@ static bool number(const char *value, double low, double high, double *target)
         return false;
     *target = read;
     return true;
+}
+
+/* A function of the vendor's library; the first that is missing is named. */
+static void *symbol(void *library, const char *name, const char **missing)
+{
+    void *found = dlsym(library, name);
+    if (!found && missing && !*missing)
+        *missing = name;
+    return found;
+}
+
+/* The end of loading it: one that lacks a function is closed again. */
+static int complete(void **library, const char *missing)
+{
+    if (!missing)
+        return TAUT_DEVICE_OK;
+    dlclose(*library);
+    *library = NULL;
+    return fail(TAUT_DEVICE_FAILED, "the library is too old or another one: it lacks", missing);
 }
 
 /* w x y z of a rotation matrix, by the largest of the four. NaN stays NaN. */

@@ -4,29 +4,22 @@ use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command as Program, Stdio};
 use std::sync::{Arc, Mutex};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use crate::support::floor::{Dice, OnFloor, ms, wait_until};
 use nalgebra::{Point3, Similarity3, UnitQuaternion, Vector3, Vector6};
 use taut_bridge::haply::{
     Exchange, ExchangeSettings, HaplyService, ServiceAddress, SimulatedInverse, SimulatedSettings,
 };
-use taut_bridge::realtime::monotonic_now;
 use taut_bridge::{
-    Anchor, ArmDevice, ArmPort, ArmState, Command, CommandSource, Device, DeviceFault, DevicePort,
-    Hand, HaplySettings, Placement, Pose, SafetySettings,
+    Anchor, ArmDevice, ArmPort, ArmState, Device, Hand, HaplySettings, Placement, Pose,
+    SafetySettings,
 };
 
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
 /// Of the wall below the start, N/m.
 const STIFFNESS: f64 = 200.0;
 /// Its depth below the start, m.
 const DEPTH: f64 = 0.02;
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
 
 fn placement() -> Placement {
     Placement::plain(
@@ -50,48 +43,13 @@ fn settings(address: SocketAddr) -> HaplySettings {
 }
 
 /// The wall's wrench, with a torque that nobody can render.
-fn wall(z: f64) -> Vector6<f64> {
-    let below = (0.1 - DEPTH - z).max(0.0);
+fn wall(pose: &Pose) -> Vector6<f64> {
+    let below = (0.1 - DEPTH - pose.translation.vector.z).max(0.0);
     Vector6::new(0.0, 0.0, STIFFNESS * below, 0.3, 0.0, 0.0)
 }
 
-fn port(device: impl Device + 'static) -> DevicePort {
-    let placement = placement();
-    let mut port = DevicePort::new(
-        Box::new(device),
-        SafetySettings::default(),
-        placement.reference_point,
-        &placement.start,
-    );
-    port.restart(CommandSource::Same);
-    port
-}
-
-fn tick(port: &mut DevicePort, now: Duration) -> (Option<DeviceFault>, f64) {
-    let report = port.tick(now, |reading| {
-        Some(Command::fresh(
-            now,
-            wall(reading.sample.pose.translation.vector.z),
-        ))
-    });
-    assert_eq!(report.wrench.fixed_rows::<3>(3).norm(), 0.0, "a torque");
-    (
-        report.reading.fault,
-        report.wrench.fixed_rows::<3>(0).norm(),
-    )
-}
-
-/// Ticks in real time until `done` of fault and force.
-fn tick_until(port: &mut DevicePort, what: &str, done: impl Fn(Option<DeviceFault>, f64) -> bool) {
-    let begun = Instant::now();
-    loop {
-        let (fault, force) = tick(port, monotonic_now());
-        if done(fault, force) {
-            return;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
-        thread::sleep(ms(1));
-    }
+fn at_wall(device: ArmDevice) -> OnFloor {
+    OnFloor::new(Box::new(device), &placement(), wall)
 }
 
 #[test]
@@ -102,46 +60,33 @@ fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
         .open(placement(), 0)
         .expect("it is there");
     assert_eq!(device.info().actuated_degrees_of_freedom, 3);
-    let mut port = port(device);
-    let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
-    tick_until(&mut port, "the wall", felt);
-    tick_until(&mut port, "the wall at the arm", |_, _| {
-        service.totals().force > 0.3
-    });
+    let mut held = at_wall(device);
+    held.until_felt("the wall");
+    held.until("the wall at the arm", |_, _| service.totals().force > 0.3);
 
     service.set_plugged(false);
-    tick_until(&mut port, "the cable is out", |fault, force| {
-        fault.is_some() && force == 0.0
-    });
+    held.until_gone("the cable is out");
     assert_eq!(service.totals().force, 0.0);
     service.set_plugged(true);
-    tick_until(&mut port, "the cable is in", felt);
+    held.until_felt("the cable is in");
 
     // A service that hangs: its connection is given up.
     service.set_mute(true);
-    tick_until(&mut port, "it hangs", |fault, force| {
-        fault.is_some() && force == 0.0
-    });
+    held.until_gone("it hangs");
     let before = service.totals().sessions;
     service.set_mute(false);
-    tick_until(&mut port, "it goes on", felt);
+    held.until_felt("it goes on");
     assert!(service.totals().sessions > before, "no other connection");
 
     // Another service at the same place.
     let address = service.address();
     drop(service);
-    tick_until(&mut port, "it is gone", |fault, force| {
-        fault.is_some() && force == 0.0
-    });
+    held.until_gone("it is gone");
     let service = HaplyService::start(address, simulated(true)).expect("the port again");
-    tick_until(&mut port, "another one", felt);
+    held.until_felt("another one");
 
-    drop(port);
-    let begun = Instant::now();
-    while service.totals().force != 0.0 {
-        assert!(begun.elapsed() < PATIENCE, "a force stayed");
-        thread::sleep(ms(1));
-    }
+    drop(held);
+    wait_until("a force stayed", || service.totals().force == 0.0);
 }
 
 /// A service that is ended by the end of its test.
@@ -179,15 +124,12 @@ fn play(bind: &str) -> (Played, SocketAddr) {
 fn a_service_in_a_process_of_its_own_is_killed_and_comes_back() {
     let (played, address) = play("127.0.0.1:0");
     let device = settings(address).open(placement(), 0).expect("it is there");
-    let mut port = port(device);
-    let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
-    tick_until(&mut port, "the wall", felt);
+    let mut held = at_wall(device);
+    held.until_felt("the wall");
     drop(played);
-    tick_until(&mut port, "it is killed", |fault, force| {
-        fault.is_some() && force == 0.0
-    });
+    held.until_gone("it is killed");
     let _played = play(&address.to_string());
-    tick_until(&mut port, "it is back", felt);
+    held.until_felt("it is back");
 }
 
 #[test]
@@ -261,45 +203,32 @@ impl ArmPort for Wire {
     }
 }
 
-fn wired(with_grip: bool) -> (Wire, DevicePort) {
+fn wired(with_grip: bool) -> (Wire, OnFloor) {
     let wire = Wire::new(with_grip);
     let device = ArmDevice::new(
         Box::new(wire.clone()),
         HaplySettings::default().arm(),
         placement(),
     );
-    (wire, port(device))
+    (wire, at_wall(device))
 }
 
 #[test]
 fn the_force_is_gone_120_ms_after_the_last_answer_and_back_within_a_second() {
     for unplugs in [false, true] {
-        let (wire, mut port) = wired(true);
-        let mut time = 0;
-        let mut run = |port: &mut DevicePort, until: u64, answers: bool| {
-            let mut zero_since = None;
-            while time < until {
-                time += 1;
-                if answers {
-                    wire.turn(ms(time));
-                }
-                let (_, force) = tick(port, ms(time));
-                zero_since = if force == 0.0 {
-                    zero_since.or(Some(time))
-                } else {
-                    None
-                };
-            }
-            zero_since
-        };
-        assert_eq!(run(&mut port, 3000, true), None, "no wall is felt");
-        if unplugs {
+        let (wire, mut held) = wired(true);
+        let turn = |now| wire.turn(now);
+        assert_eq!(held.run(3000, turn), None, "no wall is felt");
+        let gone = if unplugs {
             wire.with(|ends| ends.service.set_plugged(false));
-        }
-        let gone = run(&mut port, 3500, unplugs).expect("a force without a device");
+            held.run(3500, turn)
+        } else {
+            held.run(3500, |_| ())
+        };
+        let gone = gone.expect("a force without a device");
         assert!(gone <= 3120, "{gone}");
         wire.with(|ends| ends.service.set_plugged(true));
-        assert_eq!(run(&mut port, 4500, true), None, "no force after a second");
+        assert_eq!(held.run(4500, turn), None, "no force after a second");
     }
 }
 
@@ -391,19 +320,6 @@ fn a_prop_stands_where_the_arm_is_and_forces_of_two_programs_add_up() {
     });
 }
 
-/// A linear congruential generator: the same damage each time.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % sides
-    }
-}
-
 /// Where a hand leads the cursor, m, and how it turns the grip.
 fn smooth(time_s: f64) -> (Vector3<f64>, UnitQuaternion<f64>) {
     let wave = |rate: f64| (rate * time_s).sin();
@@ -433,7 +349,7 @@ fn damaged_frames(frames: u64) -> (u64, u64) {
         HaplySettings::default().arm(),
         placement(),
     );
-    let mut port = port(device);
+    let mut port = at_wall(device).port;
     let limits = SafetySettings::default().validation;
     let (g, start) = (placement().reference_point, placement().start);
     let mut dice = Dice(7);

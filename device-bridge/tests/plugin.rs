@@ -8,16 +8,15 @@
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::thread;
 use std::time::Instant;
 
 use libloading::Library;
 use nalgebra::{UnitQuaternion, Vector3};
-use taut_bridge::{ArmingState, Rearm};
+use taut_bridge::Rearm;
 
 use crate::support::stage::{
     GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, goes_wrong, ms, opened,
+    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, ms, opened,
 };
 
 fn here() -> &'static Path {
@@ -160,25 +159,7 @@ fn a_person_arms_a_plug_in_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let library = stand_in(folder.path(), "hand.c", "HAND");
     let inside = Loaded::of(&library);
-    let mut stage = Stage::new(&format!("plugin:{}", library.display()), Rearm::Manual);
-    let in_order = |stage: &mut Stage| {
-        stage.until("it is there", |_, fault, _| fault.is_none());
-        for _ in 0..20 {
-            assert_eq!(stage.tick().1, 0.0, "a force that nobody armed");
-            thread::sleep(ms(1));
-        }
-        stage.port.ask_to_arm();
-    };
-    in_order(&mut stage);
-    stage.until_felt(&inside);
-    inside.set("mode", UNPLUGGED);
-    stage.until("it is gone", |_, fault, force| {
-        fault.is_some() && force == 0.0
-    });
-    inside.set("mode", GOOD);
-    in_order(&mut stage);
-    assert_ne!(stage.port.state(), ArmingState::Armed);
-    stage.until_felt(&inside);
+    a_person_arms(&format!("plugin:{}", library.display()), &inside);
 }
 
 #[test]

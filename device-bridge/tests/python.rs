@@ -4,15 +4,14 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::thread;
 use std::time::Instant;
 
-use taut_bridge::{ArmingState, DeviceFault, Rearm};
+use taut_bridge::{DeviceFault, Rearm};
 use tempfile::TempDir;
 
 use crate::support::stage::{
     GOOD, HANGS, Inside, LONG_QUATERNION, NOT_A_NUMBER, NOT_CALIBRATED, NOTHING_NEW, PATIENCE,
-    Stage, TOO_HOT, UNPLUGGED, goes_wrong, ms, opened,
+    Stage, TOO_HOT, UNPLUGGED, a_person_arms, goes_wrong, opened,
 };
 
 // Of tests/python/hand.py.
@@ -186,25 +185,7 @@ fn a_force_does_not_outlive_the_loop_that_wrote_it_nor_the_bridge() {
 #[test]
 fn a_person_arms_a_device_in_python_again() {
     let inside = Shared::new();
-    let mut stage = Stage::new(&inside.choice, Rearm::Manual);
-    let in_order = |stage: &mut Stage| {
-        stage.until("it is there", |_, fault, _| fault.is_none());
-        for _ in 0..20 {
-            assert_eq!(stage.tick().1, 0.0, "a force that nobody armed");
-            thread::sleep(ms(1));
-        }
-        stage.port.ask_to_arm();
-    };
-    in_order(&mut stage);
-    stage.until_felt(&inside);
-    inside.set("mode", UNPLUGGED);
-    stage.until("it is gone", |_, fault, force| {
-        fault.is_some() && force == 0.0
-    });
-    inside.set("mode", GOOD);
-    in_order(&mut stage);
-    assert_ne!(stage.port.state(), ArmingState::Armed);
-    stage.until_felt(&inside);
+    a_person_arms(&inside.choice, &inside);
 }
 
 #[test]

@@ -2,26 +2,17 @@
 #![cfg(unix)]
 
 use std::sync::{Arc, Mutex};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use crate::support::floor::{Dice, OnFloor, ms};
 use nalgebra::{Isometry3, Point3, Vector6};
 use taut_bridge::pseudo_terminal::{FarEnd, PseudoTerminal};
-use taut_bridge::realtime::monotonic_now;
 use taut_bridge::spidar_uart::{BoardInfo, Counters, Cycle, SimulatedBoards};
 use taut_bridge::{
-    Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Hand, InputChoice,
-    MinJerkPath, Placement, Pose, SafetySettings, SpidarDevice, SpidarPlacement, ViaPoint,
-    string_geometry,
+    DeviceChoice, Hand, InputChoice, MinJerkPath, Placement, Pose, SpidarDevice, SpidarPlacement,
+    ViaPoint, string_geometry,
 };
 use taut_spidar::{Geometry, PerString, Reading, STRINGS, StringFault, StringHardware};
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
 
 fn geometry() -> Geometry {
     string_geometry("g6x4r").expect("shipped")
@@ -52,37 +43,15 @@ fn boards(one_board: bool, offsets: [i32; STRINGS]) -> SimulatedBoards {
     .expect("volts are known")
 }
 
-/// A floor half-way down, and a torque about it.
-fn floor(pose: &Pose, up: usize) -> Vector6<f64> {
+/// A floor half-way down along an axis.
+fn floor<const UP: usize>(pose: &Pose) -> Vector6<f64> {
     let mut wrench = Vector6::zeros();
-    wrench[up] = 200.0 * (-0.004 - pose.translation.vector[up]).max(0.0);
+    wrench[UP] = 200.0 * (-0.004 - pose.translation.vector[UP]).max(0.0);
     wrench
 }
 
-fn tick(port: &mut DevicePort, now: Duration, up: usize) -> (Option<DeviceFault>, f64) {
-    let report = port.tick(now, |reading| {
-        Some(Command::fresh(now, floor(&reading.sample.pose, up)))
-    });
-    (report.reading.fault, report.wrench.norm())
-}
-
-fn port(device: Box<dyn Device>) -> DevicePort {
-    let start = Pose::identity();
-    let mut port = DevicePort::new(device, SafetySettings::default(), Point3::origin(), &start);
-    port.restart(CommandSource::Same);
-    port
-}
-
-fn tick_until(port: &mut DevicePort, what: &str, done: impl Fn(Option<DeviceFault>, f64) -> bool) {
-    let begun = Instant::now();
-    loop {
-        let (fault, force) = tick(port, monotonic_now(), 2);
-        if done(fault, force) {
-            return;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
-        thread::sleep(ms(1));
-    }
+fn plain() -> Placement {
+    Placement::plain(Pose::identity(), Point3::origin())
 }
 
 #[test]
@@ -100,23 +69,19 @@ fn a_floor_is_felt_through_the_serial_line_and_again_after_the_cable_was_out() {
         let DeviceChoice::Input(InputChoice::Spidar(settings)) = choice else {
             panic!("it is opened");
         };
-        let placement = Placement::plain(Pose::identity(), Point3::origin());
-        let device = settings.open(&placement, 0).expect("it is there");
-        let mut port = port(device);
+        let device = settings.open(&plain(), 0).expect("it is there");
         // The frame's y is up, as the workbench's z is.
-        let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
-        tick_until(&mut port, "the floor", felt);
+        let mut held = OnFloor::new(device, &plain(), floor::<2>);
+        held.until_felt("the floor");
 
         drop(terminal);
-        tick_until(&mut port, "the cable is out", |fault, force| {
-            fault.is_some() && force == 0.0
-        });
+        held.until_gone("the cable is out");
         let terminal = plug();
-        tick_until(&mut port, "the cable is in", felt);
+        held.until_felt("the cable is in");
         let currents = || *terminal.device().digits();
         assert!(currents().iter().any(|digit| *digit != 0));
 
-        drop(port);
+        drop(held);
         assert_eq!(currents(), [0; STRINGS], "a current stayed");
     }
 }
@@ -128,9 +93,8 @@ fn a_line_without_boards_is_a_sentence() {
         let DeviceChoice::Input(input) = choice else {
             panic!("it is opened");
         };
-        let placement = Placement::plain(Pose::identity(), Point3::origin());
         input
-            .open(placement, 0)
+            .open(plain(), 0)
             .err()
             .expect("nothing there")
             .to_string()
@@ -214,48 +178,28 @@ fn the_force_is_gone_120_ms_after_the_last_answer_and_back_within_a_second() {
     }
     let placement = SpidarPlacement::default();
     let device = SpidarDevice::calibrated_at_centre(geometry(), hardware, placement, ms(2));
-    let mut port = port(Box::new(device.expect("counts")));
-    let mut time = 2;
-    let mut run = |port: &mut DevicePort, until: u64| {
-        let mut zero_since = None;
-        while time < until {
-            time += 1;
-            let (fault, force) = tick(port, ms(time), 1);
-            if fault.is_none() && time > 1000 {
-                // What is read is where the grip is: within a count of eight strings.
-                let truth = boards.lock().expect("not poisoned").held().true_pose();
-                let read = port.tick(ms(time), |_| None).reading.sample.pose;
-                let off = (truth.translation.vector - read.translation.vector).norm();
-                assert!(off < 1e-4, "{off} m at {time} ms");
-            }
-            zero_since = if force == 0.0 {
-                zero_since.or(Some(time))
-            } else {
-                None
-            };
-        }
-        zero_since
+    let device = Box::new(device.expect("counts"));
+    let mut held = OnFloor::new(device, &plain(), floor::<1>);
+    let truth = || {
+        let mut boards = boards.lock().expect("not poisoned");
+        boards.held().true_pose().translation.vector
     };
-    assert_eq!(run(&mut port, 2500), None, "no floor is felt");
-    *plugged.lock().expect("not poisoned") = false;
-    let gone = run(&mut port, 2800).expect("a force without counts");
-    assert!(gone <= 2620, "{gone}");
-    *plugged.lock().expect("not poisoned") = true;
-    let _ = run(&mut port, 3400);
-    assert_eq!(run(&mut port, 3500), None, "no force after 0.6 s");
-}
-
-/// A linear congruential generator: the same damage each time.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % sides
+    let plug = |is_in| *plugged.lock().expect("not poisoned") = is_in;
+    let _ = held.run(1000, |_| ());
+    for time in 1001..2500 {
+        let _ = held.run(time, |_| ());
+        // What is read is where the grip is: within a count of eight strings.
+        let read = held.port.tick(ms(time), |_| None).reading.sample.pose;
+        let off = (truth() - read.translation.vector).norm();
+        assert!(off < 1e-4, "{off} m at {time} ms");
     }
+    assert_eq!(held.run(2500, |_| ()), None, "no floor is felt");
+    plug(false);
+    let gone = held.run(2800, |_| ()).expect("a force without counts");
+    assert!(gone <= 2620, "{gone}");
+    plug(true);
+    let _ = held.run(3400, |_| ());
+    assert_eq!(held.run(3500, |_| ()), None, "no force after 0.6 s");
 }
 
 /// Loses, doubles, cuts, repeats and changes one answer in ten of strings that a hand moves: how many were damaged, and of these believed.

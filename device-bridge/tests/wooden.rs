@@ -2,59 +2,26 @@
 #![cfg(unix)]
 
 use std::sync::{Arc, Mutex};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use crate::support::floor::{Dice, OnFloor, ms, wait_until};
 use nalgebra::{Point3, Vector3, Vector6};
-use taut_bridge::realtime::monotonic_now;
 use taut_bridge::spidar_uart::Counters;
 use taut_bridge::wooden::{
     BoardReport, HostReport, SimulatedWooden, WOODEN_MODELS, WoodenModel, WoodenService,
 };
 use taut_bridge::{
-    ArmDevice, ArmPort, ArmState, Command, CommandSource, Device, DeviceChoice, DeviceFault,
-    DevicePort, Hand, InputChoice, Placement, Pose, SafetySettings, WoodenSettings,
+    ArmDevice, ArmPort, ArmState, DeviceChoice, Hand, InputChoice, Placement, Pose, WoodenSettings,
 };
-
-/// Only a hang takes this long.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-fn ms(time: u64) -> Duration {
-    Duration::from_millis(time)
-}
 
 fn placement() -> Placement {
     Placement::plain(Pose::identity(), Point3::origin())
 }
 
-fn port(device: Box<dyn Device>) -> DevicePort {
-    let start = Pose::identity();
-    let mut port = DevicePort::new(device, SafetySettings::default(), Point3::origin(), &start);
-    port.restart(CommandSource::Same);
-    port
-}
-
 /// A floor 20 mm below the start, with a torque that nobody can render.
-fn tick(port: &mut DevicePort, now: Duration) -> (Option<DeviceFault>, f64) {
-    let report = port.tick(now, |reading| {
-        let below = (-0.02 - reading.sample.pose.translation.vector.z).max(0.0);
-        let wrench = Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0);
-        Some(Command::fresh(now, wrench))
-    });
-    assert_eq!(report.wrench.fixed_rows::<3>(3).norm(), 0.0, "a torque");
-    (report.reading.fault, report.wrench.norm())
-}
-
-fn tick_until(port: &mut DevicePort, what: &str, done: impl Fn(Option<DeviceFault>, f64) -> bool) {
-    let begun = Instant::now();
-    loop {
-        let (fault, force) = tick(port, monotonic_now());
-        if done(fault, force) {
-            return;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
-        thread::sleep(ms(1));
-    }
+fn floor(pose: &Pose) -> Vector6<f64> {
+    let below = (-0.02 - pose.translation.vector.z).max(0.0);
+    Vector6::new(0.0, 0.0, 200.0 * below, 0.0, 0.4, 0.0)
 }
 
 #[test]
@@ -81,25 +48,18 @@ fn a_floor_is_felt_through_the_reports_and_again_after_the_cable_was_out() {
         let device = input.open(placement(), 0).expect("it is there");
         let sensed = if model == "polhem-1" { 6 } else { 3 };
         assert_eq!(device.info().sensed_degrees_of_freedom, sensed);
-        let mut port = port(device);
-        let felt = |fault: Option<DeviceFault>, force: f64| fault.is_none() && force > 0.3;
-        tick_until(&mut port, "the floor", felt);
-        tick_until(&mut port, "the floor at the arm", |_, _| {
+        let mut held = OnFloor::new(device, &placement(), floor);
+        held.until_felt("the floor");
+        held.until("the floor at the arm", |_, _| {
             service.arm().rendered().z > 0.3
         });
 
         drop(service);
-        tick_until(&mut port, "the cable is out", |fault, force| {
-            fault.is_some() && force == 0.0
-        });
+        held.until_gone("the cable is out");
         let service = plug();
-        tick_until(&mut port, "the cable is in", felt);
-        drop(port);
-        let begun = Instant::now();
-        while service.arm().rendered().norm() > 0.0 {
-            assert!(begun.elapsed() < PATIENCE, "a force stayed");
-            thread::sleep(ms(1));
-        }
+        held.until_felt("the cable is in");
+        drop(held);
+        wait_until("a force stayed", || service.arm().rendered().norm() == 0.0);
     }
 }
 
@@ -168,42 +128,8 @@ fn the_force_is_gone_120_ms_after_the_last_report_and_back_within_a_second() {
         WoodenSettings::default().arm(),
         placement(),
     );
-    let mut port = port(Box::new(device));
-    let mut time = 0;
-    let mut run = |port: &mut DevicePort, until: u64, answers: bool| {
-        let mut zero_since = None;
-        while time < until {
-            time += 1;
-            if answers {
-                wire.turn(ms(time));
-            }
-            let (_, force) = tick(port, ms(time));
-            zero_since = if force == 0.0 {
-                zero_since.or(Some(time))
-            } else {
-                None
-            };
-        }
-        zero_since
-    };
-    assert_eq!(run(&mut port, 4500, true), None, "no floor is felt");
-    let gone = run(&mut port, 4800, false).expect("a force without reports");
-    assert!(gone <= 4620, "{gone}");
-    let _ = run(&mut port, 5400, true);
-    assert_eq!(run(&mut port, 5500, true), None, "no force after 0.7 s");
-}
-
-/// A linear congruential generator: the same damage each time.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % sides
-    }
+    let mut held = OnFloor::new(Box::new(device), &placement(), floor);
+    held.loses_and_finds(4500, |now| wire.turn(now));
 }
 
 /// Loses, repeats, cuts and changes one report in ten: how many were damaged, and of these believed.
@@ -221,14 +147,7 @@ fn damaged_reports(reports: u64) -> (u64, u64) {
         let is_damaged = dice.roll(10) == 0;
         if is_damaged {
             damaged += 1;
-            let at = dice.roll(report.len() as u64) as usize;
-            match dice.roll(5) {
-                0 => report.clear(),
-                1 => report = last.clone(),
-                2 => report.truncate(at),
-                3 => report[at] ^= 1 << dice.roll(8),
-                _ => drop(report.remove(at)),
-            }
+            dice.damage(&mut report, &last);
         }
         last = whole;
         let Some(heard) = BoardReport::parse(&report) else {

@@ -1,5 +1,6 @@
 //! A server on this machine that renders a wall, and a bridge's way to it.
 
+pub mod floor;
 #[cfg(unix)]
 pub mod stage;
 

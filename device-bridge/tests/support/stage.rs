@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector6};
 use taut_bridge::{
-    Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Placement, Pose, Rearm,
-    SafetySettings,
+    ArmingState, Command, CommandSource, Device, DeviceChoice, DeviceFault, DevicePort, Placement,
+    Pose, Rearm, SafetySettings,
 };
 
 /// Only a hang takes this long.
@@ -144,4 +144,27 @@ pub fn goes_wrong(choice: &str, inside: &dyn Inside, modes: &[(i64, &str)]) {
     }
     drop(stage);
     assert_eq!(inside.get("force"), 0, "a force stayed");
+}
+
+/// A device that was gone renders nothing until a person arms it again.
+pub fn a_person_arms(choice: &str, inside: &dyn Inside) {
+    let mut stage = Stage::new(choice, Rearm::Manual);
+    let in_order = |stage: &mut Stage| {
+        stage.until("it is there", |_, fault, _| fault.is_none());
+        for _ in 0..20 {
+            assert_eq!(stage.tick().1, 0.0, "a force that nobody armed");
+            thread::sleep(ms(1));
+        }
+        stage.port.ask_to_arm();
+    };
+    in_order(&mut stage);
+    stage.until_felt(inside);
+    inside.set("mode", UNPLUGGED);
+    stage.until("it is gone", |_, fault, force| {
+        fault.is_some() && force == 0.0
+    });
+    inside.set("mode", GOOD);
+    in_order(&mut stage);
+    assert_ne!(stage.port.state(), ArmingState::Armed);
+    stage.until_felt(inside);
 }

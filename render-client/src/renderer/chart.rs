@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Point3};
 
 use super::gpu::Gpu;
 use super::overlay::{OverlayPipeline, part_of};
-use super::pipeline::{DEPTH, Output, filled, shader};
+use super::pipeline::{Output, filled, over_all};
 use crate::calibration::{Chart, ChartQuad};
 use crate::hud::Mark;
 use crate::view::Eye;
@@ -40,46 +40,13 @@ impl ChartDrawing {
             wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x2];
         let device = &gpu.device;
         let source = include_str!("../../shaders/chart.wgsl");
-        let module = shader(device, "chart", source.to_owned());
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("chart"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<ChartVertex>() as u64,
-                    step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &ATTRIBUTES,
-                })],
-            },
-            primitive: Default::default(),
-            // One part over the other, in their order.
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: wgpu::MultisampleState {
-                count: output.samples,
-                ..Default::default()
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: output.format,
-                    blend: Some(wgpu::BlendState::ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::ALL,
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let vertices = wgpu::VertexBufferLayout {
+            array_stride: size_of::<ChartVertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &ATTRIBUTES,
+        };
+        let triangles = wgpu::PrimitiveTopology::TriangleList;
+        let pipeline = over_all(gpu, output, "chart", source, triangles, vertices);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("chart"),

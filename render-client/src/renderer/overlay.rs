@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 use super::gpu::Gpu;
-use super::pipeline::{DEPTH, Output, shader};
+use super::pipeline::{Output, over_all};
 use crate::hud::{MAX_MARKS, Mark};
 
 /// First and last letter of the texture; others are shown as `UNKNOWN`. The last place is full: for boxes.
@@ -50,55 +50,16 @@ pub(crate) struct OverlayQuads {
 impl OverlayPipeline {
     pub(crate) fn new(gpu: &Gpu, output: Output) -> Self {
         let device = &gpu.device;
-        let module = shader(
-            device,
-            "overlay",
-            include_str!("../../shaders/overlay.wgsl").to_owned(),
-        );
         const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
             wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4];
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("overlay"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vertex"),
-                compilation_options: Default::default(),
-                buffers: &[Some(wgpu::VertexBufferLayout {
-                    array_stride: size_of::<Quad>() as u64,
-                    step_mode: wgpu::VertexStepMode::Instance,
-                    attributes: &ATTRIBUTES,
-                })],
-            },
-            primitive: wgpu::PrimitiveState {
-                topology: wgpu::PrimitiveTopology::TriangleStrip,
-                ..Default::default()
-            },
-            // Over everything that the pass has drawn.
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: wgpu::MultisampleState {
-                count: output.samples,
-                ..Default::default()
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fragment"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format: output.format,
-                    blend: Some(wgpu::BlendState::ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::ALL,
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let source = include_str!("../../shaders/overlay.wgsl");
+        let quads = wgpu::VertexBufferLayout {
+            array_stride: size_of::<Quad>() as u64,
+            step_mode: wgpu::VertexStepMode::Instance,
+            attributes: &ATTRIBUTES,
+        };
+        let strip = wgpu::PrimitiveTopology::TriangleStrip;
+        let pipeline = over_all(gpu, output, "overlay", source, strip, quads);
         let texture = letters(gpu);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("letters"),

@@ -4,6 +4,7 @@ use wgpu::util::DeviceExt;
 
 use super::environment::EnvironmentMap;
 use super::frame::FrameUniform;
+use super::gpu::Gpu;
 use super::shadow::ShadowMap;
 
 /// Format of all depth textures.
@@ -177,6 +178,56 @@ impl FrameLayout {
             cache: None,
         })
     }
+}
+
+/// A pipeline for what lies over everything that its pass has drawn, one part over the other in their order. It has its own bindings.
+pub(crate) fn over_all(
+    gpu: &Gpu,
+    output: Output,
+    label: &str,
+    source: &str,
+    topology: wgpu::PrimitiveTopology,
+    vertices: wgpu::VertexBufferLayout<'_>,
+) -> wgpu::RenderPipeline {
+    let module = shader(&gpu.device, label, source.to_owned());
+    let descriptor = wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: Default::default(),
+            buffers: &[Some(vertices)],
+        },
+        primitive: wgpu::PrimitiveState {
+            topology,
+            ..Default::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(false),
+            depth_compare: Some(wgpu::CompareFunction::Always),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: output.samples,
+            ..Default::default()
+        },
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: output.format,
+                blend: Some(wgpu::BlendState::ALPHA_BLENDING),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    };
+    gpu.device.create_render_pipeline(&descriptor)
 }
 
 /// A shader module from WGSL that is part of this program.

@@ -319,12 +319,13 @@ impl MovingTriangle {
 
 /// The first h >= 0 at which `height + speed h - bend h^2` becomes negative; infinite when it never does, 0 for NaN.
 #[inline]
-fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
+pub(crate) fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
     let above = height >= 0.0; // false for NaN
     if !above {
         return 0.0;
     }
     let discriminant = speed * speed + 4.0 * bend * height;
+    let known = |time: f64| if time.is_nan() { 0.0 } else { time };
     if speed < 0.0 {
         // No real root: the path bends away in time.
         return if discriminant < 0.0 {
@@ -333,16 +334,11 @@ fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
             known(2.0 * height / (discriminant.sqrt() - speed))
         };
     }
-    if bend <= 0.0 {
+    if bend <= 0.0 && speed >= 0.0 {
         f64::INFINITY
     } else {
         known((speed + discriminant.sqrt()) / (2.0 * bend))
     }
-}
-
-#[inline]
-fn known(time: f64) -> f64 {
-    if time.is_nan() { 0.0 } else { time }
 }
 
 #[cfg(test)]
@@ -379,6 +375,7 @@ mod tests {
         for (height, speed, bend) in [
             (f64::NAN, 1.0, 0.0),
             (1.0, f64::NAN, 1.0),
+            (1.0, f64::NAN, -1.0),
             (1.0, -1.0, f64::NAN),
             (1.0, 1.0, f64::NAN),
         ] {

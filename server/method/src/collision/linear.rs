@@ -1,5 +1,7 @@
 //! Time of impact of single features whose vertices move along straight lines: vertex and face, edge and edge.
 //!
+//! For programs whose meshes deform, and for published query sets, which have such motions. The god-object's motions are rigid: [`super::time_of_impact`].
+//!
 //! | symbol     | name in code | unit | meaning                                                         |
 //! |------------|--------------|------|-----------------------------------------------------------------|
 //! | n          | `direction`  | –    | unit direction from the second feature to the first             |

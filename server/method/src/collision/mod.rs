@@ -33,6 +33,7 @@ pub use time_of_impact::{AdvancementSettings, TimeOfImpact, time_of_impact};
 pub use work::Work;
 pub use workspace::CollisionWorkspace;
 
+pub(crate) use advancement::time_to_fall;
 pub(crate) use bands::{for_deepest_triangle_pairs, for_nearest_triangle_pairs};
 pub(crate) use descent::for_facing_triangle_pairs;
 pub(crate) use displacements::{MAX_MOTIONS, Motions};

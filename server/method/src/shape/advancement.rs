@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 
 use super::closest;
 use super::piece::Piece;
-use crate::collision::{Placement, RelativeMotion, Work};
+use crate::collision::{Placement, RelativeMotion, Work, time_to_fall};
 
 /// Bodies nearer than the minimum gap at the start may come down to this share of their distance there.
 const KEPT_SHARE_OF_START_GAP: f64 = 0.9;
@@ -338,29 +338,5 @@ impl Moving {
             n.dot(&self.velocities[i]),
             self.remainders[i] * sideways - n.dot(&self.bends[i]),
         )
-    }
-}
-
-/// The first h >= 0 at which `height + speed h - bend h^2` becomes negative; infinite when it never does, 0 for NaN.
-#[inline]
-fn time_to_fall(height: f64, speed: f64, bend: f64) -> f64 {
-    let above = height >= 0.0; // false for NaN
-    if !above {
-        return 0.0;
-    }
-    let discriminant = speed * speed + 4.0 * bend * height;
-    let known = |time: f64| if time.is_nan() { 0.0 } else { time };
-    if speed < 0.0 {
-        // No real root: the path bends away in time.
-        return if discriminant < 0.0 {
-            f64::INFINITY
-        } else {
-            known(2.0 * height / (discriminant.sqrt() - speed))
-        };
-    }
-    if bend <= 0.0 && speed >= 0.0 {
-        f64::INFINITY
-    } else {
-        known((speed + discriminant.sqrt()) / (2.0 * bend))
     }
 }

@@ -1,0 +1,128 @@
+//! A floor under a device, felt through its port: in real time, or under a virtual clock; and damage that is the same each time.
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector6;
+use taut_bridge::realtime::monotonic_now;
+use taut_bridge::{
+    Command, CommandSource, Device, DeviceFault, DevicePort, Placement, Pose, SafetySettings,
+};
+
+use super::PATIENCE;
+
+pub fn ms(time: u64) -> Duration {
+    Duration::from_millis(time)
+}
+
+/// A device whose port ticks on a floor.
+pub struct OnFloor {
+    pub port: DevicePort,
+    floor: fn(&Pose) -> Vector6<f64>,
+    /// The virtual clock, ms.
+    time: u64,
+}
+
+impl OnFloor {
+    /// `floor` is the wrench at a pose; a torque of it is one that nobody can render.
+    pub fn new(
+        device: Box<dyn Device>,
+        placement: &Placement,
+        floor: fn(&Pose) -> Vector6<f64>,
+    ) -> Self {
+        let (safety, point) = (SafetySettings::default(), placement.reference_point);
+        let mut port = DevicePort::new(device, safety, point, &placement.start);
+        port.restart(CommandSource::Same);
+        Self {
+            port,
+            floor,
+            time: 0,
+        }
+    }
+
+    /// The fault, and the force on the device, N.
+    pub fn tick(&mut self, now: Duration) -> (Option<DeviceFault>, f64) {
+        let floor = self.floor;
+        let report = self.port.tick(now, |reading| {
+            Some(Command::fresh(now, floor(&reading.sample.pose)))
+        });
+        assert_eq!(report.wrench.fixed_rows::<3>(3).norm(), 0.0, "a torque");
+        (report.reading.fault, report.wrench.norm())
+    }
+
+    /// Ticks in real time until `done` of fault and force.
+    pub fn until(&mut self, what: &str, done: impl Fn(Option<DeviceFault>, f64) -> bool) {
+        let begun = Instant::now();
+        loop {
+            let (fault, force) = self.tick(monotonic_now());
+            if done(fault, force) {
+                return;
+            }
+            assert!(begun.elapsed() < PATIENCE, "{what}: {fault:?}, {force} N");
+            thread::sleep(ms(1));
+        }
+    }
+
+    pub fn until_felt(&mut self, what: &str) {
+        self.until(what, |fault, force| fault.is_none() && force > 0.3);
+    }
+
+    pub fn until_gone(&mut self, what: &str) {
+        self.until(what, |fault, force| fault.is_some() && force == 0.0);
+    }
+
+    /// Ticks once a millisecond of the virtual clock, after `wire`. Since when the force was zero at the end, ms.
+    pub fn run(&mut self, until: u64, mut wire: impl FnMut(Duration)) -> Option<u64> {
+        let mut zero_since = None;
+        while self.time < until {
+            self.time += 1;
+            wire(ms(self.time));
+            let (_, force) = self.tick(ms(self.time));
+            zero_since = (force == 0.0).then(|| zero_since.unwrap_or(self.time));
+        }
+        zero_since
+    }
+
+    /// The floor is felt at `felt` ms with the `wire`, is gone 120 ms after the wire was cut, and is back within 0.7 s.
+    pub fn loses_and_finds(&mut self, felt: u64, mut wire: impl FnMut(Duration)) {
+        assert_eq!(self.run(felt, &mut wire), None, "no floor is felt");
+        let gone = self.run(felt + 300, |_| ());
+        let gone = gone.expect("a force without a wire");
+        assert!(gone <= felt + 120, "{gone}");
+        let _ = self.run(felt + 900, &mut wire);
+        assert_eq!(self.run(felt + 1000, wire), None, "no force after 0.7 s");
+    }
+}
+
+pub fn wait_until(what: &str, done: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !done() {
+        assert!(begun.elapsed() < PATIENCE, "{what}");
+        thread::sleep(ms(1));
+    }
+}
+
+/// A linear congruential generator: the same damage each time.
+pub struct Dice(pub u64);
+
+impl Dice {
+    pub fn roll(&mut self, sides: u64) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % sides
+    }
+
+    /// Nothing, what came before it, a beginning, a bit changed, or a byte less.
+    pub fn damage(&mut self, bytes: &mut Vec<u8>, before: &[u8]) {
+        let at = self.roll(bytes.len() as u64) as usize;
+        match self.roll(5) {
+            0 => bytes.clear(),
+            1 => *bytes = before.to_vec(),
+            2 => bytes.truncate(at),
+            3 => bytes[at] ^= 1 << self.roll(8),
+            _ => drop(bytes.remove(at)),
+        }
+    }
+}
