@@ -25,25 +25,26 @@
 //!
 //! Source: cutting planes, Kelley 1960; row generation for Eq. (1) of Ortega et al. 2007 is beyond the paper.
 
+mod at;
 mod candidates;
+mod grow;
 mod neighbours;
-
-use std::sync::Arc;
+mod row;
 
 use arrayvec::ArrayVec;
-use nalgebra::{Point3, Vector3};
 
-use super::collect::{for_contacts, in_world};
+pub(crate) use at::{At, Place, Purpose, Surfaces};
+
+use super::collect::in_world;
 use super::facing::Facing;
 use super::overlay::{MAX_PLACES, Overlay};
 use super::{Collected, Contact, FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::collision::{Placement, Work};
-use crate::geometry::Mesh;
-use crate::quasi_statics::{HalfSpace, Metric, Projection, Projector, SolverKind};
-use crate::spatial::{Pose, Vector6, angular, linear};
+use crate::quasi_statics::{HalfSpace, Projector, SolverKind};
+use crate::spatial::{Vector6, angular, linear};
 use crate::world::World;
 use candidates::Candidates;
-use neighbours::{Arrival, Sides, for_neighbours};
+use row::{Known, face, felt, jacobian};
 
 /// Most rows known at a time. A projection holds six; the rest are those of the probes, and of updates before.
 pub(crate) const MAX_ROWS: usize = 160;
@@ -63,20 +64,6 @@ const IDLE_UPDATES: u32 = 8;
 /// The same for a row that is implied: it matters in the corner that the body is in, and nowhere else.
 const IDLE_UPDATES_IMPLIED: u32 = 1;
 
-/// A row, and when it was last of use.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    contact: Contact,
-    jacobian: Vector6,
-    /// The Jacobian that the force has: along the shading normal where the surface is shaded.
-    felt: Vector6,
-    /// How much nearer than its gap says the pair counts, m: its obstacle moves.
-    nearer: f64,
-    idle: u32,
-    /// Its pair faces no more: it slid past a reentrant edge, where the row is implied by those that are there.
-    implied: bool,
-}
-
 /// Pairs up to this many rest distances apart touch.
 const TOUCHING_REST_DISTANCES: f64 = 2.0;
 /// A row of a gap up to so many rest distances holds the body, or will soon.
@@ -90,80 +77,6 @@ const ALONG_PER_PLACE: usize = 2;
 
 /// A collection reaches for so many times what the last one was complete within, where that was given up.
 const REACH_GROWTH: f64 = 2.0;
-
-/// Where an obstacle is, and whether its rows are chosen: of exact primitives, which have few, every pair is a row, given from outside.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
-    /// World from obstacle.
-    pub(crate) pose: Pose,
-    pub(crate) chosen: bool,
-}
-
-/// Where the rows are to hold.
-#[derive(Clone, Debug)]
-pub(crate) struct At {
-    pub(crate) world: Arc<World>,
-    /// Of each obstacle of the world.
-    pub(crate) places: Arc<[Place]>,
-    pub(crate) pose: Pose,
-    /// Pose of the reference point.
-    pub(crate) reference: Pose,
-    pub(crate) metric: Metric,
-    pub(crate) rest_distance: f64,
-    /// eps, m.
-    pub(crate) tolerance: f64,
-}
-
-impl At {
-    /// G, world.
-    pub(crate) fn center(&self) -> Point3<f64> {
-        Point3::from(self.reference.translation.vector)
-    }
-
-    /// An obstacle's mesh, and the world from it.
-    pub(crate) fn obstacle(&self, index: usize) -> (&Mesh, &Pose) {
-        (&self.world.obstacles[index].mesh, &self.places[index].pose)
-    }
-}
-
-/// Rows of the god-object loop ease a body out that is nearer than the rest distance, those of the coupling do not, and have shading normals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
-    Motion,
-    Force,
-    /// The force when the next set is due: what moves has gone on as far as it came.
-    ForceThen,
-    /// The god-object makes room for what moves: with and without easing out.
-    RoomEased,
-    Room,
-}
-
-impl Purpose {
-    /// Whether rows have shading normals.
-    pub(crate) fn is_felt(self) -> bool {
-        matches!(self, Self::Force | Self::ForceThen)
-    }
-
-    /// The least gap that a row counts as, m.
-    fn least_gap(self, at: &At) -> f64 {
-        match self {
-            Self::Motion | Self::RoomEased => 0.0,
-            Self::Force | Self::ForceThen | Self::Room => at.rest_distance,
-        }
-    }
-}
-
-/// What the scene adds to a contact.
-pub(crate) trait Surfaces {
-    /// Whether some surface is shaded.
-    fn shade(&self) -> bool;
-    /// Whether some obstacle moves.
-    fn move_on(&self) -> bool;
-    /// Its shading normal, world, where its obstacle is shaded.
-    fn shading_normal(&self, contact: &Contact) -> Option<Vector3<f64>>;
-    /// How far its obstacle's point comes nearer while the rows are in use, m.
-    fn nearer(&self, contact: &Contact) -> f64;
-}
 
 /// Finds rows as motions need them.
 #[derive(Debug)]
@@ -492,177 +405,10 @@ impl RowReduction {
         })
     }
 
-    /// Adds rows until the projection of `unconstrained` violates none by more than the tolerance; the projection.
-    pub(crate) fn complete(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        unconstrained: &Vector6,
-        purpose: Purpose,
-        work: &mut Work,
-    ) -> Projection {
-        let least_gap = purpose.least_gap(at);
-        self.warm_start.clear();
-        let mut rounds = 0;
-        loop {
-            self.rows.clear();
-            let known = self.known.iter().map(|row| {
-                let (jacobian, nearer) = row.for_purpose(purpose);
-                (jacobian, row.contact.gap, nearer)
-            });
-            let given = self
-                .given
-                .iter()
-                .map(|(jacobian, gap)| (*jacobian, *gap, 0.0));
-            let all = known.chain(given);
-            self.rows
-                .extend(all.map(|(jacobian, gap, nearer)| HalfSpace {
-                    jacobian,
-                    bound: at.rest_distance - gap.max(least_gap) + nearer,
-                }));
-            work.projections += 1;
-            let projection =
-                self.projector
-                    .project(&at.metric, unconstrained, &self.rows, &self.warm_start);
-            self.warm_start.clear();
-            self.warm_start
-                .extend(projection.active.iter().map(|row| row.row));
-            for row in &projection.active {
-                if let Some(row) = self.known.get_mut(row.row as usize) {
-                    row.idle = 0;
-                }
-            }
-            rounds += 1;
-            let answer = &projection.acceleration;
-            let violation = self.add_most_violated((at, surfaces), answer, purpose, work);
-            let finished = violation <= at.tolerance || rounds == MAX_ROUNDS; // false for NaN
-            if finished || !violation.is_finite() {
-                let turns_a_corner = purpose == Purpose::Motion
-                    && rounds < MAX_ROUNDS
-                    && self.add_neighbours((at, surfaces), answer, work);
-                if turns_a_corner {
-                    continue;
-                }
-                self.error = self.error.max(violation);
-                return projection;
-            }
-        }
-    }
-
-    /// Adds the pairs that those of rows which touch turn into, where the motion violates them by more than the tolerance; whether there are any. Also of
-    /// rows that the motion leaves: what lies in a groove leaves one of its sides for the other.
-    fn add_neighbours(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        motion: &Vector6,
-        work: &mut Work,
-    ) -> bool {
-        let before = self.known.len();
-        for k in 0..before {
-            let Contact {
-                features: pair,
-                gap,
-                ..
-            } = self.known[k].contact;
-            if gap > TOUCHING_REST_DISTANCES * at.rest_distance {
-                continue;
-            }
-            let obstacle = &at.world.obstacles[usize::from(pair.obstacle)].mesh;
-            let body = &at.world.body.mesh;
-            let arrival = Arrival::of(at, &pair, motion);
-            for_neighbours(body, obstacle, &pair, Sides::Reentrant, |features| {
-                let clear = arrival
-                    .over(body, obstacle, &features)
-                    .is_some_and(|clearance| clearance >= at.rest_distance - at.tolerance);
-                if clear || self.known.len() == MAX_ROWS || self.knows(&features) {
-                    return;
-                }
-                let Some(contact) = face(at, &features, true, work) else {
-                    return;
-                };
-                let row = jacobian(&contact, &at.center());
-                let violation = at.rest_distance - contact.gap - row.dot(motion);
-                if violation > at.tolerance {
-                    self.add((at, surfaces), &contact);
-                    if let Some(row) = self.known.last_mut() {
-                        // It does not face yet.
-                        row.implied = true;
-                    }
-                }
-            });
-        }
-        self.known.len() > before
-    }
-
-    /// Adds the pairs that one turned into which has slid off its features.
-    fn follow(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        pair: &FeaturePair,
-        work: &mut Work,
-    ) {
-        let obstacle = &at.world.obstacles[usize::from(pair.obstacle)];
-        let near = NEAR_REST_DISTANCES * at.rest_distance;
-        let body = &at.world.body.mesh;
-        for_neighbours(body, &obstacle.mesh, pair, Sides::All, |features| {
-            if self.known.len() == MAX_ROWS || self.knows(&features) {
-                return;
-            }
-            if let Some(contact) = face(at, &features, false, work)
-                && contact.gap <= near
-            {
-                self.add((at, surfaces), &contact);
-            }
-        });
-    }
-
     fn knows(&self, features: &FeaturePair) -> bool {
         self.known
             .iter()
             .any(|row| row.contact.features == *features)
-    }
-
-    /// Adds the candidate that `motion` violates most, if by more than the tolerance; by how much it is violated, m.
-    fn add_most_violated(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        motion: &Vector6,
-        purpose: Purpose,
-        work: &mut Work,
-    ) -> f64 {
-        let least_gap = purpose.least_gap(at);
-        for _ in 0..MAX_STALE {
-            let least = self.candidates.least_clearance(motion, purpose, least_gap);
-            let Some((k, clearance)) = least else {
-                return 0.0;
-            };
-            let violation = at.rest_distance - clearance;
-            if violation <= at.tolerance {
-                return violation.max(0.0);
-            }
-            let features = self.candidates.contacts[k].features;
-            // Known rows are satisfied; one that was carried here to first order is looked at as it is.
-            self.candidates.gap[k] = f64::INFINITY;
-            if self.knows(&features) {
-                continue;
-            }
-            let contact = if self.candidates.moved == Vector6::zeros() {
-                Some(self.candidates.contacts[k])
-            } else {
-                face(at, &features, false, work)
-            };
-            self.outdated |= contact.is_none();
-            if let Some(contact) = contact {
-                let row = Known::of(&contact, surfaces, &at.center());
-                let (jacobian, nearer) = row.for_purpose(purpose);
-                let gap = contact.gap.max(least_gap) - nearer;
-                let violation = at.rest_distance - gap - jacobian.dot(motion);
-                if violation > at.tolerance {
-                    self.add((at, surfaces), &contact);
-                    return violation;
-                }
-            }
-        }
-        0.0
     }
 
     /// Makes every candidate a row where they are few; false where they are many. At the pose where they were collected.
@@ -706,114 +452,5 @@ impl RowReduction {
             self.truncated = true;
         }
         self.known.push(Known::of(contact, surfaces, &at.center()));
-    }
-
-    /// Adds what faces between two triangles that stopped a motion.
-    fn take_witness(
-        &mut self,
-        (at, surfaces): (&At, &dyn Surfaces),
-        (a, b): (u32, u32),
-        work: &mut Work,
-    ) {
-        // A witness does not say which obstacle it is of; a pair of another does not face, or is a pair like any.
-        for index in 0..at.places.len() {
-            let (mesh, pose) = at.obstacle(index);
-            let body = &at.world.body.mesh;
-            let there =
-                (a as usize) < body.triangles().len() && (b as usize) < mesh.triangles().len();
-            if !there || !at.places[index].chosen {
-                continue;
-            }
-            let placement = Placement::of(&at.pose, pose);
-            let facing = Facing {
-                body,
-                obstacle: mesh,
-                placement: &placement,
-                obstacle_index: u16::try_from(index).unwrap_or(u16::MAX),
-                activation_distance: WITNESS_REST_DISTANCES * at.rest_distance,
-                past_reentrant_edges: false,
-            };
-            // The features that touch may be other triangles' to look at.
-            for a in owners(body, a) {
-                for b in owners(mesh, b) {
-                    for_contacts(&facing, &facing.pair(a, b), work, |contact| {
-                        if !self.knows(&contact.features) {
-                            self.add((at, surfaces), &in_world(&contact, pose));
-                        }
-                    });
-                }
-            }
-        }
-    }
-}
-
-/// A triangle, and those that own its corners and sides; each once.
-fn owners(mesh: &Mesh, t: u32) -> ArrayVec<u32, 7> {
-    let mut owners = ArrayVec::from_iter([t]);
-    let corners = mesh.triangles()[t as usize].map(|v| mesh.vertex_owner(v).unwrap_or(t));
-    let sides = mesh
-        .triangle_edges(t)
-        .map(|e| mesh.edges()[e as usize].faces[0]);
-    for owner in corners.into_iter().chain(sides) {
-        if !owners.contains(&owner) {
-            owners.push(owner);
-        }
-    }
-    owners
-}
-
-/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid past a reentrant edge.
-fn face(
-    at: &At,
-    features: &FeaturePair,
-    past_reentrant_edges: bool,
-    work: &mut Work,
-) -> Option<Contact> {
-    let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
-    let placement = Placement::of(&at.pose, pose);
-    let facing = Facing {
-        body: &at.world.body.mesh,
-        obstacle: mesh,
-        placement: &placement,
-        obstacle_index: features.obstacle,
-        activation_distance: f64::INFINITY,
-        past_reentrant_edges,
-    };
-    work.feature_pairs += 1;
-    facing
-        .features(features)
-        .map(|contact| in_world(&contact, pose))
-}
-
-fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {
-    contact_jacobian(&contact.normal, &contact.point_on_obstacle, center)
-}
-
-/// The row that the force has.
-fn felt(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Vector6 {
-    let normal = surfaces.shading_normal(contact).unwrap_or(contact.normal);
-    contact_jacobian(&normal, &contact.point_on_obstacle, center)
-}
-
-impl Known {
-    fn of(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Self {
-        Self {
-            contact: *contact,
-            jacobian: jacobian(contact, center),
-            felt: felt(contact, surfaces, center),
-            nearer: surfaces.nearer(contact),
-            idle: 0,
-            implied: false,
-        }
-    }
-
-    /// The Jacobian, and how much nearer the pair counts, m.
-    fn for_purpose(&self, purpose: Purpose) -> (Vector6, f64) {
-        match purpose {
-            Purpose::Motion => (self.jacobian, 0.0),
-            Purpose::Force => (self.felt, 0.0),
-            Purpose::Room | Purpose::RoomEased => (self.jacobian, self.nearer),
-            Purpose::ForceThen => (self.felt, self.nearer),
-        }
     }
 }

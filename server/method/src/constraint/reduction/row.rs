@@ -1,0 +1,80 @@
+//! A row that is known, and how it is read off a pair of features.
+
+use nalgebra::Point3;
+
+use super::at::{At, Purpose, Surfaces};
+use crate::collision::{Placement, Work};
+use crate::constraint::collect::in_world;
+use crate::constraint::facing::Facing;
+use crate::constraint::{Contact, FeaturePair, contact_jacobian};
+use crate::spatial::Vector6;
+
+/// A row, and when it was last of use.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    pub(super) contact: Contact,
+    pub(super) jacobian: Vector6,
+    /// The Jacobian that the force has: along the shading normal where the surface is shaded.
+    pub(super) felt: Vector6,
+    /// How much nearer than its gap says the pair counts, m: its obstacle moves.
+    pub(super) nearer: f64,
+    pub(super) idle: u32,
+    /// Its pair faces no more: it slid past a reentrant edge, where the row is implied by those that are there.
+    pub(super) implied: bool,
+}
+
+/// The contact between two features at a pose, world frame, when they face each other there, or did before they slid past a reentrant edge.
+pub(super) fn face(
+    at: &At,
+    features: &FeaturePair,
+    past_reentrant_edges: bool,
+    work: &mut Work,
+) -> Option<Contact> {
+    let (mesh, pose) = at.obstacle(usize::from(features.obstacle));
+    let placement = Placement::of(&at.pose, pose);
+    let facing = Facing {
+        body: &at.world.body.mesh,
+        obstacle: mesh,
+        placement: &placement,
+        obstacle_index: features.obstacle,
+        activation_distance: f64::INFINITY,
+        past_reentrant_edges,
+    };
+    work.feature_pairs += 1;
+    facing
+        .features(features)
+        .map(|contact| in_world(&contact, pose))
+}
+
+pub(super) fn jacobian(contact: &Contact, center: &Point3<f64>) -> Vector6 {
+    contact_jacobian(&contact.normal, &contact.point_on_obstacle, center)
+}
+
+/// The row that the force has.
+pub(super) fn felt(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Vector6 {
+    let normal = surfaces.shading_normal(contact).unwrap_or(contact.normal);
+    contact_jacobian(&normal, &contact.point_on_obstacle, center)
+}
+
+impl Known {
+    pub(super) fn of(contact: &Contact, surfaces: &dyn Surfaces, center: &Point3<f64>) -> Self {
+        Self {
+            contact: *contact,
+            jacobian: jacobian(contact, center),
+            felt: felt(contact, surfaces, center),
+            nearer: surfaces.nearer(contact),
+            idle: 0,
+            implied: false,
+        }
+    }
+
+    /// The Jacobian, and how much nearer the pair counts, m.
+    pub(super) fn for_purpose(&self, purpose: Purpose) -> (Vector6, f64) {
+        match purpose {
+            Purpose::Motion => (self.jacobian, 0.0),
+            Purpose::Force => (self.felt, 0.0),
+            Purpose::Room | Purpose::RoomEased => (self.jacobian, self.nearer),
+            Purpose::ForceThen => (self.felt, self.nearer),
+        }
+    }
+}
