@@ -20,6 +20,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 const PHASE: Duration = Duration::from_micros(350);
 /// For the first opening.
 const OPEN_WITHIN: Duration = Duration::from_secs(10);
+
 /// A library under a thread of its own. Dropping it closes the device.
 pub struct Plugin {
     thread: WireThread<ArmState, [f64; 6]>,

@@ -56,7 +56,8 @@ pub struct ConstraintSet {
     /// Most by which a facing pair without a row, of those nearer than `complete_within` and of those found along surfaces that conform, is
     /// violated by a motion that the rows were chosen for, m; zero for a full set. Those motions are the projected ways to the device's pose at the update, and to poses that lie off it by
     /// the activation distance and the device's last path, along and about each axis. The way to a pose that is a metric distance d off one
-    /// of these violates pair k by at most `|J_k| d` more, in the inverse metric: projections bring nothing farther apart.
+    /// of these violates pair k by at most `|J_k| d` more, in the inverse metric: projections bring nothing farther apart. Infinite where one of the
+    /// projections has no certificate.
     pub reduction_error: f64,
     /// The rows made ready for the coupling, see [`ConstraintSet::prepare`].
     pub(crate) prepared: PreparedRows,
@@ -82,6 +83,9 @@ impl ConstraintSet {
     /// Let mu be the multipliers of the full set: its Lagrangian is strongly convex, and the reduced answer costs no more than the full one, so that
     /// `|a' - a|^2 <= 2 k_s e sum(mu)` in the metric, e the error; and the forces are `k_h mu`.
     pub fn force_error_bound(&self, stiffness: f64, normal_forces: f64) -> f64 {
+        if self.reduction_error == f64::INFINITY {
+            return f64::INFINITY; // without contact forces, too: nothing is known of them
+        }
         (2.0 * stiffness * self.reduction_error * normal_forces).sqrt()
     }
 }
@@ -115,4 +119,18 @@ pub fn contact_jacobian(
     reference_point: &Point3<f64>,
 ) -> Vector6 {
     six(normal, &(point - reference_point).cross(normal))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_is_not_known_bounds_no_force() {
+        let mut set = ConstraintSet::with_capacity(0);
+        set.reduction_error = f64::INFINITY;
+        assert_eq!(set.force_error_bound(1000.0, 0.0), f64::INFINITY);
+        set.reduction_error = 1e-6;
+        assert_eq!(set.force_error_bound(1000.0, 0.0), 0.0);
+    }
 }

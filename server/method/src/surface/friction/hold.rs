@@ -102,8 +102,8 @@ impl Friction {
         })
     }
 
-    /// Residual of the last cone problem, relative to a_u: the last sweep's change and what the second projection
-    /// changed. Zero without frictional contact.
+    /// Residual of the last cone problem, relative to a_u: the slip and penetration that are left, and what the second projection changed.
+    /// Zero without frictional contact.
     pub fn residual(&self) -> f64 {
         self.residual
     }
