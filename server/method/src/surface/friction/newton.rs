@@ -1,34 +1,57 @@
-//! The cone problem with contacts that give a little: a semi-smooth Newton iteration in the six unknowns of the correction.
+//! The cone problem with contacts that give a little: a semi-smooth Newton iteration in the six unknowns of the correction, and an augmented
+//! Lagrangian around it, which takes the giving out again.
 //!
 //! | symbol      | name in code | unit       | meaning                                                              |
 //! |-------------|--------------|------------|----------------------------------------------------------------------|
 //! | y           | `y`          | m kg^(1/2) | `L^T (a - a_u)`                                                      |
-//! | lambda      | `Reaction`   | N s^2      | multipliers of one contact at y: `(lambda_0 - r (c + j . y))` on its cone |
-//! | lambda_0    | in the contacts |         | multipliers of full stick, cut to the cones                          |
+//! | lambda_0    | in the contacts | N s^2   | multipliers to start from                                            |
+//! | lambda(y)   | `Reaction`   | N s^2      | multipliers of one contact at y: `(lambda_0 - r (c + j . y))` on its cone |
 //! | r           | `stiffness`  |            | in units of the contact's own                                        |
-//! | G(y)        | `rest`       | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
+//! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
-//! What gives by a share 1/r of what is asked for has one answer, however many contacts there are and in whatever order they come. A contact
-//! whose slip turns back within a step is taken as stuck in the next: from one side of the cone to the other and back the iteration would
-//! go round for ever. Source: Alart and Curnier 1991, in six unknowns.
+//! What gives by a share 1/r of `lambda - lambda_0` has one answer, however many contacts there are and in whatever order they come. Where it is found,
+//! `lambda` becomes `lambda_0` and the contacts are solved again: they give less each time. A stiffness that does it at once leaves the iteration
+//! going round where contacts hardly slip. The first step takes the contacts that lambda_0 loads for the loaded ones, whatever y says: y is of the
+//! sample before, where the hand pressed less or more. A contact whose slip turns back within a step is taken as stuck in the next.
+//! Source: Alart and Curnier 1991, in six unknowns; Simo and Laursen 1992 (augmented Lagrangian of friction).
 
-use nalgebra::Matrix6;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::ConeContact;
+use crate::quasi_statics::lanes::{Lanes8, add_scaled, dot, vector6, widened};
 use crate::spatial::Vector6;
 
-/// Stiffness of the multipliers against slip and penetration, in units of the contact's own, and the most Newton steps with it, half a microsecond
-/// each: what is left of slip and penetration is this much smaller than the correction. With 1e4 a body that sticks on an obstacle that moves creeps
-/// by more than the god-object loop takes for rest. A softer one, whose kinks are wider, is tried where forces do not balance: on a
-/// peg that slides in its hole more often than not, and seldom a third time.
-const STIFFNESSES: [(f64, usize); 3] = [(1e5, 6), (1e3, 12), (1e1, 12)];
+/// Stiffness of the multipliers against slip and penetration, in units of the contact's own, and the most Newton steps with it. Of 2,800 problems of pegs,
+/// plates and shafts ten end without balance; with 1e2 it is a hundred, and with 1e1 contacts that stick need more rounds of the augmented Lagrangian.
+const STIFFNESS: f64 = 5e1;
+const MAX_STEPS: usize = 12;
+/// Most times that the multipliers found become those to start from. It ends before that where what contacts slip and penetrate by giving is felt by
+/// nobody, as a share of the scale, and a small share of their true slip: what sticks would creep by it. Contacts that stick have no true slip,
+/// for them it is as good as none. And it ends where a time no longer halves it.
+const MAX_AUGMENTATIONS: usize = 5;
+const FELT_SHARE: f64 = 1e-3;
+const SHARE_OF_SLIP: f64 = 0.02;
+const NO_SLIP: f64 = 1e-6;
+const LEAST_GAIN: f64 = 0.5;
 /// Forces balance when this share of the scale is left.
-const BALANCE_TOLERANCE: f64 = 1e-8;
+const BALANCE_TOLERANCE: f64 = 1e-6;
+
+/// A linear system for the next y: six rows, and their right sides.
+struct System {
+    rows: [Lanes8; 6],
+    right: Lanes8,
+}
+
+/// The rows of a contact, padded.
+#[derive(Clone, Copy, Debug)]
+struct Rows {
+    normal: Lanes8,
+    tangents: [Lanes8; 2],
+}
 
 /// The multipliers of one contact at some y.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Reaction {
     load: f64,
     /// `lambda_0 - r u` of the tangents, before the disc, and its length.
@@ -40,12 +63,12 @@ struct Reaction {
 
 impl Reaction {
     /// False for NaN.
-    #[inline]
+    #[inline(always)]
     fn sticks(&self) -> bool {
         self.length <= self.limit
     }
 
-    #[inline]
+    #[inline(always)]
     fn grip(&self) -> [f64; 2] {
         if self.sticks() {
             self.wished
@@ -55,74 +78,136 @@ impl Reaction {
             [0.0; 2]
         }
     }
-
-    /// The same contact stuck, whatever its disc.
-    #[inline]
-    fn stuck(&self) -> Self {
-        Self {
-            limit: f64::INFINITY,
-            ..*self
-        }
-    }
 }
 
-impl ConeContact {
-    #[inline]
-    fn reaction(&self, y: &Vector6, stiffness: f64) -> Reaction {
-        let penetration = self.slack + self.normal.dot(y);
-        let load = (self.load - stiffness * self.normal_step * penetration).max(0.0);
-        let slip = self.slip_at(y);
-        let wished = [0, 1].map(|i| self.grip[i] - stiffness * self.tangent_step * slip[i]);
+impl Rows {
+    fn of(contact: &ConeContact) -> Self {
+        Self {
+            normal: widened(&contact.normal),
+            tangents: [0, 1].map(|i| widened(&contact.tangents[i])),
+        }
+    }
+
+    #[inline(always)]
+    fn reaction(&self, contact: &ConeContact, y: &Lanes8, stiffness: f64) -> Reaction {
+        let penetration = contact.slack + dot(&self.normal, y);
+        let load = (contact.load - stiffness * contact.normal_step * penetration).max(0.0);
+        let wished = [0, 1].map(|i| {
+            let slip = contact.slip[i] + dot(&self.tangents[i], y);
+            contact.grip[i] - stiffness * contact.tangent_step * slip
+        });
         Reaction {
             load,
             wished,
             length: (wished[0] * wished[0] + wished[1] * wished[1]).sqrt(),
-            limit: self.coefficient * load,
+            limit: contact.coefficient * load,
         }
     }
 
-    #[inline]
-    fn wrench_of(&self, reaction: &Reaction) -> Vector6 {
+    /// `rest - j lambda`.
+    #[inline(always)]
+    fn pulled(&self, rest: &Lanes8, reaction: &Reaction) -> Lanes8 {
         let grip = reaction.grip();
-        self.normal * reaction.load + self.tangents[0] * grip[0] + self.tangents[1] * grip[1]
+        let rest = add_scaled(rest, &self.normal, -reaction.load);
+        let rest = add_scaled(&rest, &self.tangents[0], -grip[0]);
+        add_scaled(&rest, &self.tangents[1], -grip[1])
     }
 
-    /// Adds `- d(j lambda)/dy` at a reaction.
-    #[inline]
-    fn add_slope(&self, reaction: &Reaction, stiffness: f64, slope: &mut Matrix6<f64>) {
-        if reaction.load <= 0.0 {
-            return;
-        }
-        let normal_rate = stiffness * self.normal_step;
-        let rate = stiffness * self.tangent_step;
-        if self.coefficient <= 0.0 {
-            add_product(slope, &(self.normal * normal_rate), &self.normal);
+    /// Adds `j lambda(y)`, linear about the reaction at `y`, to a system for the next y.
+    #[inline(always)]
+    fn add_to(
+        &self,
+        system: &mut System,
+        contact: &ConeContact,
+        (reaction, y): (&Reaction, &Lanes8),
+        stiffness: f64,
+    ) {
+        let normal_rate = stiffness * contact.normal_step;
+        let rate = stiffness * contact.tangent_step;
+        let load = contact.load - normal_rate * contact.slack;
+        if contact.coefficient <= 0.0 {
+            system.add_product(&self.normal, &self.normal, normal_rate, load);
         } else if reaction.sticks() {
-            add_product(slope, &(self.normal * normal_rate), &self.normal);
-            for tangent in &self.tangents {
-                add_product(slope, &(tangent * rate), tangent);
+            system.add_product(&self.normal, &self.normal, normal_rate, load);
+            for (i, tangent) in self.tangents.iter().enumerate() {
+                let grip = contact.grip[i] - rate * contact.slip[i];
+                system.add_product(tangent, tangent, rate, grip);
             }
         } else {
             // Slipping: the grip follows the load along its direction, and turns across it.
             let [u, v] = reaction.wished.map(|x| x / reaction.length);
-            let along = self.tangents[0] * u + self.tangents[1] * v;
-            let across = self.tangents[1] * u - self.tangents[0] * v;
-            let loaded = (self.normal + along * self.coefficient) * normal_rate;
-            add_product(slope, &loaded, &self.normal);
+            let [first, second] = &self.tangents;
+            let mu = contact.coefficient;
+            let slipping = add_scaled(&self.normal, first, mu * u);
+            let slipping = add_scaled(&slipping, second, mu * v);
+            system.add_product(&slipping, &self.normal, normal_rate, load);
+            let across = add_scaled(&[0.0; 8], second, u);
+            let across = add_scaled(&across, first, -v);
             let turning = rate * reaction.limit / reaction.length;
-            add_product(slope, &(across * turning), &across);
+            system.add_product(&across, &across, turning, turning * dot(&across, y));
         }
     }
 }
 
-/// Adds `a b^T`.
-#[inline]
-fn add_product(sum: &mut Matrix6<f64>, a: &Vector6, b: &Vector6) {
-    for k in 0..6 {
-        let mut column = sum.column_mut(k);
-        for i in 0..6 {
-            column[i] += a[i] * b[k];
+impl System {
+    #[inline(always)]
+    fn identity() -> Self {
+        let mut rows = [[0.0; 8]; 6];
+        for (k, row) in rows.iter_mut().enumerate() {
+            row[k] = 1.0;
         }
+        Self {
+            rows,
+            right: [0.0; 8],
+        }
+    }
+
+    /// Adds `rate a b^T` to the rows, and `a right` to their right sides.
+    #[inline(always)]
+    fn add_product(&mut self, a: &Lanes8, b: &Lanes8, rate: f64, right: f64) {
+        let scaled = b.map(|x| x * rate);
+        for (row, x) in self.rows.iter_mut().zip(a) {
+            *row = add_scaled(row, &scaled, *x);
+        }
+        self.right = add_scaled(&self.right, a, right);
+    }
+
+    /// Gaussian elimination with the largest of each column; `None` for a singular system, and for NaN.
+    #[inline(always)]
+    fn solved(self) -> Option<Lanes8> {
+        let Self {
+            mut rows,
+            mut right,
+        } = self;
+        for k in 0..6 {
+            let mut largest = k;
+            for i in k + 1..6 {
+                if rows[i][k].abs() > rows[largest][k].abs() {
+                    largest = i;
+                }
+            }
+            if largest != k {
+                rows.swap(k, largest);
+                right.swap(k, largest);
+            }
+            let pivot = rows[k];
+            let regular = pivot[k].abs() > 0.0; // false for NaN
+            if !regular {
+                return None;
+            }
+            let inverse = 1.0 / pivot[k];
+            for i in k + 1..6 {
+                let share = rows[i][k] * inverse;
+                rows[i] = add_scaled(&rows[i], &pivot, -share);
+                right[i] -= right[k] * share;
+            }
+        }
+        let mut y = [0.0; 8];
+        for k in (0..6).rev() {
+            let known: f64 = (k + 1..6).map(|i| rows[k][i] * y[i]).sum();
+            y[k] = (right[k] - known) / rows[k][k];
+        }
+        Some(y)
     }
 }
 
@@ -133,6 +218,8 @@ struct Newton<'a> {
     stiffness: f64,
     steps: usize,
     tolerance: f64,
+    /// The contacts that are loaded now are so in the first step.
+    loaded: bool,
 }
 
 impl WithSimd for Newton<'_> {
@@ -142,66 +229,98 @@ impl WithSimd for Newton<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Option<Vector6> {
         let Self {
             problem,
-            start: mut y,
+            start,
             stiffness,
             steps,
             tolerance,
+            loaded,
         } = self;
-        let mut before = [[0.0; 2]; MAX_CONE_CONTACTS];
+        let contacts = &problem.contacts;
+        let zero = Rows {
+            normal: [0.0; 8],
+            tangents: [[0.0; 8]; 2],
+        };
+        let mut rows = [zero; MAX_CONE_CONTACTS];
+        for (rows, contact) in rows.iter_mut().zip(contacts) {
+            *rows = Rows::of(contact);
+        }
+        let none = Reaction {
+            load: 0.0,
+            wished: [0.0; 2],
+            length: 0.0,
+            limit: 0.0,
+        };
+        let mut reactions = [none; MAX_CONE_CONTACTS];
+        let mut y = widened(&start);
         for step in 0..=steps {
-            let (mut rest, mut linear) = (y, y);
-            let mut slope = Matrix6::identity();
-            for (contact, before) in problem.contacts.iter().zip(&mut before) {
-                let reaction = contact.reaction(&y, stiffness);
-                let wished = reaction.wished;
-                let turned = before[0] * wished[0] + before[1] * wished[1] < 0.0;
-                *before = wished;
-                let wrench = contact.wrench_of(&reaction);
-                rest -= wrench;
-                if turned && contact.coefficient > 0.0 && reaction.load > 0.0 {
-                    let stuck = reaction.stuck();
-                    linear -= contact.wrench_of(&stuck);
-                    contact.add_slope(&stuck, stiffness, &mut slope);
-                } else {
-                    linear -= wrench;
-                    contact.add_slope(&reaction, stiffness, &mut slope);
+            let given = loaded && step == 0;
+            let mut rest = y;
+            let all = rows.iter().zip(contacts).zip(&mut reactions);
+            for ((rows, contact), reaction) in all {
+                let before = reaction.wished;
+                *reaction = rows.reaction(contact, &y, stiffness);
+                rest = rows.pulled(&rest, reaction);
+                if before[0] * reaction.wished[0] + before[1] * reaction.wished[1] < 0.0 {
+                    reaction.limit = f64::INFINITY;
+                }
+                if given {
+                    reaction.load = contact.load;
+                    reaction.limit = contact.limit();
                 }
             }
-            if rest.norm() <= tolerance {
-                return Some(y);
+            if !given && dot(&rest, &rest).sqrt() <= tolerance {
+                return Some(vector6(&y));
             }
-            if step < steps {
-                y -= slope.lu().solve(&linear)?;
+            if step == steps {
+                break;
             }
+            let mut system = System::identity();
+            for ((rows, contact), reaction) in rows.iter().zip(contacts).zip(&reactions) {
+                if reaction.load > 0.0 {
+                    rows.add_to(&mut system, contact, (reaction, &y), stiffness);
+                }
+            }
+            y = system.solved()?;
         }
         None
     }
 }
 
 impl ConeProblem {
-    /// Finds the multipliers, from the one of `starts` that is nearest to balance; `scale` is a length in whitened coordinates, > 0.
+    /// Finds the multipliers, from those in the contacts and a correction `start` that is likely; `scale` is a length in whitened coordinates, > 0.
     ///
     /// Returns the slip and penetration that are left, relative to `scale`; `None` where forces do not balance
     /// by then: the multipliers stay as they were.
-    pub(super) fn balance(&mut self, scale: f64, starts: &[Vector6]) -> Option<f64> {
+    pub(super) fn balance(&mut self, scale: f64, start: &Vector6) -> Option<f64> {
         let tolerance = BALANCE_TOLERANCE * scale;
-        for (stiffness, steps) in STIFFNESSES {
-            let rest = |y: &Vector6| self.rest(y, stiffness).norm();
-            let nearest = starts.iter().min_by(|a, b| rest(a).total_cmp(&rest(b)));
-            if let Some(y) = self.newton(*nearest?, stiffness, steps, tolerance) {
-                return Some(self.take_over(&y, stiffness) / scale);
+        let mut y = *start;
+        let mut left: Option<f64> = None;
+        for _ in 0..MAX_AUGMENTATIONS {
+            let loaded = self.contacts.iter().any(|contact| contact.load > 0.0);
+            let Some(next) = self.newton(y, STIFFNESS, MAX_STEPS, tolerance, loaded) else {
+                break;
+            };
+            y = next;
+            let given = self.take_over(&y, STIFFNESS) / scale;
+            let slow = left.is_some_and(|before| given > LEAST_GAIN * before);
+            left = Some(given);
+            let slip = SHARE_OF_SLIP * self.slip(&y) / scale;
+            if slow || given <= slip.clamp(NO_SLIP, FELT_SHARE) {
+                break;
             }
         }
-        None
+        left
     }
 
-    /// Newton steps on G from `y`. `None` where forces do not balance to `tolerance` after the last.
+    /// Newton steps on G from `y`; where it is `loaded`, the contacts that carry load now do so in the first. `None` where forces do not balance to
+    /// `tolerance` after the last.
     pub(super) fn newton(
         &self,
         start: Vector6,
         stiffness: f64,
         steps: usize,
         tolerance: f64,
+        loaded: bool,
     ) -> Option<Vector6> {
         Arch::new().dispatch(Newton {
             problem: self,
@@ -209,14 +328,16 @@ impl ConeProblem {
             stiffness,
             steps,
             tolerance,
+            loaded,
         })
     }
 
     /// The multipliers at `y` become those of the contacts. Returns the most that a contact slips or penetrates there.
     fn take_over(&mut self, y: &Vector6, stiffness: f64) -> f64 {
+        let y = widened(y);
         let mut given: f64 = 0.0;
         for contact in &mut self.contacts {
-            let reaction = contact.reaction(y, stiffness);
+            let reaction = Rows::of(contact).reaction(contact, &y, stiffness);
             let before = contact.wrench();
             contact.load = reaction.load;
             contact.grip = reaction.grip();
@@ -225,10 +346,13 @@ impl ConeProblem {
         given / stiffness
     }
 
-    /// G(y).
-    fn rest(&self, y: &Vector6, stiffness: f64) -> Vector6 {
-        self.contacts.iter().fold(*y, |rest, contact| {
-            rest - contact.wrench_of(&contact.reaction(y, stiffness))
-        })
+    /// Largest slip of a loaded contact at `y`, as a length in whitened coordinates.
+    fn slip(&self, y: &Vector6) -> f64 {
+        let loaded = |c: &&ConeContact| c.load > 0.0 && c.coefficient > 0.0;
+        let slips = self.contacts.iter().filter(loaded).map(|contact| {
+            let [u, v] = contact.slip_at(y);
+            (u * u + v * v) * contact.tangent_step
+        });
+        slips.fold(0.0, f64::max).sqrt()
     }
 }
