@@ -16,7 +16,7 @@ use crate::spatial::Vector6;
 
 /// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else; and each costs in
 /// every step.
-pub(super) const MAX_CONE_CONTACTS: usize = 12;
+pub(super) const MAX_CONE_CONTACTS: usize = 8;
 /// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
 const LEAST_NORM_REGULARISATION: f64 = 1e-11;
 /// Share of full stick's correction that the cones may cut before it is relaxed: rounding.

@@ -6,7 +6,7 @@
 //! | y           | `y`          | m kg^(1/2) | `L^T (a - a_u)`                                                      |
 //! | lambda_0    | in the contacts | N s^2   | multipliers to start from                                            |
 //! | lambda(y)   | `Reaction`   | N s^2      | multipliers of one contact at y: `(lambda_0 - r (c + j . y))` on its cone |
-//! | r           | `stiffness`  |            | in units of the contact's own                                        |
+//! | r           | `STIFFNESS`  |            | in units of the contact's own                                        |
 //! | G(y)        |              | m kg^(1/2) | `y - sum j lambda(y)`: zero where forces balance                     |
 //!
 //! What gives by a share 1/r of `lambda - lambda_0` has one answer, however many contacts there are and in whatever order they come. Where it is found,
@@ -19,7 +19,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::ConeContact;
-use crate::quasi_statics::lanes::{Lanes8, add_scaled, dot, vector6, widened};
+use crate::quasi_statics::lanes::{Lanes8, add_scaled, dot, widened};
 use crate::spatial::Vector6;
 
 /// Stiffness of the multipliers against slip and penetration, in units of the contact's own, and the most Newton steps with it. Of 2,800 problems of pegs,
@@ -62,6 +62,13 @@ struct Reaction {
 }
 
 impl Reaction {
+    const NONE: Self = Self {
+        load: 0.0,
+        wished: [0.0; 2],
+        length: 0.0,
+        limit: 0.0,
+    };
+
     /// False for NaN.
     #[inline(always)]
     fn sticks(&self) -> bool {
@@ -73,7 +80,8 @@ impl Reaction {
         if self.sticks() {
             self.wished
         } else if self.length > 0.0 {
-            self.wished.map(|x| x * (self.limit / self.length))
+            let share = self.limit / self.length;
+            [self.wished[0] * share, self.wished[1] * share]
         } else {
             [0.0; 2]
         }
@@ -81,6 +89,12 @@ impl Reaction {
 }
 
 impl Rows {
+    const NONE: Self = Self {
+        normal: [0.0; 8],
+        tangents: [[0.0; 8]; 2],
+    };
+
+    #[inline(always)]
     fn of(contact: &ConeContact) -> Self {
         Self {
             normal: widened(&contact.normal),
@@ -88,14 +102,26 @@ impl Rows {
         }
     }
 
+    /// Tangential displacement since the contact stuck, m.
     #[inline(always)]
-    fn reaction(&self, contact: &ConeContact, y: &Lanes8, stiffness: f64) -> Reaction {
+    fn slip(&self, contact: &ConeContact, y: &Lanes8) -> [f64; 2] {
+        let [first, second] = &self.tangents;
+        [
+            contact.slip[0] + dot(first, y),
+            contact.slip[1] + dot(second, y),
+        ]
+    }
+
+    #[inline(always)]
+    fn reaction(&self, contact: &ConeContact, y: &Lanes8) -> Reaction {
         let penetration = contact.slack + dot(&self.normal, y);
-        let load = (contact.load - stiffness * contact.normal_step * penetration).max(0.0);
-        let wished = [0, 1].map(|i| {
-            let slip = contact.slip[i] + dot(&self.tangents[i], y);
-            contact.grip[i] - stiffness * contact.tangent_step * slip
-        });
+        let load = (contact.load - STIFFNESS * contact.normal_step * penetration).max(0.0);
+        let slip = self.slip(contact, y);
+        let rate = STIFFNESS * contact.tangent_step;
+        let wished = [
+            contact.grip[0] - rate * slip[0],
+            contact.grip[1] - rate * slip[1],
+        ];
         Reaction {
             load,
             wished,
@@ -120,10 +146,9 @@ impl Rows {
         system: &mut System,
         contact: &ConeContact,
         (reaction, y): (&Reaction, &Lanes8),
-        stiffness: f64,
     ) {
-        let normal_rate = stiffness * contact.normal_step;
-        let rate = stiffness * contact.tangent_step;
+        let normal_rate = STIFFNESS * contact.normal_step;
+        let rate = STIFFNESS * contact.tangent_step;
         let load = contact.load - normal_rate * contact.slack;
         if contact.coefficient <= 0.0 {
             system.add_product(&self.normal, &self.normal, normal_rate, load);
@@ -135,14 +160,16 @@ impl Rows {
             }
         } else {
             // Slipping: the grip follows the load along its direction, and turns across it.
-            let [u, v] = reaction.wished.map(|x| x / reaction.length);
+            let [u, v] = [
+                reaction.wished[0] / reaction.length,
+                reaction.wished[1] / reaction.length,
+            ];
             let [first, second] = &self.tangents;
             let mu = contact.coefficient;
             let slipping = add_scaled(&self.normal, first, mu * u);
             let slipping = add_scaled(&slipping, second, mu * v);
             system.add_product(&slipping, &self.normal, normal_rate, load);
-            let across = add_scaled(&[0.0; 8], second, u);
-            let across = add_scaled(&across, first, -v);
+            let across = add_scaled(&scaled(second, u), first, -v);
             let turning = rate * reaction.limit / reaction.length;
             system.add_product(&across, &across, turning, turning * dot(&across, y));
         }
@@ -165,9 +192,9 @@ impl System {
     /// Adds `rate a b^T` to the rows, and `a right` to their right sides.
     #[inline(always)]
     fn add_product(&mut self, a: &Lanes8, b: &Lanes8, rate: f64, right: f64) {
-        let scaled = b.map(|x| x * rate);
+        let b = scaled(b, rate);
         for (row, x) in self.rows.iter_mut().zip(a) {
-            *row = add_scaled(row, &scaled, *x);
+            *row = add_scaled(row, &b, *x);
         }
         self.right = add_scaled(&self.right, a, right);
     }
@@ -211,79 +238,110 @@ impl System {
     }
 }
 
-/// Newton steps, with the vectors that the processor has.
-struct Newton<'a> {
-    problem: &'a ConeProblem,
-    start: Vector6,
-    stiffness: f64,
-    steps: usize,
-    tolerance: f64,
-    /// The contacts that are loaded now are so in the first step.
-    loaded: bool,
+#[inline(always)]
+fn scaled(a: &Lanes8, by: f64) -> Lanes8 {
+    let mut product = *a;
+    for x in &mut product {
+        *x *= by;
+    }
+    product
 }
 
-impl WithSimd for Newton<'_> {
-    type Output = Option<Vector6>;
+/// The search for balance, with the vectors that the processor has.
+struct Balance<'a> {
+    problem: &'a mut ConeProblem,
+    start: &'a Vector6,
+    scale: f64,
+}
+
+impl WithSimd for Balance<'_> {
+    type Output = Option<f64>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Option<Vector6> {
-        let Self {
-            problem,
-            start,
-            stiffness,
-            steps,
-            tolerance,
-            loaded,
-        } = self;
-        let contacts = &problem.contacts;
-        let zero = Rows {
-            normal: [0.0; 8],
-            tangents: [[0.0; 8]; 2],
-        };
-        let mut rows = [zero; MAX_CONE_CONTACTS];
-        for (rows, contact) in rows.iter_mut().zip(contacts) {
+    fn with_simd<S: Simd>(self, _: S) -> Option<f64> {
+        let contacts = &mut self.problem.contacts;
+        let mut rows = [Rows::NONE; MAX_CONE_CONTACTS];
+        for (rows, contact) in rows.iter_mut().zip(contacts.iter()) {
             *rows = Rows::of(contact);
         }
-        let none = Reaction {
-            load: 0.0,
-            wished: [0.0; 2],
-            length: 0.0,
-            limit: 0.0,
-        };
-        let mut reactions = [none; MAX_CONE_CONTACTS];
-        let mut y = widened(&start);
-        for step in 0..=steps {
-            let given = loaded && step == 0;
-            let mut rest = y;
-            let all = rows.iter().zip(contacts).zip(&mut reactions);
-            for ((rows, contact), reaction) in all {
-                let before = reaction.wished;
-                *reaction = rows.reaction(contact, &y, stiffness);
-                rest = rows.pulled(&rest, reaction);
-                if before[0] * reaction.wished[0] + before[1] * reaction.wished[1] < 0.0 {
-                    reaction.limit = f64::INFINITY;
+        let tolerance = BALANCE_TOLERANCE * self.scale;
+        let mut y = widened(self.start);
+        let mut left: Option<f64> = None;
+        for _ in 0..MAX_AUGMENTATIONS {
+            let Some((next, reactions)) = newton(&rows, contacts, &y, tolerance) else {
+                break;
+            };
+            y = next;
+            let (mut given, mut slip) = (0.0_f64, 0.0_f64);
+            for ((rows, contact), reaction) in rows.iter().zip(&mut *contacts).zip(&reactions) {
+                let grip = reaction.grip();
+                let change = scaled(&rows.normal, reaction.load - contact.load);
+                let change = add_scaled(&change, &rows.tangents[0], grip[0] - contact.grip[0]);
+                let change = add_scaled(&change, &rows.tangents[1], grip[1] - contact.grip[1]);
+                given = given.max(dot(&change, &change));
+                if reaction.load > 0.0 && contact.coefficient > 0.0 {
+                    let [u, v] = rows.slip(contact, &y);
+                    slip = slip.max((u * u + v * v) * contact.tangent_step);
                 }
-                if given {
-                    reaction.load = contact.load;
-                    reaction.limit = contact.limit();
-                }
+                contact.load = reaction.load;
+                contact.grip = grip;
             }
-            if !given && dot(&rest, &rest).sqrt() <= tolerance {
-                return Some(vector6(&y));
-            }
-            if step == steps {
+            let given = given.sqrt() / (STIFFNESS * self.scale);
+            let slow = left.is_some_and(|before| given > LEAST_GAIN * before);
+            left = Some(given);
+            let slip = SHARE_OF_SLIP * slip.sqrt() / self.scale;
+            if slow || given <= slip.clamp(NO_SLIP, FELT_SHARE) {
                 break;
             }
-            let mut system = System::identity();
-            for ((rows, contact), reaction) in rows.iter().zip(contacts).zip(&reactions) {
-                if reaction.load > 0.0 {
-                    rows.add_to(&mut system, contact, (reaction, &y), stiffness);
-                }
-            }
-            y = system.solved()?;
         }
-        None
+        left
     }
+}
+
+/// Newton steps on G from `start`; the contacts that carry load now do so in the first. Where forces balance, and the multipliers there; `None` where they
+/// do not to `tolerance` after the last.
+#[inline(always)]
+fn newton(
+    rows: &[Rows; MAX_CONE_CONTACTS],
+    contacts: &[ConeContact],
+    start: &Lanes8,
+    tolerance: f64,
+) -> Option<(Lanes8, [Reaction; MAX_CONE_CONTACTS])> {
+    let loaded = contacts.iter().any(|contact| contact.load > 0.0);
+    let mut reactions = [Reaction::NONE; MAX_CONE_CONTACTS];
+    let mut y = *start;
+    for step in 0..=MAX_STEPS {
+        let given = loaded && step == 0;
+        let before = reactions;
+        let mut rest = y;
+        for ((rows, contact), reaction) in rows.iter().zip(contacts).zip(&mut reactions) {
+            *reaction = rows.reaction(contact, &y);
+            rest = rows.pulled(&rest, reaction);
+        }
+        if !given && dot(&rest, &rest).sqrt() <= tolerance {
+            return Some((y, reactions));
+        }
+        if step == MAX_STEPS {
+            break;
+        }
+        let mut system = System::identity();
+        let all = rows.iter().zip(contacts).zip(reactions.iter().zip(&before));
+        for ((rows, contact), (reaction, before)) in all {
+            let mut linear = *reaction;
+            if before.wished[0] * linear.wished[0] + before.wished[1] * linear.wished[1] < 0.0 {
+                linear.limit = f64::INFINITY;
+            }
+            if given {
+                linear.load = contact.load;
+                linear.limit = contact.limit();
+            }
+            if linear.load > 0.0 {
+                rows.add_to(&mut system, contact, (&linear, &y));
+            }
+        }
+        y = system.solved()?;
+    }
+    None
 }
 
 impl ConeProblem {
@@ -292,67 +350,10 @@ impl ConeProblem {
     /// Returns the slip and penetration that are left, relative to `scale`; `None` where forces do not balance
     /// by then: the multipliers stay as they were.
     pub(super) fn balance(&mut self, scale: f64, start: &Vector6) -> Option<f64> {
-        let tolerance = BALANCE_TOLERANCE * scale;
-        let mut y = *start;
-        let mut left: Option<f64> = None;
-        for _ in 0..MAX_AUGMENTATIONS {
-            let loaded = self.contacts.iter().any(|contact| contact.load > 0.0);
-            let Some(next) = self.newton(y, STIFFNESS, MAX_STEPS, tolerance, loaded) else {
-                break;
-            };
-            y = next;
-            let given = self.take_over(&y, STIFFNESS) / scale;
-            let slow = left.is_some_and(|before| given > LEAST_GAIN * before);
-            left = Some(given);
-            let slip = SHARE_OF_SLIP * self.slip(&y) / scale;
-            if slow || given <= slip.clamp(NO_SLIP, FELT_SHARE) {
-                break;
-            }
-        }
-        left
-    }
-
-    /// Newton steps on G from `y`; where it is `loaded`, the contacts that carry load now do so in the first. `None` where forces do not balance to
-    /// `tolerance` after the last.
-    pub(super) fn newton(
-        &self,
-        start: Vector6,
-        stiffness: f64,
-        steps: usize,
-        tolerance: f64,
-        loaded: bool,
-    ) -> Option<Vector6> {
-        Arch::new().dispatch(Newton {
+        Arch::new().dispatch(Balance {
             problem: self,
             start,
-            stiffness,
-            steps,
-            tolerance,
-            loaded,
+            scale,
         })
-    }
-
-    /// The multipliers at `y` become those of the contacts. Returns the most that a contact slips or penetrates there.
-    fn take_over(&mut self, y: &Vector6, stiffness: f64) -> f64 {
-        let y = widened(y);
-        let mut given: f64 = 0.0;
-        for contact in &mut self.contacts {
-            let reaction = Rows::of(contact).reaction(contact, &y, stiffness);
-            let before = contact.wrench();
-            contact.load = reaction.load;
-            contact.grip = reaction.grip();
-            given = given.max((contact.wrench() - before).norm());
-        }
-        given / stiffness
-    }
-
-    /// Largest slip of a loaded contact at `y`, as a length in whitened coordinates.
-    fn slip(&self, y: &Vector6) -> f64 {
-        let loaded = |c: &&ConeContact| c.load > 0.0 && c.coefficient > 0.0;
-        let slips = self.contacts.iter().filter(loaded).map(|contact| {
-            let [u, v] = contact.slip_at(y);
-            (u * u + v * v) * contact.tangent_step
-        });
-        slips.fold(0.0, f64::max).sqrt()
     }
 }
