@@ -11,7 +11,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::descent::{AT_ONCE, Opened, open};
+use super::descent::open;
 use super::displacements::Motions;
 use super::facing_volumes::FacingVolumes;
 use super::turned::TurnedNodes;
@@ -173,38 +173,27 @@ where
         let (body, obstacle) = trees;
         bands.clear();
         let mut room = bands.push(0, (ROOT, ROOT));
-        let mut opened = [Opened::NONE; AT_ONCE];
         let mut band = 0;
         while band < SIGNED_BANDS {
-            let mut count = 0;
-            while count < AT_ONCE
-                && let Some((a, b)) = bands.pop(band)
-            {
-                if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b))
-                {
-                    work.triangle_pairs += 1;
-                    if !visit(t, s, work) {
-                        return Some(band);
-                    }
-                    continue;
-                }
-                work.node_pairs += 1;
-                opened[count] = open(trees, volumes, turned, (a, b));
-                count += 1;
-            }
-            if count == 0 {
+            let Some((a, b)) = bands.pop(band) else {
                 band += 1;
                 continue;
+            };
+            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+                work.triangle_pairs += 1;
+                if !visit(t, s, work) {
+                    return Some(band);
+                }
+                continue;
             }
-            for pair in &opened[..count] {
-                pair.for_each(|(a, b), beyond| {
-                    if wanted(body.owned(a), obstacle.owned(b))
-                        && let Some(own) = band_of_pair((a, b), beyond)
-                    {
-                        room &= bands.push(own.max(band), (a, b));
-                    }
-                });
-            }
+            work.node_pairs += 1;
+            open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
+                if wanted(body.owned(a), obstacle.owned(b))
+                    && let Some(own) = band_of_pair((a, b), beyond)
+                {
+                    room &= bands.push(own.max(band), (a, b));
+                }
+            });
             if !room {
                 return Some(band);
             }
