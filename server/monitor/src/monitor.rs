@@ -29,8 +29,8 @@ const PICTURE_PERIOD: Duration = Duration::from_nanos(1_000_000_000 / 30);
 /// The plots are sent with every sixth picture: fewer, larger messages, which the viewer takes in faster.
 const PICTURES_PER_PLOT: u32 = 6;
 
-/// Most bytes on their way inside rerun: a second or two, so that a machine too busy to encode loses pictures and not the present. A larger mesh passes alone.
-const BYTES_IN_FLIGHT: u64 = 1024 * 1024;
+/// Most bytes on their way inside rerun: half a second, so that a machine too busy to encode loses pictures and not the present. A larger mesh passes alone.
+const BYTES_IN_FLIGHT: u64 = 128 * 1024;
 
 /// A running monitor. Dropping it stops it as [`Monitor::stop`] does.
 #[derive(Debug)]
