@@ -40,7 +40,10 @@ fn served_until(keys: &str, enough: impl Fn(f32) -> bool) -> serde_json::Value {
             break rest.split(' ').next().unwrap_or(rest).to_owned();
         }
     };
-    let rest = std::thread::spawn(move || lines.map_while(Result::ok).collect::<Vec<_>>());
+    let rest = std::thread::Builder::new()
+        .name("errors".to_owned())
+        .spawn(move || lines.map_while(Result::ok).collect::<Vec<_>>())
+        .expect("a thread");
     let key = read_key_file(&place.path("cluster.key")).expect("a key");
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     let options = ClientOptions::new(address, key, Role::Operator, "witness");
