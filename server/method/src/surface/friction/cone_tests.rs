@@ -11,8 +11,12 @@ use crate::spatial::{Vector6, six};
 
 /// Sweeps of the oracle: as many as it takes, for two contacts or three.
 const ORACLE_SWEEPS: usize = 200_000;
-/// Residual of an answer that stiff steps have found.
+/// Residual of an answer that the iteration has found.
 const BALANCED: f64 = 1e-3;
+/// Contacts that hold the body badly turn slip and penetration into a motion so many times as large: 26 times in the worst of 30,000 draws. And a residual
+/// that counts as none.
+const AMPLIFIED: f64 = 100.0;
+const NO_RESIDUAL: f64 = 1e-6;
 
 /// Contacts of a body of 1 kg and 1 kg m^2 about every axis, with a point and a normal each; a_u presses and turns, sticking since zero.
 fn problem(
@@ -133,7 +137,7 @@ proptest! {
         let balanced = answer.residual <= BALANCED;
         if balanced && let Some(expected) = oracle(problem) {
             let error = (answer.correction - expected).norm() / scale;
-            prop_assert!(error <= 10.0 * BALANCED, "{error} {}", answer.residual);
+            prop_assert!(error <= AMPLIFIED * answer.residual.max(NO_RESIDUAL), "{error} {}", answer.residual);
         }
     }
 
@@ -145,10 +149,10 @@ proptest! {
         let (_, one) = solved(&problem(0.2, &wished, &contacts), Vector6::zeros(), scale);
         let turned: Vec<_> = contacts.iter().rev().copied().collect();
         let (_, other) = solved(&problem(0.2, &wished, &turned), Vector6::from(start), scale);
-        let balanced = one.residual.max(other.residual) <= 0.1 * BALANCED;
-        if balanced {
+        let residual = one.residual.max(other.residual);
+        if residual <= BALANCED {
             let difference = (one.correction - other.correction).norm() / scale;
-            prop_assert!(difference <= BALANCED, "{difference}");
+            prop_assert!(difference <= AMPLIFIED * residual.max(NO_RESIDUAL), "{difference} {residual}");
         }
     }
 
