@@ -340,6 +340,47 @@ fn swaps_are_compared_when_all_have_told() {
 }
 
 #[test]
+fn the_light_of_screens_is_compared_beside_their_calls() {
+    let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
+    let shown = released(&master);
+    let now = last + 20 * MS;
+    let told = |call, light| Arrive {
+        swapped_frame: shown,
+        swapped_ns: last + call,
+        lit_frame: shown,
+        lit_ns: light,
+        ..arrived(shown + 1)
+    };
+    let _ = master.arrive(now, 1, &told(70_000, last + 9 * MS));
+    assert_eq!(master.take_light(), None, "one has not told");
+    let _ = master.arrive(now, 2, &told(90_000, last + 12 * MS));
+    let lit = master.take_light().expect("both have told");
+    assert_eq!((lit.frame, lit.skew_ns), (shown, 3 * MS));
+    release_when_due(&mut master);
+    let newest = master.newest().expect("released");
+    assert_eq!(newest.skew_ns, 20_000, "that of the calls");
+
+    // A node that knows no light keeps nobody's skew of calls back, and makes none of light.
+    let shown = released(&master);
+    let now = now + 50 * MS;
+    for (session, call) in [(1, 10_000), (2, 30_000)] {
+        let told = Arrive {
+            swapped_frame: shown,
+            swapped_ns: now + call,
+            lit_frame: if session == 1 { shown } else { 0 },
+            lit_ns: now + MS,
+            ..arrived(shown + 1)
+        };
+        let skew = master.arrive(now, session, &told).1;
+        assert_eq!(
+            skew.map(|skew| skew.skew_ns),
+            (session == 2).then_some(20_000)
+        );
+    }
+    assert_eq!(master.take_light(), None);
+}
+
+#[test]
 fn a_wrong_picture_is_counted() {
     let (mut master, last) = in_step(Swap::Immediate, &[1]);
     let before = master.counts();

@@ -5,6 +5,7 @@
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 mod display;
+mod light;
 pub(crate) mod still;
 
 use std::time::{Duration, Instant};
@@ -25,7 +26,7 @@ use crate::headless::shown;
 use crate::hud::Overlay;
 use crate::mouse::{Mouse, Pointed};
 use crate::pacing::Pacer;
-use crate::renderer::{Gpu, GpuChoice};
+use crate::renderer::GpuChoice;
 use crate::session::{Session, Turn};
 use crate::stage::Stage;
 use crate::statistics::{Ended, Statistics};
@@ -85,10 +86,10 @@ pub(crate) fn run(
         result: None,
     };
     events.run_app(&mut app).map_err(no_display)?;
-    let gpu = app.screen.as_ref().map(|screen| &screen.gpu);
+    let screen = app.screen.as_ref();
     let drawn_with = DrawnWith {
-        adapter: gpu.map_or_else(String::new, |gpu| gpu.summary().to_string()),
-        present_timing: gpu.map_or("no window", Gpu::present_timing).to_owned(),
+        adapter: screen.map_or_else(String::new, |screen| screen.gpu.summary().to_string()),
+        present_timing: screen.map_or_else(|| "no window".to_owned(), Display::present_timing),
     };
     match app.result {
         Some(Ok(ended)) => Ok((ended, drawn_with)),
@@ -250,6 +251,25 @@ impl App<'_> {
         Ok(())
     }
 
+    /// What the window system has told of the light of earlier frames.
+    fn take_light(&mut self) {
+        let Some(light) = self
+            .screen
+            .as_mut()
+            .and_then(|screen| screen.light.as_mut())
+        else {
+            return;
+        };
+        while let Some(lit) = light.take() {
+            self.statistics
+                .light(lit.lit.saturating_duration_since(lit.called));
+            if let (Some(frame), Some(pacer)) = (lit.frame, &mut self.pacer) {
+                pacer.lit(frame, lit.lit);
+            }
+        }
+        self.statistics.never_lit = light.discarded();
+    }
+
     /// Draws a frame if one is due; says if this was the last.
     fn tick(&mut self, events: &ActiveEventLoop) -> Result<Option<Ended>, RenderError> {
         if self.session.interrupted() {
@@ -276,6 +296,7 @@ impl App<'_> {
         {
             return Ok(Some(Ended::Duration));
         }
+        self.take_light();
         if let Some(stats) = self.statistics.report(false) {
             self.session.report(stats);
         }
@@ -312,6 +333,7 @@ impl App<'_> {
             gpu,
             renderer,
             panes,
+            light,
         } = screen;
         renderer.set_state(gpu, &self.stage, &latched, self.show);
         let status = pacer.complete(self.statistics.status(&self.plan.node, health));
@@ -328,7 +350,7 @@ impl App<'_> {
         self.god_object = latched.state.god_object;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut textures = Vec::with_capacity(panes.len());
-        for pane in panes.iter() {
+        for (place, pane) in panes.iter().enumerate() {
             let Some(texture) = pane.texture(gpu)? else {
                 continue;
             };
@@ -338,7 +360,7 @@ impl App<'_> {
             });
             let screen = &self.stage.screens[pane.screen].screen;
             renderer.draw(gpu, &mut encoder, screen, &eyes, &pane.target, &view);
-            textures.push((pane, texture));
+            textures.push((place, pane, texture));
         }
         if textures.is_empty() && !locked {
             return Ok(None); // all windows are hidden
@@ -349,7 +371,10 @@ impl App<'_> {
             gpu.finish()?;
             pacer.wait();
         }
-        for (pane, texture) in textures {
+        if let Some(light) = light {
+            light.follow(pacer.frame(), textures.iter().map(|(place, ..)| *place));
+        }
+        for (_, pane, texture) in textures {
             pane.window.pre_present_notify();
             gpu.queue.present(texture);
         }

@@ -593,6 +593,76 @@ fn the_program_draws_in_windows_where_there_is_a_display() {
     server.stop();
 }
 
+/// A Wayland compositor without a screen, until it is dropped.
+struct Compositor {
+    server: std::process::Child,
+    folder: tempfile::TempDir,
+}
+
+impl Compositor {
+    /// `None` where weston is not installed.
+    fn start() -> Option<Self> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let server = Command::new("weston")
+            .args([
+                "--backend=headless-backend.so",
+                "--socket=light",
+                "--no-config",
+            ])
+            .args(["--width=800", "--height=600", "--idle-time=0"])
+            .env("XDG_RUNTIME_DIR", folder.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .ok()?;
+        let compositor = Self { server, folder };
+        let socket = compositor.folder.path().join("light");
+        wait_for("the compositor's socket", || socket.exists());
+        Some(compositor)
+    }
+}
+
+impl Drop for Compositor {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_compositor_tells_when_the_pictures_of_a_node_lit_up() {
+    let Some(compositor) = Compositor::start() else {
+        taut_test_kit::left_out("no weston");
+        return;
+    };
+    if !can_draw() {
+        return;
+    }
+    let server = Server::start();
+    for (node, frames) in [("both", "12"), ("pair", "12")] {
+        let mut command = program(&server, node, &["--frames", frames, "--width", "200"]);
+        command
+            .env_remove("DISPLAY")
+            .env("XDG_RUNTIME_DIR", compositor.folder.path())
+            .env("WAYLAND_DISPLAY", "light");
+        let output = command.output().expect("runs");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{text}");
+        let said = String::from_utf8_lossy(&output.stdout);
+        // weston's headless backend ticks by a timer, and says so.
+        for part in [
+            "told by the compositor (clock Monotonic",
+            "timer",
+            "; light ",
+        ] {
+            assert!(said.contains(part), "{part} in {said}");
+        }
+    }
+    server.stop();
+}
+
 #[test]
 fn without_a_display_the_program_says_so_and_names_the_way_out() {
     let server = Server::start();

@@ -8,6 +8,7 @@ use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::Plan;
+use super::light::Light;
 use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor;
@@ -21,6 +22,8 @@ pub(super) struct Display {
     pub(super) gpu: Gpu,
     pub(super) renderer: Renderer,
     pub(super) panes: Vec<Pane>,
+    /// Where the window system tells when pictures lit up.
+    pub(super) light: Option<Light>,
 }
 
 /// One window.
@@ -117,11 +120,24 @@ impl Display {
         let renderer = renderer.ok_or_else(|| RenderError::BadScene {
             what: "this node draws no screen".to_owned(),
         })?;
+        let windows = panes.iter().map(|pane| Arc::clone(&pane.window)).collect();
         Ok(Self {
             gpu,
             renderer,
             panes,
+            light: Light::of(events.owned_display_handle(), windows),
         })
+    }
+
+    /// What can be known of the time at which pictures light up.
+    pub(super) fn present_timing(&self) -> String {
+        match &self.light {
+            Some(light) => light.described(),
+            None => format!(
+                "not known: no wp_presentation here, and VK_GOOGLE_display_timing is {}",
+                self.gpu.present_timing()
+            ),
+        }
     }
 
     /// Draws another stage in the same windows.

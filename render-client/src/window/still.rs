@@ -123,6 +123,7 @@ impl Still {
             gpu,
             renderer,
             panes,
+            ..
         }) = &self.display
         else {
             return Ok(());
