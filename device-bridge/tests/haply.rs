@@ -89,6 +89,31 @@ fn a_wall_is_felt_through_the_wire_and_again_after_every_outage() {
     wait_until("a force stayed", || service.totals().force == 0.0);
 }
 
+#[test]
+fn who_comes_after_a_pause_finds_the_hand_where_it_began_and_an_outage_moves_nothing() {
+    let mut service = simulated(true);
+    let height = |service: &SimulatedInverse| service.true_pose().translation.vector.z;
+    let _ = service.inventory(ms(0), 1);
+    let begin = height(&service);
+    let low = |service: &mut SimulatedInverse, from: u64| {
+        (1..=30).for_each(|step| service.advance(ms(from + 100 * step)));
+        height(service) < begin - 0.04
+    };
+    assert!(low(&mut service, 0), "it goes down in three seconds");
+    service.leave(ms(3000), 1);
+    let _ = service.inventory(ms(3200), 2);
+    assert!(height(&service) < begin - 0.04, "the same program again");
+    let _ = service.inventory(ms(3300), 3);
+    service.leave(ms(3400), 2);
+    let _ = service.inventory(ms(4900), 4);
+    assert!(height(&service) != begin, "another was there all the time");
+    service.leave(ms(5000), 3);
+    service.leave(ms(5000), 4);
+    let _ = service.inventory(ms(6100), 5);
+    assert_eq!(height(&service), begin);
+    assert!(low(&mut service, 6100), "it goes down for the next one");
+}
+
 /// A service that is ended by the end of its test.
 struct Played(Child);
 
@@ -426,7 +451,7 @@ fn no_wrong_pose_is_believed_of_damaged_answers() {
     assert!(damaged > 4000, "{damaged}");
 }
 
-/// `cargo test --release -p taut-bridge --test haply -- --ignored --nocapture`
+/// `cargo test --release -p taut-bridge --test all haply:: -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn no_wrong_pose_is_believed_of_ten_million_answers() {

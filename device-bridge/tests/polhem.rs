@@ -155,7 +155,7 @@ fn no_wrong_pose_is_believed_of_damaged_lines() {
     assert!(damaged > 5000, "{damaged}");
 }
 
-/// `cargo test --release -p taut-bridge --test polhem -- --ignored --nocapture`
+/// `cargo test --release -p taut-bridge --test all polhem:: -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn no_wrong_pose_is_believed_of_ten_million_lines() {

@@ -272,7 +272,7 @@ fn no_wrong_length_is_believed_of_damaged_answers() {
     assert!(damaged > 5000, "{damaged}");
 }
 
-/// `cargo test --release -p taut-bridge --test spidar_uart -- --ignored --nocapture`
+/// `cargo test --release -p taut-bridge --test all spidar_uart:: -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn no_wrong_length_is_believed_of_ten_million_answers() {

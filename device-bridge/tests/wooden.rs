@@ -173,7 +173,7 @@ fn no_wrong_pose_is_believed_of_damaged_reports() {
     assert!(damaged > 5000, "{damaged}");
 }
 
-/// `cargo test --release -p taut-bridge --test wooden -- --ignored --nocapture`
+/// `cargo test --release -p taut-bridge --test all wooden:: -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn no_wrong_pose_is_believed_of_ten_million_reports() {

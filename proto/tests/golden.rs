@@ -61,7 +61,7 @@ fn made() -> Vec<(String, String)> {
     lines
 }
 
-/// After a meant change of layout, with the version raised: `cargo test -p taut-proto --test golden -- --ignored`.
+/// After a meant change of layout, with the version raised: `cargo test -p taut-proto --test all golden:: -- --ignored`.
 #[test]
 #[ignore = "writes the golden file"]
 fn write_the_golden_file() {

@@ -1,9 +1,12 @@
 //! The cluster key, what is derived from it, credentials as files, and what proofs are bound to.
 
+use std::mem::MaybeUninit;
+
 use proptest::prelude::*;
 use taut_proto::{
     ClusterKey, Credential, Holder, JoinKey, Role, ServerPin,
     credential::{CredentialError, NotAllowed},
+    group::{GROUP_SECRET_BYTES, GroupSecret},
     key::KeyError,
     proof::{Claim, Grant},
 };
@@ -28,6 +31,36 @@ fn a_key_survives_its_file() {
         Ok(key.clone())
     );
     assert_eq!(ClusterKey::parse(&key.to_hex().to_uppercase()), Ok(key));
+}
+
+/// What the place of a secret holds before and after it was dropped there.
+fn around_its_end<Secret>(secret: Secret) -> [Vec<u8>; 2] {
+    let mut place = Box::new(MaybeUninit::new(secret));
+    #[allow(
+        unsafe_code,
+        reason = "what is left of a value can be seen in no other way"
+    )]
+    // SAFETY: the secrets are 32 bytes without padding, and all of them are initialised; `place` outlives the value, and nobody uses it after its end.
+    unsafe {
+        let bytes = std::slice::from_raw_parts(place.as_ptr().cast::<u8>(), size_of::<Secret>());
+        let before = bytes.to_vec();
+        std::ptr::drop_in_place(place.as_mut_ptr());
+        let bytes = std::slice::from_raw_parts(place.as_ptr().cast::<u8>(), size_of::<Secret>());
+        [before, bytes.to_vec()]
+    }
+}
+
+#[test]
+fn secrets_are_wiped_when_they_are_let_go_of() {
+    let join = key('7').join_secret(Role::Render, "front", Grant::Node { issue: 1 });
+    for [before, after] in [
+        around_its_end(key('7')),
+        around_its_end(join),
+        around_its_end(GroupSecret([7; GROUP_SECRET_BYTES])),
+    ] {
+        assert_ne!(before, [0; 32]);
+        assert_eq!(after, [0; 32]);
+    }
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn parts() -> (&'static str, &'static str, &'static str) {
     (before, table, after)
 }
 
-/// After a change of a range: `cargo test -p taut-proto --test numbers -- --ignored`.
+/// After a change of a range: `cargo test -p taut-proto --test all numbers:: -- --ignored`.
 #[test]
 #[ignore = "writes the page"]
 fn write_the_page() {

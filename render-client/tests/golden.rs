@@ -1,6 +1,6 @@
 //! Pictures that must stay as they are, up to what nobody sees (support/perceptual.rs).
 //!
-//! After a wanted change: `TAUT_WRITE_GOLDEN=1 cargo test -p taut-render --test golden`, and look at
+//! After a wanted change: `TAUT_WRITE_GOLDEN=1 cargo test -p taut-render --test all golden::`, and look at
 //! the pictures in tests/golden before they are committed. They are half as large as drawn.
 
 use std::path::PathBuf;

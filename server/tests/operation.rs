@@ -109,7 +109,10 @@ fn what_strangers_and_clients_write_is_shown_harmless_and_audited_and_metrics_ar
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let join = |key: JoinKey, role, node: &str| {
-            connect(ClientOptions::new(quic.as_str(), key, role, node))
+            connect(ClientOptions {
+                connect_timeout: PATIENCE,
+                ..ClientOptions::new(quic.as_str(), key, role, node)
+            })
         };
         let stranger = ClusterKey::generate().expect("random");
         // Not of this workbench: the name comes unproven. Its pin would stop it before: it takes the server for its own.

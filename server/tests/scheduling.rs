@@ -1,4 +1,4 @@
-//! The class of every thread of a running `taut serve`: what strangers can cause never comes before the loops.
+//! What a running `taut serve` asked of the system: the class of every thread, so that what strangers can cause never comes before the loops; no core dump.
 #![cfg(target_os = "linux")]
 
 use std::collections::BTreeMap;
@@ -143,4 +143,17 @@ fn the_device_comes_first_then_the_loops_and_strangers_are_of_the_normal_class()
             "{name}: {classes:?}"
         );
     }
+}
+
+#[test]
+fn a_server_leaves_no_core_dump() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let server = serve(directory.path());
+    let limits = std::fs::read_to_string(format!("/proc/{}/limits", server.child.id()));
+    let limits = limits.expect("it runs");
+    let core = limits
+        .lines()
+        .find(|line| line.starts_with("Max core file size"));
+    let words: Vec<&str> = core.unwrap_or_default().split_whitespace().collect();
+    assert_eq!(words[4..6], ["0", "0"], "{core:?}");
 }

@@ -16,6 +16,7 @@ mod method_scenes;
 #[cfg(feature = "monitor")]
 mod monitor;
 mod pictures;
+mod promises;
 mod replay;
 mod revocation;
 mod soak;

@@ -1,5 +1,6 @@
 //! The documents hang together: the book has every page, links lead somewhere, and words of the glossary are those of the code.
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +70,74 @@ fn every_link_leads_to_something() {
             }
         }
     }
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// Packages by name: where they are, and their manifest.
+fn packages() -> HashMap<String, (PathBuf, String)> {
+    let mut manifests = Vec::new();
+    files(&root(), "toml", &mut manifests);
+    manifests.retain(|path| path.ends_with("Cargo.toml"));
+    let named = manifests.into_iter().filter_map(|path| {
+        let text = read(&path);
+        let name = text.split("[package]\nname = \"").nth(1)?;
+        let name = name.split('"').next()?.to_owned();
+        Some((name, (path.parent()?.to_owned(), text)))
+    });
+    named.collect()
+}
+
+/// Whether a command of cargo names a package and targets that there are.
+fn is_there(command: &str, packages: &HashMap<String, (PathBuf, String)>) -> bool {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    let after = |option| words.windows(2).find(|pair| pair[0] == option);
+    let Some([_, package]) = after("-p") else {
+        return true;
+    };
+    let Some((folder, manifest)) = packages.get(*package) else {
+        return false;
+    };
+    [
+        ("--test", "tests"),
+        ("--example", "examples"),
+        ("--bench", "benches"),
+    ]
+    .into_iter()
+    .filter_map(|(option, place)| Some((place, after(option)?[1])))
+    .all(|(place, name)| {
+        let alone = place == "tests" && manifest.contains("autotests = false");
+        let declared = manifest.contains(&format!("name = \"{name}\""));
+        let main = folder.join(place).join(name);
+        declared || !alone && (main.with_extension("rs").exists() || main.join("main.rs").exists())
+    })
+}
+
+#[test]
+fn every_command_of_cargo_names_what_there_is() {
+    let packages = packages();
+    assert!(packages.len() > 25, "{:?}", packages.keys());
+    assert!(!is_there(
+        "cargo test -p taut-bridge --test haply",
+        &packages
+    ));
+    let mut read_in = Vec::new();
+    for ending in ["md", "rs", "toml", "h"] {
+        files(&root(), ending, &mut read_in);
+    }
+    let (mut found, mut broken) = (0, Vec::new());
+    for path in read_in {
+        let text = read(&path);
+        for kind in ["cargo test ", "cargo run ", "cargo bench "] {
+            for rest in text.split(kind).skip(1) {
+                let end = rest.find(['`', '\n', '"', ')']).unwrap_or(rest.len());
+                found += 1;
+                if !is_there(&rest[..end], &packages) && !path.ends_with("documents.rs") {
+                    broken.push(format!("{}: {kind}{}", path.display(), &rest[..end]));
+                }
+            }
+        }
+    }
+    assert!(found > 40, "{found}");
     assert!(broken.is_empty(), "{broken:#?}");
 }
 

@@ -122,6 +122,8 @@ fn nodes_go_on_swapping_together_when_the_server_and_then_their_leader_are_kille
         return;
     }
     workbench.set("scene", "sphere-on-plane");
+    // Slower than this a node would swap on its own.
+    workbench.set("frames.least_rate", 1.0);
     // A node leads after three tenths of this: more than a busy machine starves the server for.
     workbench.set("network.node_timeout", 4.0);
     let mut server = workbench.serve(&[]);

@@ -7,6 +7,8 @@ use taut_tests::workbench::TestWorkbench;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_taut-under-test");
 /// Frames per second that each node is made for: what software draws beside other tests.
 const RATE: &str = "8";
+/// Frames per second below which a node is not waited for: the least that there is.
+const LEAST_RATE: f64 = 1.0;
 /// Frames that each node shows.
 const FRAMES: &str = "40";
 /// Longest wait for these, on a machine that is busy with other tests.
@@ -21,6 +23,8 @@ fn frames_of_two_nodes(swap: &str) -> Option<serde_json::Value> {
     }
     workbench.set("scene", "sphere-on-plane");
     workbench.set("frames.swap", swap);
+    // Slower than this a node would swap on its own, and there would be nothing to compare.
+    workbench.set("frames.least_rate", LEAST_RATE);
     let server = workbench.serve(&[]);
     let nodes = ["front", "table"].map(|node| {
         workbench.join(

@@ -1,5 +1,5 @@
 //! The whole program in a short soak: server, bridge with a moving hand, nodes and an observer that come, go and are killed. For hours:
-//! `taut-network-tests --taut PROGRAM --soak 28800 --log FILE soak`.
+//! `taut-network-tests --taut PROGRAM --soak 28800 --log FILE soak-program`.
 
 use std::path::Path;
 use std::time::Duration;

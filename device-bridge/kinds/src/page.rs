@@ -63,6 +63,35 @@ mod tests {
     use super::*;
     use std::path::Path;
 
+    /// A kind that is added without a word on what it was tried with, or on how a reader reports a real one, is caught here.
+    #[test]
+    fn the_document_says_of_every_kind_what_it_was_tried_with() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/devices.md");
+        let document = std::fs::read_to_string(path).expect("the document");
+        let (_, rest) = document.split_once("## What there is").expect("a heading");
+        let (there, rest) = rest.split_once("\n## ").expect("the next heading");
+        assert!(rest.contains("## How to tell us of a real device\n"));
+        for kind in &KINDS {
+            let name = kind.name;
+            let chosen = [
+                format!("`{name}`"),
+                format!("`{name}:"),
+                format!("`{name}="),
+                format!("kind = \"{name}\""),
+            ];
+            let row = there
+                .lines()
+                .filter(|line| line.starts_with('|'))
+                .find(|line| {
+                    let by = line.split('|').nth(2).unwrap_or("");
+                    chosen.iter().any(|text| by.contains(text))
+                });
+            let row = row.unwrap_or_else(|| panic!("no row for {name}"));
+            let tried = row.split('|').nth(5).unwrap_or("").trim();
+            assert!(tried.len() > 4, "tried with what? {row}");
+        }
+    }
+
     /// `TAUT_WRITE_DOCUMENTS=1` writes the table instead of comparing it.
     #[test]
     fn the_document_has_every_key() {

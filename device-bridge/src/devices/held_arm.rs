@@ -13,6 +13,7 @@ const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 /// A plant that goes on with a clock.
 pub(crate) struct HeldArm {
     pub(crate) plant: Plant,
+    begin: Plant,
     epoch: Option<Duration>,
     elapsed: Duration,
     commanded: Duration,
@@ -27,12 +28,18 @@ impl HeldArm {
             plant = plant.with_tremor(tremor);
         }
         Self {
+            begin: plant.clone(),
             plant,
             epoch: None,
             elapsed: Duration::ZERO,
             commanded: Duration::ZERO,
             largest_force: 0.0,
         }
+    }
+
+    /// At rest where the path begins, once more.
+    pub(crate) fn begin_again(&mut self) {
+        self.plant = self.begin.clone();
     }
 
     /// What the motors render, N.

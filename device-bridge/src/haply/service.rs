@@ -184,10 +184,10 @@ fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<tungstenite::Erro
     socket.get_ref().set_read_timeout(Some(LOOK)).map_err(io)?;
     let session = shared.sessions.fetch_add(1, Ordering::Relaxed) + 1;
     let greeting = shared.inverse().inventory(monotonic_now(), session);
-    socket.send(Message::text(greeting)).map_err(Box::new)?;
-    let outcome = loop {
+    let mut outcome = socket.send(Message::text(greeting)).map_err(Box::new);
+    while outcome.is_ok() {
         if shared.is_over() {
-            break Ok(());
+            break;
         }
         match socket.read() {
             Ok(Message::Text(text)) => {
@@ -196,19 +196,19 @@ fn serve(stream: TcpStream, shared: &Shared) -> Result<(), Box<tungstenite::Erro
                 }
                 let answer = shared.inverse().answer(monotonic_now(), session, &text);
                 if let Err(error) = socket.send(Message::text(answer)) {
-                    break Err(Box::new(error));
+                    outcome = Err(Box::new(error));
                 }
             }
-            Ok(Message::Close(_)) => break Ok(()),
+            Ok(Message::Close(_)) => break,
             Ok(_) => {}
             Err(tungstenite::Error::Io(error))
                 if matches!(
                     error.kind(),
                     std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut
                 ) => {}
-            Err(error) => break Err(Box::new(error)),
+            Err(error) => outcome = Err(Box::new(error)),
         }
-    };
+    }
     shared.inverse().leave(monotonic_now(), session);
     outcome
 }

@@ -3,7 +3,7 @@
 //! The arm's mechanics are those that the driver assumes ([`crate::HaplySettings`]). Forces of all sessions add up; each holds for its message, and
 //! ends after [`IDLE_AFTER`] without another.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::time::Duration;
 
 use nalgebra::{Point3, Vector3};
@@ -17,6 +17,8 @@ use crate::devices::held_arm::{HeldArm, down_and_up};
 pub(crate) const WORKSPACE_CENTRE: [f64; 3] = [0.0, -0.1, 0.16];
 /// Silence after which a session's force is none. Assumed: the documentation says that it ends, not when.
 const IDLE_AFTER: Duration = Duration::from_millis(50);
+/// Longer without a connection than an outage, and no longer than a person takes for the next command.
+const PAUSE: Duration = Duration::from_secs(1);
 /// Largest force along an axis that is taken, N; more is limited to the arm's largest.
 const LARGEST_COMMAND: f64 = 1e3;
 /// Largest message that is read, bytes.
@@ -64,6 +66,9 @@ pub struct SimulatedInverse {
     with_grip: bool,
     plugged: bool,
     pushes: HashMap<u64, Push>,
+    connected: HashSet<u64>,
+    /// Since when nobody is connected.
+    alone_since: Option<Duration>,
     messages: u64,
 }
 
@@ -79,6 +84,8 @@ impl SimulatedInverse {
             with_grip: settings.with_grip,
             plugged: true,
             pushes: HashMap::new(),
+            connected: HashSet::new(),
+            alone_since: None,
             messages: 0,
         }
     }
@@ -112,9 +119,15 @@ impl SimulatedInverse {
         self.messages
     }
 
-    /// The inventory that greets a connection.
+    /// The inventory that greets a connection. Who comes first after a pause finds the hand where its path begins: a body that starts where
+    /// the hand is reaches what lies below it.
     pub fn inventory(&mut self, now: Duration, session: u64) -> String {
         self.advance(now);
+        let alone = self.alone_since.take();
+        if alone.is_some_and(|since| now.saturating_sub(since) > PAUSE) {
+            self.arm.begin_again();
+        }
+        self.connected.insert(session);
         self.state(session, true)
     }
 
@@ -141,6 +154,9 @@ impl SimulatedInverse {
         self.advance(now);
         self.pushes.remove(&session);
         self.command(now);
+        if self.connected.remove(&session) && self.connected.is_empty() {
+            self.alone_since = Some(now);
+        }
     }
 
     /// Goes on to `now`.

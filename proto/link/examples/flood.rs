@@ -5,8 +5,8 @@
 //! the common socket, read in the normal class, and on the device's own, read at SCHED_FIFO 85.
 //! Compare the rows with the first one, of the same run: the machine's speed is not ours.
 //!
-//! Then 8,000 first packets of QUIC a second, beside a loop of 1 kHz that works 0.2 ms of each (nice -10, as the god-object loop): once with QUIC in the real-time
-//! class, as it was, and once behind the normal one, with the device on its own socket. Where the system grants no real-time class both are the same.
+//! Then 8,000 first packets of QUIC a second, beside two loops of 1 kHz as a server has them: without and with the flood, each with QUIC in the real-time class, as it
+//! was, and behind the normal one, with the device on its own socket; turn by turn. Where the system grants no real-time class both are the same.
 
 use std::{
     net::{SocketAddr, UdpSocket},
@@ -57,8 +57,6 @@ enum Class {
 
 /// First packets, 1/s.
 const FIRST_PACKETS: u32 = 8_000;
-/// Work of the loop beside the flood in each period.
-const WORK: Duration = Duration::from_micros(200);
 
 fn main() -> Result<(), Failure> {
     println!(
@@ -81,35 +79,114 @@ fn main() -> Result<(), Failure> {
             println!("{name:<12} {row}");
         }
     }
-    println!(
-        "\nfirst packets: CPU of QUIC's threads; lateness of a loop beside them p50/p99/max, us; periods more than 1 ms late"
-    );
-    for (name, class) in [
+    first_packets_beside_loops()
+}
+
+/// Turns of each of the four runs beside loops.
+const TURNS: usize = 8;
+
+/// What was seen of one run beside loops.
+#[derive(Clone, Copy)]
+struct Beside {
+    /// CPU of QUIC's threads, share of a core.
+    cpu: f64,
+    /// For each loop: lateness at p99, us, and share of its periods that began more than a period late.
+    loops: [(f64, f64); LOOPS.len()],
+    exchange: Row,
+}
+
+/// Both classes of QUIC, without and with strangers, turn by turn in changing order: what else the machine does falls upon all four alike.
+fn first_packets_beside_loops() -> Result<(), Failure> {
+    const CLASSES: [(&str, Class); 2] = [
         ("SCHED_FIFO 40", Class::RealTime),
         ("nice 5", Class::Behind),
-    ] {
-        for (what, flood) in [("none", Flood::None), ("8,000/s", Flood::FirstPackets)] {
-            let runtime = self::runtime(class)?;
-            let stop = Arc::new(AtomicBool::new(false));
-            let beside = start_loop(stop.clone())?;
-            let (before, start) = (cpu_of("network"), Instant::now());
-            let row = runtime.block_on(measure(flood, class))?;
-            let cpu = cpu_of("network").saturating_sub(before).as_secs_f64();
-            let share = 100.0 * cpu / start.elapsed().as_secs_f64();
-            stop.store(true, Ordering::Relaxed);
-            let mut late = beside.join().map_err(|_| "the loop panicked")?;
-            late.sort_by(f64::total_cmp);
-            let missed = late.iter().filter(|late| **late > 1e3).count();
-            println!(
-                "{name:<14} {what:<8} {share:>5.1} % {:>7.0} / {:>7.0} / {:>7.0} {missed:>6} of {}\n  {row}",
-                quantile(&late, 0.5),
-                quantile(&late, 0.99),
-                quantile(&late, 1.0),
-                late.len()
-            );
+    ];
+    let mut seen: [[Vec<Beside>; 2]; 2] = Default::default();
+    for turn in 0..TURNS {
+        for run in 0..4 {
+            let run = (run + turn) % 4;
+            let (class, flooded) = (run / 2, run % 2);
+            seen[class][flooded].push(beside_loops(CLASSES[class].1, flooded == 1)?);
         }
     }
+    println!(
+        "\nfirst packets, {FIRST_PACKETS} a second asked for; medians of {TURNS} turns, none / flood, and flood beside none of the same turn: median (least to most)"
+    );
+    for (name, of) in CLASSES.map(|(name, _)| name).into_iter().zip(&seen) {
+        let median = |flooded: usize, read: &dyn Fn(&Beside) -> f64| {
+            middle(of[flooded].iter().map(read).collect())
+        };
+        let line = |what: &str, unit: &str, read: &dyn Fn(&Beside) -> f64| {
+            let mut more: Vec<f64> = (0..TURNS)
+                .map(|turn| read(&of[1][turn]) - read(&of[0][turn]))
+                .collect();
+            more.sort_by(f64::total_cmp);
+            println!(
+                "  {what:<34} {:>8.2} / {:>8.2} {unit:<3} {:+.2} ({:+.2} to {:+.2})",
+                median(0, read),
+                median(1, read),
+                middle(more.clone()),
+                more[0],
+                more[TURNS - 1]
+            );
+        };
+        println!(
+            "QUIC at {name}, {:.0} first packets a second:",
+            median(1, &|of| of.exchange.flooded_per_s)
+        );
+        line("QUIC's threads", "%", &|of| 100.0 * of.cpu);
+        for (index, (what, ..)) in LOOPS.iter().enumerate() {
+            line(&format!("{what}: late, p99"), "us", &|of| of.loops[index].0);
+            line(&format!("{what}: a period late"), "%", &|of| {
+                100.0 * of.loops[index].1
+            });
+        }
+        line("device's round trip, p50", "us", &|of| {
+            of.exchange.round_trip_us.0
+        });
+        line("device's round trip, p99", "us", &|of| {
+            of.exchange.round_trip_us.1
+        });
+        line("readings lost", "%", &|of| of.exchange.inputs_lost);
+        line("states lost", "%", &|of| of.exchange.states_lost);
+    }
     Ok(())
+}
+
+fn middle(mut of: Vec<f64>) -> f64 {
+    of.sort_by(f64::total_cmp);
+    quantile(&of, 0.5)
+}
+
+fn beside_loops(class: Class, flooded: bool) -> Result<Beside, Failure> {
+    let flood = if flooded {
+        Flood::FirstPackets
+    } else {
+        Flood::None
+    };
+    let runtime = self::runtime(class)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let beside = LOOPS.map(|(_, class, work)| start_loop(class, work, stop.clone()));
+    let (before, start) = (cpu_of("network"), Instant::now());
+    let exchange = runtime.block_on(measure(flood, class))?;
+    let cpu =
+        cpu_of("network").saturating_sub(before).as_secs_f64() / start.elapsed().as_secs_f64();
+    stop.store(true, Ordering::Relaxed);
+    let mut loops = [(0.0, 0.0); LOOPS.len()];
+    for (seen, beside) in loops.iter_mut().zip(beside) {
+        let mut late = beside?.join().map_err(|_| "a loop panicked")?;
+        late.sort_by(f64::total_cmp);
+        let missed = late
+            .iter()
+            .filter(|late| **late > PERIOD.as_secs_f64() * 1e6)
+            .count();
+        *seen = (quantile(&late, 0.99), missed as f64 / late.len() as f64);
+    }
+    Ok(Beside {
+        cpu,
+        loops,
+        exchange,
+    })
 }
 
 fn runtime(class: Class) -> Result<tokio::runtime::Runtime, Failure> {
@@ -126,10 +203,37 @@ fn runtime(class: Class) -> Result<tokio::runtime::Runtime, Failure> {
     Ok(runtime)
 }
 
+/// Loops beside the flood: their class in the server, and their work in each period.
+const LOOPS: [(&str, LoopClass, Duration); 2] = [
+    (
+        "haptics loop (FIFO 80, 50 us)",
+        LoopClass::Fifo(80),
+        Duration::from_micros(50),
+    ),
+    (
+        "god-object loop (nice -10, 200 us)",
+        LoopClass::Nice(-10),
+        Duration::from_micros(200),
+    ),
+];
+
+#[derive(Clone, Copy)]
+enum LoopClass {
+    Fifo(i32),
+    Nice(i32),
+}
+
 /// How late each period of a working loop began, us.
-fn start_loop(stop: Arc<AtomicBool>) -> Result<thread::JoinHandle<Vec<f64>>, Failure> {
-    let work = move || {
-        system::nice(-10);
+fn start_loop(
+    class: LoopClass,
+    work: Duration,
+    stop: Arc<AtomicBool>,
+) -> Result<thread::JoinHandle<Vec<f64>>, std::io::Error> {
+    let run = move || {
+        match class {
+            LoopClass::Fifo(priority) => system::real_time(priority),
+            LoopClass::Nice(value) => system::nice(value),
+        }
         let mut late = Vec::with_capacity(64_000);
         let mut due = Instant::now();
         while !stop.load(Ordering::Relaxed) {
@@ -137,7 +241,7 @@ fn start_loop(stop: Arc<AtomicBool>) -> Result<thread::JoinHandle<Vec<f64>>, Fai
             thread::sleep(due.saturating_duration_since(Instant::now()));
             let began = Instant::now();
             late.push(began.saturating_duration_since(due).as_secs_f64() * 1e6);
-            while began.elapsed() < WORK {
+            while began.elapsed() < work {
                 std::hint::spin_loop();
             }
             // What was missed is not made up for.
@@ -145,7 +249,7 @@ fn start_loop(stop: Arc<AtomicBool>) -> Result<thread::JoinHandle<Vec<f64>>, Fai
         }
         late
     };
-    Ok(thread::Builder::new().name("loop".to_owned()).spawn(work)?)
+    thread::Builder::new().name("loop".to_owned()).spawn(run)
 }
 
 /// What is asked of the scheduler; a refusal leaves the thread as it is.
@@ -209,7 +313,38 @@ fn start_first_packets(server: &ServerLink, stop: Arc<AtomicBool>) -> Result<Run
     Ok((thread, count))
 }
 
-async fn measure(flood: Flood, class: Class) -> Result<String, Failure> {
+/// What a device saw of one run.
+#[derive(Clone, Copy)]
+struct Row {
+    flooded_per_s: f64,
+    inputs_lost: f64,
+    states_lost: f64,
+    round_trip_us: (f64, f64),
+    udp_share: f64,
+    flooded: u64,
+    forged: u64,
+    garbage: u64,
+}
+
+impl std::fmt::Display for Row {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{:>9.0} {:>10.2} % {:>10.2} % {:>12.0} / {:>6.0} {:>14.1} % {:>10} {:>7} {:>8}",
+            self.flooded_per_s,
+            self.inputs_lost,
+            self.states_lost,
+            self.round_trip_us.0,
+            self.round_trip_us.1,
+            100.0 * self.udp_share,
+            self.flooded,
+            self.forged,
+            self.garbage
+        )
+    }
+}
+
+async fn measure(flood: Flood, class: Class) -> Result<Row, Failure> {
     let key = ClusterKey::generate()?;
     let server = serve(ServerOptions::loopback(key.clone()), content()?).await?;
     let mut options =
@@ -262,18 +397,16 @@ async fn measure(flood: Flood, class: Class) -> Result<String, Failure> {
     }
     let inputs = after.inputs - before.inputs + after.inputs_late - before.inputs_late;
     let of = |read: fn(&Counters) -> u64| read(&after) - read(&before);
-    let row = format!(
-        "{:>9.0} {:>10.2} % {:>10.2} % {:>12.0} / {:>6.0} {:>14.1} % {:>10} {:>7} {:>8}",
-        flooded as f64 / elapsed,
-        100.0 * (1.0 - inputs as f64 / sent as f64),
-        100.0 * (client.counters().lost - lost_before) as f64 / sent as f64,
-        quantile(&round_trips, 0.5),
-        quantile(&round_trips, 0.99),
-        100.0 * cpu.as_secs_f64() / elapsed,
-        of(|c| c.flooded),
-        of(|c| c.forged),
-        of(|c| c.garbage),
-    );
+    let row = Row {
+        flooded_per_s: flooded as f64 / elapsed,
+        inputs_lost: 100.0 * (1.0 - inputs as f64 / sent as f64),
+        states_lost: 100.0 * (client.counters().lost - lost_before) as f64 / sent as f64,
+        round_trip_us: (quantile(&round_trips, 0.5), quantile(&round_trips, 0.99)),
+        udp_share: cpu.as_secs_f64() / elapsed,
+        flooded: of(|c| c.flooded),
+        forged: of(|c| c.forged),
+        garbage: of(|c| c.garbage),
+    };
     client.close().await;
     server.shutdown().await;
     Ok(row)

@@ -195,6 +195,22 @@ mod tests {
         }
     }
 
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_memory_of_a_program_that_asks_is_its_own() {
+        assert!(keep_memory_private());
+        #[allow(unsafe_code, reason = "the process is asked by a system call")]
+        // SAFETY: takes numbers only.
+        let dumpable = unsafe { libc::prctl(libc::PR_GET_DUMPABLE, 0 as libc::c_ulong, 0, 0, 0) };
+        assert_eq!(dumpable, 0);
+        let limits = fs::read_to_string("/proc/self/limits").expect("Linux");
+        let core = limits
+            .lines()
+            .find(|line| line.starts_with("Max core file size"));
+        let words: Vec<&str> = core.unwrap_or_default().split_whitespace().collect();
+        assert_eq!(words[4..6], ["0", "0"], "{core:?}");
+    }
+
     #[test]
     fn a_key_that_somebody_else_could_replace_is_refused_with_what_to_do() {
         let folder = tempfile::tempdir().expect("a directory");

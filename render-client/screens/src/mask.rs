@@ -12,6 +12,8 @@ use crate::pfm::{FloatMap, MAX_SIDE};
 
 /// Most memory that the decoding of a PNG may take, bytes: 8192 x 8192 of 16 bits, twice.
 const MAX_DECODED: u64 = 1 << 28;
+/// Most that a byte of a PNG can stand for (deflate: 258 bytes in two bits).
+const MOST_PER_BYTE: u64 = 1032;
 /// Largest PNG file, bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 28;
 
@@ -28,11 +30,13 @@ pub struct Mask {
 
 /// Reads a mask from the bytes of a PNG file.
 pub(crate) fn from_png(bytes: Vec<u8>, gamma: f64) -> Result<Mask, Unnamed> {
+    // What the file cannot hold is not made room for, whatever its header says.
+    let most = MAX_DECODED.min(MOST_PER_BYTE * bytes.len() as u64);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     let mut limits = Limits::default();
     let side = Some(MAX_SIDE as u32);
     (limits.max_image_width, limits.max_image_height) = (side, side);
-    limits.max_alloc = Some(MAX_DECODED);
+    limits.max_alloc = Some(most);
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| {
         Unnamed::new(format!(

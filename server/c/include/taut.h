@@ -1,4 +1,4 @@
-/* The god-object method for programs in C. Made by cbindgen from server/c/src; to make it again: TAUT_WRITE_HEADER=1 cargo test -p taut-c --test header
+/* The god-object method for programs in C. Made by cbindgen from server/c/src; to make it again: TAUT_WRITE_HEADER=1 cargo test -p taut-c --test all header::
  * Poses are world from body, SI units, quaternions w x y z. One thread at a time uses a scene. docs/c.md says more. */
 
 #ifndef TAUT_H

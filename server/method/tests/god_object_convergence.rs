@@ -1,6 +1,6 @@
 //! With the device at rest the god-object comes to the constrained minimiser and stays there, bit for bit.
 //!
-//! Other presses: `PROPTEST_RNG_SEED=2 PROPTEST_CASES=20000 cargo test --release -p god-object --test god_object_convergence`.
+//! Other presses: `PROPTEST_RNG_SEED=2 PROPTEST_CASES=20000 cargo test --release -p god-object --test all god_object_convergence::`.
 
 use std::sync::Arc;
 

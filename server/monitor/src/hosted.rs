@@ -1,35 +1,38 @@
 //! rerun's stream and its page, served here: rerun's own services behind our guard, on sockets of our own.
 //!
 //! What rerun would start by itself answers every `Host`, the pages of other origins, and takes messages from anybody. Its parts are
-//! public: the message proxy is put behind [`Guard`] here, and fed within the process.
+//! public: its protocol is spoken behind [`Guard`] here, from a [`History`] of our own.
 
 use std::net::TcpListener;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::response::IntoResponse;
+use futures_util::stream::{Stream, StreamExt as _, empty};
 use http::{StatusCode, Uri, header};
-use re_grpc_server::{
-    MAX_DECODING_MESSAGE_SIZE, MAX_ENCODING_MESSAGE_SIZE, MessageProxy, ServerOptions,
-};
 use re_log_encoding::ToTransport as _;
 use re_log_encoding::rrd::Compression;
-use re_protos::sdk_comms::v1alpha1::WriteMessagesRequest;
-use re_protos::sdk_comms::v1alpha1::message_proxy_service_client::MessageProxyServiceClient;
-use re_protos::sdk_comms::v1alpha1::message_proxy_service_server::MessageProxyServiceServer;
+use re_protos::sdk_comms::v1alpha1::message_proxy_service_server::{
+    MessageProxyService, MessageProxyServiceServer,
+};
+use re_protos::sdk_comms::v1alpha1::{
+    ReadMessagesRequest, ReadMessagesResponse, ReadTablesRequest, ReadTablesResponse,
+    WriteMessagesRequest, WriteMessagesResponse, WriteTableRequest, WriteTableResponse,
+};
 use re_web_viewer_server::WebViewerData;
 use rerun::log::LogMsg;
 use rerun::sink::{LogSink, SinkFlushError};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::watch;
 use tonic::service::Routes;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
+use tonic::{Request, Response, Status, Streaming};
 
 use crate::error::MonitorError;
 use crate::guard::Guard;
+use crate::history::History;
 
-/// Messages between the feeding thread and the server.
-const WAITING_MESSAGES: usize = 32;
 /// Pings by which a client that is gone without a word is found.
 const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 /// See [`KEEPALIVE_INTERVAL`].
@@ -37,8 +40,9 @@ const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The running server, as rerun feeds it. Dropped, it closes both ports.
 pub(crate) struct Hosted {
-    messages: mpsc::Sender<WriteMessagesRequest>,
-    _stop: watch::Sender<()>,
+    history: Arc<History>,
+    /// Told when the history has grown; gone, it is the end.
+    grown: watch::Sender<()>,
 }
 
 impl Hosted {
@@ -46,7 +50,8 @@ impl Hosted {
     pub(crate) fn start(
         stream: TcpListener,
         page: TcpListener,
-        options: ServerOptions,
+        allowed_origins: Vec<String>,
+        history: Arc<History>,
     ) -> Result<Hosted, MonitorError> {
         let not_served = |error: &dyn std::fmt::Display| MonitorError::Rerun {
             what: "to be served",
@@ -66,14 +71,17 @@ impl Hosted {
             .enable_all()
             .build()
             .map_err(|error| not_served(&error))?;
-        let (messages, waiting) = mpsc::channel(WAITING_MESSAGES);
-        let (stop, stopped) = watch::channel(());
+        let (grown, growth) = watch::channel(());
+        let proxy = Proxy {
+            history: Arc::clone(&history),
+            growth: growth.clone(),
+        };
         std::thread::Builder::new()
             .name("taut-monitor-web".to_owned())
             .spawn(move || {
                 runtime.block_on(async {
-                    let stream = serve_stream(stream, page_port, options, waiting, stopped.clone());
-                    let page = serve_page(page, viewer, stopped);
+                    let stream = serve_stream(stream, page_port, &allowed_origins, proxy);
+                    let page = serve_page(page, viewer, growth);
                     let (stream, page) = futures_util::join!(stream, page);
                     for error in [stream, page].into_iter().filter_map(Result::err) {
                         tracing::warn!("the monitor is not served any more: {error}");
@@ -82,10 +90,7 @@ impl Hosted {
                 runtime.shutdown_background();
             })
             .map_err(MonitorError::Thread)?;
-        Ok(Hosted {
-            messages,
-            _stop: stop,
-        })
+        Ok(Hosted { history, grown })
     }
 }
 
@@ -94,22 +99,10 @@ type Served = Result<(), Box<dyn std::error::Error + Send + Sync>>;
 async fn serve_stream(
     socket: TcpListener,
     page_port: u16,
-    options: ServerOptions,
-    mut waiting: mpsc::Receiver<WriteMessagesRequest>,
-    stopped: watch::Receiver<()>,
+    allowed_origins: &[String],
+    proxy: Proxy,
 ) -> Served {
-    let cors = re_grpc_server::cors_layer(&options.cors_allowed_origins);
-    let proxy = MessageProxyServiceServer::from_arc(Arc::new(MessageProxy::new(options)))
-        .max_decoding_message_size(MAX_DECODING_MESSAGE_SIZE)
-        .max_encoding_message_size(MAX_ENCODING_MESSAGE_SIZE);
-    // The one who writes: not by the network, and so past the guard.
-    let mut feed = MessageProxyServiceClient::new(proxy.clone());
-    tokio::spawn(async move {
-        let messages = futures_util::stream::poll_fn(move |context| waiting.poll_recv(context));
-        if let Err(error) = feed.write_messages(messages).await {
-            tracing::warn!("rerun takes no more messages: {error}");
-        }
-    });
+    let stopped = proxy.growth.clone();
     Server::builder()
         .accept_http1(true) // browsers speak gRPC-Web
         .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
@@ -117,9 +110,9 @@ async fn serve_stream(
         .layer(Guard {
             page_port: Some(page_port),
         })
-        .layer(cors)
+        .layer(re_grpc_server::cors_layer(allowed_origins))
         .layer(tonic_web::GrpcWebLayer::new())
-        .add_routes(Routes::new(proxy))
+        .add_routes(Routes::new(MessageProxyServiceServer::new(proxy)))
         .serve_with_incoming_shutdown(incoming(socket)?, end(stopped))
         .await?;
     Ok(())
@@ -173,18 +166,70 @@ async fn end(mut stopped: watch::Receiver<()>) {
     while stopped.changed().await.is_ok() {}
 }
 
+/// What an observer may ask of the stream.
+struct Proxy {
+    history: Arc<History>,
+    growth: watch::Receiver<()>,
+}
+
+type Told<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+#[tonic::async_trait]
+impl MessageProxyService for Proxy {
+    type ReadMessagesStream = Told<ReadMessagesResponse>;
+    type ReadTablesStream = Told<ReadTablesResponse>;
+
+    async fn read_messages(
+        &self,
+        _: Request<ReadMessagesRequest>,
+    ) -> Result<Response<Self::ReadMessagesStream>, Status> {
+        let messages = self.history.observe(self.growth.clone());
+        let told = messages.map(|message| {
+            Ok(ReadMessagesResponse {
+                log_msg: Some(message),
+            })
+        });
+        Ok(Response::new(Box::pin(told)))
+    }
+
+    async fn read_tables(
+        &self,
+        _: Request<ReadTablesRequest>,
+    ) -> Result<Response<Self::ReadTablesStream>, Status> {
+        Ok(Response::new(Box::pin(empty()))) // there are none
+    }
+
+    async fn write_messages(
+        &self,
+        _: Request<Streaming<WriteMessagesRequest>>,
+    ) -> Result<Response<WriteMessagesResponse>, Status> {
+        Err(nobody_writes())
+    }
+
+    async fn write_table(
+        &self,
+        _: Request<WriteTableRequest>,
+    ) -> Result<Response<WriteTableResponse>, Status> {
+        Err(nobody_writes())
+    }
+}
+
+fn nobody_writes() -> Status {
+    Status::permission_denied("this stream is to be read")
+}
+
 impl LogSink for Hosted {
     fn send(&self, message: LogMsg) {
         match message.to_transport(Compression::LZ4) {
-            // Fails only when the server has ended.
-            Ok(message) => drop(self.messages.blocking_send(WriteMessagesRequest {
-                log_msg: Some(message.into()),
-            })),
+            Ok(message) => {
+                self.history.add(message.into());
+                self.grown.send_replace(());
+            }
             Err(error) => tracing::warn!("rerun cannot encode a message: {error}"),
         }
     }
 
     fn flush_blocking(&self, _timeout: Duration) -> Result<(), SinkFlushError> {
-        Ok(())
+        Ok(()) // Observers get what they get: nothing here may wait for them.
     }
 }

@@ -70,6 +70,32 @@ pub fn inspect(path: &Path) -> Result<RrdSummary, InspectError> {
 ///
 /// `stream_address` is what [`crate::Monitor::stream_address`] says. A stream that ends early is no error.
 pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, InspectError> {
+    let mut contents = Contents::default();
+    follow(stream_address, duration, |message| contents.add(message))?;
+    Ok(contents.summary())
+}
+
+/// Looks on in the same way; `told` gets the newest session time of every message as it arrives, ns.
+pub fn observe_times(
+    stream_address: &str,
+    duration: Duration,
+    mut told: impl FnMut(u64),
+) -> Result<(), InspectError> {
+    follow(stream_address, duration, |message| {
+        let mut contents = Contents::default();
+        contents.add(message)?;
+        if let Some((_, newest)) = contents.time_ns {
+            told(newest.unsigned_abs());
+        }
+        Ok(())
+    })
+}
+
+fn follow(
+    stream_address: &str,
+    duration: Duration,
+    mut take: impl FnMut(&LogMsg) -> Result<(), String>,
+) -> Result<(), InspectError> {
     let connect = |reason: String| InspectError::Connect {
         address: stream_address.to_owned(),
         reason,
@@ -86,7 +112,7 @@ pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, I
     let handle = AsyncRuntimeHandle::new_native(runtime.handle().clone());
     let messages = re_grpc_client::stream(&handle, uri);
 
-    let mut contents = Contents::default();
+    let mut none_yet = true;
     let end = Instant::now() + duration;
     loop {
         let left = end.saturating_duration_since(Instant::now());
@@ -95,10 +121,11 @@ pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, I
         }
         match messages.recv_timeout(left).map(|message| message.payload) {
             Ok(SmartMessagePayload::Msg(DataSourceMessage::LogMsg(message))) => {
-                contents.add(&message).map_err(connect)?;
+                take(&message).map_err(connect)?;
+                none_yet = false;
             }
             Ok(SmartMessagePayload::Msg(_) | SmartMessagePayload::Flush { .. }) => {}
-            Ok(SmartMessagePayload::Quit(Some(error))) if contents.rows.is_empty() => {
+            Ok(SmartMessagePayload::Quit(Some(error))) if none_yet => {
                 return Err(connect(error.to_string()));
             }
             Ok(SmartMessagePayload::Quit(_))
@@ -106,7 +133,7 @@ pub fn observe(stream_address: &str, duration: Duration) -> Result<RrdSummary, I
         }
     }
     runtime.shutdown_background();
-    Ok(contents.summary())
+    Ok(())
 }
 
 #[derive(Default)]

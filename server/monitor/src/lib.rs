@@ -11,6 +11,7 @@
 mod colours;
 mod error;
 mod guard;
+mod history;
 mod hosted;
 mod inspect;
 mod layout;
@@ -24,7 +25,6 @@ mod ports;
 mod queue;
 mod sample;
 mod scene;
-mod served;
 mod shading;
 mod stream;
 mod window;
@@ -33,7 +33,7 @@ mod window;
 const APPLICATION: &str = "taut";
 
 pub use error::{InspectError, MonitorError};
-pub use inspect::{RrdSummary, inspect, observe};
+pub use inspect::{RrdSummary, inspect, observe, observe_times};
 pub use log::{LogLevel, MonitorLog};
 pub use monitor::{Monitor, MonitorStats};
 pub use options::{

@@ -9,11 +9,10 @@ use std::time::{Duration, Instant};
 
 use rerun::log::ChunkBatcherConfig;
 use rerun::sink::{FileSink, FileSinkOptions, LogSink};
-use rerun::{
-    MemoryLimit, PlaybackBehavior, RecordingStream, RecordingStreamBuilder, ServerOptions,
-};
+use rerun::{RecordingStream, RecordingStreamBuilder};
 
 use crate::error::MonitorError;
+use crate::history::History;
 use crate::hosted::Hosted;
 use crate::log::{Command, LINE_QUEUE_CAPACITY, LogLevel, MonitorLog};
 use crate::options::MonitorOptions;
@@ -21,7 +20,6 @@ use crate::ports::{self, GRPC_KEY, WEB_KEY};
 use crate::queue::{self, Counters, MonitorReceiver, MonitorSender, SAMPLE_CAPACITY};
 use crate::sample::MonitorSample;
 use crate::scene::MonitorScene;
-use crate::served::ServedSink;
 use crate::stream::Stream;
 use crate::{APPLICATION, picture};
 
@@ -31,11 +29,8 @@ const PICTURE_PERIOD: Duration = Duration::from_nanos(1_000_000_000 / 30);
 /// The plots are sent with every sixth picture: fewer, larger messages, which the viewer takes in faster.
 const PICTURES_PER_PLOT: u32 = 6;
 
-/// Most bytes on their way inside rerun; enough for the largest mesh, small beside the history.
-const BYTES_IN_FLIGHT: u64 = 32 * 1024 * 1024;
-
-/// Least history beside the meshes, bytes: the layout, and some seconds.
-const LEAST_HISTORY_BYTES: u64 = 1024 * 1024;
+/// Most bytes on their way inside rerun: half a second, so that a machine too busy to encode loses pictures and not the present. A larger mesh passes alone.
+const BYTES_IN_FLIGHT: u64 = 128 * 1024;
 
 /// A running monitor. Dropping it stops it as [`Monitor::stop`] does.
 #[derive(Debug)]
@@ -60,7 +55,7 @@ pub struct MonitorStats {
     pub samples_not_finite: u64,
     /// Lines of text dropped because too many waited.
     pub lines_dropped: u64,
-    /// Messages that observers missed because one of them stalled the stream.
+    /// Messages that observers missed because they were too slow.
     pub messages_dropped: u64,
 }
 
@@ -80,7 +75,7 @@ impl Monitor {
         let messages_dropped = Arc::new(AtomicU64::new(0));
         let mut served = None;
         if options.serve {
-            let (server, sink) = Served::start(options, &scene, Arc::clone(&messages_dropped))?;
+            let (server, sink) = Served::start(options, Arc::clone(&messages_dropped))?;
             sinks.push(Box::new(sink));
             served = Some(server);
         }
@@ -204,23 +199,14 @@ struct Served {
 impl Served {
     fn start(
         options: &MonitorOptions,
-        scene: &MonitorScene,
         messages_dropped: Arc<AtomicU64>,
-    ) -> Result<(Served, ServedSink), MonitorError> {
+    ) -> Result<(Served, Hosted), MonitorError> {
         let bind = options.bind;
         let (stream, grpc_port) = ports::listen(bind, options.grpc_port, GRPC_KEY)?;
         let (page, web_port) = ports::listen(bind, options.web_port, WEB_KEY)?;
-        let server = Hosted::start(
-            stream,
-            page,
-            ServerOptions {
-                // Who joins late sees the present at once; the past follows.
-                playback_behavior: PlaybackBehavior::NewestFirst,
-                memory_limit: MemoryLimit::from_bytes(history_bytes(options, scene)),
-                cors_allowed_origins: ports::allowed_origins(bind, web_port),
-            },
-        )?;
-        let sink = ServedSink::new(server, messages_dropped)?;
+        let history = History::new(options.memory_limit_bytes, messages_dropped);
+        let origins = ports::allowed_origins(bind, web_port);
+        let hosted = Hosted::start(stream, page, origins, history)?;
 
         let host = ports::reachable_by_observers(bind);
         let stream_url = ports::stream_url(host, grpc_port);
@@ -229,17 +215,8 @@ impl Served {
             page_url,
             stream_url,
         };
-        Ok((served, sink))
+        Ok((served, hosted))
     }
-}
-
-/// The history's limit; never so small that rerun would have to throw the meshes away.
-fn history_bytes(options: &MonitorOptions, scene: &MonitorScene) -> u64 {
-    let bodies = scene.bodies.iter();
-    let meshes = bodies.map(|body| 24 * body.vertices.len() + 12 * body.triangles.len());
-    // Creases multiply vertices, and the god-object is there twice, as itself and as the ghost.
-    let at_least = LEAST_HISTORY_BYTES + 6 * meshes.sum::<usize>() as u64;
-    options.memory_limit_bytes.max(at_least)
 }
 
 /// A stream into all `sinks`; into nothing without any.

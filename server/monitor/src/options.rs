@@ -21,8 +21,7 @@ pub struct MonitorOptions {
     pub web_port: u16,
     /// Also write everything to this `.rrd` file.
     pub record: Option<PathBuf>,
-    /// Most bytes of history kept for late observers; the oldest goes first. Raised to
-    /// what the meshes need, if less.
+    /// Most bytes of history kept for late observers, beside the scene; the oldest goes first.
     pub memory_limit_bytes: u64,
     /// Serve the stream and the web page. Without this and without `record` nothing is kept.
     pub serve: bool,

@@ -13,14 +13,22 @@ use crate::problem::Problem;
 const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Longest side, pixels: 400 MB while it is read.
 const MAX_SIDE: u32 = 8192;
+/// Most bytes of a picture as floats that a byte of its file can stand for: a run of 127 takes two bytes of each of four channels.
+const MOST_PER_BYTE: u64 = 127 * 12 / 8 + 1;
 
 /// Reads the light around a scene, or says why a file has none.
-pub(crate) fn read_environment(path: &Path) -> Result<Panorama, Problem> {
+///
+/// # Errors
+/// It cannot be opened, is no such picture, or not twice as wide as high.
+pub fn read_environment(path: &Path) -> Result<Panorama, Problem> {
     let fail = |text: String| Problem::of_file(path.display(), text);
     let bytes = read_bytes(path, MAX_FILE_BYTES)?;
+    // What the file cannot hold is not made room for, whatever its header says.
+    let most = MOST_PER_BYTE * bytes.len() as u64;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Hdr);
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    limits.max_alloc = Some(most);
     reader.limits(limits);
     let picture = reader.decode().map_err(|error| {
         fail(format!(

@@ -26,6 +26,7 @@ mod workbench;
 pub use appearance::{Appearance, srgb};
 pub use check::{FaultPlaces, FileKind, FileReport, MeshFigures, check};
 pub use document::Document;
+pub use environment_file::read_environment;
 pub use fidelity::FidelityPlan;
 pub use files::{DATA_VARIABLE, MAX_MESH_BYTES, MAX_TOML_BYTES, data_dir, data_dirs, data_file};
 pub use import::{

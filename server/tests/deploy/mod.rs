@@ -4,7 +4,6 @@ mod misuse;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
-use std::net::UdpSocket;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Child;
@@ -38,19 +37,18 @@ address = "127.0.0.4"
 device = "simulated"
 "#;
 
-/// Two ports that were free just now.
-fn free_ports() -> [u16; 2] {
-    let sockets = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").expect("a free port"));
-    sockets.map(|socket| socket.local_addr().expect("bound").port())
+/// A loopback address of this process: the ports of a workbench that is deployed are fixed, and one that was free just now is somebody else's by the time
+/// that the server starts.
+fn own_address() -> String {
+    let [_, high, middle, low] = std::process::id().to_be_bytes();
+    format!("127.{}.{middle}.{low}", 64 + high % 64)
 }
 
 /// The shipped workbench on four machines, with a scene of its own beside it.
 fn workbench() -> String {
     let mut file: Table = SHIPPED_WORKBENCH.parse().expect("shipped");
-    let [quic, udp] = free_ports();
     for (table, key, value) in [
-        ("network", "quic_port", Value::from(i64::from(quic))),
-        ("network", "udp_port", Value::from(i64::from(udp))),
+        ("network", "bind", Value::from(own_address())),
         ("monitoring", "enabled", Value::from(false)),
     ] {
         let table = file.get_mut(table).and_then(Value::as_table_mut);
@@ -59,7 +57,8 @@ fn workbench() -> String {
     let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
     file.insert("device".to_owned(), remote.into());
     file.insert("scene".to_owned(), "scenes/mine.toml".into());
-    let machines: Table = MACHINES.parse().expect("tables");
+    let machines = MACHINES.replace("127.0.0.1", &own_address());
+    let machines: Table = machines.parse().expect("tables");
     file.extend(machines);
     file.to_string()
 }
@@ -283,11 +282,17 @@ fn processes_of_two_archives_join_each_other() {
     // The service waits for its server, whichever machine starts first.
     let mut bridge = Running(start(&bridge));
     let mut server = Running(start(&command(&haptic, "taut-serve.service")));
-    let said = BufReader::new(server.0.stderr.take().expect("piped")).lines();
-    let joined = said
-        .map_while(Result::ok)
-        .find(|line| line.contains("bridge joined as"));
-    assert!(joined.is_some(), "the server ended");
+    let mut said = Vec::new();
+    let mut lines = BufReader::new(server.0.stderr.take().expect("piped")).lines();
+    while !said
+        .iter()
+        .any(|line: &String| line.contains("bridge joined as"))
+    {
+        let Some(Ok(line)) = lines.next() else {
+            panic!("the server ended: {said:#?}");
+        };
+        said.push(line);
+    }
     std::thread::sleep(Duration::from_millis(500));
     interrupt(&bridge.0);
     let begun = Instant::now();

@@ -58,6 +58,39 @@ pub(crate) fn scene_toml(bytes: &[u8]) {
     }
 }
 
+/// Edits of a scene, a line each: what comes out is a scene that is read as the same, with its name and the keys that were named.
+pub(crate) fn scene_edit(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    thread_local! {
+        static SCENE: Scene = Scene::named_or_file("sphere-on-plane").unwrap_or_else(|error| panic!("{error}"));
+    }
+    SCENE.with(|scene| {
+        let edits: Vec<&str> = text.split('\n').collect();
+        match scene.edited(&edits) {
+            Ok((edited, keys)) => {
+                assert_eq!(keys.len(), edits.len());
+                assert_eq!(edited.name(), scene.name());
+                let again = Scene::parse(edited.name(), edited.text(), Path::new(NOWHERE));
+                assert!(again.is_ok(), "{again:?} of {text:?}");
+            }
+            Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    });
+}
+
+pub(crate) fn scene_edit_seeds() -> Vec<Vec<u8>> {
+    [
+        "coupling.k_h=1500",
+        "god_object.color=\"#ff8800\"",
+        "plane.surface.friction=0.3\nplane.pose.position=[0, 0, -0.1]",
+        "plane.opacity=0.5\ncoupling.damping_time=0.002",
+    ]
+    .map(|text| text.as_bytes().to_vec())
+    .into()
+}
+
 /// A workbench file; nothing that it names is opened.
 pub(crate) fn workbench_toml(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
@@ -200,7 +233,7 @@ impl SampleRecording {
 }
 
 /// Writes `bytes` to a file of this thread and reads it by `read`.
-fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+pub(crate) fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     thread_local! {
         static DIRECTORY: RefCell<Option<TempDir>> = const { RefCell::new(None) };
     }

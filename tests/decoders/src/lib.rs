@@ -5,11 +5,13 @@
 //! changes golden samples by a seed for a fixed number of times and watches the memory.
 #![forbid(unsafe_code)]
 
+mod boards;
 mod files;
 mod meshes;
 pub mod mutation;
 mod peripherals;
 mod samples;
+mod screens;
 mod wire;
 
 /// Something that takes bytes from outside.
@@ -32,7 +34,7 @@ pub struct Decoder {
 pub const FIXED_MEMORY: usize = 4 << 20;
 
 /// All of them.
-pub const DECODERS: [Decoder; 23] = [
+pub const DECODERS: [Decoder; 31] = [
     decoder("datagram", wire::datagram, wire::datagram_seeds, 1),
     decoder("payload", wire::payload, wire::payload_seeds, 1),
     decoder("opener", wire::opener, wire::datagram_seeds, 1),
@@ -74,6 +76,39 @@ pub const DECODERS: [Decoder; 23] = [
         peripherals::http_seeds,
         1,
     ),
+    decoder(
+        "haply_service",
+        boards::haply_service,
+        boards::haply_service_seeds,
+        128,
+    ),
+    decoder("arm_board", boards::arm_board, boards::arm_board_seeds, 4),
+    decoder(
+        "motor_boards",
+        boards::motor_boards,
+        boards::motor_boards_seeds,
+        1,
+    ),
+    decoder(
+        "ros_wrench",
+        peripherals::ros_wrench,
+        peripherals::ros_wrench_seeds,
+        4,
+    ),
+    decoder(
+        "screen_file",
+        screens::screen_file,
+        screens::screen_file_seeds,
+        8192, // a PNG's pixels, 1032 for a byte, as bytes, words and shares
+    ),
+    decoder(
+        "environment_hdr",
+        screens::environment_hdr,
+        screens::environment_hdr_seeds,
+        1024,
+    ),
+    decoder("panorama", wire::panorama, wire::panorama_seeds, 2),
+    decoder("scene_edit", files::scene_edit, files::scene_edit_seeds, 64),
     decoder("join_key", files::join_key, files::join_key_seeds, 1),
     decoder("key_file", files::key_file, files::key_seeds, 1),
     decoder("scene_toml", files::scene_toml, files::scene_seeds, 1024),

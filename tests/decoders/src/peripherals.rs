@@ -1,9 +1,12 @@
-//! What comes from devices: VRPN servers, HID reports, devices in Python.
+//! What comes from programs and devices beside us: VRPN, HID reports, devices in Python, wrenches of ROS 2, requests of observers.
 
 use std::net::{Ipv4Addr, SocketAddrV4};
+use std::time::Duration;
 
+use god_object::Vector6;
 use taut_bridge::plugin::{ReadAnswer, read_answer};
 use taut_bridge::{CapState, Report};
+use taut_ros::{Attachment, Header as RosHeader, Message, ReceivedWrench, WrenchStamped};
 use taut_vrpn::{
     Client, Event, Header, MAX_LISTED_SENDERS, MAX_PENDING_BYTES, PoseReport, SensorMapping,
     ServerSession, Stamp, VelocityReport, callback_address, description, message,
@@ -130,6 +133,36 @@ pub(crate) fn python_device_seeds() -> Vec<Vec<u8>> {
     assert!(seeds.iter().all(taken), "a seed that is none");
     seeds.push(seeds.concat());
     seeds
+}
+
+/// A wrench of ROS 2, and what Zenoh carries beside it: no more is kept than came, and what goes with it is written as it was read.
+pub(crate) fn ros_wrench(bytes: &[u8]) {
+    if let Some(wrench) = ReceivedWrench::decode(bytes) {
+        assert!(wrench.frame_id.len() < bytes.len(), "{wrench:?}");
+        assert!(wrench.stamp.1 < 1_000_000_000, "{wrench:?}");
+    }
+    if let Some(attachment) = Attachment::decode(bytes) {
+        assert_eq!(attachment.encode(), bytes);
+    }
+}
+
+pub(crate) fn ros_wrench_seeds() -> Vec<Vec<u8>> {
+    let wrench = Vector6::new(0.0, 0.0, 1.0, 0.0, -0.1, 0.0);
+    let mut message = Vec::new();
+    let header = RosHeader::new(Duration::from_millis(1500), "workbench");
+    let header = header.unwrap_or_else(|| panic!("a time of ROS"));
+    let encoded = WrenchStamped::new(header, &wrench).encode(&mut message);
+    assert!(encoded.is_ok(), "{encoded:?}");
+    let attachment = Attachment {
+        sequence: 7,
+        sent_ns: 1_700_000_000_000_000_000,
+        gid: [3; 16],
+    };
+    assert!(
+        ReceivedWrench::decode(&message).is_some(),
+        "a seed that is none"
+    );
+    vec![message, attachment.encode().to_vec()]
 }
 
 /// What observers must show in the checks.

@@ -3,7 +3,8 @@
 use std::cell::RefCell;
 
 use taut_proto::{
-    Assembler, ConstraintPart, ControlMessage, Header, Kind, MeshBlob, PROTOCOL_VERSION, Payload,
+    Assembler, ConstraintPart, ControlMessage, Header, Kind, MeshBlob, PROTOCOL_VERSION, Panorama,
+    Payload,
     control::{LENGTH_BYTES, MAX_FRAME_BYTES},
     header::{HEADER_BYTES, MAX_PAYLOAD_BYTES, TAG_BYTES},
 };
@@ -131,6 +132,21 @@ pub(crate) fn mesh_blob(bytes: &[u8]) {
         let mut corners = mesh.triangles().iter().flatten();
         assert!(corners.all(|index| (*index as usize) < vertices));
     }
+}
+
+/// The light around a scene as it travels: what is read is written as the same bytes, and all of it is finite.
+pub(crate) fn panorama(bytes: &[u8]) {
+    if let Ok(light) = Panorama::decode(bytes) {
+        assert_eq!(light.encode(), bytes);
+        for texel in 0..Panorama::WIDTH * Panorama::HEIGHT {
+            let light = light.light(texel % Panorama::WIDTH, texel / Panorama::WIDTH);
+            assert!(light.iter().all(|part| part.is_finite() && *part >= 0.0));
+        }
+    }
+}
+
+pub(crate) fn panorama_seeds() -> Vec<Vec<u8>> {
+    vec![Panorama::from_fn(|column, row| [column as f32, row as f32, 0.5]).encode()]
 }
 
 pub(crate) fn datagram_seeds() -> Vec<Vec<u8>> {

@@ -1,5 +1,5 @@
 //! The quick extent twice: every table is the same byte for byte, whoever ran what on how many threads. Only times differ.
-//! A part of it in every run; the whole, with the maps, by `cargo test --release -p taut-lab --test identical -- --ignored`.
+//! A part of it in every run; the whole, with the maps, by `cargo test --release -p taut-lab --test all identical:: -- --ignored`.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -11,6 +11,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use taut_link::Transport;
+use taut_network_tests::bench::scale::Place;
 use taut_network_tests::bench::{client_process, leader_process, node};
 use taut_network_tests::report::{Extent, Row, SECTIONS, Section, Verdict, csv, table};
 
@@ -119,9 +120,10 @@ taut-network-tests [OPTION...] [SECTION...]
   --quick          seconds instead of minutes: invariants, no speeds
   --seconds S      length of each latency or age run
   --turns N        turns of the isolation runs, each without and with clients
-  --soak S         clients come, go and die for S seconds while datagrams are forged; then, with --taut, the whole program for S seconds
-  --log FILE       CSV file of the soak's resources and broken promises, and of the whole program's beside it; a soak that was cut off goes
-                   on with it
+  --soak S         length of each of the two soaks
+  --log FILE       CSV file of a soak's resources and broken promises; one that was cut off goes on with it. Each soak has its own
+  --namespaces NAME ADDRESS
+                   section `scale` starts client K in the network namespace NAME K, and serves at ADDRESS; scripts/netns-scale does it
   --taut PROGRAM   the program that serves and draws; build it by cargo build --release -p taut
   --csv FILE       writes the table, too
 
@@ -129,7 +131,8 @@ Sections, all of them unless some are named:
 {}
 Exit code 1: a target is missed. 2: something could not be measured, or the arguments are wrong.
 Examples: taut-network-tests --taut target/release/taut skew screens
-          taut-network-tests --taut target/release/taut --soak 28800 --log soak.csv soak
+          taut-network-tests --soak 28800 --log soak-links.csv soak
+          taut-network-tests --taut target/release/taut --soak 28800 --log soak-program.csv soak-program
 ",
         sections.collect::<String>()
     )
@@ -149,6 +152,7 @@ fn read(mut arguments: impl Iterator<Item = String>) -> Result<Arguments, Box<dy
             }
             "--soak" => extent.soak_seconds = Some(positive(&value()?)?),
             "--log" => extent.soak_log = Some(value()?.into()),
+            "--namespaces" => extent.place = Place::Namespaces(value()?, value()?.parse()?),
             "--seconds" => extent.seconds = positive(&value()?)?,
             "--turns" => extent.turns = positive(&value()?)?.ceil() as usize,
             // Some of those that run it do so from a folder of their own.

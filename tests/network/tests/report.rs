@@ -36,6 +36,19 @@ fn isolation_says_what_is_missing() {
 }
 
 #[test]
+fn scale() {
+    check("scale");
+}
+
+#[test]
+fn every_section_has_a_test() {
+    for section in SECTIONS.iter().filter(|one| one.name != "hostile") {
+        let call = format!("check(\"{}\")", section.name);
+        assert!(include_str!("report.rs").contains(&call), "no {call}");
+    }
+}
+
+#[test]
 fn forged() {
     check("forged");
 }
@@ -53,6 +66,11 @@ fn death() {
 #[test]
 fn soak() {
     check("soak");
+}
+
+#[test]
+fn the_soak_of_the_program_says_what_is_missing() {
+    check("soak-program");
 }
 
 #[test]

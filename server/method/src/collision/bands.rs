@@ -9,6 +9,8 @@
 //! A search that is given up has then looked at every pair of triangles nearer than the lower edge of its band. What lies below a
 //! volume is no nearer than the volume: it goes into its band or a later one.
 
+use pulp::{Simd, WithSimd};
+
 use super::descent::open;
 use super::displacements::Motions;
 use super::facing_volumes::FacingVolumes;
@@ -121,50 +123,83 @@ pub(crate) fn for_nearest_triangle_pairs(
 ) -> f64 {
     let scale = (1.0 / margin) as f32;
     let band = |_, beyond: f32| Some(band_of(1.0 + beyond * scale).min(BANDS - 1));
-    let stopped_in = for_pairs_by_band(trees, volumes, (bands, turned), work, wanted, band, visit);
+    let stopped_in = volumes.processor.dispatch(ByBand {
+        trees,
+        volumes,
+        bands,
+        turned,
+        work,
+        wanted,
+        band_of_pair: band,
+        visit,
+    });
     stopped_in.map_or(margin, |band| edge(band, margin))
 }
 
-/// Visits pairs of triangles in the order of the bands that `band_of_pair` puts pairs of volumes in, from what these are beyond the margin (m); `None` leaves
-/// a pair out. The band in which it ended because `visit` returned false or there was no room.
-fn for_pairs_by_band(
-    trees: (&WideTree, &WideTree),
-    volumes: &FacingVolumes,
-    (bands, turned): (&mut Bands, &mut TurnedNodes),
-    work: &mut Work,
-    wanted: impl Fn(u8, u8) -> bool,
-    band_of_pair: impl Fn((Child, Child), f32) -> Option<usize>,
-    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
-) -> Option<usize> {
-    let (body, obstacle) = trees;
-    bands.clear();
-    let mut room = bands.push(0, (ROOT, ROOT));
-    let mut band = 0;
-    while band < SIGNED_BANDS {
-        let Some((a, b)) = bands.pop(band) else {
-            band += 1;
-            continue;
-        };
-        if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-            work.triangle_pairs += 1;
-            if !visit(t, s, work) {
+/// A search that visits pairs of triangles in the order of the bands that `band_of_pair` puts pairs of volumes in, from what these are beyond the margin
+/// (m); `None` leaves a pair out. The answer is the band in which it ended because `visit` returned false or there was no room.
+struct ByBand<'a, W, B, V> {
+    trees: (&'a WideTree, &'a WideTree),
+    volumes: &'a FacingVolumes,
+    bands: &'a mut Bands,
+    turned: &'a mut TurnedNodes,
+    work: &'a mut Work,
+    wanted: W,
+    band_of_pair: B,
+    visit: V,
+}
+
+/// The whole search with the vectors that the processor has: a call for each pair of volumes would cost as much as what it tells.
+impl<W, B, V> WithSimd for ByBand<'_, W, B, V>
+where
+    W: Fn(u8, u8) -> bool,
+    B: Fn((Child, Child), f32) -> Option<usize>,
+    V: FnMut(u32, u32, &mut Work) -> bool,
+{
+    type Output = Option<usize>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<usize> {
+        let Self {
+            trees,
+            volumes,
+            bands,
+            turned,
+            work,
+            wanted,
+            band_of_pair,
+            mut visit,
+        } = self;
+        let (body, obstacle) = trees;
+        bands.clear();
+        let mut room = bands.push(0, (ROOT, ROOT));
+        let mut band = 0;
+        while band < SIGNED_BANDS {
+            let Some((a, b)) = bands.pop(band) else {
+                band += 1;
+                continue;
+            };
+            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
+                work.triangle_pairs += 1;
+                if !visit(t, s, work) {
+                    return Some(band);
+                }
+                continue;
+            }
+            work.node_pairs += 1;
+            open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
+                if wanted(body.owned(a), obstacle.owned(b))
+                    && let Some(own) = band_of_pair((a, b), beyond)
+                {
+                    room &= bands.push(own.max(band), (a, b));
+                }
+            });
+            if !room {
                 return Some(band);
             }
-            continue;
         }
-        work.node_pairs += 1;
-        open(trees, volumes, turned, (a, b)).for_each(|(a, b), beyond| {
-            if wanted(body.owned(a), obstacle.owned(b))
-                && let Some(own) = band_of_pair((a, b), beyond)
-            {
-                room &= bands.push(own.max(band), (a, b));
-            }
-        });
-        if !room {
-            return Some(band);
-        }
+        None
     }
-    None
 }
 
 /// The band of a signed share: what is deepest comes first, what is farthest last.
@@ -197,7 +232,16 @@ pub(crate) fn for_deepest_triangle_pairs(
         let out_of_question = short > 0.0; // false for NaN
         (!out_of_question).then(|| signed_band_of(short * scale))
     };
-    for_pairs_by_band(trees, volumes, (bands, turned), work, wanted, band, visit);
+    volumes.processor.dispatch(ByBand {
+        trees,
+        volumes,
+        bands,
+        turned,
+        work,
+        wanted,
+        band_of_pair: band,
+        visit,
+    });
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! One volume against eight of the other tree: by how much are they apart, beyond the margin? Why and how exactly: [`facing_volumes`](super::facing_volumes).
 
-use pulp::{Simd, WithSimd};
-
 use super::facing_volumes::{COSINE_ROUNDING, FacingVolumes};
 use super::single::{dot, larger, product};
 use super::turned::{Turned, aside};
@@ -34,26 +32,11 @@ pub(super) struct OneToEight<'a> {
     pub(super) node: &'a WideNode,
 }
 
-/// By how much they are apart.
-#[inline]
-pub(super) fn beyond(pairs: OneToEight) -> Beyond {
-    pairs.volumes.processor.dispatch(pairs)
-}
-
-impl WithSimd for OneToEight<'_> {
-    type Output = Beyond;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Beyond {
-        beyond_in_lanes(&self)
-    }
-}
-
-/// NaN is passed over: what has no other bound is near.
+/// By how much they are apart. NaN is passed over: what has no other bound is near.
 ///
-/// One loop over the lanes, without branches: the compiler makes vectors of it.
+/// One loop over the lanes, without branches: the compiler makes vectors of it, of those that its caller was compiled for.
 #[inline(always)]
-fn beyond_in_lanes(
+pub(super) fn beyond(
     &OneToEight {
         volumes,
         turned,

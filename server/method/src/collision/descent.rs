@@ -1,5 +1,7 @@
 //! Descent of two wide trees together: the thicker of two volumes is opened, and those of its eight that may come near go on.
 
+use pulp::{Simd, WithSimd};
+
 use super::beyond::{Beyond, OneToEight, beyond};
 use super::facing_volumes::{FacingVolumes, Side};
 use super::turned::TurnedNodes;
@@ -30,34 +32,76 @@ pub(crate) fn for_facing_triangle_pairs(
     (stack, turned): (&mut Vec<(Child, Child)>, &mut TurnedNodes),
     work: &mut Work,
     wanted: impl Fn(u8, u8) -> bool,
-    mut visit: impl FnMut(u32, u32, &mut Work) -> bool,
+    visit: impl FnMut(u32, u32, &mut Work) -> bool,
 ) {
-    let (body, obstacle) = trees;
-    stack.clear();
-    stack.push((ROOT, ROOT));
-    let mut opened = [Opened::NONE; AT_ONCE];
-    while !stack.is_empty() {
-        let (most, mut count) = (at_once(stack.len()), 0);
-        while count < most
-            && let Some((a, b)) = stack.pop()
-        {
-            if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b)) {
-                work.triangle_pairs += 1;
-                if !visit(t, s, work) {
-                    return;
+    volumes.processor.dispatch(DepthFirst {
+        trees,
+        volumes,
+        stack,
+        turned,
+        work,
+        wanted,
+        visit,
+    });
+}
+
+/// That search, with the vectors that the processor has.
+struct DepthFirst<'a, W, V> {
+    trees: (&'a WideTree, &'a WideTree),
+    volumes: &'a FacingVolumes,
+    stack: &'a mut Vec<(Child, Child)>,
+    turned: &'a mut TurnedNodes,
+    work: &'a mut Work,
+    wanted: W,
+    visit: V,
+}
+
+impl<W, V> WithSimd for DepthFirst<'_, W, V>
+where
+    W: Fn(u8, u8) -> bool,
+    V: FnMut(u32, u32, &mut Work) -> bool,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self {
+            trees,
+            volumes,
+            stack,
+            turned,
+            work,
+            wanted,
+            mut visit,
+        } = self;
+        let (body, obstacle) = trees;
+        stack.clear();
+        stack.push((ROOT, ROOT));
+        let mut opened = [Opened::NONE; AT_ONCE];
+        while !stack.is_empty() {
+            let (most, mut count) = (at_once(stack.len()), 0);
+            while count < most
+                && let Some((a, b)) = stack.pop()
+            {
+                if let (Below::Triangle(t), Below::Triangle(s)) = (body.below(a), obstacle.below(b))
+                {
+                    work.triangle_pairs += 1;
+                    if !visit(t, s, work) {
+                        return;
+                    }
+                    continue;
                 }
-                continue;
+                work.node_pairs += 1;
+                opened[count] = open(trees, volumes, turned, (a, b));
+                count += 1;
             }
-            work.node_pairs += 1;
-            opened[count] = open(trees, volumes, turned, (a, b));
-            count += 1;
-        }
-        for pair in opened[..count].iter().rev() {
-            pair.for_each(|(a, b), _| {
-                if wanted(body.owned(a), obstacle.owned(b)) {
-                    stack.push((a, b));
-                }
-            });
+            for pair in opened[..count].iter().rev() {
+                pair.for_each(|(a, b), _| {
+                    if wanted(body.owned(a), obstacle.owned(b)) {
+                        stack.push((a, b));
+                    }
+                });
+            }
         }
     }
 }
@@ -110,7 +154,7 @@ pub(super) fn open(
                 first: node * LANES as u32,
                 other: b,
                 side: Side::Body,
-                beyond: beyond(OneToEight {
+                beyond: beyond(&OneToEight {
                     volumes,
                     turned: one,
                     lane: b as usize % LANES,
@@ -124,7 +168,7 @@ pub(super) fn open(
                 first: node * LANES as u32,
                 other: a,
                 side: Side::Obstacle,
-                beyond: beyond(OneToEight {
+                beyond: beyond(&OneToEight {
                     volumes,
                     turned: one,
                     lane: a as usize % LANES,

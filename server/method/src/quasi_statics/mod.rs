@@ -5,7 +5,7 @@ mod certificate;
 mod clarabel;
 mod half_space;
 mod kkt;
-mod lanes;
+pub(crate) mod lanes;
 mod least_distance;
 mod metric;
 mod projection;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::awkward::run;
 use super::cases::{Expected, cases};
 
-const BEGIN: &str = "<!-- the table is written by: cargo test -p taut-scene --test import write_the_table -- --ignored -->\n";
+const BEGIN: &str = "<!-- the table is written by: cargo test -p taut-scene --test all write_the_table -- --ignored -->\n";
 const END: &str = "<!-- end of the table -->\n";
 
 fn page() -> PathBuf {
@@ -65,7 +65,7 @@ fn split() -> (String, String, String) {
 #[test]
 fn the_page_has_the_table() {
     const WRITE: &str =
-        "write it again: cargo test -p taut-scene --test import write_the_table -- --ignored";
+        "write it again: cargo test -p taut-scene --test all write_the_table -- --ignored";
     let ((_, written, _), table) = (split(), table());
     for (there, wanted) in written.lines().zip(table.lines()) {
         assert_eq!(there, wanted, "{WRITE}");

@@ -10,6 +10,7 @@ use god_object::{GodObject, Mesh, Pose, Settings, Vector6, World};
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use taut_method_tests::solids::{body, obstacle};
 use taut_method_tests::variants::measure::quantile;
+use taut_method_tests::variants::oracle::Oracle;
 use taut_scene::{data_file, read_mesh};
 
 use crate::update_support::{Hand, subdivided, thread_cpu_us};
@@ -17,6 +18,8 @@ use crate::update_support::{Hand, subdivided, thread_cpu_us};
 const SIZE: f64 = 0.15;
 /// Updates before the body has come to the obstacle.
 const APPROACH: usize = 60;
+/// Every so many sets are held against the oracle.
+const ERROR_STRIDE: usize = 5;
 
 /// A bunny on a bunny that a hand slides over it.
 struct Slide {
@@ -85,19 +88,38 @@ fn run_slide(slide: &Slide, bunny: &Mesh, repeats: usize) {
         body: body(mesh.clone()),
         obstacles: vec![obstacle("bunny", mesh, Pose::identity())],
     });
-    let runs: Vec<[f64; 4]> = (0..repeats).map(|_| updates(&world, slide)).collect();
+    let runs: Vec<[f64; 4]> = (0..repeats).map(|_| updates(&world, slide, None)).collect();
     print_medians(slide.name, &runs);
+    let mut errors = Vec::new();
+    updates(&world, slide, Some(&mut errors));
+    let share = |of| 100.0 * quantile(&errors, of);
+    println!(
+        "{:20} force off by {:.2} % at p90, {:.2} % at p99, {:.2} % at most, of {} sets",
+        "",
+        share(0.9),
+        share(0.99),
+        share(1.0),
+        errors.len()
+    );
 }
 
-/// p50, p99, p99.9 and the greatest time of an update, us.
-fn updates(world: &Arc<World>, slide: &Slide) -> [f64; 4] {
+/// p50, p99, p99.9 and the greatest time of an update, us. With `errors`: how far published sets are from every pair, for the device one step on.
+fn updates(world: &Arc<World>, slide: &Slide, mut errors: Option<&mut Vec<f64>>) -> [f64; 4] {
     let start = Pose::new(Vector3::new(0.16, 0.02, 0.0), Vector3::new(0.0, 2.0, 0.0));
-    let mut god_object = GodObject::new(Arc::clone(world), Settings::for_size(SIZE), start)
-        .expect("apart at the start");
+    let settings = Settings::for_size(SIZE);
+    let mut god_object =
+        GodObject::new(Arc::clone(world), settings, start).expect("apart at the start");
+    let mut oracle = errors.as_ref().map(|_| Oracle::default());
     let mut hand = Hand::with_steps(start, 1, slide.step);
     let mut times = Vec::new();
     for k in 0..APPROACH + slide.updates {
         let device = hand.next(god_object.pose());
+        if let (Some(errors), Some(oracle)) = (&mut errors, &mut oracle)
+            && k > APPROACH
+            && k % ERROR_STRIDE == 0
+        {
+            errors.push(oracle.compare(world, &god_object, &device).relative);
+        }
         let clock = thread_cpu_us();
         god_object.step(&device, None);
         if k >= APPROACH {

@@ -1,6 +1,5 @@
 //! A client as a process of its own, of this program: one that can be killed and stopped.
 
-use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -38,14 +37,24 @@ pub(super) fn start_client(
     node: &str,
     transport: &str,
 ) -> Result<Process, BenchError> {
+    start_client_by(Command::new(this), server, key, node, transport)
+}
+
+/// The same by another command that runs this program with what follows.
+pub(super) fn start_client_by(
+    mut this: Command,
+    server: &str,
+    key: &Path,
+    node: &str,
+    transport: &str,
+) -> Result<Process, BenchError> {
     let mut process = Process::start(
-        Command::new(this)
-            .args(["--client", server, node, transport])
+        this.args(["--client", server, node, transport])
             .arg(key)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped()),
     )?;
-    let line = process.first_line()?;
+    let line = process.line()?;
     if line.trim() == "joined" {
         return Ok(process);
     }
@@ -54,7 +63,19 @@ pub(super) fn start_client(
     )))
 }
 
-/// What such a process does: joins, says so, and takes states until its standard input ends.
+/// States that a client process got so far, and that were lost on the way.
+pub(super) fn states_and_lost(client: &mut Process) -> Result<[u64; 2], BenchError> {
+    let line = client.ask()?;
+    let mut numbers = line.split_whitespace().map(str::parse);
+    match (numbers.next(), numbers.next()) {
+        (Some(Ok(states)), Some(Ok(lost))) => Ok([states, lost]),
+        _ => Err(BenchError::Missing(format!(
+            "a client does not say what it got: {line:?}"
+        ))),
+    }
+}
+
+/// What such a process does: joins, says so, takes states until its standard input ends, and answers each line there with what it got.
 ///
 /// # Errors
 /// It does not get in.
@@ -67,8 +88,11 @@ pub fn client(server: &str, node: &str, transport: &str, key: &Path) -> Result<(
     };
     let link = member(&runtime, server, &key, node, transport)?;
     println!("joined");
-    let mut ignored = Vec::new();
-    std::io::stdin().read_to_end(&mut ignored)?;
+    for line in std::io::stdin().lines() {
+        line?;
+        let counters = link.counters();
+        println!("{} {}", counters.states, counters.lost);
+    }
     drop(link);
     Ok(())
 }

@@ -46,7 +46,7 @@ impl LeaderProcess {
                 .stdin(Stdio::piped())
                 .stdout(Stdio::piped()),
         )?;
-        let line = process.first_line()?;
+        let line = process.line()?;
         let Some((quic, udp)) = line.trim().split_once(' ') else {
             return Err(BenchError::Missing(format!("no server started: {line}")));
         };

@@ -1,7 +1,7 @@
 //! Processes that end with their owner.
 
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, Command};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdout, Command};
 
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -11,21 +11,31 @@ use super::BenchError;
 #[derive(Debug)]
 pub(super) struct Process {
     child: Child,
+    out: Option<BufReader<ChildStdout>>,
 }
 
 impl Process {
     pub(super) fn start(command: &mut Command) -> Result<Process, BenchError> {
-        let child = command.spawn()?;
-        Ok(Process { child })
+        let mut child = command.spawn()?;
+        let out = child.stdout.take().map(BufReader::new);
+        Ok(Process { child, out })
     }
 
-    /// The first line that it writes to standard output, which is not read after that; empty where it ends before.
-    pub(super) fn first_line(&mut self) -> Result<String, BenchError> {
+    /// The next line that it writes to standard output; empty where it ends before.
+    pub(super) fn line(&mut self) -> Result<String, BenchError> {
         let mut line = String::new();
-        if let Some(out) = self.child.stdout.take() {
-            BufReader::new(out).read_line(&mut line)?;
+        if let Some(out) = &mut self.out {
+            out.read_line(&mut line)?;
         }
         Ok(line)
+    }
+
+    /// Writes an empty line to its standard input; the line that it answers.
+    pub(super) fn ask(&mut self) -> Result<String, BenchError> {
+        if let Some(input) = &mut self.child.stdin {
+            input.write_all(b"\n")?;
+        }
+        self.line()
     }
 
     /// Its standard error.
@@ -51,11 +61,11 @@ impl Process {
         Ok(kill_process(self.id(), signal).map_err(std::io::Error::from)?)
     }
 
-    /// Ends it as Ctrl-C does; what it wrote to standard output.
+    /// Ends it as Ctrl-C does; what it wrote to standard output and nobody has read.
     pub(super) fn end(mut self) -> Result<String, BenchError> {
         self.signal(Signal::INT)?;
         let mut text = String::new();
-        if let Some(mut out) = self.child.stdout.take() {
+        if let Some(mut out) = self.out.take() {
             out.read_to_string(&mut text)?;
         }
         self.child.wait()?;

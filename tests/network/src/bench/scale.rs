@@ -1,12 +1,13 @@
 //! What one more client costs: the processor time of the thread that broadcasts, for each state and client.
 //!
 //! Time of the thread, not of the clock: other work on the machine does not count, but for what it does to caches. On loopback the sender's system call runs the
-//! receiver's half of the network stack too, so that these figures are above those of a network card.
+//! receiver's half of the network stack too, so that these figures are above those of a network card; between namespaces it runs the switch as well.
 
 use std::io::IoSlice;
-use std::net::{SocketAddr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::os::fd::AsRawFd;
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use nix::sys::socket::{MsgFlags, MultiHeaders, SockaddrIn, sendmmsg};
@@ -17,10 +18,13 @@ use taut_proto::codec::encode_into;
 use taut_proto::header::{MAX_DATAGRAM_BYTES, MAX_PAYLOAD_BYTES};
 use taut_proto::seal::{KEY_MATERIAL_BYTES, Sealer};
 
-use super::client_process::start_client;
+use super::client_process::{start_client_by, states_and_lost};
+use super::process::Process;
 use super::threads::{on_own_thread, runtime};
 use super::{BenchError, server_options, small_content, state, wait_until};
 
+/// Places that are kept for device, tracker and operator.
+const OTHERS: usize = 3;
 /// Rounds of the comparison of system calls.
 const ROUNDS: u32 = 400;
 
@@ -35,6 +39,40 @@ pub struct Ways {
     pub at_once: f64,
 }
 
+/// Where server and clients are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Place {
+    /// All on loopback.
+    #[default]
+    Loopback,
+    /// Each client in a network namespace of its own, of this name with the client's number behind it; the server is this process, at this address.
+    Namespaces(String, Ipv4Addr),
+}
+
+impl Place {
+    /// The server's address.
+    #[must_use]
+    pub fn address(&self) -> Ipv4Addr {
+        match self {
+            Place::Loopback => Ipv4Addr::LOCALHOST,
+            Place::Namespaces(_, address) => *address,
+        }
+    }
+
+    /// What runs `program` where this client is.
+    fn command(&self, program: &Path, client: usize) -> Command {
+        match self {
+            Place::Loopback => Command::new(program),
+            Place::Namespaces(name, _) => {
+                let mut command = Command::new("ip");
+                let namespace = format!("{name}{client}");
+                command.args(["netns", "exec", &namespace]).arg(program);
+                command
+            }
+        }
+    }
+}
+
 /// What a server pays, µs of the broadcasting thread for each state and client.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
@@ -46,6 +84,10 @@ pub struct Cost {
     pub state: f64,
     /// Of all states that were due, those that were sent.
     pub sent: f64,
+    /// Datagrams that clients took in the meantime, and those that were lost on the way.
+    pub taken: u64,
+    /// See above.
+    pub lost: u64,
 }
 
 /// Processor time of this thread.
@@ -164,12 +206,21 @@ fn drain(sockets: &[UdpSocket]) {
     }
 }
 
+/// What all clients took and lost so far.
+fn taken_and_lost(clients: &mut [Process]) -> Result<[u64; 2], BenchError> {
+    clients.iter_mut().try_fold([0, 0], |sum, client| {
+        let [taken, lost] = states_and_lost(client)?;
+        Ok([sum[0] + taken, sum[1] + lost])
+    })
+}
+
 /// Serves `clients` processes for `seconds` at 1 kHz; to a group where there is one, once all hear it.
 ///
 /// # Errors
 /// A process does not join, or the system has no sockets.
 pub fn cost(
     this: &Path,
+    place: &Place,
     clients: usize,
     group: Option<MulticastOptions>,
     seconds: f64,
@@ -179,14 +230,19 @@ pub fn cost(
     let key_path = directory.path().join("cluster.key");
     let key = create_key_file(&key_path)?;
     let options = ServerOptions {
-        max_clients: clients,
+        max_clients: clients + OTHERS,
         multicast: group,
+        quic: SocketAddr::from((place.address(), 0)),
+        udp: SocketAddr::from((place.address(), 0)),
         ..server_options(&key)
     };
     let server = runtime.block_on(serve(options, small_content()))?;
     let address = server.quic_addr().to_string();
-    let processes = (0..clients)
-        .map(|k| start_client(this, &address, &key_path, &format!("node-{k}"), "udp"))
+    let mut processes = (0..clients)
+        .map(|k| {
+            let this = place.command(this, k);
+            start_client_by(this, &address, &key_path, &format!("node-{k}"), "udp")
+        })
         .collect::<Result<Vec<_>, _>>()?;
     wait_until("datagrams of all", || {
         server
@@ -213,6 +269,7 @@ pub fn cost(
         while group.is_some() && !by_group() && begun.elapsed() < Duration::from_secs(20) {
             send();
         }
+        let before = taken_and_lost(&mut processes)?;
         let (mut time, mut sent, mut due, mut states) = (Duration::ZERO, 0, 0, 0);
         let begun = Instant::now();
         while begun.elapsed().as_secs_f64() < seconds {
@@ -222,12 +279,15 @@ pub fn cost(
             due += report.sent + report.skipped + report.failed;
             states += 1;
         }
+        let after = taken_and_lost(&mut processes)?;
         let us = time.as_secs_f64() * 1e6;
         Ok(Cost {
             clients,
             each: us / due.max(1) as f64,
             state: us / f64::from(states.max(1)),
             sent: sent as f64 / due.max(1) as f64,
+            taken: after[0] - before[0],
+            lost: after[1].saturating_sub(before[1]),
         })
     });
     drop(processes);

@@ -29,6 +29,9 @@ const NODES: usize = 2;
 /// Time between two deaths as a share of the run; at least and at most this long.
 const LIFE_SHARE: f64 = 0.01;
 const LIFE_S: (f64, f64) = (1.0, 15.0);
+/// Share of the run in which server and bridge die, too. After it they live on: what a server gathers in hours is not seen in one that is
+/// killed every other minute.
+const ALL_MAY_DIE_SHARE: f64 = 0.25;
 /// Longest time without a server, ms.
 const LONGEST_AWAY_MS: usize = 2_000;
 /// Silence after which the workbench gives a node up, s: more than a busy machine starves one for.
@@ -74,7 +77,8 @@ pub fn run(
         log.note(&cast.server_name, cast.server()?.number())?;
         log.note(&cast.bridge_name, cast.bridge()?.number())?;
         log.note(&this, std::process::id())?;
-        cast.somebody_dies(&mut random, log)?;
+        let all_may_die = log.elapsed_s() < ALL_MAY_DIE_SHARE * duration.as_secs_f64();
+        cast.somebody_dies(all_may_die, &mut random, log)?;
         cast.findings(log)?;
     }
     cast.all_are_in()?;
@@ -190,8 +194,13 @@ impl Cast {
         Ok(())
     }
 
-    fn somebody_dies(&mut self, random: &mut Random, log: &mut SoakLog) -> Result<(), BenchError> {
-        match random.below(12) {
+    fn somebody_dies(
+        &mut self,
+        all_may_die: bool,
+        random: &mut Random,
+        log: &mut SoakLog,
+    ) -> Result<(), BenchError> {
+        match random.below(if all_may_die { 12 } else { 8 }) {
             0..=4 => {
                 let watcher = self.watchers.swap_remove(random.below(self.watchers.len()));
                 self.result.nodes += 1;

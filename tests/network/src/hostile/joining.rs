@@ -2,6 +2,7 @@
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use taut_link::pinning::PinnedServer;
@@ -12,7 +13,9 @@ use taut_proto::VersionRange;
 use tokio::runtime::Runtime;
 
 use super::{Attack, Finding};
-use crate::bench::{BenchError, client_options, server_options, small_content, state};
+use crate::bench::{
+    BenchError, Ticker, client_options, reading, request_fifo, server_options, small_content, state,
+};
 use crate::report::Extent;
 
 /// The attacks of this group.
@@ -28,6 +31,12 @@ pub(super) const ATTACKS: &[Attack] = &[
         tried: "four addresses hold 96 joins open without a word, again and again, while a device comes",
         promised: "the device gets in: none of them keeps its place against a newcomer",
         run: silent_joins,
+    },
+    Attack {
+        name: "first-packets",
+        tried: "8,000 first packets of QUIC a second, of as many joins that never go on, while a device sends readings and a node joins",
+        promised: "every reading comes, and the node gets in",
+        run: first_packets,
     },
     Attack {
         name: "steered-path",
@@ -49,6 +58,10 @@ const MAX_CLIENTS: usize = 12;
 const HELD_OF_ONE: usize = 24;
 /// Longest wait for all places of joining to be taken.
 const CROWD_LIMIT: Duration = Duration::from_secs(10);
+/// First packets that differ, and how long they come.
+const DIFFERENT_PACKETS: usize = 256;
+/// See above.
+const FLOOD_TIME: Duration = Duration::from_secs(2);
 /// States that are sent after the path was steered.
 const STEERED_STATES: u64 = 400;
 /// Bytes of a challenge: header, token, seal.
@@ -163,6 +176,93 @@ fn silent_joins(_: &Extent) -> Result<Finding, BenchError> {
             counters.turned_away
         ),
         kept: joined.is_ok() && counters.crowded_out > 0,
+    })
+}
+
+/// Different first packets, which are sent again and again: the server knows none of them.
+fn first_packets_to(server: &ServerLink) -> Result<Vec<Vec<u8>>, BenchError> {
+    let heard = UdpSocket::bind("127.0.0.1:0")?;
+    heard.set_read_timeout(Some(Duration::from_secs(10)))?;
+    let pinned = Arc::new(PinnedServer::new(server.pin()));
+    let config = transport::client_config(pinned, Duration::from_secs(5))?;
+    let endpoint = quinn::Endpoint::client(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))?;
+    let mut packets = Vec::new();
+    for _ in 0..DIFFERENT_PACKETS {
+        let joining = endpoint.connect_with(config.clone(), heard.local_addr()?, "taut");
+        let joining = joining.map_err(|error| BenchError::Missing(error.to_string()))?;
+        let mut packet = vec![0; 2048];
+        let length = heard.recv(&mut packet)?;
+        packet.truncate(length);
+        packets.push(packet);
+        drop(joining);
+    }
+    Ok(packets)
+}
+
+fn first_packets(_: &Extent) -> Result<Finding, BenchError> {
+    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let server = runtime.block_on(serve(server_options(&key), small_content()))?;
+    let join = |role, node| runtime.block_on(connect(client_options(&server, &key, role, node)));
+    let device = join(Role::Device, "bridge")?;
+    let packets = {
+        let _within = runtime.enter();
+        first_packets_to(&server)?
+    };
+    let (socket, to) = (UdpSocket::bind("127.0.0.2:0")?, server.quic_addr());
+    let (is_over, strangers) = (AtomicBool::new(false), AtomicU64::new(0));
+    let mut receiver = server.device_receiver();
+    let (sent, node) = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            // As in a server; where the class is not granted the kernel's buffer bears a pause of some tenths of a second.
+            let _granted = request_fifo(85);
+            receiver.run(&|| is_over.load(Ordering::Relaxed));
+        });
+        scope.spawn(|| {
+            let mut ticker = Ticker::new(MILLISECOND);
+            let mut packets = packets.iter().cycle();
+            while !is_over.load(Ordering::Relaxed) {
+                for packet in packets.by_ref().take(8) {
+                    if socket.send_to(packet, to).is_ok() {
+                        strangers.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+                ticker.wait();
+            }
+        });
+        let readings = scope.spawn(|| {
+            let mut ticker = Ticker::new(MILLISECOND);
+            let mut sent = 0;
+            while !is_over.load(Ordering::Relaxed) {
+                sent += 1;
+                device.send_input(&reading(sent));
+                ticker.wait();
+            }
+            sent
+        });
+        std::thread::sleep(FLOOD_TIME);
+        let node = join(Role::Render, "left");
+        is_over.store(true, Ordering::Relaxed);
+        (readings.join(), node)
+    });
+    let sent = sent.map_err(|_| BenchError::Missing("the device broke down".to_owned()))?;
+    let taken = || {
+        let counters = server.counters();
+        counters.inputs + counters.inputs_late
+    };
+    let end = Instant::now() + CROWD_LIMIT;
+    while taken() < sent && Instant::now() < end {
+        std::thread::sleep(MILLISECOND);
+    }
+    Ok(Finding {
+        happened: format!(
+            "{} of {sent} readings taken; the node {} beside {} first packets in {:.1} s",
+            taken(),
+            node.as_ref()
+                .map_or_else(ToString::to_string, |_| "is in".to_owned()),
+            strangers.load(Ordering::Relaxed),
+            FLOOD_TIME.as_secs_f64()
+        ),
+        kept: taken() == sent && node.is_ok(),
     })
 }
 

@@ -4,7 +4,7 @@
 //! nothing falls silent, and each datagram that arrives is genuine and new.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use taut::report::terminal::Terminal;
 use taut::session::Session;
@@ -42,6 +42,10 @@ pub(super) const ATTACKS: &[Attack] = &[
 const PROMISE: &str = "at most 20 mJ more for the hand than without delay; no force from readings of 120 ms ago; an event";
 /// J.
 const MORE_ENERGY: f64 = 0.02;
+/// A force that there is something of to be attacked, N.
+const FELT: f64 = 0.5;
+/// Longest wait for one.
+const PATIENCE: Duration = Duration::from_secs(60);
 const ZERO_AFTER: Duration = Duration::from_millis(120);
 
 /// A ball over a half-space, both exact: 1000 N/m.
@@ -97,13 +101,28 @@ fn growing_delay_down() -> Result<Finding, BenchError> {
 /// What the hand is given behind this network, and without it.
 fn compare(coupling: CouplingChoice, treatment: Treatment) -> Result<Finding, BenchError> {
     let usual = run(coupling, Treatment::both_ways(Impairment::default()))?;
-    let attacked = run(coupling, treatment)?;
-    let given = [&usual, &attacked].map(|report| report.energy_injected_j);
+    let begun = Instant::now();
+    loop {
+        let attacked = run(coupling, treatment.clone())?;
+        let finding = judged(&usual, &attacked);
+        // On a machine that pauses the bridge again and again there is no force that could be attacked; what is promised holds all the same.
+        let is_attack = attacked.max_force_n > FELT;
+        if is_attack || !finding.kept || begun.elapsed() > PATIENCE {
+            return Ok(Finding {
+                kept: finding.kept && is_attack,
+                ..finding
+            });
+        }
+    }
+}
+
+fn judged(usual: &BridgeReport, attacked: &BridgeReport) -> Finding {
+    let given = [usual, attacked].map(|report| report.energy_injected_j);
     // The loop of a machine that pauses it notices an age that much later.
     let late = attacked.period_us.map_or(0, |period| period.max);
     let allowed = ZERO_AFTER + Duration::from_micros(late);
     let oldest = attacked.max_force_age_ms;
-    Ok(Finding {
+    Finding {
         happened: format!(
             "{:.2} mJ given ({:.2} without delay), {:.1} N at most; oldest reading felt {oldest:.0} ms ({:.1} ms the longest period), {} events",
             given[1] * 1e3,
@@ -114,9 +133,8 @@ fn compare(coupling: CouplingChoice, treatment: Treatment) -> Result<Finding, Be
         ),
         kept: given[1] <= given[0] + MORE_ENERGY
             && oldest <= allowed.as_secs_f64() * 1e3
-            && attacked.max_force_n > 0.5
             && attacked.safety_events > 0,
-    })
+    }
 }
 
 /// A session with a remote device, and a bridge to it whose datagrams are treated like this.

@@ -33,27 +33,33 @@ pub(super) fn scale_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
         ));
     }
     for &clients in extent.clients {
-        let unicast = cost(&extent.this, clients, None, seconds)?;
+        let place = &extent.place;
+        let unicast = cost(&extent.this, place, clients, None, seconds)?;
         rows.push(Row::at_most(
             format!("{clients} clients by unicast: broadcasting thread, a state"),
             unicast.state,
             HALF_A_CORE,
             "us",
             format!(
-                "{} us for each client, {:.1} % sent",
+                "{} us for each client, {:.1} % sent, {} of {} lost",
                 brief(unicast.each),
-                unicast.sent * 100.0
+                unicast.sent * 100.0,
+                unicast.lost,
+                unicast.taken + unicast.lost
             ),
         ));
-        let multicast = cost(&extent.this, clients, Some(group()?), seconds)?;
+        let group = group(place.address())?;
+        let multicast = cost(&extent.this, place, clients, Some(group), seconds)?;
         rows.push(Row::at_most(
             format!("{clients} clients by multicast: broadcasting thread, a state"),
             multicast.state,
             HALF_A_CORE,
             "us",
             format!(
-                "{} of unicast's time",
-                brief(multicast.state / unicast.state)
+                "{} of unicast's time, {} of {} lost",
+                brief(multicast.state / unicast.state),
+                multicast.lost,
+                multicast.taken + multicast.lost
             ),
         ));
     }
@@ -61,12 +67,12 @@ pub(super) fn scale_rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
 }
 
 /// A group of this run alone.
-fn group() -> Result<MulticastOptions, BenchError> {
-    let port = UdpSocket::bind("127.0.0.1:0")?.local_addr()?.port();
+fn group(interface: Ipv4Addr) -> Result<MulticastOptions, BenchError> {
+    let port = UdpSocket::bind((interface, 0))?.local_addr()?.port();
     let [high, low] = port.to_be_bytes();
     Ok(MulticastOptions {
         group: SocketAddrV4::new(Ipv4Addr::new(239, 255, high, low), port),
         announced: None,
-        interface: Ipv4Addr::LOCALHOST,
+        interface,
     })
 }

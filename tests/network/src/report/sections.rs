@@ -11,6 +11,7 @@ use super::row::{Row, brief};
 use super::scale::scale_rows;
 use crate::bench::age::{self, Age};
 use crate::bench::death::{self, Aftermath, Death};
+use crate::bench::scale::Place;
 use crate::bench::{BenchError, events, isolation, join, latency};
 use crate::forge::attack;
 use crate::relay::{Burst, Impairment};
@@ -28,6 +29,8 @@ pub struct Extent {
     pub deaths: usize,
     /// Numbers of clients whose cost is measured.
     pub clients: &'static [usize],
+    /// Where these clients are.
+    pub place: Place,
     /// Numbers of nodes whose swaps are compared.
     pub screens: &'static [u64],
     /// Runs of each sort of frames, of which the median counts.
@@ -123,8 +126,13 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "soak",
-        about: "hours in which clients, server and bridge come, go and are killed",
-        run: super::soak::rows,
+        about: "hours in which clients of the links come, go and are killed",
+        run: super::soak::of_links,
+    },
+    Section {
+        name: "soak-program",
+        about: "hours in which nodes, observers, server and bridge come, go and are killed",
+        run: super::soak::of_program,
     },
     Section {
         name: "hostile",
@@ -429,6 +437,7 @@ impl Extent {
             joins: 10,
             deaths: 5,
             clients: &[8, 32, 64],
+            place: Place::Loopback,
             screens: &[2, 4],
             skew_turns: 5,
             node_timeout: Duration::from_nanos(SilenceLimits::OF_A_NODE.dead_after_ns),

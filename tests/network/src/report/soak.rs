@@ -1,6 +1,5 @@
 //! Rows of the soak: what held for hours, and what grew.
 
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::row::Row;
@@ -10,37 +9,20 @@ use crate::bench::{BenchError, soak, soak_program};
 
 const SEED: u64 = 21;
 
-/// The links first, then the whole program, where there is one.
-pub(super) fn rows(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+fn not_asked_for(what: &str) -> Vec<Row> {
+    vec![Row::unknown(
+        what,
+        "no promise broken",
+        "--soak SECONDS runs it",
+    )]
+}
+
+pub(super) fn of_links(extent: &Extent) -> Result<Vec<Row>, BenchError> {
     let Some(seconds) = extent.soak_seconds else {
-        let why = "--soak SECONDS runs it";
-        return Ok(vec![Row::unknown("soak", "no invariant broken", why)]);
+        return Ok(not_asked_for("soak"));
     };
     let duration = Duration::from_secs_f64(seconds);
-    let mut rows = of_links(duration, extent.soak_log.as_deref())?;
-    if extent.program.is_file() {
-        let log = extent.soak_log.as_deref().map(beside);
-        rows.extend(of_program(&extent.program, duration, log.as_deref())?);
-    } else {
-        let why = format!("{} is not there: --taut PROGRAM", extent.program.display());
-        rows.push(Row::unknown(
-            "soak of the whole program",
-            "no promise broken",
-            why,
-        ));
-    }
-    Ok(rows)
-}
-
-/// `soak.csv` has `soak-program.csv` beside it.
-fn beside(log: &Path) -> PathBuf {
-    let stem = log.file_stem().unwrap_or_default().to_string_lossy();
-    let end = log.extension().unwrap_or_default().to_string_lossy();
-    log.with_file_name(format!("{stem}-program.{end}"))
-}
-
-fn of_links(duration: Duration, log: Option<&Path>) -> Result<Vec<Row>, BenchError> {
-    let mut log = SoakLog::open(log)?;
+    let mut log = SoakLog::open(extent.soak_log.as_deref())?;
     let run = soak::run(duration, SEED, &mut log)?;
     let server = &run.server;
     let forged_counted =
@@ -90,12 +72,18 @@ fn of_links(duration: Duration, log: Option<&Path>) -> Result<Vec<Row>, BenchErr
     Ok(rows)
 }
 
-fn of_program(
-    program: &Path,
-    duration: Duration,
-    log: Option<&Path>,
-) -> Result<Vec<Row>, BenchError> {
-    let mut log = SoakLog::open(log)?;
+pub(super) fn of_program(extent: &Extent) -> Result<Vec<Row>, BenchError> {
+    const WHAT: &str = "soak of the whole program";
+    let program = &extent.program;
+    if !program.is_file() {
+        let why = format!("{} is not there: --taut PROGRAM", program.display());
+        return Ok(vec![Row::unknown(WHAT, "no promise broken", why)]);
+    }
+    let Some(seconds) = extent.soak_seconds else {
+        return Ok(not_asked_for(WHAT));
+    };
+    let duration = Duration::from_secs_f64(seconds);
+    let mut log = SoakLog::open(extent.soak_log.as_deref())?;
     let run = soak_program::run(program, duration, SEED, &mut log)?;
     let broken = log.broken();
     let first = broken
@@ -103,7 +91,9 @@ fn of_program(
         .map_or(String::new(), |what| format!(", the first: {what}"));
     Ok(vec![
         Row::invariant(
-            "soak of the whole program: promises broken (penetration, age and slew of the force, order, events, coming back)",
+            format!(
+                "{WHAT}: promises broken (penetration, age and slew of the force, order, events, coming back)"
+            ),
             "0",
             format!(
                 "{}{first}; {} states, largest force {:.1} N; {} nodes, {} observers, {} bridges, {} servers went and came",
@@ -117,7 +107,7 @@ fn of_program(
             ),
             broken.is_empty() && run.states > 0,
         ),
-        growth("soak of the whole program", &log),
+        growth(WHAT, &log),
     ])
 }
 

@@ -3,8 +3,8 @@
 //! Each contact: `0 <= lambda_n  _|_  J_n a - b >= 0`, and its tangential multiplier is the point of the disc of radius
 //! `mu lambda_n` that opposes its slip most (maximal dissipation; exact circles, so no direction is preferred). The rows are
 //! more than the six unknowns, and the share of each contact is not unique: the start is the least-norm distribution, as of
-//! an elastic foundation, which neither order nor duplication of the rows changes, and the iteration moves from there only
-//! where a cone forbids it.
+//! an elastic foundation, which neither order nor duplication of the rows changes: of what full stick needs, and where a cone forbids that, of
+//! the answer before. The iteration goes on from there.
 //!
 //! Source: the contact laws are those of Moreau and Jean's non-smooth contact dynamics (Jean 1999), with displacements for velocities.
 
@@ -16,7 +16,7 @@ use crate::spatial::Vector6;
 
 /// Most contacts of one cone problem. A rigid patch has six freedoms: more contacts change how the load is shared, and little else; and each costs in
 /// every step.
-pub(super) const MAX_CONE_CONTACTS: usize = 12;
+pub(super) const MAX_CONE_CONTACTS: usize = 8;
 /// Regularisation of the least-norm distribution, relative to its trace: below it, directions that no contact holds.
 const LEAST_NORM_REGULARISATION: f64 = 1e-11;
 /// Share of full stick's correction that the cones may cut before it is relaxed: rounding.
@@ -38,61 +38,74 @@ pub(super) struct ConeAnswer {
 }
 
 impl ConeProblem {
-    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0; `starts` are corrections that may be
-    /// near the answer.
+    /// Solves the problem; the multipliers stay in the contacts. `scale` is a length in whitened coordinates, > 0; `likely` is a correction that
+    /// may be near the answer.
     ///
     /// Where the Newton iteration comes to its limit, full stick cut to the cones stays, and a residual that says how much was cut.
-    pub(super) fn solve(&mut self, scale: f64, starts: [Vector6; 2]) -> ConeAnswer {
-        let cut = self.start_from_stick();
-        let stick = self.wrench();
+    pub(super) fn solve(&mut self, scale: f64, likely: &Vector6) -> ConeAnswer {
+        let held = Held::by(&self.contacts);
+        let cut = self.start_from_stick(held.as_ref());
         if cut <= STICK_TOLERANCE * scale {
             return ConeAnswer {
-                correction: stick,
+                correction: self.wrench(),
                 residual: 0.0,
             };
         }
-        let residual = self
-            .balance(scale, &[starts[0], starts[1], stick])
-            .unwrap_or(cut / scale);
+        if let Some(held) = &held {
+            self.share(&held.solve(likely));
+        }
+        let residual = self.balance(scale, likely);
+        if residual.is_none() {
+            self.start_from_stick(held.as_ref());
+        }
         ConeAnswer {
             correction: self.wrench(),
-            residual,
+            residual: residual.unwrap_or(cut / scale),
+        }
+    }
+
+    /// The same again after a contact has come to those of the last answer, `before`.
+    pub(super) fn solve_again(&mut self, scale: f64, before: &ConeAnswer) -> ConeAnswer {
+        let residual = self.balance(scale, &before.correction);
+        ConeAnswer {
+            correction: self.wrench(),
+            residual: residual.unwrap_or(before.residual),
         }
     }
 
     /// Gives every contact its share of what full stick needs, cut to its cone. Returns the length of what was cut.
-    pub(super) fn start_from_stick(&mut self) -> f64 {
+    pub(super) fn start_from_stick(&mut self, held: Option<&Held>) -> f64 {
         // y = A d with A = sum j j^T, and j . y = -c for each row: A A d = -sum j c; the multipliers are j . d.
-        let mut gram = Matrix6::zeros();
-        let mut wanted = Vector6::zeros();
-        for contact in &self.contacts {
-            let mut row = |j: &Vector6, c: f64| {
-                gram.ger(1.0, j, j, 1.0);
-                wanted -= j * c;
-            };
-            row(&contact.normal, contact.slack);
+        let Some(held) = held else {
+            return f64::INFINITY; // the contacts keep what they have
+        };
+        let wanted = self.contacts.iter().fold(Vector6::zeros(), |sum, contact| {
+            let sum = sum - contact.normal * contact.slack;
             if contact.coefficient > 0.0 {
-                row(&contact.tangents[0], contact.slip[0]);
-                row(&contact.tangents[1], contact.slip[1]);
+                sum - contact.tangents[0] * contact.slip[0] - contact.tangents[1] * contact.slip[1]
+            } else {
+                sum
             }
-        }
-        let Some(factor) = regular(&gram) else {
-            return f64::INFINITY; // the contacts keep zero
-        };
-        // One step of refinement takes the regularisation out again where contacts hold.
-        let solve = |right: &Vector6| {
-            let first = factor.solve(right);
-            first + factor.solve(&(right - gram * first))
-        };
-        let shares = solve(&solve(&wanted));
+        });
+        let cut = self.share(&held.solve(&held.solve(&wanted)));
+        // What no contact can hold (contacts that contradict each other) counts as cut, too.
+        let y = self.wrench();
+        let missed = self.contacts.iter().fold(0.0, |worst: f64, contact| {
+            worst.max((contact.slack + contact.normal.dot(&y)).abs())
+        });
+        cut.norm() + missed
+    }
+
+    /// Gives every contact `j . shares`, cut to its cone. Returns the wrench that was cut.
+    fn share(&mut self, shares: &Vector6) -> Vector6 {
         let mut cut = Vector6::zeros();
         for contact in &mut self.contacts {
-            let wished_load = contact.normal.dot(&shares);
+            let wished_load = contact.normal.dot(shares);
             contact.load = wished_load.max(0.0);
             cut += contact.normal * (contact.load - wished_load);
             let frictional = contact.coefficient > 0.0;
             let wished = if frictional {
-                contact.tangents.map(|j| j.dot(&shares))
+                contact.tangents.map(|j| j.dot(shares))
             } else {
                 [0.0; 2]
             };
@@ -100,12 +113,7 @@ impl ConeProblem {
             let [u, v] = [0, 1].map(|i| contact.grip[i] - wished[i]);
             cut += contact.tangents[0] * u + contact.tangents[1] * v;
         }
-        // What no contact can hold (contacts that contradict each other) counts as cut, too.
-        let y = self.wrench();
-        let missed = self.contacts.iter().fold(0.0, |worst: f64, contact| {
-            worst.max((contact.slack + contact.normal.dot(&y)).abs())
-        });
-        cut.norm() + missed
+        cut
     }
 
     /// The part of the whitened motion `y` that loaded contacts which stick leave free.
@@ -133,6 +141,35 @@ impl ConeProblem {
         self.contacts
             .iter()
             .fold(Vector6::zeros(), |sum, contact| sum + contact.grip_wrench())
+    }
+}
+
+/// What contacts hold: the sum of products of all their rows, by which a wrench is shared among them with the least norm.
+pub(super) struct Held {
+    gram: Matrix6<f64>,
+    factor: Cholesky<f64, Const<6>>,
+}
+
+impl Held {
+    /// `None` where they hold nothing.
+    pub(super) fn by(contacts: &[ConeContact]) -> Option<Self> {
+        let mut gram = Matrix6::zeros();
+        for contact in contacts {
+            gram.ger(1.0, &contact.normal, &contact.normal, 1.0);
+            if contact.coefficient > 0.0 {
+                for tangent in &contact.tangents {
+                    gram.ger(1.0, tangent, tangent, 1.0);
+                }
+            }
+        }
+        let factor = regular(&gram)?;
+        Some(Self { gram, factor })
+    }
+
+    /// One step of refinement takes the regularisation out again where contacts hold.
+    fn solve(&self, right: &Vector6) -> Vector6 {
+        let first = self.factor.solve(right);
+        first + self.factor.solve(&(right - self.gram * first))
     }
 }
 

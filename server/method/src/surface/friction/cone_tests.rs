@@ -5,14 +5,18 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 
-use super::cone::{ConeAnswer, ConeProblem, MAX_CONE_CONTACTS};
+use super::cone::{ConeAnswer, ConeProblem, Held, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, in_disc, tangents_of};
 use crate::spatial::{Vector6, six};
 
 /// Sweeps of the oracle: as many as it takes, for two contacts or three.
 const ORACLE_SWEEPS: usize = 200_000;
-/// Residual of an answer that stiff steps have found.
+/// Residual of an answer that the iteration has found.
 const BALANCED: f64 = 1e-3;
+/// Contacts that hold the body badly turn slip and penetration into a motion so many times as large: 26 times in the worst of 30,000 draws. And a residual
+/// that counts as none.
+const AMPLIFIED: f64 = 100.0;
+const NO_RESIDUAL: f64 = 1e-6;
 
 /// Contacts of a body of 1 kg and 1 kg m^2 about every axis, with a point and a normal each; a_u presses and turns, sticking since zero.
 fn problem(
@@ -87,7 +91,7 @@ fn oracle(mut problem: ConeProblem) -> Option<Vector6> {
 
 fn solved(problem: &ConeProblem, start: Vector6, scale: f64) -> (ConeProblem, ConeAnswer) {
     let mut problem = problem.clone();
-    let answer = problem.solve(scale, [start, Vector6::zeros()]);
+    let answer = problem.solve(scale, &start);
     (problem, answer)
 }
 
@@ -133,7 +137,7 @@ proptest! {
         let balanced = answer.residual <= BALANCED;
         if balanced && let Some(expected) = oracle(problem) {
             let error = (answer.correction - expected).norm() / scale;
-            prop_assert!(error <= 10.0 * BALANCED, "{error} {}", answer.residual);
+            prop_assert!(error <= AMPLIFIED * answer.residual.max(NO_RESIDUAL), "{error} {}", answer.residual);
         }
     }
 
@@ -145,10 +149,10 @@ proptest! {
         let (_, one) = solved(&problem(0.2, &wished, &contacts), Vector6::zeros(), scale);
         let turned: Vec<_> = contacts.iter().rev().copied().collect();
         let (_, other) = solved(&problem(0.2, &wished, &turned), Vector6::from(start), scale);
-        let balanced = one.residual.max(other.residual) <= 0.1 * BALANCED;
-        if balanced {
+        let residual = one.residual.max(other.residual);
+        if residual <= BALANCED {
             let difference = (one.correction - other.correction).norm() / scale;
-            prop_assert!(difference <= BALANCED, "{difference}");
+            prop_assert!(difference <= AMPLIFIED * residual.max(NO_RESIDUAL), "{difference} {residual}");
         }
     }
 
@@ -158,12 +162,10 @@ proptest! {
     ) {
         let scale = wished.norm();
         let mut problem = problem(coefficient, &wished, &contacts);
-        problem.start_from_stick();
-        let before = problem.grip_wrench();
-        prop_assert!(problem.newton(Vector6::repeat(1.0), 1e4, 0, 0.0).is_none());
-        prop_assert_eq!(problem.grip_wrench(), before);
+        let held = Held::by(&problem.contacts);
+        problem.start_from_stick(held.as_ref());
         prop_assert!(keeps_cones(&problem));
-        let answer = problem.solve(scale, [Vector6::repeat(f64::NAN); 2]);
+        let answer = problem.solve(scale, &Vector6::repeat(f64::NAN));
         prop_assert!(keeps_cones(&problem));
         prop_assert!(answer.residual.is_finite());
     }

@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, tangents_of};
-use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
+use crate::constraint::{FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, linear};
@@ -20,11 +20,8 @@ use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
 pub(crate) const TOUCHING_MOTION_TOLERANCES: f64 = 4.0;
-/// Friction may bring other contacts to touch: so often the cone problem is set up again with them.
-const MAX_ROUNDS: usize = 3;
-/// Where the projection differs by less than this share of the scale from the cone problem, other rows that hold the body are no other contacts: of
-/// many that lie close together, the cone problem has some and the projection others.
-const SAME_ANSWER: f64 = 1e-3;
+/// Friction may press the body against other rows: so many times the one that the answer violates most becomes a contact.
+const MAX_ADDED: usize = 3;
 /// A friction that would make energy is halved so often, then dropped.
 const MAX_HALVINGS: usize = 3;
 
@@ -37,8 +34,9 @@ pub struct Friction {
     /// Rows that touch.
     touched: Vec<u32>,
     cone: ConeProblem,
-    /// The rows of the cone problem's contacts, in their order.
+    /// The rows of the cone problem's contacts, in their order, and their features.
     rows: ArrayVec<u32, MAX_CONE_CONTACTS>,
+    features: ArrayVec<FeaturePair, MAX_CONE_CONTACTS>,
     /// `L^T (a - a_u)` of the last cone problem: the next one's may be near.
     last: Vector6,
     residual: f64,
@@ -78,7 +76,7 @@ impl FrictionProblem<'_> {
 
 impl Friction {
     /// Most projections of one [`Friction::hold`].
-    pub(crate) const MAX_PROJECTIONS: u32 = MAX_ROUNDS as u32 + 1;
+    pub(crate) const MAX_PROJECTIONS: u32 = MAX_HALVINGS as u32 + 1;
 
     /// The friction of a world; `None` where every obstacle is frictionless: then there is nothing to pay.
     pub fn of(world: &World, settings: &Settings) -> Option<Self> {
@@ -94,6 +92,7 @@ impl Friction {
             touched: Vec::with_capacity(settings.max_constraints),
             cone: ConeProblem::default(),
             rows: ArrayVec::new(),
+            features: ArrayVec::new(),
             last: Vector6::zeros(),
             residual: 0.0,
             scale: 0.0,
@@ -150,6 +149,7 @@ impl Friction {
         self.slid = true;
         self.acts = false;
         if frictionless.status != ProjectionStatus::Solved || frictionless.active.is_empty() {
+            self.last = Vector6::zeros();
             return frictionless;
         }
         let metric = problem.metric;
@@ -161,113 +161,146 @@ impl Friction {
             return frictionless;
         }
         self.scale = scale;
-        let mut held: Option<Projection> = None;
-        self.rows.clear();
-        self.cone.contacts.clear();
-        for _ in 0..MAX_ROUNDS {
-            let now = held.as_ref().unwrap_or(&frictionless);
-            if !self.gather(problem, now) {
-                break;
-            }
-            let wanted = now.acceleration - problem.unconstrained;
-            let likely: ArrayVec<u32, MAX_ACTIVE> = now.active.iter().map(|row| row.row).collect();
-            let answer = self.cone.solve(scale, [metric.whiten(&wanted), self.last]);
-            self.last = answer.correction;
-            let with_grip = self.project_with_grip(problem, &likely, &mut project);
-            let Some((projection, correction)) = with_grip else {
-                self.residual = f64::INFINITY;
-                return frictionless;
-            };
-            let difference = (correction - answer.correction).norm() / scale;
-            self.residual = answer.residual + difference;
-            let mut active = projection.active.iter();
-            let complete =
-                difference <= SAME_ANSWER || active.all(|row| self.rows.contains(&row.row));
-            held = Some(projection);
-            if complete {
-                break;
-            }
+        if !self.gather(problem, &frictionless) {
+            self.last = Vector6::zeros();
+            return frictionless;
         }
-        self.acts = held.is_some();
-        held.unwrap_or(frictionless)
+        if self.last == Vector6::zeros() {
+            self.last = metric.whiten(&(frictionless.acceleration - problem.unconstrained));
+        }
+        let mut answer = self.cone.solve(scale, &self.last);
+        for _ in 0..MAX_ADDED {
+            if !self.add_violated(problem, &frictionless, &answer.correction) {
+                break;
+            }
+            answer = self.cone.solve_again(scale, &answer);
+        }
+        self.last = answer.correction;
+        let active: ArrayVec<u32, MAX_ACTIVE> =
+            frictionless.active.iter().map(|row| row.row).collect();
+        let Some((projection, correction)) = self.project_with_grip(problem, &active, &mut project)
+        else {
+            self.residual = f64::INFINITY;
+            return frictionless;
+        };
+        self.residual = answer.residual + (correction - answer.correction).norm() / scale;
+        self.acts = true;
+        projection
     }
 
-    /// Fills the cone problem with the contacts that touch at `now`. False when none of them is frictional.
+    /// Makes the row that the correction violates most a contact, if by more than what touching contacts may differ; whether there is one and room for it.
+    fn add_violated(
+        &mut self,
+        problem: &FrictionProblem<'_>,
+        frictionless: &Projection,
+        correction: &Vector6,
+    ) -> bool {
+        let acceleration = problem.unconstrained + problem.metric.unwhiten(correction);
+        let slacks = problem.rows.iter().map(|row| row.slack(&acceleration));
+        let rows = slacks
+            .enumerate()
+            .filter(|(_, slack)| *slack < -self.touching);
+        let deepest = rows.min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, _)) = deepest.filter(|(k, _)| !self.rows.contains(&(*k as u32))) else {
+            return false;
+        };
+        if self.rows.is_full() {
+            let Some(idle) = self.cone.contacts.iter().position(|c| c.load <= 0.0) else {
+                return false;
+            };
+            self.rows.swap_remove(idle);
+            self.features.swap_remove(idle);
+            self.cone.contacts.swap_remove(idle);
+        }
+        self.add(problem, frictionless, index as u32)
+    }
+
+    /// Fills the cone problem with the contacts that touch at the frictionless answer. False when none of them is frictional.
     fn gather(&mut self, problem: &FrictionProblem<'_>, now: &Projection) -> bool {
-        let contacts = self.rows.iter().zip(&self.cone.contacts);
+        let contacts = self.features.iter().zip(&self.cone.contacts);
         let loaded = contacts.filter(|(_, contact)| contact.load > 0.0);
-        let loaded: ArrayVec<u32, MAX_CONE_CONTACTS> = loaded.map(|(row, _)| *row).collect();
+        let loaded: ArrayVec<FeaturePair, MAX_CONE_CONTACTS> =
+            loaded.map(|(pair, _)| *pair).collect();
         self.cone.contacts.clear();
         self.rows.clear();
+        self.features.clear();
         self.touched.clear();
-        let coefficient_of = |constraint: &NonPenetrationConstraint| {
-            let obstacle = usize::from(constraint.features.obstacle);
-            self.coefficients.get(obstacle).copied().unwrap_or(0.0)
-        };
         let mut frictional = false;
-        let (metric, touching) = (problem.metric, self.touching);
         // What touched with friction a moment ago most likely does so again.
-        let before = problem.unconstrained + metric.unwhiten(&self.last);
+        let before = problem.unconstrained + problem.metric.unwhiten(&self.last);
         let rows = problem.rows.iter().zip(problem.constraints);
         for (index, (row, constraint)) in rows.enumerate() {
             let slack = row.slack(&now.acceleration).min(row.slack(&before));
-            let touches = slack <= touching;
+            let touches = slack <= self.touching;
             if touches && self.touched.len() < self.touched.capacity() {
                 self.touched.push(index as u32);
-                frictional |= coefficient_of(constraint) > 0.0;
+                frictional |= self.coefficient_of(constraint) > 0.0;
             }
         }
         if !frictional {
             return false;
         }
-
-        let (at_now, wished) = (
-            metric.whiten(&(now.acceleration - problem.unconstrained)),
-            problem.unconstrained - problem.stuck_at,
-        );
-        let contact = |row: &HalfSpace, constraint: &NonPenetrationConstraint| {
-            let point = problem.point(constraint);
-            let point_row =
-                |direction| contact_jacobian(&direction, &point, problem.reference_point);
-            let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
-            let normal = metric.whiten_row(&row.jacobian);
-            // Touching is touching: the contact's own slack at `now` is taken as none.
-            let gap = row.slack(&now.acceleration);
-            let gap = if gap <= touching { 0.0 } else { gap };
-            let slack = gap - normal.dot(&at_now);
-            ConeContact::new(
-                coefficient_of(constraint),
-                normal,
-                tangents.map(|j| metric.whiten_row(&j)),
-                slack,
-                tangents.map(|j| j.dot(&wished)),
-            )
-        };
-        let mut add = |index: u32| {
-            let at = index as usize;
-            if !self.rows.contains(&index)
-                && let Some(row) = problem.rows.get(at)
-                && let Some(constraint) = problem.constraints.get(at)
-                && let Some(contact) = contact(row, constraint)
-                && self.cone.contacts.try_push(contact).is_ok()
-            {
-                self.rows.push(index);
-            }
-        };
-        // More contacts than the cone problem takes: those that carry the load here and in the round before, then every n-th of the others.
+        // More contacts than the cone problem takes: those that hold the body now and those that did so a moment ago, then every n-th of the others.
         let count = self.touched.len();
         let stride = if count <= MAX_CONE_CONTACTS {
             1
         } else {
-            now.active.iter().for_each(|active| add(active.row));
-            loaded.iter().for_each(|row| add(*row));
+            for active in &now.active {
+                self.add(problem, now, active.row);
+            }
+            for k in 0..count {
+                let index = self.touched[k];
+                if loaded.contains(&problem.constraints[index as usize].features) {
+                    self.add(problem, now, index);
+                }
+            }
             count.div_ceil(MAX_CONE_CONTACTS - now.active.len())
         };
-        self.touched
-            .iter()
-            .step_by(stride)
-            .for_each(|index| add(*index));
+        for k in (0..count).step_by(stride) {
+            self.add(problem, now, self.touched[k]);
+        }
         !self.rows.is_empty()
+    }
+
+    fn coefficient_of(&self, constraint: &NonPenetrationConstraint) -> f64 {
+        let obstacle = usize::from(constraint.features.obstacle);
+        self.coefficients.get(obstacle).copied().unwrap_or(0.0)
+    }
+
+    /// Makes a row a contact without load, if there is room; whether it is a new one.
+    fn add(&mut self, problem: &FrictionProblem<'_>, now: &Projection, index: u32) -> bool {
+        let at = index as usize;
+        let (Some(row), Some(constraint)) = (problem.rows.get(at), problem.constraints.get(at))
+        else {
+            return false;
+        };
+        if self.rows.contains(&index) || self.rows.is_full() {
+            return false;
+        }
+        let metric = problem.metric;
+        let point = problem.point(constraint);
+        let point_row = |direction| contact_jacobian(&direction, &point, problem.reference_point);
+        let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
+        let normal = metric.whiten_row(&row.jacobian);
+        // Touching is touching: the contact's own slack at `now` is taken as none.
+        let gap = row.slack(&now.acceleration);
+        let gap = if gap <= self.touching { 0.0 } else { gap };
+        let at_now = metric.whiten(&(now.acceleration - problem.unconstrained));
+        let wished = problem.unconstrained - problem.stuck_at;
+        let contact = ConeContact::new(
+            self.coefficient_of(constraint),
+            normal,
+            tangents.map(|j| metric.whiten_row(&j)),
+            gap - normal.dot(&at_now),
+            tangents.map(|j| j.dot(&wished)),
+        );
+        let Some(contact) = contact else {
+            return false;
+        };
+        self.cone.contacts.push(contact);
+        self.rows.push(index);
+        self.features.push(constraint.features);
+        true
     }
 
     /// Eq. (1) once more, with the cone problem's tangential wrench in a_u; with its `L^T (a_c - a_u)`.
