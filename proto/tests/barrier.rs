@@ -9,7 +9,7 @@ use taut_proto::barrier::{
     SWAP_TOLD_NS, Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
 };
 
-const MS: u64 = 1_000_000;
+pub const MS: u64 = 1_000_000;
 const PERIOD: u64 = 16_666_667;
 /// Ten frames per second at least.
 const SLOWEST: u64 = 100 * MS;
@@ -23,7 +23,7 @@ fn settings(swap: Swap) -> MasterSettings {
 }
 
 /// A master with these nodes in step, at the moment after a release; all arrive at once in every frame.
-fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
+pub fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
     let mut master = Master::new(settings(swap), 0, 1, 1);
     let mut now = MS;
     for &session in sessions {
@@ -43,7 +43,7 @@ fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
     (master, now)
 }
 
-fn arrived(frame: u64) -> Arrive {
+pub fn arrived(frame: u64) -> Arrive {
     Arrive {
         term: 1,
         frame,
@@ -52,12 +52,12 @@ fn arrived(frame: u64) -> Arrive {
     }
 }
 
-fn released(master: &Master) -> u64 {
+pub fn released(master: &Master) -> u64 {
     master.newest().map_or(0, |newest| newest.frame)
 }
 
 /// Polls at the moment that the master asks for, and not a nanosecond before.
-fn release_when_due(master: &mut Master) -> u64 {
+pub fn release_when_due(master: &mut Master) -> u64 {
     let Some(wake) = master.wake_ns() else {
         panic!("there are nodes");
     };
@@ -337,47 +337,6 @@ fn swaps_are_compared_when_all_have_told() {
     assert_eq!(after, [(1, 0), (2, 20_000)]);
     release_when_due(&mut master);
     assert_eq!(master.newest().map(|newest| newest.skew_ns), Some(20_000));
-}
-
-#[test]
-fn the_light_of_screens_is_compared_beside_their_calls() {
-    let (mut master, last) = in_step(Swap::Immediate, &[1, 2]);
-    let shown = released(&master);
-    let now = last + 20 * MS;
-    let told = |call, light| Arrive {
-        swapped_frame: shown,
-        swapped_ns: last + call,
-        lit_frame: shown,
-        lit_ns: light,
-        ..arrived(shown + 1)
-    };
-    let _ = master.arrive(now, 1, &told(70_000, last + 9 * MS));
-    assert_eq!(master.take_light(), None, "one has not told");
-    let _ = master.arrive(now, 2, &told(90_000, last + 12 * MS));
-    let lit = master.take_light().expect("both have told");
-    assert_eq!((lit.frame, lit.skew_ns), (shown, 3 * MS));
-    release_when_due(&mut master);
-    let newest = master.newest().expect("released");
-    assert_eq!(newest.skew_ns, 20_000, "that of the calls");
-
-    // A node that knows no light keeps nobody's skew of calls back, and makes none of light.
-    let shown = released(&master);
-    let now = now + 50 * MS;
-    for (session, call) in [(1, 10_000), (2, 30_000)] {
-        let told = Arrive {
-            swapped_frame: shown,
-            swapped_ns: now + call,
-            lit_frame: if session == 1 { shown } else { 0 },
-            lit_ns: now + MS,
-            ..arrived(shown + 1)
-        };
-        let skew = master.arrive(now, session, &told).1;
-        assert_eq!(
-            skew.map(|skew| skew.skew_ns),
-            (session == 2).then_some(20_000)
-        );
-    }
-    assert_eq!(master.take_light(), None);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::hand::Hand;
 use crate::membership::MembershipArgs;
 use crate::renderer::{Gpu, GpuChoice};
 use crate::session::Session;
-use crate::statistics::{Ended, RenderReport, Statistics};
+use crate::statistics::{Ended, NO_WINDOW, RenderReport, Statistics};
 use crate::timeline::Timeline;
 use crate::{headless, window};
 
@@ -212,7 +212,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let ended = if let Some(gpu) = gpu {
         let drawn_with = DrawnWith {
             adapter: gpu.summary().to_string(),
-            present_timing: "no window".to_owned(),
+            present_timing: NO_WINDOW.to_owned(),
         };
         let mut canvas = Canvas::new(gpu, stage);
         let plan = headless::Plan {
@@ -292,7 +292,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         adapter: drawn_with.adapter,
         present_timing: drawn_with.present_timing,
         light_ms: statistics.lights(),
-        never_lit: statistics.never_lit,
+        unlit: statistics.unlit,
         frames: statistics.frames,
         locked_frames: statistics.locked_frames,
         stale_frames: statistics.stale_frames,
@@ -325,7 +325,7 @@ impl RenderReport {
             adapter: String::new(),
             present_timing: String::new(),
             light_ms: Default::default(),
-            never_lit: 0,
+            unlit: 0,
             frames: 0,
             locked_frames: 0,
             stale_frames: 0,

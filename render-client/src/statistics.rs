@@ -21,6 +21,10 @@ const MS_PER_US: f64 = 1e-3;
 /// Most drawn states named in one report.
 const MAX_DRAWN: usize = 64;
 
+/// What a node without a window knows of the time at which its pictures light up.
+pub(crate) const NO_WINDOW: &str =
+    "not known, the times told are those of calls alone: no window lights up";
+
 /// Why a node stopped drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
@@ -49,8 +53,8 @@ pub struct RenderReport {
     pub present_timing: String,
     /// From handing a frame's first picture over to the light of its last; without a count where the window system does not tell.
     pub light_ms: Distribution,
-    /// Frames of which a picture never lit up, by the window system.
-    pub never_lit: u64,
+    /// Frames of which a picture never lit up, or lit up at a time that cannot be, by the window system.
+    pub unlit: u64,
     /// Frames drawn, each on all screens of the node.
     pub frames: u64,
     /// Of these, frames that the barrier released: shown when all nodes showed them.
@@ -121,7 +125,7 @@ pub(crate) struct Statistics {
     swaps_since_report: Histogram<u64>,
     /// From handing a frame over to its light, in microseconds, since the start.
     lights: Histogram<u64>,
-    pub(crate) never_lit: u64,
+    pub(crate) unlit: u64,
     /// Frames that the barrier released.
     pub(crate) locked_frames: u64,
     frames_at_report: u64,
@@ -143,7 +147,7 @@ impl Statistics {
             since_report: Ages::new(),
             swaps_since_report: histogram(),
             lights: histogram(),
-            never_lit: 0,
+            unlit: 0,
             locked_frames: 0,
             frames_at_report: 0,
             drawn: Vec::with_capacity(MAX_DRAWN),
@@ -306,7 +310,7 @@ impl std::fmt::Display for RenderReport {
             adapter,
             present_timing,
             light_ms: light,
-            never_lit,
+            unlit,
             sessions,
             longest_gap_ms,
             to_first_frame_ms,
@@ -321,7 +325,7 @@ impl std::fmt::Display for RenderReport {
         if light.count > 0 {
             write!(
                 f,
-                "; light {:.1} ms after the call in the median, {:.1} ms at p99, {:.1} ms at most, of {} frames; {never_lit} never lit up",
+                "; light {:.1} ms after the call in the median, {:.1} ms at p99, {:.1} ms at most, of {} frames; {unlit} never lit up",
                 light.p50, light.p99, light.max, light.count
             )?;
         }

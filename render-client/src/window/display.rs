@@ -8,7 +8,7 @@ use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::Plan;
-use super::light::Light;
+use super::light::{Light, Untold};
 use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor;
@@ -22,8 +22,8 @@ pub(super) struct Display {
     pub(super) gpu: Gpu,
     pub(super) renderer: Renderer,
     pub(super) panes: Vec<Pane>,
-    /// Where the window system tells when pictures lit up.
-    pub(super) light: Option<Light>,
+    /// Where the window system tells when pictures lit up; else why not.
+    pub(super) light: Result<Light, Untold>,
 }
 
 /// One window.
@@ -132,9 +132,9 @@ impl Display {
     /// What can be known of the time at which pictures light up.
     pub(super) fn present_timing(&self) -> String {
         match &self.light {
-            Some(light) => light.described(),
-            None => format!(
-                "not known: no wp_presentation here, and VK_GOOGLE_display_timing is {}",
+            Ok(light) => light.described(),
+            Err(why) => format!(
+                "not known, the times told are those of calls alone: {why}; {}",
                 self.gpu.present_timing()
             ),
         }
@@ -176,6 +176,14 @@ impl Pane {
     ) -> PictureTarget {
         let screen = &stage.screens[self.screen];
         target_of(gpu, renderer, screen, (self.place, &self.picture), size)
+    }
+
+    /// The window's next texture as it is drawn to.
+    pub(super) fn view(&self, texture: &wgpu::SurfaceTexture) -> wgpu::TextureView {
+        texture.texture.create_view(&wgpu::TextureViewDescriptor {
+            format: Some(self.format),
+            ..Default::default()
+        })
     }
 
     /// What to draw to next; `None` while the window is hidden or changes.

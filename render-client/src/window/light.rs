@@ -1,45 +1,63 @@
 //! When pictures lit up, as a Wayland compositor tells it by `wp_presentation`.
 //!
-//! winit hands display and surfaces out as the C pointers of libwayland; this file, and no other of the node, takes them: it asks on winit's own
-//! connection, by a queue of its own. What comes for that queue is read with what comes for winit's, whose loop waits on the socket.
-#![allow(
-    unsafe_code,
-    reason = "winit hands its Wayland display and surfaces out by C pointers alone"
-)]
+//! Asks on winit's own connection ([`foreign`]), by a queue of its own. What comes for that queue is read with what comes for winit's, whose loop
+//! waits on the socket. What the compositor tells is from outside: a time that cannot be is not believed, and no answer stops a frame.
+
+mod foreign;
 
 use std::collections::VecDeque;
+use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use rustix::time::{ClockId, clock_gettime};
-use wayland_backend::client::{Backend, ObjectId};
 use wayland_client::globals::{GlobalListContents, registry_queue_init};
 use wayland_client::protocol::wl_registry::{self, WlRegistry};
-use wayland_client::protocol::wl_surface::WlSurface;
-use wayland_client::{Connection, Dispatch, EventQueue, Proxy, QueueHandle, WEnum};
+use wayland_client::{Connection, Dispatch, EventQueue, QueueHandle, WEnum};
 use wayland_protocols::wp::presentation_time::client::wp_presentation::{self, WpPresentation};
 use wayland_protocols::wp::presentation_time::client::wp_presentation_feedback::{
     self, Kind, WpPresentationFeedback,
 };
 use winit::event_loop::OwnedDisplayHandle;
-use winit::raw_window_handle::{
-    HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle,
-};
 use winit::window::Window;
 
-/// Frames that are followed at once; the compositor holds more back only while windows are hidden, and those are not asked for.
+use foreign::Foreign;
+
+/// Frames that are followed at once. A compositor that keeps its answers longer is asked for no more until it gives them.
 const MAX_FOLLOWED: usize = 64;
+
+/// Farthest that a time of light is believed from the moment at which it is told, either way: a display plans a refresh ahead, and tells late only
+/// when the program did not look. Anything farther is a clock that is not the one that was named.
+const FARTHEST: Duration = Duration::from_secs(10);
 
 /// Asks the compositor of the node's windows.
 pub(super) struct Light {
     queue: EventQueue<Told>,
     told: Told,
     presentation: WpPresentation,
-    /// In the order of the windows.
-    surfaces: Vec<WlSurface>,
-    /// What the pointers above belong to: dropped after them.
-    _windows: Vec<Arc<Window>>,
-    _display: OwnedDisplayHandle,
+    /// What the others stand on: dropped after them.
+    foreign: Foreign,
+}
+
+/// Why nobody tells when pictures light up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Untold {
+    /// X11, or another window system that is not Wayland.
+    NotWayland,
+    /// A compositor without `wp_presentation`.
+    NoProtocol,
+    /// A compositor whose times are of a clock that this program cannot read.
+    NoClock,
+}
+
+impl fmt::Display for Untold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NotWayland => "this window system is not Wayland, which alone tells",
+            Self::NoProtocol => "the Wayland compositor has no wp_presentation",
+            Self::NoClock => "the Wayland compositor names a clock that cannot be read here",
+        })
+    }
 }
 
 /// A frame all of whose pictures lit up.
@@ -60,8 +78,8 @@ struct Told {
     /// Number of the oldest of `frames`.
     oldest: u64,
     frames: VecDeque<Followed>,
-    /// Frames a picture of which never lit up: a newer one came first, or the window was hidden.
-    discarded: u64,
+    /// Frames without a light: a newer one came before a picture lit up, a window was hidden, or the time told cannot be.
+    unlit: u64,
     newest: Option<(Kind, Duration)>,
 }
 
@@ -72,65 +90,44 @@ struct Followed {
     /// Pictures that were not told of yet.
     open: usize,
     lit: Option<Instant>,
-    discarded: bool,
+    unlit: bool,
 }
 
 impl Light {
-    /// `None` where there is nobody to ask: under X11, and where the compositor has no `wp_presentation`.
-    pub(super) fn of(display: OwnedDisplayHandle, windows: Vec<Arc<Window>>) -> Option<Self> {
-        let RawDisplayHandle::Wayland(handle) = display.display_handle().ok()?.as_raw() else {
-            return None;
-        };
-        // SAFETY: the display is winit's, open while `_display` holds its connection, which is dropped last; this backend does not close it.
-        let backend = unsafe { Backend::from_foreign_display(handle.display.as_ptr().cast()) };
-        let connection = Connection::from_backend(backend);
-        let (globals, mut queue) = registry_queue_init::<Told>(&connection).ok()?;
-        let presentation: WpPresentation = globals.bind(&queue.handle(), 1..=1, ()).ok()?;
+    /// Begins to listen; asks nothing yet.
+    pub(super) fn of(
+        display: OwnedDisplayHandle,
+        windows: Vec<Arc<Window>>,
+    ) -> Result<Self, Untold> {
+        let foreign = Foreign::of(display, windows).ok_or(Untold::NotWayland)?;
+        let (globals, mut queue) =
+            registry_queue_init::<Told>(foreign.connection()).map_err(|_| Untold::NoProtocol)?;
+        let presentation: WpPresentation = globals
+            .bind(&queue.handle(), 1..=1, ())
+            .map_err(|_| Untold::NoProtocol)?;
         let mut told = Told::default();
-        queue.roundtrip(&mut told).ok()?; // its clock
-        told.clock?;
-        let surface = |window: &Arc<Window>| {
-            let RawWindowHandle::Wayland(handle) = window.window_handle().ok()?.as_raw() else {
-                return None;
-            };
-            // SAFETY: the surface is the window's, a `wl_surface` of the same connection, and lives as long as the window, which `_windows` holds.
-            let id = unsafe {
-                ObjectId::from_ptr(WlSurface::interface(), handle.surface.as_ptr().cast())
-            };
-            WlSurface::from_id(&connection, id.ok()?).ok()
-        };
-        let surfaces = windows.iter().map(surface).collect::<Option<Vec<_>>>()?;
-        Some(Self {
+        queue.roundtrip(&mut told).map_err(|_| Untold::NoProtocol)?; // its clock
+        told.clock.ok_or(Untold::NoClock)?;
+        Ok(Self {
             queue,
             told,
             presentation,
-            surfaces,
-            _windows: windows,
-            _display: display,
+            foreign,
         })
     }
 
     /// Follows the frame that is handed over next, with pictures in these windows, by their places: call it right before.
     pub(super) fn follow(&mut self, frame: Option<u64>, places: impl Iterator<Item = usize>) {
-        if self.told.frames.len() == MAX_FOLLOWED {
+        let Some(number) = self.told.next_number() else {
             return;
-        }
-        let number = self.told.oldest + self.told.frames.len() as u64;
-        let mut open = 0;
-        for surface in places.filter_map(|place| self.surfaces.get(place)) {
+        };
+        let mut pictures = 0;
+        for surface in places.filter_map(|place| self.foreign.surface(place)) {
             self.presentation
                 .feedback(surface, &self.queue.handle(), number);
-            open += 1;
+            pictures += 1;
         }
-        if open > 0 {
-            self.told.frames.push_back(Followed {
-                frame,
-                called: Instant::now(),
-                open,
-                lit: None,
-                discarded: false,
-            });
-        }
+        self.told.follow(frame, pictures);
     }
 
     /// The next frame that lit up, in order.
@@ -140,9 +137,9 @@ impl Light {
         self.told.take()
     }
 
-    /// Frames that never lit up.
-    pub(super) fn discarded(&self) -> u64 {
-        self.told.discarded
+    /// Frames without a light ([`Told::unlit`]) that were told of since this was asked last.
+    pub(super) fn take_unlit(&mut self) -> u64 {
+        std::mem::take(&mut self.told.unlit)
     }
 
     /// What the times are worth, for people.
@@ -182,18 +179,38 @@ fn worth(kind: Kind) -> String {
 }
 
 impl Told {
+    /// Number of the frame that is followed next; `None` while as many as can be wait for their light.
+    fn next_number(&self) -> Option<u64> {
+        let waiting = self.frames.len();
+        (waiting < MAX_FOLLOWED).then(|| self.oldest + waiting as u64)
+    }
+
+    /// A frame with this number at the barrier is handed over now, if it has a picture.
+    fn follow(&mut self, frame: Option<u64>, pictures: usize) {
+        if pictures == 0 {
+            return;
+        }
+        self.frames.push_back(Followed {
+            frame,
+            called: Instant::now(),
+            open: pictures,
+            lit: None,
+            unlit: false,
+        });
+    }
+
     fn followed(&mut self, number: u64) -> Option<&mut Followed> {
         let place = usize::try_from(number.checked_sub(self.oldest)?).ok()?;
         self.frames.get_mut(place)
     }
 
-    /// One picture of a frame lit up at `lit`, or never (`None`).
+    /// One picture of a frame lit up at `lit`; `None` where it never did, or nobody knows when.
     fn note(&mut self, number: u64, lit: Option<Instant>) {
         let Some(followed) = self.followed(number) else {
             return;
         };
         followed.open = followed.open.saturating_sub(1);
-        followed.discarded |= lit.is_none();
+        followed.unlit |= lit.is_none();
         followed.lit = followed.lit.max(lit);
     }
 
@@ -201,19 +218,19 @@ impl Told {
         while self.frames.front().is_some_and(|frame| frame.open == 0) {
             let done = self.frames.pop_front()?;
             self.oldest += 1;
-            if let (Some(lit), false) = (done.lit, done.discarded) {
+            if let (Some(lit), false) = (done.lit, done.unlit) {
                 return Some(Lit {
                     frame: done.frame,
                     called: done.called,
                     lit,
                 });
             }
-            self.discarded += 1;
+            self.unlit += 1;
         }
         None
     }
 
-    /// A time of the compositor's clock on this program's.
+    /// A time of the compositor's clock on this program's; `None` where it is farther than [`FARTHEST`] from now.
     fn instant(&self, at: Duration) -> Option<Instant> {
         let clock = clock_gettime(self.clock?);
         let now = Instant::now();
@@ -221,10 +238,22 @@ impl Told {
             u64::try_from(clock.tv_sec).ok()?,
             u32::try_from(clock.tv_nsec).ok()?,
         );
+        if reading.abs_diff(at) > FARTHEST {
+            return None;
+        }
         match reading.checked_sub(at) {
             Some(ago) => now.checked_sub(ago),
             None => now.checked_add(at - reading), // planned by the display, and told before it is
         }
+    }
+
+    /// A picture of the frame with this number lit up at a time of the compositor's clock, in its parts as on the wire.
+    fn presented(&mut self, number: u64, (high, low, ns): (u32, u32, u32)) {
+        let seconds = u64::from(high) << 32 | u64::from(low);
+        // More than a second of nanoseconds is no time.
+        let at = (ns < 1_000_000_000).then(|| Duration::new(seconds, ns));
+        let lit = at.and_then(|at| self.instant(at));
+        self.note(number, lit);
     }
 }
 
@@ -278,16 +307,12 @@ impl Dispatch<WpPresentationFeedback, u64> for Told {
                 flags,
                 ..
             } => {
-                let seconds = u64::from(tv_sec_hi) << 32 | u64::from(tv_sec_lo);
-                // More than a second of nanoseconds is no time.
-                let at = (tv_nsec < 1_000_000_000).then(|| Duration::new(seconds, tv_nsec));
                 let kind = match flags {
                     WEnum::Value(kind) => kind,
                     WEnum::Unknown(_) => Kind::empty(),
                 };
                 told.newest = Some((kind, Duration::from_nanos(refresh.into())));
-                let lit = at.and_then(|at| told.instant(at));
-                told.note(*number, lit);
+                told.presented(*number, (tv_sec_hi, tv_sec_lo, tv_nsec));
             }
             wp_presentation_feedback::Event::Discarded => told.note(*number, None),
             _ => {}
@@ -310,21 +335,25 @@ impl Dispatch<WlRegistry, GlobalListContents> for Told {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
+    /// Follows frames 100, 101 .. with so many pictures each, by numbers from 7 on.
     fn following(pictures: &[usize]) -> Told {
-        let followed = |(frame, open): (usize, &usize)| Followed {
-            frame: Some(100 + frame as u64),
-            called: Instant::now(),
-            open: *open,
-            lit: None,
-            discarded: false,
-        };
-        Told {
+        let mut told = Told {
             clock: Some(ClockId::Monotonic),
             oldest: 7,
-            frames: pictures.iter().enumerate().map(followed).collect(),
             ..Told::default()
+        };
+        for (frame, pictures) in (100..).zip(pictures) {
+            told.follow(Some(frame), *pictures);
         }
+        told
+    }
+
+    /// The clock that the compositor is said to have.
+    fn reading(clock: ClockId) -> Duration {
+        let reading = clock_gettime(clock);
+        Duration::new(reading.tv_sec as u64, reading.tv_nsec as u32)
     }
 
     #[test]
@@ -339,7 +368,7 @@ mod tests {
         let first = told.take().expect("both told");
         assert_eq!((first.frame, Some(first.lit)), (Some(100), at(16)));
         assert_eq!(told.take().and_then(|lit| lit.frame), Some(101));
-        assert_eq!((told.take(), told.discarded), (None, 0));
+        assert_eq!((told.take(), told.unlit), (None, 0));
     }
 
     #[test]
@@ -350,7 +379,7 @@ mod tests {
         told.note(8, Some(Instant::now()));
         told.note(99, None); // nobody asked
         assert_eq!(told.take().and_then(|lit| lit.frame), Some(101));
-        assert_eq!(told.discarded, 1);
+        assert_eq!(told.unlit, 1);
     }
 
     #[test]
@@ -360,8 +389,7 @@ mod tests {
                 clock: Some(clock),
                 ..Told::default()
             };
-            let reading = clock_gettime(clock);
-            let reading = Duration::new(reading.tv_sec as u64, reading.tv_nsec as u32);
+            let reading = reading(clock);
             let before = Instant::now();
             let ago = told
                 .instant(reading - Duration::from_secs(5))
@@ -376,6 +404,86 @@ mod tests {
         }
         assert_eq!(clock_of(4), Some(ClockId::MonotonicRaw));
         assert_eq!(clock_of(3), None, "a thread's processor time");
+    }
+
+    #[test]
+    fn a_time_that_cannot_be_is_no_light_and_stops_no_frame() {
+        let far = (reading(ClockId::Monotonic) + 2 * FARTHEST).as_secs() as u32;
+        let impossible = [
+            (0, 0, 0),               // since the start of the machine, or of another clock
+            (u32::MAX, u32::MAX, 0), // beyond what this program's clock can hold
+            (0, far, 0),             // more than ten seconds ahead
+            (0, u32::MAX, 999_999_999),
+            (0, 1, 1_000_000_000), // more than a second of nanoseconds
+        ];
+        for parts in impossible {
+            let mut told = following(&[1, 1]);
+            told.presented(7, parts);
+            let now = reading(ClockId::Monotonic);
+            told.presented(8, (0, now.as_secs() as u32, now.subsec_nanos()));
+            let next = told.take().and_then(|lit| lit.frame);
+            assert_eq!((next, told.unlit), (Some(101), 1), "{parts:?}");
+        }
+    }
+
+    #[test]
+    fn why_nobody_tells_is_said_by_name() {
+        assert!(Untold::NoProtocol.to_string().contains("wp_presentation"));
+        assert!(Untold::NotWayland.to_string().contains("not Wayland"));
+    }
+
+    /// What a node or a compositor does.
+    #[derive(Clone, Debug)]
+    enum Done {
+        Follow(usize),
+        Presented(u64, (u32, u32, u32)),
+        Discarded(u64),
+        Take,
+    }
+
+    fn done() -> impl Strategy<Value = Done> {
+        let parts = || (0_u32..3, any::<u32>(), 0_u32..1_100_000_000);
+        let soon = move || {
+            let now = reading(ClockId::Monotonic).as_secs() as u32;
+            (Just(0), now - 12..now + 12, 0_u32..1_000_000_000)
+        };
+        prop_oneof![
+            (0_usize..3).prop_map(Done::Follow),
+            (0_u64..90, parts()).prop_map(|(number, at)| Done::Presented(number, at)),
+            (0_u64..90, soon()).prop_map(|(number, at)| Done::Presented(number, at)),
+            (0_u64..90).prop_map(Done::Discarded),
+            Just(Done::Take),
+        ]
+    }
+
+    proptest! {
+        /// Whatever a compositor answers, in whatever order and how often.
+        #[test]
+        fn no_answer_of_a_compositor_breaks_the_count_of_frames(all in proptest::collection::vec(done(), 0..400)) {
+            let mut told = following(&[]);
+            told.oldest = 0;
+            let (mut followed, mut taken) = (0_u64, Vec::new());
+            for one in all {
+                match one {
+                    Done::Follow(pictures) if told.next_number().is_some() => {
+                        told.follow(Some(followed), pictures);
+                        followed += u64::from(pictures > 0);
+                    }
+                    Done::Follow(_) => {}
+                    Done::Presented(number, at) => told.presented(number, at),
+                    Done::Discarded(number) => told.note(number, None),
+                    Done::Take => taken.extend(told.take()),
+                }
+                prop_assert!(told.frames.len() <= MAX_FOLLOWED);
+                prop_assert_eq!(taken.len() as u64 + told.unlit + told.frames.len() as u64, followed);
+            }
+            let now = Instant::now();
+            for lit in &taken {
+                let off = lit.lit.saturating_duration_since(now).max(now.saturating_duration_since(lit.lit));
+                prop_assert!(off < 2 * FARTHEST, "{off:?}");
+            }
+            prop_assert!(taken.is_sorted_by(|a, b| a.frame < b.frame));
+        }
     }
 
     #[test]

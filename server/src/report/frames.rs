@@ -27,7 +27,7 @@ pub struct FramesReport {
     pub freed: u64,
     /// Last swap call of a frame less the first, over the nodes that had drawn it in time; `null` until two swapped one together.
     pub swap_skew_us: Option<Distribution>,
-    /// The same of the times at which their pictures lit up, as the window systems tell them; `null` until two nodes told of one frame.
+    /// Last light of a frame less the first, by each node's last picture and as their window systems tell it; `null` until two nodes told of one frame.
     #[serde(default)]
     pub light_skew_us: Option<Distribution>,
     /// From the moment at which a frame could be shown to its last swap call.
@@ -87,7 +87,10 @@ impl fmt::Display for FramesReport {
                 )?;
             }
         }
-        Ok(())
+        match (&self.swap_skew_us, &self.light_skew_us) {
+            (Some(_), None) => write!(f, " (of calls; when they lit up is not known)"),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -130,6 +133,15 @@ mod tests {
         let said = report.to_string();
         assert!(
             said.contains("; swap skew p50 10 us") && said.contains("; light skew p50 3000 us"),
+            "{said}"
+        );
+        let calls_alone = FramesReport {
+            light_skew_us: None,
+            ..report
+        };
+        let said = calls_alone.to_string();
+        assert!(
+            said.contains("max 40 us (of calls; when they lit up is not known)"),
             "{said}"
         );
         assert!(clients[0].free_running && !clients[1].free_running);
