@@ -50,6 +50,8 @@ pub(crate) struct Plan {
     /// The monitors of the windows in order, by name or number.
     pub(crate) monitors: Vec<String>,
     pub(crate) gpu: GpuChoice,
+    /// Samples per pixel, where they are asked for.
+    pub(crate) samples: Option<u32>,
     /// From handing a picture over to its light, in nanoseconds.
     pub(crate) display_ns: u64,
     pub(crate) show: Show,

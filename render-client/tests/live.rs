@@ -184,6 +184,7 @@ impl Server {
             out: None,
             duration: Some(20.0), // so that a failure ends
             fps: Some(20.0),
+            samples: None,
             show: None,
             stereo: None,
             width: Some(120),

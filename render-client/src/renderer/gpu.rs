@@ -149,12 +149,21 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// The same, drawing with so many samples per pixel at most: below 4 it is one, and edges are not smoothed.
+    /// The same, drawing with so many samples per pixel at most: below 4 it is one, edges of bodies are not smoothed, and those of shadows less.
     pub fn with_samples(self, most: u32) -> Self {
         Self {
             most_samples: most,
             ..self
         }
+    }
+
+    /// The same with the samples that are asked for; else with four, but one where the processor draws and the pictures are not `kept`.
+    pub(crate) fn smoothed(self, asked: Option<u32>, kept: bool) -> Self {
+        let most = match (self.is_software(), kept) {
+            (true, false) => 1,
+            _ => SMOOTH,
+        };
+        self.with_samples(asked.unwrap_or(most))
     }
 
     /// What to tell people of the adapter.

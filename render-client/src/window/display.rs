@@ -89,7 +89,8 @@ impl Display {
             instance,
             opened.first().map(|(.., surface)| surface),
             &plan.gpu,
-        )?;
+        )?
+        .smoothed(plan.samples, false);
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
         for ((screen, place), picture, window, surface) in opened {
