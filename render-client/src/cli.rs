@@ -30,6 +30,9 @@ const SOFTWARE_FPS: f64 = 20.0;
 /// Frames per second in a window, at most; the monitor may take fewer.
 const WINDOW_FPS: f64 = 120.0;
 
+/// Frames per second that the processor draws smoothly and writes to files.
+const WRITTEN_FPS: f64 = 10.0;
+
 /// Longest delay of the picture, in milliseconds: as far as states are kept at 1 kHz.
 const MAX_DELAY_MS: f64 = 200.0;
 
@@ -70,7 +73,8 @@ pub struct RenderArgs {
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     pub duration: Option<f64>,
-    /// Most frames per second [default: 120 in windows; 20 off-screen, or without a graphics card].
+    /// Most frames per second [default: 120 in windows; 20 off-screen or without a graphics card, 10 for pictures of --out
+    /// without one].
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
     /// Samples per pixel: 4 smooths edges of bodies and shadows, 1 is twice as fast in software [default: 4; 1 without a graphics card,
@@ -180,6 +184,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     };
     let default_fps = match &gpu {
         None => WINDOW_FPS,
+        Some(gpu) if gpu.is_software() && args.out.is_some() => WRITTEN_FPS,
         Some(_) => HEADLESS_FPS,
     };
     let fps = fps.unwrap_or(default_fps);

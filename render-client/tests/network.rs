@@ -7,8 +7,8 @@ use std::sync::atomic::Ordering;
 
 use taut_proto::barrier::{MasterSettings, Swap};
 use taut_proto::{MeshHash, Panorama};
-use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::RenderError;
+use taut_render::cli::{RenderArgs, TransportArg};
 use taut_render::statistics::Ended;
 
 #[test]
