@@ -95,11 +95,15 @@ fn who_comes_after_a_pause_finds_the_hand_where_it_began_and_an_outage_moves_not
     let height = |service: &SimulatedInverse| service.true_pose().translation.vector.z;
     let _ = service.inventory(ms(0), 1);
     let begin = height(&service);
-    let low = |service: &mut SimulatedInverse, from: u64| {
+    let no_force = r#"{"inverse3":[{"device_id":"51A3","commands":{"set_cursor_force":{"vector":{"x":0,"y":0,"z":0}}}}]}"#;
+    (1..=30).for_each(|step| drop(service.answer(ms(step), 1, "{}")));
+    assert_eq!(height(&service), begin, "who only looks moves nothing");
+    let low = |service: &mut SimulatedInverse, from: u64, session| {
+        let _ = service.answer(ms(from + 50), session, no_force);
         (1..=30).for_each(|step| service.advance(ms(from + 100 * step)));
         height(service) < begin - 0.04
     };
-    assert!(low(&mut service, 0), "it goes down in three seconds");
+    assert!(low(&mut service, 0, 1), "it goes down in three seconds");
     service.leave(ms(3000), 1);
     let _ = service.inventory(ms(3200), 2);
     assert!(height(&service) < begin - 0.04, "the same program again");
@@ -111,7 +115,7 @@ fn who_comes_after_a_pause_finds_the_hand_where_it_began_and_an_outage_moves_not
     service.leave(ms(5000), 4);
     let _ = service.inventory(ms(6100), 5);
     assert_eq!(height(&service), begin);
-    assert!(low(&mut service, 6100), "it goes down for the next one");
+    assert!(low(&mut service, 6100, 5), "it goes down for the next one");
 }
 
 /// A service that is ended by the end of its test.

@@ -3,7 +3,6 @@
 
 use assert_no_alloc::AllocDisabler;
 
-mod blocked_terminal;
 mod cli;
 #[cfg(unix)]
 mod deploy;

@@ -79,6 +79,28 @@ fn a_recorded_session_is_read_back_with_its_entities_and_its_whole_time() {
     );
 }
 
+/// A device that pushes and cannot turn: whoever looks on is told, and sees what the hand feels.
+#[test]
+fn a_device_without_torque_is_said_in_the_picture_and_its_torque_is_none() {
+    let mut workbench = TestWorkbench::new(PROGRAM);
+    workbench.set("scene", "sphere-on-plane");
+    let example = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../server/python/examples/spring_hand.py"
+    );
+    let device = format!("kind = \"python\"\nfile = \"{example}\"\noptions = \"depth=0.04\"");
+    workbench.set("device", device.parse::<toml::Table>().expect("a table"));
+    let path = workbench.directory().join("session.rrd");
+    let record = path.display().to_string();
+    let server = workbench.serve(&["--duration", "6", "--record", &record]);
+    let ended = server.process.end(START_LIMIT + END_LIMIT);
+    assert!(ended.status.success(), "{}", ended.status);
+    let summary = inspect(&path).unwrap_or_else(|error| panic!("{error}"));
+    let said = |line: &String| line.contains("spring hand renders force and no torque");
+    assert!(summary.lines.iter().any(said), "{:?}", summary.lines);
+    assert_eq!(summary.numbers["/plots/torque"], (0.0, 0.0));
+}
+
 #[test]
 fn the_web_viewer_s_page_is_served_while_the_session_runs() {
     let mut workbench = TestWorkbench::new(PROGRAM);

@@ -69,6 +69,8 @@ pub struct SimulatedInverse {
     connected: HashSet<u64>,
     /// Since when nobody is connected.
     alone_since: Option<Duration>,
+    /// The hand rests where its path begins, until the arm is commanded.
+    rests: bool,
     messages: u64,
 }
 
@@ -86,6 +88,7 @@ impl SimulatedInverse {
             pushes: HashMap::new(),
             connected: HashSet::new(),
             alone_since: None,
+            rests: true,
             messages: 0,
         }
     }
@@ -119,13 +122,14 @@ impl SimulatedInverse {
         self.messages
     }
 
-    /// The inventory that greets a connection. Who comes first after a pause finds the hand where its path begins: a body that starts where
-    /// the hand is reaches what lies below it.
+    /// The inventory that greets a connection. Who comes first after a pause finds the hand where its path begins, and the hand waits there for the
+    /// first command: a body that starts where the hand is reaches what lies below it, however long its program takes to begin.
     pub fn inventory(&mut self, now: Duration, session: u64) -> String {
         self.advance(now);
         let alone = self.alone_since.take();
         if alone.is_some_and(|since| now.saturating_sub(since) > PAUSE) {
             self.arm.begin_again();
+            self.rests = true;
         }
         self.connected.insert(session);
         self.state(session, true)
@@ -140,7 +144,9 @@ impl SimulatedInverse {
         } else {
             Value::Null
         };
-        match commanded(&message) {
+        let command = commanded(&message);
+        self.rests &= command.is_none();
+        match command {
             Some(force) => drop(self.pushes.insert(session, Push { force, said: now })),
             None => drop(self.pushes.remove(&session)),
         }
@@ -162,6 +168,9 @@ impl SimulatedInverse {
     /// Goes on to `now`.
     pub fn advance(&mut self, now: Duration) {
         let due = self.arm.due(now);
+        if self.rests {
+            return;
+        }
         let ends = self.pushes.values().map(|push| push.said + IDLE_AFTER);
         // A force that has grown too old ended where it did.
         let without = ends

@@ -35,6 +35,8 @@ pub struct RrdSummary {
     pub bytes: BTreeMap<String, u64>,
     /// Least and largest number of a plot per entity path.
     pub numbers: BTreeMap<String, (f64, f64)>,
+    /// The log's lines.
+    pub lines: Vec<String>,
 }
 
 impl RrdSummary {
@@ -144,6 +146,7 @@ struct Contents {
     blueprints: usize,
     bytes: BTreeMap<String, u64>,
     numbers: BTreeMap<String, (f64, f64)>,
+    lines: Vec<String>,
 }
 
 impl Contents {
@@ -175,6 +178,9 @@ impl Contents {
             let (least, largest) = self.numbers.entry(path).or_insert(none);
             (*least, *largest) = (least.min(*number), largest.max(*number));
         }
+        let text = rerun::TextLog::descriptor_text().component;
+        let texts = chunk.iter_slices::<String>(text).flatten();
+        self.lines.extend(texts.map(|line| line.to_string()));
         for (name, column) in chunk.timelines() {
             self.timelines.insert(name.to_string());
             if name.as_str() == crate::stream::TIMELINE {
@@ -197,6 +203,7 @@ impl Contents {
             blueprints: self.blueprints,
             bytes: self.bytes,
             numbers: self.numbers,
+            lines: self.lines,
         }
     }
 }

@@ -314,13 +314,23 @@ fn connect_device(
 /// What the monitor's log begins with.
 fn opening(setup: &SessionSetup) -> String {
     let (body, settings) = (&setup.world.body, &setup.settings);
-    format!(
+    let opening = format!(
         "session with scene \"{}\": stiffness {:.0} N/m, at most {} N and {} N m",
         setup.content.description.name,
         settings.stiffness(body.mass),
         settings.force_limit,
         settings.torque_limit
-    )
+    );
+    // Whoever looks on sees contacts that turn the body, and no torque in the plot.
+    let no_torque = match &setup.device {
+        DeviceSource::Local(device) => device.info().renders_no_torque(),
+        DeviceSource::Remote { .. } => None,
+    };
+    [Some(opening), no_torque]
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join("; ")
 }
 
 /// What the monitor draws once.

@@ -5,12 +5,10 @@
 
 use god_object::{Mesh, Pose, World};
 use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::shape::Triangle;
 
 use crate::triangles::intersect;
-
-/// Triangles per axis of the grid of boxes in which obstacle triangles are looked up, at most.
-const MAX_CELLS_PER_AXIS: usize = 64;
 
 /// The obstacles of a scene in the world, ready to be asked, and the body's triangles.
 pub struct PenetrationChecker {
@@ -22,7 +20,7 @@ pub struct PenetrationChecker {
 struct Obstacle {
     name: String,
     triangles: Vec<Triangle>,
-    grid: Grid,
+    tree: Bvh,
 }
 
 impl PenetrationChecker {
@@ -37,9 +35,10 @@ impl PenetrationChecker {
                 .iter()
                 .map(|t| triangle(&vertices, t))
                 .collect();
+            let boxes: Vec<_> = triangles.iter().map(Triangle::local_aabb).collect();
             Obstacle {
                 name: obstacle.name.clone(),
-                grid: Grid::new(&triangles),
+                tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
                 triangles,
             }
         });
@@ -66,11 +65,9 @@ impl PenetrationChecker {
         let hit = |obstacle: &&Obstacle| {
             self.triangles.iter().any(|indices| {
                 let mine = triangle(&vertices, indices);
-                let bounds = Bounds::of(&mine);
-                obstacle.grid.any_near(&bounds, |index| {
-                    let other = &obstacle.triangles[index];
-                    bounds.overlaps(&Bounds::of(other)) && intersect(&mine, other)
-                })
+                let bounds = mine.local_aabb();
+                let mut near = obstacle.tree.intersect_aabb(&bounds);
+                near.any(|index| intersect(&mine, &obstacle.triangles[index as usize]))
             })
         };
         self.obstacles
@@ -98,90 +95,6 @@ fn mapped(pose: &Pose, v: &Vector) -> Vector {
     let axis = Vector::new(q.i, q.j, q.k);
     let twice = 2.0 * axis.cross(*v);
     *v + q.w * twice + axis.cross(twice) + Vector::new(p.x, p.y, p.z)
-}
-
-/// A box along the axes.
-#[derive(Clone, Copy)]
-struct Bounds {
-    low: Vector,
-    high: Vector,
-}
-
-impl Bounds {
-    fn of(triangle: &Triangle) -> Self {
-        Self {
-            low: triangle.a.min(triangle.b).min(triangle.c),
-            high: triangle.a.max(triangle.b).max(triangle.c),
-        }
-    }
-
-    fn overlaps(&self, other: &Self) -> bool {
-        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
-    }
-
-    fn joined(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-        }
-    }
-}
-
-/// A uniform grid over an obstacle: each cell lists the triangles whose boxes reach into it.
-struct Grid {
-    bounds: Bounds,
-    cells_per_axis: usize,
-    cell: Vector,
-    lists: Vec<Vec<usize>>,
-}
-
-impl Grid {
-    fn new(triangles: &[Triangle]) -> Self {
-        let bounds = triangles
-            .iter()
-            .map(Bounds::of)
-            .reduce(Bounds::joined)
-            .expect("an obstacle has triangles");
-        let cells_per_axis =
-            ((triangles.len() as f64).sqrt().ceil() as usize).clamp(1, MAX_CELLS_PER_AXIS);
-        let cell = (bounds.high - bounds.low) / cells_per_axis as f64;
-        let mut grid = Self {
-            bounds,
-            cells_per_axis,
-            cell,
-            lists: vec![Vec::new(); cells_per_axis.pow(3)],
-        };
-        for (index, triangle) in triangles.iter().enumerate() {
-            for cell in grid.cells(&Bounds::of(triangle)) {
-                grid.lists[cell].push(index);
-            }
-        }
-        grid
-    }
-
-    /// Whether `test` holds for any triangle that shares a cell with `bounds`.
-    fn any_near(&self, bounds: &Bounds, mut test: impl FnMut(usize) -> bool) -> bool {
-        self.bounds.overlaps(bounds)
-            && self
-                .cells(bounds)
-                .any(|cell| self.lists[cell].iter().any(|index| test(*index)))
-    }
-
-    /// The cells that `bounds` reaches into; those at the rim stand for everything beyond.
-    fn cells(&self, bounds: &Bounds) -> impl Iterator<Item = usize> + use<> {
-        let count = self.cells_per_axis;
-        let place = |at: Vector, axis: usize| {
-            let cells = (at[axis] - self.bounds.low[axis]) / self.cell[axis];
-            // Casting saturates: below the grid is 0, and a flat grid's 0 / 0 as well.
-            (cells as usize).min(count - 1)
-        };
-        let [xs, ys, zs] = [0, 1, 2].map(|axis| place(bounds.low, axis)..=place(bounds.high, axis));
-        xs.flat_map(move |x| {
-            let zs = zs.clone();
-            ys.clone()
-                .flat_map(move |y| zs.clone().map(move |z| (x * count + y) * count + z))
-        })
-    }
 }
 
 #[cfg(test)]
@@ -215,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn the_grid_finds_what_testing_every_pair_finds() {
+    fn the_tree_finds_what_testing_every_pair_finds() {
         let world = sphere_on_plane();
         let checker = PenetrationChecker::new(&world);
         for step in 0..60 {

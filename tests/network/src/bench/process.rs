@@ -5,24 +5,24 @@ use std::process::{Child, ChildStdout, Command};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::BenchError;
+use super::{BenchError, wait_until};
 
 /// A process that does not outlive its owner: killed when dropped.
 #[derive(Debug)]
-pub(super) struct Process {
+pub(crate) struct Process {
     child: Child,
     out: Option<BufReader<ChildStdout>>,
 }
 
 impl Process {
-    pub(super) fn start(command: &mut Command) -> Result<Process, BenchError> {
+    pub(crate) fn start(command: &mut Command) -> Result<Process, BenchError> {
         let mut child = command.spawn()?;
         let out = child.stdout.take().map(BufReader::new);
         Ok(Process { child, out })
     }
 
     /// The next line that it writes to standard output; empty where it ends before.
-    pub(super) fn line(&mut self) -> Result<String, BenchError> {
+    pub(crate) fn line(&mut self) -> Result<String, BenchError> {
         let mut line = String::new();
         if let Some(out) = &mut self.out {
             out.read_line(&mut line)?;
@@ -31,7 +31,7 @@ impl Process {
     }
 
     /// Writes an empty line to its standard input; the line that it answers.
-    pub(super) fn ask(&mut self) -> Result<String, BenchError> {
+    pub(crate) fn ask(&mut self) -> Result<String, BenchError> {
         if let Some(input) = &mut self.child.stdin {
             input.write_all(b"\n")?;
         }
@@ -39,7 +39,7 @@ impl Process {
     }
 
     /// Its standard error.
-    pub(super) fn errors(&mut self) -> Result<BufReader<std::process::ChildStderr>, BenchError> {
+    pub(crate) fn errors(&mut self) -> Result<BufReader<std::process::ChildStderr>, BenchError> {
         let errors = self.child.stderr.take();
         errors
             .map(BufReader::new)
@@ -47,22 +47,32 @@ impl Process {
     }
 
     /// Its number.
-    pub(super) fn number(&self) -> u32 {
+    pub(crate) fn number(&self) -> u32 {
         self.child.id()
     }
 
     /// For signals from another thread, while it is not dropped.
-    pub(super) fn id(&self) -> Pid {
+    pub(crate) fn id(&self) -> Pid {
         Pid::from_child(&self.child)
     }
 
     /// Sends it a signal.
-    pub(super) fn signal(&self, signal: Signal) -> Result<(), BenchError> {
+    pub(crate) fn signal(&self, signal: Signal) -> Result<(), BenchError> {
         Ok(kill_process(self.id(), signal).map_err(std::io::Error::from)?)
     }
 
+    /// Waits for its end; whether that was in good order.
+    pub(crate) fn wait(&mut self) -> Result<bool, BenchError> {
+        let mut ended = None;
+        wait_until("the end of a process", || {
+            ended = self.child.try_wait().transpose();
+            ended.is_some()
+        })?;
+        Ok(ended.transpose()?.is_some_and(|status| status.success()))
+    }
+
     /// Ends it as Ctrl-C does; what it wrote to standard output and nobody has read.
-    pub(super) fn end(mut self) -> Result<String, BenchError> {
+    pub(crate) fn end(mut self) -> Result<String, BenchError> {
         self.signal(Signal::INT)?;
         let mut text = String::new();
         if let Some(mut out) = self.out.take() {
@@ -73,7 +83,7 @@ impl Process {
     }
 
     /// The same; its report.
-    pub(super) fn report(self) -> Result<serde_json::Value, BenchError> {
+    pub(crate) fn report(self) -> Result<serde_json::Value, BenchError> {
         let text = self.end()?;
         serde_json::from_str(&text).map_err(|error| {
             BenchError::Missing(format!("the program's report is no JSON ({error}): {text}"))

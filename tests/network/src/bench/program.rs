@@ -1,8 +1,10 @@
 //! The program `taut` in a directory of its own: a workbench file, a cluster key, processes that end with their owner.
 
-use std::io::{BufRead, BufReader};
+use std::collections::VecDeque;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{ChildStderr, Command, Stdio};
+use std::process::{Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use taut_link::{ClusterKey, create_key_file};
 use tempfile::TempDir;
@@ -14,17 +16,20 @@ use super::process::Process;
 /// The workbench file that is shipped.
 const SHIPPED_WORKBENCH: &str = include_str!("../../../../server/workbench.toml");
 /// The scene of all runs.
-pub(super) const SCENE: &str = "sphere-on-plane";
+pub(crate) const SCENE: &str = "sphere-on-plane";
+
+/// Lines of a server that are kept.
+const MOST_LINES: usize = 10_000;
 
 /// A workbench on free ports of loopback.
-pub(super) struct Workbench {
+pub(crate) struct Workbench {
     program: PathBuf,
     directory: TempDir,
 }
 
 impl Workbench {
     /// The shipped one with the small scene, as `change` alters it.
-    pub(super) fn new(
+    pub(crate) fn new(
         program: &Path,
         change: impl FnOnce(&mut Table) -> Result<(), BenchError>,
     ) -> Result<Workbench, BenchError> {
@@ -43,11 +48,11 @@ impl Workbench {
     }
 
     /// The cluster key.
-    pub(super) fn key(&self) -> Result<ClusterKey, BenchError> {
+    pub(crate) fn key(&self) -> Result<ClusterKey, BenchError> {
         Ok(taut_link::read_key_file(&self.key_path())?)
     }
 
-    pub(super) fn key_path(&self) -> PathBuf {
+    pub(crate) fn key_path(&self) -> PathBuf {
         self.directory.path().join("cluster.key")
     }
 
@@ -55,49 +60,105 @@ impl Workbench {
         self.directory.path().join("workbench.toml")
     }
 
+    /// A file in its directory.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
     /// Writes a file into its directory; where.
-    pub(super) fn write(&self, name: &str, content: &str) -> Result<PathBuf, BenchError> {
-        let path = self.directory.path().join(name);
+    pub(crate) fn write(&self, name: &str, content: &str) -> Result<PathBuf, BenchError> {
+        let path = self.path(name);
         std::fs::write(&path, content)?;
         Ok(path)
     }
 
     /// Starts `taut serve`, at these addresses or at free ones, and waits until it serves.
-    pub(super) fn serve(&self, at: Option<(&str, &str)>) -> Result<Served, BenchError> {
-        let mut command = self.command();
-        command.args(["serve", "--json", "--no-monitor", "--config"]);
-        command.arg(self.config()).arg("--key").arg(self.key_path());
+    pub(crate) fn serve(&self, at: Option<(&str, &str)>) -> Result<Served, BenchError> {
+        let mut command = self.server();
         if let Some((quic, udp)) = at {
             command.args(["--quic", quic, "--udp", udp]);
         }
         let mut process = Process::start(command.stderr(Stdio::piped()))?;
         let mut lines = process.errors()?;
         let (quic, udp) = addresses(&mut lines)?;
+        let said = Arc::<Mutex<VecDeque<String>>>::default();
+        let heard = Arc::clone(&said);
         // What it says later is read, too: nobody may wait for a full pipe.
         std::thread::Builder::new()
             .name("lines".to_owned())
-            .spawn(move || std::io::copy(&mut lines, &mut std::io::sink()))?;
-        Ok(Served { process, quic, udp })
+            .spawn(move || {
+                for line in lines.lines().map_while(Result::ok) {
+                    let mut heard = heard.lock().unwrap_or_else(PoisonError::into_inner);
+                    heard.truncate(MOST_LINES - 1);
+                    heard.push_front(line);
+                }
+            })?;
+        Ok(Served {
+            process,
+            quic,
+            udp,
+            said,
+        })
+    }
+
+    /// The same with a pipe of one's own for what it says, which is read up to its addresses.
+    pub(crate) fn serve_into<R: Read>(
+        &self,
+        reader: R,
+        writer: Stdio,
+    ) -> Result<(Served, R), BenchError> {
+        let process = Process::start(self.server().stderr(writer))?;
+        let mut lines = BufReader::with_capacity(1, reader);
+        let (quic, udp) = addresses(&mut lines)?;
+        let served = Served {
+            process,
+            quic,
+            udp,
+            said: Arc::default(),
+        };
+        Ok((served, lines.into_inner()))
+    }
+
+    fn server(&self) -> Command {
+        let mut command = self.command();
+        command.args(["serve", "--json", "--no-monitor", "--config"]);
+        command.arg(self.config()).arg("--key").arg(self.key_path());
+        command
     }
 
     /// Starts another role that joins `server` as `node`.
-    pub(super) fn join(
+    pub(crate) fn join(
         &self,
         role: &str,
         node: &str,
         server: &str,
         arguments: &[&str],
     ) -> Result<Process, BenchError> {
+        // What it says of a server that it lost is expected.
+        self.join_telling(role, node, server, arguments, Stdio::null())
+    }
+
+    /// The same; what it says goes to `stderr`.
+    pub(crate) fn join_telling(
+        &self,
+        role: &str,
+        node: &str,
+        server: &str,
+        arguments: &[&str],
+        stderr: Stdio,
+    ) -> Result<Process, BenchError> {
         let mut command = self.command();
         command.args([role, "--server", server, "--node", node, "--key"]);
         command.arg(self.key_path()).args(arguments);
-        // What it says of a server that it lost is expected.
-        Process::start(command.stderr(Stdio::null()))
+        Process::start(command.stderr(stderr))
     }
 
     fn command(&self) -> Command {
-        let mut command = Command::new(&self.program);
+        // Whoever runs this may ignore SIGHUP (nohup), and children inherit that.
+        let mut command = Command::new("env");
         command
+            .arg("--default-signal=HUP")
+            .arg(&self.program)
             .current_dir(self.directory.path())
             .env_remove("TAUT_KEY_FILE")
             .env_remove("DISPLAY")
@@ -110,8 +171,14 @@ impl Workbench {
     }
 }
 
+/// The device is behind a bridge.
+pub(crate) fn remote_device(file: &mut Table) {
+    let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
+    file.insert("device".to_owned(), remote.into());
+}
+
 /// Changes a value of a workbench file, such as `network.quic_port`.
-pub(super) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Result<(), BenchError> {
+pub(crate) fn set(file: &mut Table, key: &str, value: impl Into<Value>) -> Result<(), BenchError> {
     let (table, key) = key.split_once('.').ok_or_else(broken)?;
     let table = file.get_mut(table).and_then(Value::as_table_mut);
     table
@@ -125,16 +192,18 @@ fn broken() -> BenchError {
 }
 
 /// A running `taut serve`; killed when dropped.
-pub(super) struct Served {
-    process: Process,
+pub(crate) struct Served {
+    pub(crate) process: Process,
     /// Address of the control plane.
-    pub(super) quic: String,
+    pub(crate) quic: String,
     /// Address of the pose plane.
-    pub(super) udp: String,
+    pub(crate) udp: String,
+    /// The newest lines of its standard error first.
+    said: Arc<Mutex<VecDeque<String>>>,
 }
 
 /// From `serving on 127.0.0.1:1 (control) and 127.0.0.1:2 (poses)`.
-fn addresses(lines: &mut BufReader<ChildStderr>) -> Result<(String, String), BenchError> {
+fn addresses(lines: &mut impl BufRead) -> Result<(String, String), BenchError> {
     let (mut line, mut all) = (String::new(), String::new());
     while lines.read_line(&mut line)? > 0 {
         let found = line.trim_end().strip_prefix("serving on ");
@@ -154,12 +223,19 @@ fn addresses(lines: &mut BufReader<ChildStderr>) -> Result<(String, String), Ben
 
 impl Served {
     /// Its process's number.
-    pub(super) fn number(&self) -> u32 {
+    pub(crate) fn number(&self) -> u32 {
         self.process.number()
     }
 
+    /// Lines of its standard error so far that hold all `parts`.
+    pub(crate) fn lines_with(&self, parts: &[&str]) -> Vec<String> {
+        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
+        let holds = |line: &&String| parts.iter().all(|part| line.contains(part));
+        said.iter().filter(holds).cloned().collect()
+    }
+
     /// Ends it as Ctrl-C does; its report.
-    pub(super) fn stop(self) -> Result<serde_json::Value, BenchError> {
+    pub(crate) fn stop(self) -> Result<serde_json::Value, BenchError> {
         self.process.report()
     }
 }

@@ -15,10 +15,9 @@ use std::time::{Duration, Instant};
 use serde_json::Value as Json;
 use taut_link::{ClientOptions, Role};
 use taut_scene::Scene;
-use toml::{Table, Value};
 
 use super::process::Process;
-use super::program::{SCENE, Served, Workbench, set};
+use super::program::{SCENE, Served, Workbench, remote_device, set};
 use super::soak_log::SoakLog;
 use super::soak_watcher::{Restarts, Watcher};
 use super::{BenchError, wait_until};
@@ -108,9 +107,8 @@ struct Cast {
 impl Cast {
     fn start(program: &Path, log: &SoakLog) -> Result<Cast, BenchError> {
         let http = TcpListener::bind("127.0.0.1:0")?.local_addr()?;
-        let remote = Table::from_iter([("kind".to_owned(), Value::from("remote"))]);
         let workbench = Workbench::new(program, |file| {
-            file.insert("device".to_owned(), remote.into());
+            remote_device(file);
             set(file, "network.node_timeout", NODE_TIMEOUT_S)?;
             set(file, "observers.enabled", true)?;
             set(file, "observers.port", i64::from(http.port()))

@@ -4,14 +4,14 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use taut_link::proto::barrier::{Arrive, MOST_REIGNS_AHEAD, MasterSettings, Swap};
+use taut_link::proto::barrier::{Arrive, MAX_MEMBERS, MOST_REIGNS_AHEAD, MasterSettings, Swap};
 use taut_link::proto::events::EventAck;
 use taut_link::proto::header::MAX_DATAGRAM_BYTES;
 use taut_link::proto::state::RunState;
 use taut_link::proto::{Holder, JoinKey, Payload, confirmation};
 use taut_link::{
-    ClientLink, ClusterKey, FrameReport, FrameTurn, LinkEvent, MulticastOptions, Role, ServerLink,
-    ServerOptions, connect, serve,
+    ClientLink, ClusterKey, FrameReport, FrameTurn, LinkError, LinkEvent, MulticastOptions, Role,
+    ServerLink, ServerOptions, connect, serve,
 };
 use tokio::runtime::Runtime;
 
@@ -27,6 +27,12 @@ pub(super) const ATTACKS: &[Attack] = &[
         tried: "a render node that says it draws a frame in two seconds joins two that draw sixty a second",
         promised: "the wall keeps its rate, and the node is named",
         run: slow_node,
+    },
+    Attack {
+        name: "one-too-many",
+        tried: "33 render nodes come to a server that keeps frames together, then one leaves and the last comes again",
+        promised: "32 are in; the last is told why it is not and what to do, and gets the place that is left",
+        run: one_too_many,
     },
     Attack {
         name: "last_term",
@@ -124,6 +130,42 @@ fn draw(screen: &ClientLink, period: Duration, over: &AtomicBool) {
             }
         }
     }
+}
+
+fn one_too_many(_: &Extent) -> Result<Finding, BenchError> {
+    let (runtime, key) = (runtime()?, ClusterKey::generate()?);
+    let options = ServerOptions {
+        frames: frames(),
+        max_clients: 2 * MAX_MEMBERS,
+        ..server_options(&key)
+    };
+    let server = runtime.block_on(serve(options, small_content()))?;
+    let join = |number: usize| {
+        let node = format!("node{number}");
+        runtime.block_on(connect(client_options(&server, &key, Role::Render, &node)))
+    };
+    let mut inside = Vec::new();
+    for number in 0..MAX_MEMBERS {
+        inside.push(join(number)?);
+    }
+    let refusal = match join(MAX_MEMBERS) {
+        Err(LinkError::Refused { text, .. }) => text.to_string(),
+        Err(error) => return Err(error.into()),
+        Ok(_) => String::new(),
+    };
+    if let Some(first) = inside.pop() {
+        runtime.block_on(first.close());
+    }
+    wait_until("the place that is left", || {
+        server.clients().len() < MAX_MEMBERS
+    })?;
+    let comes_later = join(MAX_MEMBERS).is_ok();
+    Ok(Finding {
+        happened: format!(
+            "{MAX_MEMBERS} are in; the next one: \"{refusal}\"; in the place that was left: {comes_later}"
+        ),
+        kept: refusal.contains("stop one, or set swap") && comes_later,
+    })
 }
 
 fn slow_node(_: &Extent) -> Result<Finding, BenchError> {

@@ -1,7 +1,6 @@
 //! The hand: arming, ends of processes, limits of the force.
 //!
-//! A port with a simulated device under a virtual clock; the server that commands it is the attacker. What needs a whole process (signals, panics, a terminal
-//! that takes nothing) is in `device-bridge/tests/ends.rs` and `server/tests/blocked_terminal.rs`.
+//! A port with a simulated device under a virtual clock; the server that commands it is the attacker. Whole processes are in `program.rs`.
 
 use std::time::Duration;
 

@@ -5,10 +5,12 @@
 
 mod cluster;
 mod device;
+mod edge;
 mod joining;
 mod liar;
 mod operation;
 mod origin;
+mod program;
 
 use crate::bench::BenchError;
 use crate::report::{Extent, Row};
@@ -35,17 +37,20 @@ pub struct Finding {
     pub kept: bool,
 }
 
+/// All attacks, by the file that each stands in.
+pub const GROUPS: [(&str, &[Attack]); 7] = [
+    ("origin", origin::ATTACKS),
+    ("device", device::ATTACKS),
+    ("edge", edge::ATTACKS),
+    ("joining", joining::ATTACKS),
+    ("cluster", cluster::ATTACKS),
+    ("operation", operation::ATTACKS),
+    ("program", program::ATTACKS),
+];
+
 /// All attacks, group by group.
 pub fn attacks() -> impl Iterator<Item = &'static Attack> {
-    [
-        origin::ATTACKS,
-        device::ATTACKS,
-        joining::ATTACKS,
-        cluster::ATTACKS,
-        operation::ATTACKS,
-    ]
-    .into_iter()
-    .flatten()
+    GROUPS.into_iter().flat_map(|(_, attacks)| attacks)
 }
 
 /// Runs all attacks.

@@ -1,7 +1,7 @@
 //! Terminals, logs, observers and the running of the program.
 //!
-//! What needs the whole program stands elsewhere: a terminal that takes nothing, the audit trail and signs of life in `server/tests/operation.rs`,
-//! rerun's ports in `server/monitor/tests/serving.rs`.
+//! What needs the whole program stands elsewhere: `program.rs` here, signs of life in `server/tests/operation.rs`, rerun's ports in
+//! `server/monitor/tests/serving.rs`.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -30,7 +30,55 @@ pub(super) const ATTACKS: &[Attack] = &[
         promised: "403 for each, nothing told",
         run: page_from_elsewhere,
     },
+    Attack {
+        name: "unit-that-was-taken-over",
+        tried: "the shipped systemd units are asked what a process of theirs that is no longer ours may do, and how exposed systemd finds them",
+        promised: "no new privilege, no capability, no write but to its own directory, no code that it wrote; what a unit leaves out stands in it with the reason",
+        run: unit_that_was_taken_over,
+    },
 ];
+
+/// The units of docs/systemd.
+const UNITS: [(&str, &str); 5] = [
+    (
+        "serve",
+        include_str!("../../../../docs/systemd/taut-serve.service"),
+    ),
+    (
+        "bridge",
+        include_str!("../../../../docs/systemd/taut-bridge.service"),
+    ),
+    (
+        "track",
+        include_str!("../../../../docs/systemd/taut-track.service"),
+    ),
+    (
+        "record",
+        include_str!("../../../../docs/systemd/taut-record@.service"),
+    ),
+    (
+        "render",
+        include_str!("../../../../docs/systemd/taut-render@.service"),
+    ),
+];
+/// What each unit has; a user's unit, which draws, cannot have those after the first five (systemd.exec(5): it needs privileges, or a driver's code).
+const CONFINED: [&str; 14] = [
+    "NoNewPrivileges=yes",
+    "RestrictNamespaces=yes",
+    "RestrictSUIDSGID=yes",
+    "SystemCallFilter=@system-service",
+    "LimitCORE=0",
+    "CapabilityBoundingSet=",
+    "ProtectSystem=strict",
+    "ProtectHome=yes",
+    "PrivateTmp=yes",
+    "ProtectKernelModules=yes",
+    "ProtectProc=invisible",
+    "MemoryDenyWriteExecute=yes",
+    "PrivateDevices=yes|DevicePolicy=closed",
+    "RemoveIPC=yes",
+];
+const OF_A_USER: usize = 5;
 
 /// Clears the screen, sets a title (with C0 and C1 controls), turns the writing, fakes a line, hides.
 const HOSTILE: &str =
@@ -148,4 +196,38 @@ fn get(address: SocketAddr, target: &str, headers: &str) -> std::io::Result<Stri
     let mut answer = String::new();
     stream.read_to_string(&mut answer)?;
     Ok(answer)
+}
+
+fn unit_that_was_taken_over(_: &Extent) -> Result<Finding, BenchError> {
+    let mut open = Vec::new();
+    for (name, unit) in UNITS {
+        let asked = if name == "render" {
+            &CONFINED[..OF_A_USER]
+        } else {
+            &CONFINED[..]
+        };
+        let missing = asked.iter().filter(|wanted| {
+            !wanted
+                .split('|')
+                .any(|one| unit.lines().any(|line| line == one))
+        });
+        open.extend(missing.map(|wanted| format!("{name}: {wanted}")));
+    }
+    // The whole judgement is systemd's own, where it is at hand.
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scripts/systemd-check");
+    let judged = std::process::Command::new(script).output();
+    let judgement = match judged {
+        Ok(output) if output.status.code() != Some(2) => {
+            if !output.status.success() {
+                open.push("systemd-analyze".to_owned());
+            }
+            let lines = String::from_utf8_lossy(&output.stdout).into_owned();
+            lines.trim().replace('\n', "; ")
+        }
+        _ => "systemd-analyze is not here".to_owned(),
+    };
+    Ok(Finding {
+        happened: format!("left open: {open:?}; {judgement}"),
+        kept: open.is_empty(),
+    })
 }
