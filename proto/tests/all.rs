@@ -13,6 +13,7 @@ mod events;
 mod golden;
 mod group;
 mod key;
+mod light;
 mod limits;
 mod no_alloc;
 mod numbers;

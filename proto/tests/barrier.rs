@@ -9,7 +9,7 @@ use taut_proto::barrier::{
     SWAP_TOLD_NS, Succession, Successor, Swap, TERMS_LEFT_OUT, Turn, WARM_UP_FRAMES,
 };
 
-const MS: u64 = 1_000_000;
+pub const MS: u64 = 1_000_000;
 const PERIOD: u64 = 16_666_667;
 /// Ten frames per second at least.
 const SLOWEST: u64 = 100 * MS;
@@ -23,7 +23,7 @@ fn settings(swap: Swap) -> MasterSettings {
 }
 
 /// A master with these nodes in step, at the moment after a release; all arrive at once in every frame.
-fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
+pub fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
     let mut master = Master::new(settings(swap), 0, 1, 1);
     let mut now = MS;
     for &session in sessions {
@@ -43,7 +43,7 @@ fn in_step(swap: Swap, sessions: &[u16]) -> (Master, u64) {
     (master, now)
 }
 
-fn arrived(frame: u64) -> Arrive {
+pub fn arrived(frame: u64) -> Arrive {
     Arrive {
         term: 1,
         frame,
@@ -52,12 +52,12 @@ fn arrived(frame: u64) -> Arrive {
     }
 }
 
-fn released(master: &Master) -> u64 {
+pub fn released(master: &Master) -> u64 {
     master.newest().map_or(0, |newest| newest.frame)
 }
 
 /// Polls at the moment that the master asks for, and not a nanosecond before.
-fn release_when_due(master: &mut Master) -> u64 {
+pub fn release_when_due(master: &mut Master) -> u64 {
     let Some(wake) = master.wake_ns() else {
         panic!("there are nodes");
     };

@@ -1,4 +1,5 @@
-//! Golden vectors: the bytes of one sample of everything that travels, in `golden.txt`. A change here is a new protocol version.
+//! Golden vectors: the bytes of one sample of everything that travels, in `golden.txt`. A change here, of a layout that was released, is a new protocol
+//! version; the layout of version 4 is that of release 0.2.0, and grows until then.
 //!
 //! A datagram's line is the whole sealed datagram under the key material 00 01 02 .. 1b, epoch 0x01020304, sender 5, sequence 0, 1, 2 ..;
 //! a message's line is its frame on the stream; a mesh's line is its blob.
@@ -61,7 +62,7 @@ fn made() -> Vec<(String, String)> {
     lines
 }
 
-/// After a meant change of layout, with the version raised: `cargo test -p taut-proto --test all golden:: -- --ignored`.
+/// After a meant change of layout, with the version raised if it was released: `cargo test -p taut-proto --test all golden:: -- --ignored`.
 #[test]
 #[ignore = "writes the golden file"]
 fn write_the_golden_file() {
@@ -88,7 +89,7 @@ fn everything_that_travels_has_the_bytes_of_the_golden_file() {
         assert_eq!(
             Some(bytes.as_str()),
             expected,
-            "{name}: the layout changed; if meant, raise PROTOCOL_VERSION and write the new line"
+            "{name}: the layout changed; if meant, raise PROTOCOL_VERSION where it was released, and write the new line"
         );
     }
     assert_eq!(golden.len(), made.len(), "every golden line has its sample");

@@ -18,6 +18,5 @@ fn vertex(@builtin(vertex_index) index: u32) -> Fragment {
 fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let far = frame.workbench_from_clip * vec4(in.place, 1.0, 1.0);
     let direction = normalize(far.xyz / far.w - frame.eye.xyz);
-    let light = surroundings(direction) + (dither(in.clip.xy) - 0.5) * 0.0025;
-    return vec4(shown(light), 1.0);
+    return vec4(surroundings(direction, in.clip.xy), 1.0);
 }

@@ -1,5 +1,5 @@
 // A grid under the obstacles that takes their shadow: height above it is read from the shadow.
-// It fades out at its rim, so that it has no edge of its own.
+// It fades out into the surroundings at its rim, so that it has no edge of its own. They are mixed in here and not behind it: no pixel is drawn twice.
 
 struct Fragment {
     @builtin(position) clip: vec4<f32>,
@@ -42,6 +42,7 @@ fn fragment(in: Fragment) -> @location(0) vec4<f32> {
     let normal = vec3(0.0, 0.0, 1.0);
     let colour = mix(vec3(0.045, 0.051, 0.062), vec3(0.22, 0.25, 0.29), 0.45 * line);
     let light = colour * falling_light(in.position, normal).rgb;
-    let alpha = 1.0 - smoothstep(0.35, 1.0, from_middle);
-    return vec4(shown(light), alpha * near_share(in.clip));
+    let share = (1.0 - smoothstep(0.35, 1.0, from_middle)) * near_share(in.clip);
+    let behind = surroundings(normalize(in.position - frame.eye.xyz), in.clip.xy);
+    return vec4(mix(behind, shown(light), share), 1.0);
 }

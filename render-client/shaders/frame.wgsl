@@ -1,5 +1,5 @@
 // What every shader knows of the eye, the lights and the shadow map. Put before the others.
-// Frame: workbench, metres, z up. Colours: linear.
+// Frame: workbench, metres, z up. Colours: linear. Before this stands SMOOTH: whether edges are worth their cost (pipeline.rs).
 
 struct Frame {
     clip_from_workbench: mat4x4<f32>,
@@ -26,13 +26,16 @@ const ROUGHEST_LEVEL = 4.0;      // of the environment
 const NARROWEST = 0.07;          // alpha of the sharpest highlight: a narrower one, of a lamp without size, falls between the pixels
 const DIELECTRIC = vec3<f32>(0.04); // share of light that plastic and glass mirror head-on
 
-// Share of the key light that reaches a point: 2 x 2 samples, each filtered over 2 x 2 texels.
+// Share of the key light that reaches a point: 2 x 2 samples, each filtered over 2 x 2 texels; one where edges are not smooth.
 fn lit_by_key(position: vec3<f32>, normal: vec3<f32>) -> f32 {
     let off_surface = position + normal * (1.6 * frame.key.w);
     let clip = frame.shadow_from_workbench * vec4(off_surface, 1.0);
     let place = clip.xy * vec2(0.5, -0.5) + 0.5;
     if any(place < vec2(0.0)) || any(place > vec2(1.0)) || clip.z > 1.0 {
         return 1.0; // outside the map nothing casts
+    }
+    if !SMOOTH {
+        return textureSampleCompareLevel(shadow_map, shadow_sampler, place, clip.z);
     }
     let texel = 1.0 / f32(textureDimensions(shadow_map).x);
     var lit = 0.0;
@@ -99,7 +102,9 @@ fn highlight(normal: vec3<f32>, to_eye: vec3<f32>, to_lamp: vec3<f32>, head_on: 
     let lamp = max(dot(normal, to_lamp), 0.0);
     let eye = max(dot(normal, to_eye), 1e-3);
     let visible = 0.5 / mix(2.0 * lamp * eye + 1e-4, lamp + eye, alpha);
-    let reflected = head_on + (1.0 - head_on) * pow(1.0 - max(dot(to_eye, between), 0.0), 5.0);
+    let grazing = 1.0 - max(dot(to_eye, between), 0.0);
+    let squared = grazing * grazing;
+    let reflected = head_on + (1.0 - head_on) * (squared * squared * grazing);
     return reflected * (alpha * alpha * visible * lamp / (spread * spread)); // pi of the lobe is in the light
 }
 
@@ -129,7 +134,10 @@ fn tone(light: vec3<f32>) -> vec3<f32> {
 
 // The colour that leaves a fragment; a stale picture loses its colours.
 fn shown(light: vec3<f32>) -> vec3<f32> {
-    let colour = tone(light);
+    return aged(tone(light));
+}
+
+fn aged(colour: vec3<f32>) -> vec3<f32> {
     let grey = vec3(dot(colour, vec3(0.2126, 0.7152, 0.0722))) * vec3(0.75, 0.78, 0.85);
     return mix(colour, grey, 0.8 * frame.eye.w);
 }
@@ -145,11 +153,11 @@ fn near_share(clip: vec4<f32>) -> f32 {
     return clamp((away - frame.grid.y) / max(frame.grid.z - frame.grid.y, 1e-6), 0.0, 1.0);
 }
 
-// The far surroundings in one direction: the same from both screens at their common edge.
-fn surroundings(direction: vec3<f32>) -> vec3<f32> {
+// The far surroundings in one direction, as they leave a fragment: the same from both screens at their common edge. Far below the bend of the tone curve.
+fn surroundings(direction: vec3<f32>, pixel: vec2<f32>) -> vec3<f32> {
     let up = direction.z;
     let horizon = vec3(0.042, 0.049, 0.062);
-    let above = mix(horizon, vec3(0.010, 0.013, 0.021), smoothstep(0.0, 0.8, up));
-    let below = mix(horizon, vec3(0.016, 0.018, 0.023), smoothstep(0.0, 0.6, -up));
-    return select(below, above, up > 0.0);
+    let end = select(vec3(0.016, 0.018, 0.023), vec3(0.010, 0.013, 0.021), up > 0.0);
+    let light = mix(horizon, end, smoothstep(0.0, select(0.6, 0.8, up > 0.0), abs(up)));
+    return aged(light + (dither(pixel) - 0.5) * 0.0025);
 }

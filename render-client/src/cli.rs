@@ -14,21 +14,24 @@ use crate::description::Overrides;
 use crate::error::RenderError;
 use crate::hand::Hand;
 use crate::membership::MembershipArgs;
-use crate::renderer::{Gpu, GpuChoice};
+use crate::renderer::{Gpu, GpuChoice, SMOOTH};
 use crate::session::Session;
-use crate::statistics::{Ended, RenderReport, Statistics};
+use crate::statistics::{Ended, NO_WINDOW, RenderReport, Statistics};
 use crate::timeline::Timeline;
 use crate::{headless, window};
 
 /// Frames per second without a window.
 const HEADLESS_FPS: f64 = 20.0;
 
-/// The same where the processor draws, which the haptic loops may need: a frame of two eyes takes
-/// it about 30 ms.
-const SOFTWARE_FPS: f64 = 10.0;
+/// Frames per second in a window where the processor draws, which the haptic loops may need: the two nodes of the shipped workbench take about one
+/// core together at this rate (`--example picture_rate`).
+const SOFTWARE_FPS: f64 = 20.0;
 
 /// Frames per second in a window, at most; the monitor may take fewer.
 const WINDOW_FPS: f64 = 120.0;
+
+/// Frames per second that the processor draws smoothly and writes to files.
+const WRITTEN_FPS: f64 = 10.0;
 
 /// Longest delay of the picture, in milliseconds: as far as states are kept at 1 kHz.
 const MAX_DELAY_MS: f64 = 200.0;
@@ -70,9 +73,14 @@ pub struct RenderArgs {
     /// End after this many seconds.
     #[arg(long, value_name = "SECONDS")]
     pub duration: Option<f64>,
-    /// Most frames per second [default: 20 off-screen, 120 in windows; 10 without a graphics card].
+    /// Most frames per second [default: 120 in windows; 20 off-screen or without a graphics card, 10 for pictures of --out
+    /// without one].
     #[arg(long, value_name = "N")]
     pub fps: Option<f64>,
+    /// Samples per pixel: 4 smooths edges of bodies and shadows, 1 is twice as fast in software [default: 4; 1 without a graphics card,
+    /// but for pictures of --out].
+    #[arg(long, value_name = "1|4", value_parser = samples())]
+    pub samples: Option<u32>,
     /// Draw these too, whatever the server says.
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     pub show: Option<Vec<ShowArg>>,
@@ -170,13 +178,13 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
 
     // Without an adapter there is no use in joining the server.
     let gpu = if args.headless {
-        Some(Gpu::open_with(&choice)?)
+        Some(Gpu::open_with(&choice)?.smoothed(args.samples, args.out.is_some()))
     } else {
         None
     };
     let default_fps = match &gpu {
         None => WINDOW_FPS,
-        Some(gpu) if gpu.is_software() => SOFTWARE_FPS,
+        Some(gpu) if gpu.is_software() && args.out.is_some() => WRITTEN_FPS,
         Some(_) => HEADLESS_FPS,
     };
     let fps = fps.unwrap_or(default_fps);
@@ -212,7 +220,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
     let ended = if let Some(gpu) = gpu {
         let drawn_with = DrawnWith {
             adapter: gpu.summary().to_string(),
-            present_timing: "no window".to_owned(),
+            present_timing: NO_WINDOW.to_owned(),
         };
         let mut canvas = Canvas::new(gpu, stage);
         let plan = headless::Plan {
@@ -248,6 +256,7 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
                 args.monitor.clone()
             },
             gpu: choice,
+            samples: args.samples,
             display_ns,
             show,
             node: args.node.clone(),
@@ -291,6 +300,8 @@ pub fn run(args: RenderArgs) -> Result<RenderReport, RenderError> {
         transport: args.transport.name().to_owned(),
         adapter: drawn_with.adapter,
         present_timing: drawn_with.present_timing,
+        light_ms: statistics.lights(),
+        unlit: statistics.unlit,
         frames: statistics.frames,
         locked_frames: statistics.locked_frames,
         stale_frames: statistics.stale_frames,
@@ -322,6 +333,8 @@ impl RenderReport {
             transport: args.transport.name().to_owned(),
             adapter: String::new(),
             present_timing: String::new(),
+            light_ms: Default::default(),
+            unlit: 0,
             frames: 0,
             locked_frames: 0,
             stale_frames: 0,
@@ -380,6 +393,10 @@ fn stereo_modes() -> impl TypedValueParser<Value = Stereo> {
     let mode = |name: String| Stereo::NAMED.iter().find(|named| named.0 == name);
     PossibleValuesParser::new(Stereo::NAMED.map(|(name, _)| name))
         .map(move |name| mode(name).map_or_else(Stereo::default, |named| named.1))
+}
+
+fn samples() -> impl TypedValueParser<Value = u32> {
+    PossibleValuesParser::new(["1", "4"]).map(|samples| if samples == "1" { 1 } else { SMOOTH })
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@
 //! [`timeline`] picks the one to draw, [`view`] projects the [`stage`] onto a screen for each eye,
 //! [`stereo`] shares a picture between the eyes, [`renderer`] draws it with wgpu, off-screen
 //! ([`canvas`]) or in windows, and [`statistics`] counts it.
-#![forbid(unsafe_code)]
 
 pub mod calibrate;
 pub mod calibration;

@@ -84,6 +84,16 @@ impl Pacer {
             .map(|planned| now.saturating_duration_since(planned))
     }
 
+    /// The frame that is drawn, where the barrier named it.
+    pub(crate) fn frame(&self) -> Option<u64> {
+        self.drawn.map(|(frame, _)| frame)
+    }
+
+    /// All pictures of a frame that the barrier named lit up, the last at `lit`.
+    pub(crate) fn lit(&mut self, frame: u64, lit: Instant) {
+        self.gate.lit(frame, lit);
+    }
+
     /// How this node stands among the others.
     fn status(&self) -> FrameStatus {
         self.gate.status()

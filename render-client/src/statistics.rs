@@ -21,6 +21,10 @@ const MS_PER_US: f64 = 1e-3;
 /// Most drawn states named in one report.
 const MAX_DRAWN: usize = 64;
 
+/// What a node without a window knows of the time at which its pictures light up.
+pub(crate) const NO_WINDOW: &str =
+    "not known, the times told are those of calls alone: no window lights up";
+
 /// Why a node stopped drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
@@ -47,6 +51,10 @@ pub struct RenderReport {
     pub adapter: String,
     /// What can be known of the time at which pictures are on the screen.
     pub present_timing: String,
+    /// From handing a frame's first picture over to the light of its last; without a count where the window system does not tell.
+    pub light_ms: Distribution,
+    /// Frames of which a picture never lit up, or lit up at a time that cannot be, by the window system.
+    pub unlit: u64,
     /// Frames drawn, each on all screens of the node.
     pub frames: u64,
     /// Of these, frames that the barrier released: shown when all nodes showed them.
@@ -115,6 +123,9 @@ pub(crate) struct Statistics {
     since_report: Ages,
     /// How late after the planned moment frames were shown, in microseconds.
     swaps_since_report: Histogram<u64>,
+    /// From handing a frame over to its light, in microseconds, since the start.
+    lights: Histogram<u64>,
+    pub(crate) unlit: u64,
     /// Frames that the barrier released.
     pub(crate) locked_frames: u64,
     frames_at_report: u64,
@@ -135,6 +146,8 @@ impl Statistics {
             ages: Ages::new(),
             since_report: Ages::new(),
             swaps_since_report: histogram(),
+            lights: histogram(),
+            unlit: 0,
             locked_frames: 0,
             frames_at_report: 0,
             drawn: Vec::with_capacity(MAX_DRAWN),
@@ -178,6 +191,17 @@ impl Statistics {
         self.locked_frames += 1;
         let late_us = u64::try_from(late.as_micros()).unwrap_or(u64::MAX);
         self.swaps_since_report.saturating_record(late_us);
+    }
+
+    /// Counts that a frame lit up so long after it was handed over.
+    pub(crate) fn light(&mut self, after: Duration) {
+        let after_us = u64::try_from(after.as_micros()).unwrap_or(u64::MAX);
+        self.lights.saturating_record(after_us);
+    }
+
+    /// From handing over to light.
+    pub(crate) fn lights(&self) -> Distribution {
+        Distribution::of(&self.lights, MS_PER_US)
     }
 
     /// A new session: its server is told of its own states alone. Ticks begin again there, and those of the last session would be taken for its own.
@@ -285,6 +309,8 @@ impl std::fmt::Display for RenderReport {
             packets_received,
             adapter,
             present_timing,
+            light_ms: light,
+            unlit,
             sessions,
             longest_gap_ms,
             to_first_frame_ms,
@@ -296,6 +322,13 @@ impl std::fmt::Display for RenderReport {
             "{node}: {frames} frames, {fps:.1} per second; age of the pose {:.1} ms median, {:.1} ms at most, {:.1} ms median once drawn; {packets_received} states received, {packets_lost} lost; drawn with {adapter}; times of presentation: {present_timing}",
             age.p50, age.max, drawn.p50
         )?;
+        if light.count > 0 {
+            write!(
+                f,
+                "; light {:.1} ms after the call in the median, {:.1} ms at p99, {:.1} ms at most, of {} frames; {unlit} never lit up",
+                light.p50, light.p99, light.max, light.count
+            )?;
+        }
         if let Some(first) = to_first_frame_ms {
             write!(
                 f,

@@ -5,6 +5,7 @@
 //! holds the body ([`crate::hand`]) takes the inputs of [`crate::mouse`] as well.
 
 mod display;
+mod light;
 pub(crate) mod still;
 
 use std::time::{Duration, Instant};
@@ -24,12 +25,13 @@ use crate::hand::Hand;
 use crate::headless::shown;
 use crate::hud::Overlay;
 use crate::mouse::{Mouse, Pointed};
+use crate::node_status::LinkHealth;
 use crate::pacing::Pacer;
-use crate::renderer::{Gpu, GpuChoice};
+use crate::renderer::GpuChoice;
 use crate::session::{Session, Turn};
 use crate::stage::Stage;
-use crate::statistics::{Ended, Statistics};
-use crate::timeline::Timeline;
+use crate::statistics::{Ended, NO_WINDOW, Statistics};
+use crate::timeline::{Latched, Timeline};
 use crate::view::Eyes;
 use display::{Display, Pane};
 
@@ -48,6 +50,8 @@ pub(crate) struct Plan {
     /// The monitors of the windows in order, by name or number.
     pub(crate) monitors: Vec<String>,
     pub(crate) gpu: GpuChoice,
+    /// Samples per pixel, where they are asked for.
+    pub(crate) samples: Option<u32>,
     /// From handing a picture over to its light, in nanoseconds.
     pub(crate) display_ns: u64,
     pub(crate) show: Show,
@@ -85,10 +89,10 @@ pub(crate) fn run(
         result: None,
     };
     events.run_app(&mut app).map_err(no_display)?;
-    let gpu = app.screen.as_ref().map(|screen| &screen.gpu);
+    let screen = app.screen.as_ref();
     let drawn_with = DrawnWith {
-        adapter: gpu.map_or_else(String::new, |gpu| gpu.summary().to_string()),
-        present_timing: gpu.map_or("no window", Gpu::present_timing).to_owned(),
+        adapter: screen.map_or_else(String::new, |screen| screen.gpu.summary().to_string()),
+        present_timing: screen.map_or_else(|| NO_WINDOW.to_owned(), Display::present_timing),
     };
     match app.result {
         Some(Ok(ended)) => Ok((ended, drawn_with)),
@@ -115,8 +119,20 @@ struct App<'a> {
     next_frame: Instant,
     /// From the first frame on.
     pacer: Option<Pacer>,
-    last_drawn: Option<(u64, bool, Option<u64>)>,
+    last_drawn: Option<Drawn>,
     result: Option<Result<Ended, RenderError>>,
+}
+
+/// What distinguishes pictures: sample time of the state, whether it is stale, and what the screen says of the link.
+type Drawn = (u64, bool, Option<u64>);
+
+/// A frame to be drawn.
+struct Due {
+    latched: Latched,
+    /// The barrier released it.
+    locked: bool,
+    drawn: Drawn,
+    health: LinkHealth,
 }
 
 impl ApplicationHandler for App<'_> {
@@ -250,8 +266,52 @@ impl App<'_> {
         Ok(())
     }
 
+    /// What the window system has told of the light of earlier frames.
+    fn take_light(&mut self) {
+        let light = self.screen.as_mut().map(|screen| &mut screen.light);
+        let Some(Ok(light)) = light else {
+            return;
+        };
+        while let Some(lit) = light.take() {
+            self.statistics
+                .light(lit.lit.saturating_duration_since(lit.called));
+            if let (Some(frame), Some(pacer)) = (lit.frame, &mut self.pacer) {
+                pacer.lit(frame, lit.lit);
+            }
+        }
+        self.statistics.unlit += light.take_unlit();
+    }
+
     /// Draws a frame if one is due; says if this was the last.
     fn tick(&mut self, events: &ActiveEventLoop) -> Result<Option<Ended>, RenderError> {
+        if let Some(ended) = self.follow_session(events)? {
+            return Ok(Some(ended));
+        }
+        self.take_light();
+        if let Some(stats) = self.statistics.report(false) {
+            self.session.report(stats);
+        }
+        self.session.take_states(self.timeline);
+        let (Some(taken_ns), true) = (self.session.now_ns(), self.screen.is_some()) else {
+            self.next_frame = Instant::now() + MOMENT;
+            return Ok(None);
+        };
+        let Some(due) = self.due(taken_ns) else {
+            return Ok(None);
+        };
+        if !self.draw(due, taken_ns)? {
+            return Ok(None);
+        }
+        self.tell_first_frame();
+        let enough = self
+            .plan
+            .frames
+            .is_some_and(|frames| self.statistics.frames >= frames);
+        Ok(enough.then_some(Ended::Frames))
+    }
+
+    /// Takes part in the session's changes; why drawing ends, if it does.
+    fn follow_session(&mut self, events: &ActiveEventLoop) -> Result<Option<Ended>, RenderError> {
         if self.session.interrupted() {
             return Ok(Some(Ended::Interrupted));
         }
@@ -269,49 +329,61 @@ impl App<'_> {
             Turn::Told => return Ok(Some(Ended::ServerStopped)),
             Turn::Lost(reason) => return Err(self.session.lost(reason)),
         }
-        if self
+        let over = |duration| self.start.elapsed() >= duration;
+        Ok(self
             .plan
             .duration
-            .is_some_and(|duration| self.start.elapsed() >= duration)
-        {
-            return Ok(Some(Ended::Duration));
-        }
-        if let Some(stats) = self.statistics.report(false) {
-            self.session.report(stats);
-        }
-        self.session.take_states(self.timeline);
-        let (Some(taken_ns), Some(screen)) = (self.session.now_ns(), &mut self.screen) else {
-            self.next_frame = Instant::now() + MOMENT;
-            return Ok(None);
-        };
-        let (session, plan) = (&*self.session, &self.plan);
-        let frame_time = plan.frame_time;
+            .is_some_and(over)
+            .then_some(Ended::Duration))
+    }
+
+    /// What is to be drawn now; `None` where nothing is due, or nothing has changed.
+    fn due(&mut self, taken_ns: u64) -> Option<Due> {
+        let (session, frame_time) = (&*self.session, self.plan.frame_time);
+        let display_ns = self.plan.display_ns;
         let pacer = self
             .pacer
-            .get_or_insert_with(|| Pacer::new(session, frame_time, plan.display_ns));
+            .get_or_insert_with(|| Pacer::new(session, frame_time, display_ns));
         let released = pacer.next(taken_ns, self.timeline.newest_ns());
         let locked = released.is_some();
         let now = Instant::now();
         if locked {
             self.next_frame = now; // the barrier keeps the rhythm
         } else if now < self.next_frame {
-            return Ok(None);
+            return None;
         } else {
             self.next_frame = (self.next_frame + frame_time).max(now);
         }
-        let Some(mut latched) = released.or_else(|| self.timeline.latch(taken_ns)) else {
-            return Ok(None);
-        };
+        let latched = released.or_else(|| self.timeline.latch(taken_ns))?;
         let health = self.session.health();
-        let link = shown(health);
-        let drawn = Some((latched.state.time_ns, latched.stale, link));
-        if drawn == self.last_drawn && !locked {
-            return Ok(None);
+        let drawn = (latched.state.time_ns, latched.stale, shown(health));
+        if self.last_drawn == Some(drawn) && !locked {
+            return None;
         }
+        Some(Due {
+            latched,
+            locked,
+            drawn,
+            health,
+        })
+    }
+
+    /// Draws and shows a frame; `false` where all windows are hidden.
+    fn draw(&mut self, due: Due, taken_ns: u64) -> Result<bool, RenderError> {
+        let Due {
+            mut latched,
+            locked,
+            drawn,
+            health,
+        } = due;
+        let (Some(screen), Some(pacer)) = (&mut self.screen, &mut self.pacer) else {
+            return Ok(false);
+        };
         let Display {
             gpu,
             renderer,
             panes,
+            light,
         } = screen;
         renderer.set_state(gpu, &self.stage, &latched, self.show);
         let status = pacer.complete(self.statistics.status(&self.plan.node, health));
@@ -324,24 +396,20 @@ impl App<'_> {
             latched.state.head = self.timeline.head_at(photon_ns).or(latched.state.head);
         }
         let eyes = eyes_of(&self.stage, &latched);
-        self.eyes = eyes;
-        self.god_object = latched.state.god_object;
+        (self.eyes, self.god_object) = (eyes, latched.state.god_object);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut textures = Vec::with_capacity(panes.len());
-        for pane in panes.iter() {
+        for (place, pane) in panes.iter().enumerate() {
             let Some(texture) = pane.texture(gpu)? else {
                 continue;
             };
-            let view = texture.texture.create_view(&wgpu::TextureViewDescriptor {
-                format: Some(pane.format),
-                ..Default::default()
-            });
+            let view = pane.view(&texture);
             let screen = &self.stage.screens[pane.screen].screen;
             renderer.draw(gpu, &mut encoder, screen, &eyes, &pane.target, &view);
-            textures.push((pane, texture));
+            textures.push((place, pane, texture));
         }
         if textures.is_empty() && !locked {
-            return Ok(None); // all windows are hidden
+            return Ok(false); // all windows are hidden
         }
         gpu.queue.submit([encoder.finish()]);
         if locked {
@@ -349,7 +417,10 @@ impl App<'_> {
             gpu.finish()?;
             pacer.wait();
         }
-        for (pane, texture) in textures {
+        if let Ok(light) = light {
+            light.follow(pacer.frame(), textures.iter().map(|(place, ..)| *place));
+        }
+        for (_, pane, texture) in textures {
             pane.window.pre_present_notify();
             gpu.queue.present(texture);
         }
@@ -358,25 +429,25 @@ impl App<'_> {
         } else {
             gpu.finish()?;
         }
-        self.last_drawn = drawn;
+        self.last_drawn = Some(drawn);
         let drawn_ns = self.session.now_ns().unwrap_or(taken_ns);
         self.statistics.frame(&latched, taken_ns, drawn_ns);
-        if let Some(Display { gpu, panes, .. }) = &self.screen {
-            let stage = &self.stage;
-            self.session.tell_first_frame(|| {
-                let of = |pane: &Pane| {
-                    let (name, size) = (&stage.screens[pane.screen].name, &pane.config);
-                    format!("{name} {}x{}", size.width, size.height)
-                };
-                let pictures = panes.iter().map(of).collect::<Vec<_>>().join(", ");
-                (pictures, gpu.summary().to_string())
-            });
-        }
-        let enough = self
-            .plan
-            .frames
-            .is_some_and(|frames| self.statistics.frames >= frames);
-        Ok(enough.then_some(Ended::Frames))
+        Ok(true)
+    }
+
+    fn tell_first_frame(&mut self) {
+        let Some(Display { gpu, panes, .. }) = &self.screen else {
+            return;
+        };
+        let stage = &self.stage;
+        self.session.tell_first_frame(|| {
+            let of = |pane: &Pane| {
+                let (name, size) = (&stage.screens[pane.screen].name, &pane.config);
+                format!("{name} {}x{}", size.width, size.height)
+            };
+            let pictures = panes.iter().map(of).collect::<Vec<_>>().join(", ");
+            (pictures, gpu.summary().to_string())
+        });
     }
 }
 

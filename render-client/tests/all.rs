@@ -4,6 +4,8 @@
 mod environment;
 mod geometry;
 mod golden;
+mod light;
+mod live;
 mod network;
 #[path = "support/perceptual.rs"]
 mod perceptual;
@@ -11,3 +13,4 @@ mod pictures;
 mod preview;
 mod screens;
 mod support;
+mod windows;

@@ -14,8 +14,9 @@ use crate::support::{canvas, peg_in_hole, state};
 use image::{RgbImage, RgbaImage};
 use nalgebra::{Isometry3, Similarity3};
 use taut_proto::Finish;
+use taut_render::canvas::Canvas;
 use taut_render::node_status::{FrameMode, LinkHealth, NodeStatus};
-use taut_render::renderer::shapes;
+use taut_render::renderer::{Gpu, shapes};
 use taut_render::stage::{Stage, StageBody};
 use taut_render::timeline::Latched;
 
@@ -208,6 +209,27 @@ fn a_finer_drawn_picture_is_no_other_picture() {
         let found = difference(&halved(coarse), &halved(&quarter));
         assert!(found.is_unseen(), "{name}: {found:?}");
     }
+}
+
+/// What software draws in windows: rougher edges, and nothing else.
+#[test]
+fn a_picture_of_one_sample_differs_at_its_edges_alone() {
+    let Ok(gpu) = Gpu::open() else {
+        return; // said by the others
+    };
+    let at = half_way_in();
+    let mut rough = Canvas::new(gpu.with_samples(1), raised(PIXELS, Stereo::TwoWindows));
+    rough.draw(&at, Show::default(), true).expect("drawn");
+    let rough = rough.images().expect("read back");
+    let smooth = plain(raised(PIXELS, Stereo::TwoWindows)).expect("as before");
+    let mut differ = 0;
+    for ((_, rough), smooth) in rough.iter().zip(&smooth) {
+        let found = difference(&halved(rough), &halved(smooth));
+        assert!(found.seen < 0.02 && found.mean < 0.2, "{found:?}");
+        let pixels = rough.pixels().zip(smooth.pixels());
+        differ += pixels.filter(|(a, b)| a != b).count();
+    }
+    assert!(differ > 100, "{differ} pixels: edges are smooth with four");
 }
 
 #[test]

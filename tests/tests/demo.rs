@@ -37,7 +37,7 @@ const KEYS: [&str; 21] = [
     "clients",
     "observers",
 ];
-const CLIENT_KEYS: [&str; 9] = [
+const CLIENT_KEYS: [&str; 10] = [
     "node",
     "transport",
     "frames",
@@ -45,6 +45,7 @@ const CLIENT_KEYS: [&str; 9] = [
     "pose_age_ms",
     "drawn_age_ms",
     "swap_skew_us",
+    "light_skew_us",
     "packets_lost",
     "state_hash_mismatches",
 ];

@@ -31,6 +31,8 @@ const MAX_PERIOD_NS: u64 = MAX_PERIOD_US as u64 * 1000;
 const REMEMBERED: usize = 64;
 /// Changes kept for who takes them.
 const MAX_CHANGES: usize = 64;
+/// Frames kept for who takes how they lit up.
+const MAX_LIT: usize = 8;
 
 /// When a frame is swapped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -129,6 +131,9 @@ pub struct Master {
     /// Frame number and state of the newest frames that were begun.
     states: [(u64, Newest); REMEMBERED],
     swaps: Swaps,
+    /// The same of the times at which they lit up.
+    lights: Swaps,
+    lit: ArrayVec<FrameSkew, MAX_LIT>,
     skew_ns: u32,
     counts: Counts,
     changes: ArrayVec<Change, MAX_CHANGES>,
@@ -155,6 +160,8 @@ impl Master {
             reclaimed_ns: None,
             states: [(0, Newest::default()); REMEMBERED],
             swaps: Swaps::default(),
+            lights: Swaps::default(),
+            lit: ArrayVec::new(),
             skew_ns: 0,
             counts: Counts::default(),
             changes: ArrayVec::new(),
@@ -202,7 +209,10 @@ impl Master {
             };
             return (answer, None);
         }
-        let told_ns = self.told(now_ns, arrive);
+        let lit_ns = self.told(now_ns, arrive.lit_ns);
+        let lit = self.lights.tell(session, arrive.lit_frame, lit_ns);
+        self.keep_light(lit);
+        let told_ns = self.told(now_ns, arrive.swapped_ns);
         let skew = self.swaps.tell(session, arrive.swapped_frame, told_ns);
         if let Some(skew) = &skew {
             self.skew_ns = u32::try_from(skew.skew_ns).unwrap_or(u32::MAX);
@@ -299,6 +309,11 @@ impl Master {
         (!self.changes.is_empty()).then(|| self.changes.remove(0))
     }
 
+    /// How far apart the screens of a frame lit up, where at least two nodes know; the oldest that was not taken.
+    pub fn take_light(&mut self) -> Option<FrameSkew> {
+        (!self.lit.is_empty()).then(|| self.lit.remove(0))
+    }
+
     /// P: the workbench's period, or the longest that a node is made for which sets the pace.
     pub fn period_ns(&self) -> u64 {
         let paced = self.members.iter().filter(|m| m.sets_the_pace());
@@ -341,14 +356,23 @@ impl Master {
         }
     }
 
-    /// When the swap was called, as the node tells it; 0 if it does not know, or if that cannot be.
-    fn told(&self, now_ns: u64, arrive: &Arrive) -> u64 {
-        let lately = now_ns.abs_diff(arrive.swapped_ns) <= SWAP_TOLD_NS;
+    /// A time as the node tells it; 0 if it does not know, or if that cannot be.
+    fn told(&self, now_ns: u64, told_ns: u64) -> u64 {
+        let lately = now_ns.abs_diff(told_ns) <= SWAP_TOLD_NS;
         // Where a node leads, its clock is not the session's, and nobody asks.
         match lately || self.newest.master != SERVER_SENDER {
-            true => arrive.swapped_ns,
+            true => told_ns,
             false => 0,
         }
+    }
+
+    /// One that nobody takes makes room for a newer one.
+    fn keep_light(&mut self, lit: Option<FrameSkew>) {
+        let Some(lit) = lit else { return };
+        if self.lit.is_full() {
+            self.lit.remove(0);
+        }
+        self.lit.push(lit);
     }
 
     fn lead_ns(&self) -> u64 {
@@ -470,13 +494,16 @@ impl Master {
             (known, state) if known == drawn => state.time_ns,
             _ => now_ns, // the very first frame has no state, and nobody draws it
         };
-        self.swaps.follow(OpenFrame {
+        let shown = OpenFrame {
             frame: drawn,
             expected,
             ready_ns,
             state_time_ns,
             told: ArrayVec::new(),
-        })
+        };
+        let old = self.lights.follow(shown.clone());
+        self.keep_light(old);
+        self.swaps.follow(shown)
     }
 
     /// Lets nodes go that were silent.

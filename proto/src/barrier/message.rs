@@ -36,6 +36,10 @@ pub struct Arrive {
     pub swapped_frame: u64,
     /// When the swap of that frame was called: session time, ns.
     pub swapped_ns: u64,
+    /// The frame whose light is told; 0 for none, as where the window system tells no such times.
+    pub lit_frame: u64,
+    /// When its last picture lit up: session time, ns.
+    pub lit_ns: u64,
     /// How long drawing took, µs.
     pub draw_us: u32,
     /// Shortest time between two frames that this node is made for, µs; 0 for no limit of its own.
@@ -51,6 +55,8 @@ wire_ranged!(Arrive {
     missed in COUNT_32,
     swapped_frame in COUNT,
     swapped_ns in TIME,
+    lit_frame in COUNT,
+    lit_ns in TIME,
     draw_us in COUNT_32,
     period_us in NODE_PERIOD
 });

@@ -245,6 +245,12 @@ impl Node {
         self.phase = Phase::Ready;
     }
 
+    /// All pictures of a frame that was shown lit up, the last at this session time, ns; 0 where that is not known. Told with the next ARRIVE.
+    pub fn lit(&mut self, frame: u64, lit_ns: u64) {
+        self.arrive.lit_frame = frame;
+        self.arrive.lit_ns = lit_ns;
+    }
+
     /// The newest RELEASE; `None` before the first.
     pub fn newest(&self) -> Option<&ReleaseHead> {
         self.newest.as_ref()

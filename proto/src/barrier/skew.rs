@@ -15,7 +15,7 @@ pub struct NodeSwap {
     pub after_first_ns: u64,
 }
 
-/// One frame as it was shown.
+/// One frame as it was shown. For [`super::Master::take_light`] read "lit up" for "swap call".
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameSkew {
     /// The frame.

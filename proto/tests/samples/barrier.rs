@@ -19,6 +19,8 @@ pub fn arrive() -> Arrive {
         missed: 3,
         swapped_frame: 1000,
         swapped_ns: 15_995_000_000,
+        lit_frame: 999,
+        lit_ns: 15_991_000_000,
         draw_us: 4200,
         period_us: 8333,
     }
@@ -46,8 +48,8 @@ pub fn any_arrive() -> impl Strategy<Value = Arrive> {
         (far(), far(), far(), any::<u64>(), far()),
         (
             any::<u32>(),
-            far(),
-            far(),
+            (far(), far()),
+            (far(), far()),
             any::<u32>(),
             0..=100_000_000_u32,
         ),
@@ -55,7 +57,7 @@ pub fn any_arrive() -> impl Strategy<Value = Arrive> {
         .prop_map(
             |(
                 (term, frame, ready_ns, state_hash, state_time_ns),
-                (missed, swapped_frame, swapped_ns, draw_us, period_us),
+                (missed, (swapped_frame, swapped_ns), (lit_frame, lit_ns), draw_us, period_us),
             )| Arrive {
                 term,
                 frame,
@@ -65,6 +67,8 @@ pub fn any_arrive() -> impl Strategy<Value = Arrive> {
                 missed,
                 swapped_frame,
                 swapped_ns,
+                lit_frame,
+                lit_ns,
                 draw_us,
                 period_us,
             },

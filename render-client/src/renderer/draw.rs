@@ -361,10 +361,10 @@ impl Renderer {
         pass.set_vertex_buffer(1, self.instances.slice(..));
         self.draw_batches(pass, &self.plan.casters);
         self.draw_batches(pass, &self.plan.marks);
-        pass.set_pipeline(&self.pipelines.background);
-        pass.draw(0..3, 0..1);
         pass.set_pipeline(&self.pipelines.floor);
         pass.draw(0..4, 0..1);
+        pass.set_pipeline(&self.pipelines.background);
+        pass.draw(0..3, 0..1);
         self.draw_translucent(pass, eye);
         if let Some(ghost) = &self.plan.ghost {
             pass.set_pipeline(&self.pipelines.ghost);

@@ -16,7 +16,11 @@ pub struct Gpu {
     /// Why this adapter.
     reason: String,
     others: Vec<AdapterSummary>,
+    most_samples: u32,
 }
+
+/// Samples per pixel where they smooth edges.
+pub(crate) const SMOOTH: u32 = 4;
 
 /// Which adapter to draw with: by number (in the order of the list that errors and `taut doctor` print) or by a part of
 /// its name; the best one where nothing is said.
@@ -139,9 +143,27 @@ impl Gpu {
             queue,
             reason,
             others,
+            most_samples: SMOOTH,
         };
         tracing::info!("drawing with {}", gpu.chosen());
         Ok(gpu)
+    }
+
+    /// The same, drawing with so many samples per pixel at most: below 4 it is one, edges of bodies are not smoothed, and those of shadows less.
+    pub fn with_samples(self, most: u32) -> Self {
+        Self {
+            most_samples: most,
+            ..self
+        }
+    }
+
+    /// The same with the samples that are asked for; else with four, but one where the processor draws and the pictures are not `kept`.
+    pub(crate) fn smoothed(self, asked: Option<u32>, kept: bool) -> Self {
+        let most = match (self.is_software(), kept) {
+            (true, false) => 1,
+            _ => SMOOTH,
+        };
+        self.with_samples(asked.unwrap_or(most))
     }
 
     /// What to tell people of the adapter.
@@ -164,16 +186,15 @@ impl Gpu {
         format!("{}: {}; {also}", self.summary(), self.reason)
     }
 
-    /// What can be known of the time at which a picture is on the screen.
+    /// What the driver offers to tell of the time at which a picture is on the screen, for people. None of it is read.
     ///
-    /// wgpu hands the times of VK_GOOGLE_display_timing to unsafe code only, which this crate is without: where the
-    /// driver has them, this says so, and none is read.
+    /// wgpu hands the times of VK_GOOGLE_display_timing to unsafe code only, and names VK_EXT_present_timing nowhere.
     pub fn present_timing(&self) -> &'static str {
         let offered = wgpu::Features::VULKAN_GOOGLE_DISPLAY_TIMING;
         if self.adapter.features().contains(offered) {
-            "offered by the driver, not read: wgpu has no safe access to it"
+            "the driver's VK_GOOGLE_display_timing and VK_EXT_present_timing are not used: wgpu has no safe access to the one and none to the other"
         } else {
-            "not offered by the driver"
+            "the driver has no VK_GOOGLE_display_timing, and VK_EXT_present_timing is not used: wgpu has no access to it"
         }
     }
 
@@ -182,16 +203,16 @@ impl Gpu {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Samples per pixel: 4 where the adapter can for this format, else 1.
+    /// Samples per pixel: 4 where that is wanted and the adapter can for this format, else 1.
     pub(crate) fn samples(&self, format: wgpu::TextureFormat) -> u32 {
         let can = |format| {
             self.adapter
                 .get_texture_format_features(format)
                 .flags
-                .sample_count_supported(4)
+                .sample_count_supported(SMOOTH)
         };
-        if can(format) && can(super::pipeline::DEPTH) {
-            4
+        if self.most_samples >= SMOOTH && can(format) && can(super::pipeline::DEPTH) {
+            SMOOTH
         } else {
             1
         }

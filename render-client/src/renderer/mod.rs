@@ -22,7 +22,7 @@ pub mod shapes;
 mod warp;
 
 pub use draw::Renderer;
-pub(crate) use gpu::new_instance;
 pub use gpu::{AdapterSummary, Gpu, GpuChoice};
+pub(crate) use gpu::{SMOOTH, new_instance};
 pub use picture::{OffScreen, PictureTarget};
 pub use warp::Corrected;

@@ -24,7 +24,7 @@ pub(crate) enum Layer {
     Opaque,
     /// Lets what is behind it shine through; seen from its front.
     Translucent,
-    /// As `Translucent`, seen from both sides.
+    /// Hides what is behind it, seen from both sides.
     Plane,
     /// As far away as can be: where nothing is yet.
     Background,
@@ -127,12 +127,13 @@ impl FrameLayout {
         parts: &PipelineParts<'_>,
     ) -> wgpu::RenderPipeline {
         let source = format!(
-            "{}\n{}",
+            "const SMOOTH = {};\n{}\n{}",
+            output.samples > 1,
             include_str!("../../shaders/frame.wgsl"),
             parts.source
         );
         let module = shader(device, parts.label, source);
-        let opaque = matches!(parts.layer, Layer::Opaque | Layer::Background);
+        let opaque = parts.layer != Layer::Translucent;
         let one_sided = matches!(parts.layer, Layer::Opaque | Layer::Translucent);
         let background = parts.layer == Layer::Background;
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -151,7 +152,7 @@ impl FrameLayout {
             },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH,
-                depth_write_enabled: Some(parts.layer == Layer::Opaque),
+                depth_write_enabled: Some(matches!(parts.layer, Layer::Opaque | Layer::Plane)),
                 depth_compare: Some(if background {
                     wgpu::CompareFunction::LessEqual
                 } else {

@@ -8,6 +8,7 @@ use winit::monitor::MonitorHandle;
 use winit::window::{Fullscreen, Window, WindowId};
 
 use super::Plan;
+use super::light::{Light, Untold};
 use crate::canvas::target_of;
 use crate::error::RenderError;
 use crate::monitor;
@@ -21,6 +22,8 @@ pub(super) struct Display {
     pub(super) gpu: Gpu,
     pub(super) renderer: Renderer,
     pub(super) panes: Vec<Pane>,
+    /// Where the window system tells when pictures lit up; else why not.
+    pub(super) light: Result<Light, Untold>,
 }
 
 /// One window.
@@ -86,7 +89,8 @@ impl Display {
             instance,
             opened.first().map(|(.., surface)| surface),
             &plan.gpu,
-        )?;
+        )?
+        .smoothed(plan.samples, false);
         let mut renderer: Option<Renderer> = None;
         let mut panes = Vec::new();
         for ((screen, place), picture, window, surface) in opened {
@@ -117,11 +121,24 @@ impl Display {
         let renderer = renderer.ok_or_else(|| RenderError::BadScene {
             what: "this node draws no screen".to_owned(),
         })?;
+        let windows = panes.iter().map(|pane| Arc::clone(&pane.window)).collect();
         Ok(Self {
             gpu,
             renderer,
             panes,
+            light: Light::of(events.owned_display_handle(), windows),
         })
+    }
+
+    /// What can be known of the time at which pictures light up.
+    pub(super) fn present_timing(&self) -> String {
+        match &self.light {
+            Ok(light) => light.described(),
+            Err(why) => format!(
+                "not known, the times told are those of calls alone: {why}; {}",
+                self.gpu.present_timing()
+            ),
+        }
     }
 
     /// Draws another stage in the same windows.
@@ -160,6 +177,14 @@ impl Pane {
     ) -> PictureTarget {
         let screen = &stage.screens[self.screen];
         target_of(gpu, renderer, screen, (self.place, &self.picture), size)
+    }
+
+    /// The window's next texture as it is drawn to.
+    pub(super) fn view(&self, texture: &wgpu::SurfaceTexture) -> wgpu::TextureView {
+        texture.texture.create_view(&wgpu::TextureViewDescriptor {
+            format: Some(self.format),
+            ..Default::default()
+        })
     }
 
     /// What to draw to next; `None` while the window is hidden or changes.

@@ -15,6 +15,7 @@ use crate::calibrate::CalibrationWindows;
 use crate::canvas::eyes_of;
 use crate::error::RenderError;
 use crate::preview::at_start;
+use crate::renderer::SMOOTH;
 use crate::stage::Stage;
 
 /// Shows the stage at its start until the user or a signal ends it.
@@ -35,6 +36,7 @@ pub(crate) fn show(
             fullscreen: windows.fullscreen,
             monitors: windows.monitors.clone(),
             gpu: windows.gpu.clone(),
+            samples: Some(SMOOTH), // it stands still
             display_ns: 0,
             show: Show::default(),
             node: node.to_owned(),
@@ -123,6 +125,7 @@ impl Still {
             gpu,
             renderer,
             panes,
+            ..
         }) = &self.display
         else {
             return Ok(());

@@ -20,6 +20,9 @@ pub struct ClientReport {
     pub drawn_age_ms: Distribution,
     /// How much later this node called its swaps than the first node of the same frame; `null` where frames are not locked, or it was alone.
     pub swap_skew_us: Option<Distribution>,
+    /// How much later the light of its pictures came than the first node's of the same frame; `null` where its window system does not tell.
+    #[serde(default)]
+    pub light_skew_us: Option<Distribution>,
     /// It swapped on its own at the end: fewer frames than the least rate, or than it said.
     #[serde(default)]
     pub free_running: bool,

@@ -27,6 +27,9 @@ pub struct FramesReport {
     pub freed: u64,
     /// Last swap call of a frame less the first, over the nodes that had drawn it in time; `null` until two swapped one together.
     pub swap_skew_us: Option<Distribution>,
+    /// Last light of a frame less the first, by each node's last picture and as their window systems tell it; `null` until two nodes told of one frame.
+    #[serde(default)]
+    pub light_skew_us: Option<Distribution>,
     /// From the moment at which a frame could be shown to its last swap call.
     pub overhead_us: Option<Distribution>,
     /// Age of the shown state at the last swap call.
@@ -37,8 +40,12 @@ impl FramesReport {
     /// What the network measured, with each node's part put among the clients.
     pub fn new(measured: &FrameReport, clients: &mut [ClientReport]) -> Self {
         for client in clients {
-            let own = measured.nodes.iter().find(|(node, _)| *node == client.node);
-            client.swap_skew_us = own.and_then(|(_, skew)| known(*skew, 1.0));
+            let own = |nodes: &[(String, Distribution)]| {
+                let own = nodes.iter().find(|(node, _)| *node == client.node);
+                own.and_then(|(_, skew)| known(*skew, 1.0))
+            };
+            let (call, light) = (own(&measured.nodes), own(&measured.lit_nodes));
+            (client.swap_skew_us, client.light_skew_us) = (call, light);
             client.free_running = measured.free_running.contains(&client.node);
         }
         let counts = &measured.counts;
@@ -50,6 +57,7 @@ impl FramesReport {
             evicted: counts.evicted,
             freed: counts.freed,
             swap_skew_us: known(measured.skew, 1.0),
+            light_skew_us: known(measured.light, 1.0),
             overhead_us: known(measured.overhead, 1.0),
             pose_age_ms: known(measured.age, MILLISECONDS_PER_MICROSECOND),
         }
@@ -70,14 +78,19 @@ impl fmt::Display for FramesReport {
                 self.freed
             )?;
         }
-        if let Some(skew) = &self.swap_skew_us {
-            write!(
-                f,
-                "; swap skew p50 {:.0} us, p99 {:.0} us, max {:.0} us",
-                skew.p50, skew.p99, skew.max
-            )?;
+        for (what, skew) in [("swap", &self.swap_skew_us), ("light", &self.light_skew_us)] {
+            if let Some(skew) = skew {
+                write!(
+                    f,
+                    "; {what} skew p50 {:.0} us, p99 {:.0} us, max {:.0} us",
+                    skew.p50, skew.p99, skew.max
+                )?;
+            }
         }
-        Ok(())
+        match (&self.swap_skew_us, &self.light_skew_us) {
+            (Some(_), None) => write!(f, " (of calls; when they lit up is not known)"),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -102,7 +115,9 @@ mod tests {
             skew: spread(10.0),
             overhead: spread(100.0),
             age: spread(18_000.0),
+            light: spread(3000.0),
             nodes: vec![("table".into(), spread(5.0))],
+            lit_nodes: vec![("front".into(), spread(40.0))],
             free_running: vec!["front".into()],
             ..FrameReport::default()
         };
@@ -113,6 +128,22 @@ mod tests {
         let mut clients = [client("front"), client("table")];
         let report = FramesReport::new(&measured, &mut clients);
         assert_eq!(clients[0].swap_skew_us, None);
+        assert_eq!(clients[0].light_skew_us.map(|skew| skew.p50), Some(40.0));
+        assert_eq!(clients[1].light_skew_us, None);
+        let said = report.to_string();
+        assert!(
+            said.contains("; swap skew p50 10 us") && said.contains("; light skew p50 3000 us"),
+            "{said}"
+        );
+        let calls_alone = FramesReport {
+            light_skew_us: None,
+            ..report
+        };
+        let said = calls_alone.to_string();
+        assert!(
+            said.contains("max 40 us (of calls; when they lit up is not known)"),
+            "{said}"
+        );
         assert!(clients[0].free_running && !clients[1].free_running);
         assert_eq!(clients[1].swap_skew_us.map(|skew| skew.max), Some(20.0));
         assert_eq!(report.swap_skew_us.map(|skew| skew.p50), Some(10.0));

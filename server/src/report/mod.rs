@@ -84,6 +84,7 @@ mod tests {
                 "pose_age_ms",
                 "drawn_age_ms",
                 "swap_skew_us",
+                "light_skew_us",
                 "packets_lost",
                 "state_hash_mismatches",
             ],

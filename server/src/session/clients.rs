@@ -226,6 +226,7 @@ impl ClientRecord {
             pose_age_ms: of_ages(&self.pose_ages),
             drawn_age_ms: of_ages(&self.drawn_ages),
             swap_skew_us: None, // the barrier's own measure: `frames::FramesReport::new`
+            light_skew_us: None, // the same
             free_running: false, // the same
             packets_lost: self.newest.packets_lost,
             state_hash_mismatches: self.state_hash_mismatches,

@@ -220,6 +220,15 @@ impl FrameGate {
         self.raised = None;
     }
 
+    /// All pictures of the frame lit up, the last at `lit`.
+    pub fn lit(&mut self, frame: u64, lit: Instant) {
+        let lit_ns = self.session_ns(lit);
+        self.hot
+            .inbound
+            .frames
+            .with(|part| part.node.lit(frame, lit_ns));
+    }
+
     /// How the node stands.
     pub fn status(&self) -> FrameStatus {
         let status = self.hot.inbound.frames.with(|part| {

@@ -27,6 +27,8 @@ pub struct FrameMaster {
     sealed: Box<[DatagramBuffer; MAX_MEMBERS]>,
     /// Frames that were told of, on their way from the master's lock to the recorder.
     shown: Vec<FrameSkew>,
+    /// The same of their light.
+    lit: Vec<FrameSkew>,
     /// When the second copy of the newest RELEASE is due: session time, ns.
     again_ns: Option<u64>,
 }
@@ -41,6 +43,7 @@ impl FrameMaster {
             length: 0,
             sealed: Box::new([[0; MAX_DATAGRAM_BYTES]; MAX_MEMBERS]),
             shown: Vec::with_capacity(64),
+            lit: Vec::with_capacity(8),
             again_ns: None,
         }
     }
@@ -205,16 +208,22 @@ impl FrameMaster {
             }
             leading = lock(&frames.master);
         }
+        self.lit
+            .extend(std::iter::from_fn(|| leading.master.take_light()));
         drop(leading);
-        if self.shown.is_empty() {
+        if self.shown.is_empty() && self.lit.is_empty() {
             return;
         }
+        let name_of = |number| {
+            let session = self.sessions.iter().find(|s| s.number == number);
+            session.map(|session| session.node.as_str())
+        };
         let mut recorder = lock(&frames.recorder);
         for shown in self.shown.drain(..) {
-            recorder.record(&shown, |number| {
-                let session = self.sessions.iter().find(|s| s.number == number);
-                session.map(|session| session.node.as_str())
-            });
+            recorder.record(&shown, name_of);
+        }
+        for lit in self.lit.drain(..) {
+            recorder.record_light(&lit, name_of);
         }
     }
 }

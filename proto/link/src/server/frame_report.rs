@@ -18,22 +18,26 @@ pub struct FrameReport {
     pub counts: Counts,
     /// Last swap call less first, of each frame that at least two nodes told of, µs.
     pub skew: Distribution,
+    /// The same of the times at which their pictures lit up, of each frame of which at least two nodes know it, µs.
+    pub light: Distribution,
     /// From the moment at which a frame could be shown to the last swap call, µs.
     pub overhead: Distribution,
     /// Age of the state at the last swap call, µs.
     pub age: Distribution,
     /// Each node by name: its swap call less the first of the same frame, µs.
     pub nodes: Vec<(String, Distribution)>,
+    /// Each node that knows it by name: its light less the first of the same frame, µs.
+    pub lit_nodes: Vec<(String, Distribution)>,
     /// Nodes that swap on their own now, by name.
     pub free_running: Vec<String>,
 }
 
 /// Gathers shown frames. Memory is taken once, and once for each node that shows its first frame.
 pub(crate) struct Recorder {
-    skew: Histogram<u64>,
+    calls: Apart,
+    lights: Apart,
     overhead: Histogram<u64>,
     age: Histogram<u64>,
-    nodes: Vec<(String, Histogram<u64>)>,
     /// As many as there are members, at most.
     free_running: Vec<String>,
 }
@@ -41,25 +45,33 @@ pub(crate) struct Recorder {
 impl Default for Recorder {
     fn default() -> Recorder {
         Recorder {
-            skew: histogram(),
+            calls: Apart::default(),
+            lights: Apart::default(),
             overhead: histogram(),
             age: histogram(),
-            nodes: Vec::new(),
             free_running: Vec::new(),
         }
     }
 }
 
-impl Recorder {
-    /// Takes a frame in; `name_of` knows the nodes.
-    pub(crate) fn record<'a>(
-        &mut self,
-        shown: &FrameSkew,
-        name_of: impl Fn(u16) -> Option<&'a str>,
-    ) {
+/// How far apart the nodes were in each frame.
+struct Apart {
+    skew: Histogram<u64>,
+    nodes: Vec<(String, Histogram<u64>)>,
+}
+
+impl Default for Apart {
+    fn default() -> Apart {
+        Apart {
+            skew: histogram(),
+            nodes: Vec::new(),
+        }
+    }
+}
+
+impl Apart {
+    fn record<'a>(&mut self, shown: &FrameSkew, name_of: impl Fn(u16) -> Option<&'a str>) {
         self.skew.saturating_record(shown.skew_ns);
-        self.overhead.saturating_record(shown.overhead_ns);
-        self.age.saturating_record(shown.age_ns);
         for swap in &shown.swaps {
             let Some(name) = name_of(swap.session) else {
                 continue; // it has just left
@@ -75,6 +87,35 @@ impl Recorder {
             };
             self.nodes[index].1.saturating_record(swap.after_first_ns);
         }
+    }
+
+    fn by_node(&self) -> Vec<(String, Distribution)> {
+        let nodes = self.nodes.iter();
+        nodes
+            .map(|(node, times)| (node.clone(), Distribution::of(times, US_PER_NS)))
+            .collect()
+    }
+}
+
+impl Recorder {
+    /// Takes a frame in; `name_of` knows the nodes.
+    pub(crate) fn record<'a>(
+        &mut self,
+        shown: &FrameSkew,
+        name_of: impl Fn(u16) -> Option<&'a str>,
+    ) {
+        self.overhead.saturating_record(shown.overhead_ns);
+        self.age.saturating_record(shown.age_ns);
+        self.calls.record(shown, name_of);
+    }
+
+    /// Takes in how far apart the pictures of a frame lit up.
+    pub(crate) fn record_light<'a>(
+        &mut self,
+        lit: &FrameSkew,
+        name_of: impl Fn(u16) -> Option<&'a str>,
+    ) {
+        self.lights.record(lit, name_of);
     }
 
     /// Notes what became of a node; whether it runs free from now on, or is in step again, if that is news.
@@ -100,15 +141,14 @@ impl Recorder {
 
     pub(crate) fn report(&self, counts: Counts) -> FrameReport {
         let us = |times| Distribution::of(times, US_PER_NS);
-        let nodes = self.nodes.iter();
         FrameReport {
             counts,
-            skew: us(&self.skew),
+            skew: us(&self.calls.skew),
+            light: us(&self.lights.skew),
             overhead: us(&self.overhead),
             age: us(&self.age),
-            nodes: nodes
-                .map(|(node, times)| (node.clone(), us(times)))
-                .collect(),
+            nodes: self.calls.by_node(),
+            lit_nodes: self.lights.by_node(),
             free_running: self.free_running.clone(),
         }
     }
