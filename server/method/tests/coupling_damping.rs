@@ -2,9 +2,8 @@
 
 use crate::support;
 
-use god_object::constraint::{Feature, FeaturePair, Separation};
-use god_object::nalgebra::{Point3, Vector3};
-use god_object::{ConstraintSet, Coupling, NonPenetrationConstraint, Pose, Settings};
+use god_object::nalgebra::Vector3;
+use god_object::{Coupling, Pose, Settings};
 
 const TICK: f64 = 1e-3;
 const DAMPING_TIME: f64 = 0.01;
@@ -17,30 +16,11 @@ fn settings(damping_time: f64) -> Settings {
     }
 }
 
-/// A floor under the reference point, where force begins at z = 0.
-fn floor(settings: &Settings) -> ConstraintSet {
-    let mut set = ConstraintSet::with_capacity(1);
-    set.constraints.push(NonPenetrationConstraint {
-        features: FeaturePair {
-            obstacle: 0,
-            on_body: Feature::Vertex(0),
-            on_obstacle: Feature::Face(0),
-        },
-        point: Point3::origin(),
-        normal: Vector3::z(),
-        gap: settings.rest_distance,
-        separation: Separation::default(),
-        came: 0.0,
-        shading_normal: None,
-    });
-    set
-}
-
 /// Force after the device has gone from `from` for ten ticks with `velocity`.
 fn force(damping_time: f64, from: Vector3<f64>, velocity: Vector3<f64>) -> (Vector3<f64>, f64) {
     let settings = settings(damping_time);
     let world = support::box_on_table();
-    let set = floor(&settings);
+    let set = support::floor(&settings);
     let mut coupling = Coupling::new(&world, &settings);
     let mut force = Vector3::zeros();
     for tick in 0..10 {
@@ -82,7 +62,7 @@ fn what_leaves_is_not_pulled_back_and_what_touches_nothing_feels_nothing() {
 fn a_device_that_stands_feels_the_spring_alone() {
     let settings = settings(DAMPING_TIME);
     let world = support::box_on_table();
-    let set = floor(&settings);
+    let set = support::floor(&settings);
     let mut coupling = Coupling::new(&world, &settings);
     let at = |z: f64| Pose::translation(0.0, 0.0, z);
     coupling.step(0.0, &at(0.0), &set);

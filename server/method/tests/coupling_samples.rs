@@ -2,33 +2,10 @@
 
 use crate::support;
 
-use god_object::constraint::{Feature, FeaturePair, Separation};
-use god_object::nalgebra::{Point3, Vector3};
-use god_object::{
-    ConstraintSet, Coupling, NonPenetrationConstraint, Pose, Settings, SineTexture, Texture,
-    Vector6, World,
-};
+use god_object::nalgebra::Vector3;
+use god_object::{Coupling, Pose, Settings, SineTexture, Texture, Vector6, World};
 
 const TICK: f64 = 1e-3;
-
-/// A floor under the reference point, where force begins at z = 0.
-fn floor(settings: &Settings) -> ConstraintSet {
-    let mut set = ConstraintSet::with_capacity(1);
-    set.constraints.push(NonPenetrationConstraint {
-        features: FeaturePair {
-            obstacle: 0,
-            on_body: Feature::Vertex(0),
-            on_obstacle: Feature::Face(0),
-        },
-        point: Point3::origin(),
-        normal: Vector3::z(),
-        gap: settings.rest_distance,
-        separation: Separation::default(),
-        came: 0.0,
-        shading_normal: None,
-    });
-    set
-}
 
 /// The wrenches that are newest when the next sample comes, and the coupling at the end. With `sets_between` a new set comes between any two samples,
 /// as the coupling loop sees it: sample, set, sample, set.
@@ -38,7 +15,7 @@ fn felt(
     sets_between: bool,
     device: impl Fn(u64) -> Pose,
 ) -> (Vec<Vector6>, Coupling) {
-    let mut set = floor(settings);
+    let mut set = support::floor(settings);
     let mut coupling = Coupling::new(world, settings);
     let wrenches = (0..300)
         .map(|sample| {
@@ -91,7 +68,7 @@ fn the_work_between_two_samples_is_that_of_the_last_force_before_the_second() {
     let world = support::box_on_table();
     let settings = passive();
     let mut coupling = Coupling::new(&world, &settings);
-    let mut set = floor(&settings);
+    let mut set = support::floor(&settings);
     let at = |z: f64| Pose::translation(0.0, 0.0, z);
     let first = coupling.answer(0.0, 7, &at(-4e-3), &set).wrench;
     set.sequence += 1;
@@ -108,8 +85,8 @@ fn a_force_that_cannot_be_computed_ends_the_work_of_the_one_before_it_at_its_sam
     let world = support::box_on_table();
     let settings = passive();
     let mut coupling = Coupling::new(&world, &settings);
-    let set = floor(&settings);
-    let mut broken = floor(&settings);
+    let set = support::floor(&settings);
+    let mut broken = support::floor(&settings);
     broken.sequence = 1;
     broken.god_object_pose = Pose::translation(f64::NAN, 0.0, 0.0);
     let at = |z: f64| Pose::translation(0.0, 0.0, z);

@@ -18,7 +18,7 @@ const THREADS: [usize; 2] = [1, 4];
 const TIMES: [&str; 3] = ["times.csv", "report.html", "svg"];
 
 /// Recipes of every run: closed forms, references, ghost contacts, thin plates, and one under closed-loop control.
-const PART: [&str; 4] = ["R02", "R09", "R13", "R16"];
+const PART: [&str; 5] = ["R02", "R09", "R11", "R13", "R16"];
 
 /// What is written, file by file, without the columns of times.
 fn run(threads: usize, recipes: Option<&[&str]>, folder: &Path) -> BTreeMap<String, String> {

@@ -4,8 +4,11 @@ mod box_shape;
 
 use std::sync::Arc;
 
+use god_object::constraint::{Feature, FeaturePair, Separation};
 use god_object::nalgebra::{Matrix3, Point3, Vector3};
-use god_object::{Body, Mesh, Obstacle, Pose, Surface, World};
+use god_object::{
+    Body, ConstraintSet, Mesh, NonPenetrationConstraint, Obstacle, Pose, Settings, Surface, World,
+};
 use parry3d_f64::math;
 use parry3d_f64::query::intersection_test;
 use parry3d_f64::shape::Triangle;
@@ -40,6 +43,25 @@ pub(crate) fn box_obstacle(name: &str, half: Vector3<f64>, center: Vector3<f64>)
         ),
         surface: Surface::default(),
     }
+}
+
+/// A floor under the reference point, where force begins at z = 0.
+pub(crate) fn floor(settings: &Settings) -> ConstraintSet {
+    let mut set = ConstraintSet::with_capacity(1);
+    set.constraints.push(NonPenetrationConstraint {
+        features: FeaturePair {
+            obstacle: 0,
+            on_body: Feature::Vertex(0),
+            on_obstacle: Feature::Face(0),
+        },
+        point: Point3::origin(),
+        normal: Vector3::z(),
+        gap: settings.rest_distance,
+        separation: Separation::default(),
+        came: 0.0,
+        shading_normal: None,
+    });
+    set
 }
 
 /// A box of 40 x 40 x 20 mm over a table whose surface is z = 0.

@@ -1,12 +1,10 @@
 //! The coupling beside a device: what it computes with, and how often it is asked.
 
-use god_object::constraint::{Feature, FeaturePair, Separation};
-use god_object::nalgebra::Point3;
+use std::sync::Arc;
+
 use god_object::{
-    Adaptation, ConstraintSet, Coupling, NonPenetrationConstraint, Pose, RotationMetric, Settings,
-    World,
+    Adaptation, ConstraintSet, Coupling, GodObject, Pose, RotationMetric, Settings, World,
 };
-use nalgebra::Vector3;
 use taut_bridge::edge::{offer_of, world_of};
 use taut_link::proto::ControlMessage;
 use taut_link::proto::control::LENGTH_BYTES;
@@ -36,6 +34,8 @@ pub(super) const ATTACKS: &[Attack] = &[
 
 const DRAWS: usize = 300;
 const TICK: f64 = 1e-3;
+/// Of the sphere, until it lies on the plane.
+const UPDATES: usize = 500;
 /// Most that a hand may be given that paid nothing, J; free of charge it would be 12.5 mJ.
 const MOST_GIVEN: f64 = 1e-3;
 
@@ -43,40 +43,53 @@ fn missing(what: impl std::fmt::Display) -> BenchError {
     BenchError::Missing(what.to_string())
 }
 
-fn world() -> Result<World, BenchError> {
-    let scene = Scene::named_or_file("sphere-on-plane").map_err(missing)?;
-    Ok(scene.build().map_err(missing)?.world)
+/// The shipped sphere, pressed onto its plane, and the constraint set there.
+struct Resting {
+    world: Arc<World>,
+    pose: Pose,
+    set: ConstraintSet,
 }
 
-/// A floor under the reference point, where force begins at z = 0.
-fn floor(settings: &Settings) -> ConstraintSet {
-    let mut set = ConstraintSet::with_capacity(1);
-    set.constraints.push(NonPenetrationConstraint {
-        features: FeaturePair {
-            obstacle: 0,
-            on_body: Feature::Vertex(0),
-            on_obstacle: Feature::Face(0),
-        },
-        point: Point3::origin(),
-        normal: Vector3::z(),
-        gap: settings.rest_distance,
-        separation: Separation::default(),
-        came: 0.0,
-        shading_normal: None,
-    });
-    set
+impl Resting {
+    fn new() -> Result<Resting, BenchError> {
+        let scene = Scene::named_or_file("sphere-on-plane").map_err(missing)?;
+        let built = scene.build().map_err(missing)?;
+        let world = Arc::new(built.world);
+        let mut sphere =
+            GodObject::new(Arc::clone(&world), built.settings, built.start).map_err(missing)?;
+        let below = Pose::translation(0.0, 0.0, -0.1) * built.start;
+        for _ in 0..UPDATES {
+            sphere.step(&below, None);
+        }
+        let set = sphere.constraint_set().clone();
+        if set.constraints.is_empty() {
+            return Err(missing("the sphere lies on nothing"));
+        }
+        Ok(Resting {
+            world,
+            pose: *sphere.pose(),
+            set,
+        })
+    }
+
+    /// The device so far from where the sphere lies, m.
+    fn moved(&self, x: f64, z: f64) -> Pose {
+        Pose::translation(x, 0.0, z) * self.pose
+    }
 }
 
-/// Forces on a hand that goes down into the floor and turns, one for each sample.
-fn forces(world: &World, settings: &Settings) -> Vec<[f64; 6]> {
-    let set = floor(settings);
+/// Forces on a hand that goes down into the plane and along it, one for each sample.
+fn forces(resting: &Resting, world: &World, settings: &Settings) -> Vec<[f64; 6]> {
     let mut coupling = Coupling::new(world, settings);
     let samples = 0..40_u64;
     samples
         .map(|sample| {
             let time = TICK * sample as f64;
-            let pose = Pose::translation(1e-4 * time, 0.0, -0.1 * time);
-            coupling.answer(time, sample, &pose, &set).wrench.into()
+            let pose = resting.moved(1e-4 * time, -0.1 * time);
+            coupling
+                .answer(time, sample, &pose, &resting.set)
+                .wrench
+                .into()
         })
         .collect()
 }
@@ -102,19 +115,20 @@ fn drawn(random: &mut Random) -> Settings {
 }
 
 fn settings_at_the_edge(_: &Extent) -> Result<Finding, BenchError> {
-    let world = world()?;
+    let resting = Resting::new()?;
     let mut random = Random::new(7);
     let (mut same, mut felt) = (0, 0);
     for _ in 0..DRAWS {
         let settings = drawn(&mut random);
-        let offer = ControlMessage::Coupling(offer_of(&world, &settings, 1000.0));
+        let offer = ControlMessage::Coupling(offer_of(&resting.world, &settings, 1000.0));
         let frame = offer.to_frame().map_err(missing)?;
         let came = ControlMessage::from_frame_body(&frame[LENGTH_BYTES..]).map_err(missing)?;
         let ControlMessage::Coupling(CouplingOffer::AtEdge(came)) = came else {
             return Err(missing("the server computes the force itself"));
         };
         let (its_world, its_settings) = world_of(&came).map_err(missing)?;
-        let (here, there) = (forces(&world, &settings), forces(&its_world, &its_settings));
+        let here = forces(&resting, &resting.world, &settings);
+        let there = forces(&resting, &its_world, &its_settings);
         same += usize::from(here == there && its_settings == settings);
         felt += usize::from(here.iter().flatten().any(|part| part.abs() > 0.1));
     }
@@ -125,18 +139,18 @@ fn settings_at_the_edge(_: &Extent) -> Result<Finding, BenchError> {
 }
 
 fn sets_between_samples(_: &Extent) -> Result<Finding, BenchError> {
-    let world = world()?;
+    let resting = Resting::new()?;
     let settings = Settings {
         passive: true,
         adaptation: None,
         ..Settings::for_size(0.1)
     };
     let leave = |sets: u64| {
-        let mut set = floor(&settings);
-        let mut coupling = Coupling::new(&world, &settings);
+        let mut set = resting.set.clone();
+        let mut coupling = Coupling::new(&resting.world, &settings);
         let mut felt = Vec::new();
         for sample in 0..300_u64 {
-            let pose = Pose::translation(0.0, 0.0, -5e-3 + 2e-5 * sample as f64);
+            let pose = resting.moved(0.0, -5e-3 + 2e-5 * sample as f64);
             let time = TICK * sample as f64;
             let mut wrench = coupling.answer(time, sample, &pose, &set).wrench;
             for turn in 1..=sets {
