@@ -3,7 +3,7 @@
 //! | block | bytes    | count |
 //! |-------|----------|-------|
 //! | head  | 88       | 1     |
-//! | row   | 40 to 88 | ≤ 25  |
+//! | row   | 40 to 96 | ≤ 25  |
 //!
 //! A set has up to [`MAX_SET_ROWS`] rows and travels in as many datagrams as it needs, each with the whole head and a run of rows:
 //! [`crate::constraint_parts`] divides and assembles. The pose is f64, since the device's place is compared with it; rows are f32 from the
@@ -20,7 +20,7 @@ use arrayvec::ArrayVec;
 
 /// Most rows of one set: the capacity of the method's sets.
 pub const MAX_SET_ROWS: usize = 1024;
-/// Most datagrams of one set: rows with everything that a row can have, eleven to a datagram, fit.
+/// Most datagrams of one set: rows with everything that a row can have, ten to a datagram, fit.
 pub const MAX_PARTS: usize = 128;
 /// Bytes of a part before its rows.
 pub const PART_HEAD_BYTES: usize = 88;
@@ -96,8 +96,8 @@ pub struct ConstraintRow {
     pub normal: [f32; 3],
     /// Distance of the features, m.
     pub gap: f32,
-    /// How far the obstacle came along the normal in one update, m.
-    pub came: f32,
+    /// How far the obstacle's point at the contact went in one update, m, scene axes.
+    pub obstacle_displacement: [f32; 3],
     /// How the distance changes when the body turns; the default where nobody re-linearises.
     pub separation: RowSeparation,
     /// Interpolated normal where the surface is shaded.
@@ -184,7 +184,7 @@ const FEATURE: Number = Number::new("ConstraintRow.feature", NAME);
 const ARM: Number = Number::new("ConstraintRow.arm", LENGTH);
 const NORMAL: Number = Number::new("ConstraintRow.normal", UNIT);
 const GAP: Number = Number::new("ConstraintRow.gap", LENGTH);
-const CAME: Number = Number::new("ConstraintRow.came", LENGTH);
+const DISPLACEMENT: Number = Number::new("ConstraintRow.obstacle_displacement", LENGTH);
 const DIRECTION: Number = Number::new("ConstraintRow.direction", UNIT);
 const CENTRE: Number = Number::new("ConstraintRow.centre", LENGTH);
 const RADIUS: Number = Number::new("ConstraintRow.radius", SIZE);
@@ -202,7 +202,15 @@ impl ConstraintPart {
 impl ConstraintRow {
     /// Its numbers and what each may be.
     pub const NUMBERS: &'static [Number] = &[
-        OBSTACLE, FEATURE, ARM, NORMAL, GAP, CAME, DIRECTION, CENTRE, RADIUS,
+        OBSTACLE,
+        FEATURE,
+        ARM,
+        NORMAL,
+        GAP,
+        DISPLACEMENT,
+        DIRECTION,
+        CENTRE,
+        RADIUS,
     ];
 }
 
@@ -210,8 +218,8 @@ impl ConstraintRow {
 mod has {
     pub(super) const SEPARATION: u8 = 0b0111;
     pub(super) const SHADING_NORMAL: u8 = 0b0000_1000;
-    pub(super) const CAME: u8 = 0b0001_0000;
-    pub(super) const KNOWN: u8 = SEPARATION | SHADING_NORMAL | CAME;
+    pub(super) const DISPLACEMENT: u8 = 0b0001_0000;
+    pub(super) const KNOWN: u8 = SEPARATION | SHADING_NORMAL | DISPLACEMENT;
 }
 
 impl RowSeparation {
@@ -281,11 +289,16 @@ impl RowSeparation {
 }
 
 impl ConstraintRow {
+    /// Whether the obstacle did not move.
+    fn stands(&self) -> bool {
+        self.obstacle_displacement == [0.0; 3]
+    }
+
     /// Bytes on the wire.
     pub fn bytes(&self) -> usize {
-        let came = if self.came == 0.0 { 0 } else { 4 };
+        let moved = if self.stands() { 0 } else { 12 };
         let shading = if self.shading_normal.is_some() { 12 } else { 0 };
-        SMALLEST_ROW_BYTES + came + shading + self.separation.bytes()
+        SMALLEST_ROW_BYTES + moved + shading + self.separation.bytes()
     }
 }
 
@@ -307,15 +320,15 @@ impl Wire for ConstraintRow {
         if self.shading_normal.is_some() {
             has |= has::SHADING_NORMAL;
         }
-        if self.came != 0.0 {
-            has |= has::CAME;
+        if !self.stands() {
+            has |= has::DISPLACEMENT;
         }
         has.write(to)?;
         ARM.write(&self.arm, to)?;
         NORMAL.write(&self.normal, to)?;
         GAP.write(&self.gap, to)?;
-        if self.came != 0.0 {
-            CAME.write(&self.came, to)?;
+        if !self.stands() {
+            DISPLACEMENT.write(&self.obstacle_displacement, to)?;
         }
         if let Some(normal) = &self.shading_normal {
             NORMAL.write(normal, to)?;
@@ -344,12 +357,14 @@ impl Wire for ConstraintRow {
         let arm = ARM.read(from)?;
         let normal = NORMAL.read(from)?;
         let gap = GAP.read(from)?;
-        let mut came = 0.0;
-        if has & has::CAME != 0 {
-            came = CAME.read(from)?;
+        let mut obstacle_displacement = [0.0; 3];
+        if has & has::DISPLACEMENT != 0 {
+            obstacle_displacement = DISPLACEMENT.read(from)?;
             // A zero is not sent: one value, one encoding.
-            if came == 0.0 {
-                return Err(DecodeError::Inconsistent { what: "came" });
+            if obstacle_displacement == [0.0; 3] {
+                return Err(DecodeError::Inconsistent {
+                    what: "obstacle displacement",
+                });
             }
         }
         let shading_normal = if has & has::SHADING_NORMAL != 0 {
@@ -364,7 +379,7 @@ impl Wire for ConstraintRow {
             arm,
             normal,
             gap,
-            came,
+            obstacle_displacement,
             separation: RowSeparation::read(has & has::SEPARATION, from)?,
             shading_normal,
         })

@@ -36,7 +36,7 @@ fn parts(set: &ConstraintSet) -> Vec<ConstraintPart> {
 /// Most bytes that a row can have.
 fn largest_row() -> ConstraintRow {
     ConstraintRow {
-        came: 1.0,
+        obstacle_displacement: [1.0; 3],
         shading_normal: Some([0.0; 3]),
         separation: RowSeparation::OfRods([[0.0; 3]; 2], [0.0; 2]),
         ..ConstraintRow::default()

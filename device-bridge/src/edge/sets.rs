@@ -59,7 +59,7 @@ pub fn write_set(set: &ConstraintSet, separations: bool, wire: &mut proto::Const
         arm: single(&(row.point.coords - origin)),
         normal: single(&row.normal),
         gap: row.gap as f32,
-        came: row.came as f32,
+        obstacle_displacement: single(&row.obstacle_displacement),
         separation: if separations {
             wire_separation(&row.separation, &origin)
         } else {
@@ -95,7 +95,7 @@ pub fn read_set(wire: &proto::ConstraintSet, set: &mut ConstraintSet) -> Result<
             point: Point3::from(double(&row.arm) + origin),
             normal: unit(&row.normal)?,
             gap,
-            came: f64::from(row.came),
+            obstacle_displacement: double(&row.obstacle_displacement),
             separation: separation(&row.separation, &origin)?,
             shading_normal: row.shading_normal.as_ref().map(unit).transpose()?,
         });
@@ -269,14 +269,14 @@ mod tests {
     fn any_constraint() -> impl Strategy<Value = NonPenetrationConstraint> {
         (
             (any::<u16>(), any_feature(), any_feature()),
-            (any_point(), any_unit(), 0.0..0.01_f64, -1e-3..1e-3_f64),
+            (any_point(), any_unit(), 0.0..0.01_f64, any_point()),
             any_separation(),
             prop::option::of(any_unit()),
         )
             .prop_map(
                 |(
                     (obstacle, on_body, on_obstacle),
-                    (point, normal, gap, came),
+                    (point, normal, gap, moved),
                     separation,
                     shading,
                 )| {
@@ -289,7 +289,7 @@ mod tests {
                         point: Point3::from(point),
                         normal,
                         gap,
-                        came,
+                        obstacle_displacement: moved * 1e-3,
                         separation,
                         shading_normal: shading,
                     }
@@ -315,19 +315,19 @@ mod tests {
             prop_assert_eq!(read_set(&wire, &mut back), Ok(()));
             prop_assert_eq!(back.sequence, 7);
             prop_assert!((back.god_object_pose.inverse() * set.god_object_pose).translation.vector.norm() < 1e-15);
-            for (sent, came) in rows.iter().zip(&back.constraints) {
-                prop_assert_eq!(sent.features, came.features);
-                prop_assert!((sent.point - came.point).norm() < 3e-8, "arms of up to 0.35 m");
-                prop_assert!((sent.normal - came.normal).norm() < 1e-7);
-                prop_assert!((sent.gap - came.gap).abs() <= 1e-9);
-                prop_assert!((sent.came - came.came).abs() <= 1e-10);
+            for (sent, read) in rows.iter().zip(&back.constraints) {
+                prop_assert_eq!(sent.features, read.features);
+                prop_assert!((sent.point - read.point).norm() < 3e-8, "arms of up to 0.35 m");
+                prop_assert!((sent.normal - read.normal).norm() < 1e-7);
+                prop_assert!((sent.gap - read.gap).abs() <= 1e-9);
+                prop_assert!((sent.obstacle_displacement - read.obstacle_displacement).norm() <= 1e-9);
                 prop_assert_eq!(
                     std::mem::discriminant(&sent.separation),
-                    std::mem::discriminant(&came.separation)
+                    std::mem::discriminant(&read.separation)
                 );
                 // The same surface at another pose, too.
                 let there = Pose::new(place * 0.9, turn * 1.2);
-                let [a, b] = [sent, came].map(|row| row.moved(&set.god_object_pose, &there, false).gap);
+                let [a, b] = [sent, read].map(|row| row.moved(&set.god_object_pose, &there, false).gap);
                 prop_assert!((a - b).abs() < 1e-5, "{} {}", a, b);
             }
             prop_assert_eq!(back.constraints.len(), rows.len());

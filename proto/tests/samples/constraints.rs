@@ -49,7 +49,7 @@ pub fn part() -> ConstraintPart {
             of(RowSeparation::OfRim([0.5; 3], [0.0, 0.0, 1.0], 0.125)),
             of(RowSeparation::OfRods(along, [0.5, 0.25])),
             ConstraintRow {
-                came: 0.5,
+                obstacle_displacement: [0.5, 0.0, -0.25],
                 shading_normal: Some([0.0, 0.5, 0.5]),
                 ..plain
             },
@@ -108,16 +108,16 @@ pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
         (two(), prop::array::uniform2(size32())).prop_map(|(u, r)| RowSeparation::OfRods(u, r)),
     ];
     let feature = || (0_u8..16, any::<u32>()).prop_map(|(kind, index)| RowFeature { kind, index });
-    let came = prop_oneof![Just(0.0_f32), finite32()];
+    let moved = prop_oneof![Just([0.0_f32; 3]), three()];
     (
         any::<u16>(),
         (feature(), feature()),
-        (three(), unit(), finite32(), came),
+        (three(), unit(), finite32(), moved),
         separation,
         prop::option::of(unit()),
     )
         .prop_map(
-            |(obstacle, (on_body, on_obstacle), (arm, normal, gap, came), separation, shading)| {
+            |(obstacle, (on_body, on_obstacle), (arm, normal, gap, moved), separation, shading)| {
                 ConstraintRow {
                     obstacle,
                     on_body,
@@ -125,7 +125,7 @@ pub fn any_row() -> impl Strategy<Value = ConstraintRow> {
                     arm,
                     normal,
                     gap,
-                    came,
+                    obstacle_displacement: moved,
                     separation,
                     shading_normal: shading,
                 }

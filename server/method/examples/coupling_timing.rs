@@ -193,7 +193,7 @@ fn row(name: u32, arm: Vector3<f64>, normal: Vector3<f64>, gap: f64) -> NonPenet
         point: Point3::from(arm),
         normal,
         gap,
-        came: 0.0,
+        obstacle_displacement: Vector3::zeros(),
         separation: Separation::OfObstacle,
         shading_normal: None,
     }

@@ -24,7 +24,7 @@ use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, Metric, Projection, ProjectionStatus, Projector};
 use crate::settings::Settings;
 use crate::spatial::{Pose, Vector6, advance_pose, angular, linear, pose_difference};
-use crate::surface::FrictionProblem;
+use crate::surface::{Carried, FrictionProblem};
 
 /// Rounds whose lengths shrink by less come to nothing; up to this they do in the cases with a closed form, and from 1 they move away.
 const CONVERGING: f64 = 0.85;
@@ -77,11 +77,13 @@ impl<'a> LinearAnswer<'a> {
         &'b self,
         round: &'b Round<'b>,
         stuck_at: &'b Vector6,
+        carried: Carried<'b>,
     ) -> FrictionProblem<'b> {
         FrictionProblem {
             metric: round.metric,
             unconstrained: round.unconstrained,
             stuck_at,
+            carried,
             reference_point: &round.center,
             rows: round.rows,
             constraints: self.constraints,

@@ -3,8 +3,8 @@
 //! | symbol | name in code | unit | meaning                                                                        |
 //! |--------|--------------|------|--------------------------------------------------------------------------------|
 //! | l_k    | `multiplier` | kg m | Lagrange multiplier of row k in the force's projection; `k_h l_k` is its force   |
-//! | c_k    | `came`       | m    | how far the obstacle came along row k in the update that made set j              |
-//! | P_j    | `along`      | J    | `sum k_h l_k c_k`: what the force on set j does over the way that made it        |
+//! | c_k    | `approach`   | m    | how far the obstacle came along row k in the update that made set j              |
+//! | P_j    | `along`      | J    | `sum k_h l_k c_k`, and the same along the surfaces with friction: what the force on set j does over the way that made it |
 //! | W      | `work`       | J    | `sum (P_(j-1) + P_j) / 2` over the sets in which some obstacle came or went      |
 //!
 //! The force grows while the obstacle comes: the mean of two sets is exact for an obstacle at constant speed; the first set of a motion

@@ -166,7 +166,9 @@ impl PreparedRows {
         self.names
             .extend(rows.iter().map(|row| RowName::of(&row.features)));
         self.shaded = rows.iter().any(|row| row.shading_normal.is_some());
-        self.moving = rows.iter().any(|row| row.came != 0.0);
+        self.moving = rows
+            .iter()
+            .any(|row| row.obstacle_displacement != Vector3::zeros());
         self.metric = basis.metric(&self.god_object);
         if let Some(metric) = &self.metric {
             self.projector.prepare(metric, &self.given);

@@ -38,7 +38,7 @@ fn touching(sequence: u64, face: u32) -> ConstraintSet {
         normal: Vector3::z(),
         gap: 0.0,
         separation: Separation::default(),
-        came: 0.0,
+        obstacle_displacement: Vector3::zeros(),
         shading_normal: None,
     });
     set

@@ -4,7 +4,7 @@ use crate::support;
 
 use crate::projection_support::Random;
 use god_object::constraint::{Feature, FeaturePair};
-use god_object::nalgebra::Point3;
+use god_object::nalgebra::{Point3, Vector3};
 use god_object::{
     ConstraintSet, Coupling, NonPenetrationConstraint, Pose, ProjectionStatus, Settings,
 };
@@ -25,7 +25,7 @@ fn set_of(names: &BTreeSet<u32>, sequence: u64, pose: Pose) -> ConstraintSet {
             point: Point3::from(random.vector3() * 0.03),
             normal: random.direction(),
             gap: 1e-4 * random.unit(),
-            came: 0.0,
+            obstacle_displacement: Vector3::zeros(),
             separation: god_object::constraint::Separation::default(),
             shading_normal: None,
         });

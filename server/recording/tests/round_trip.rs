@@ -74,7 +74,7 @@ fn row() -> NonPenetrationConstraint {
         normal: Vector3::z(),
         gap: 1e-6,
         separation: Separation::OfObstacle,
-        came: 0.0,
+        obstacle_displacement: Vector3::zeros(),
         shading_normal: None,
     }
 }

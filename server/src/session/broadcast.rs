@@ -405,7 +405,7 @@ mod tests {
             normal: Vector3::z(),
             gap,
             separation: Default::default(),
-            came: 0.0,
+            obstacle_displacement: Vector3::zeros(),
             shading_normal: None,
         }
     }
@@ -554,10 +554,10 @@ mod tests {
         let mut device = DeviceState::at_start(&start);
         let mut source = EventSource::default();
         let mut state = taut_proto::ArrayVec::new();
-        let mut told = Vec::new();
+        let mut events = Vec::new();
         let mut send = |source: &mut EventSource| {
             source.take(&mut state);
-            told.extend(state.iter().map(|event| (event.id, event.code)));
+            events.extend(state.iter().map(|event| (event.id, event.code)));
         };
 
         // All buttons at once, then a storm of them that is more than the states can carry.
@@ -570,10 +570,10 @@ mod tests {
             source.follow(&device, &contacts);
             send(&mut source);
         }
-        let ids: Vec<u32> = told.iter().map(|(id, _)| *id).collect();
-        assert_eq!(ids, (1..=told.len() as u32).collect::<Vec<_>>());
+        let ids: Vec<u32> = events.iter().map(|(id, _)| *id).collect();
+        assert_eq!(ids, (1..=events.len() as u32).collect::<Vec<_>>());
         for button in 0..BUTTONS {
-            let of_button: Vec<u32> = told
+            let of_button: Vec<u32> = events
                 .iter()
                 .filter(|(_, code)| code >> BUTTON_SHIFT == button)
                 .map(|(_, code)| code & 0xffff)

@@ -48,7 +48,7 @@ pub fn contacts(settings: &Settings, places: &[(Point3<f64>, Vector3<f64>)]) -> 
             normal: *normal,
             gap: settings.rest_distance,
             separation: Separation::default(),
-            came: 0.0,
+            obstacle_displacement: Vector3::zeros(),
             shading_normal: None,
         });
     }

@@ -293,7 +293,7 @@ mod tests {
             normal,
             gap: 1e-3,
             separation,
-            came: 0.0,
+            obstacle_displacement: Vector3::zeros(),
             shading_normal: None,
         })
         .to_vec()

@@ -29,10 +29,17 @@ pub struct NonPenetrationConstraint {
     pub gap: f64,
     /// How the distance changes when the body turns.
     pub separation: Separation,
-    /// How far the obstacle's point came along the normal in the update that made the set, m: 0 for what stands still.
-    pub came: f64,
+    /// How far the obstacle's point at the contact went in the update that made the set, world, m: zero for what stands still.
+    pub obstacle_displacement: Vector3<f64>,
     /// Interpolated normal where the surface is shaded, Section 6.1.
     pub shading_normal: Option<Vector3<f64>>,
+}
+
+impl NonPenetrationConstraint {
+    /// How far the obstacle came along the normal in that update, m: negative where it gave way.
+    pub fn approach(&self) -> f64 {
+        self.normal.dot(&self.obstacle_displacement)
+    }
 }
 
 /// A god-object pose and the constraints that hold there; replaced as a whole, never in part.

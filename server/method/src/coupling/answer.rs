@@ -7,7 +7,7 @@ use crate::constraint::ConstraintSet;
 use crate::implicit::LinearAnswer;
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Metric, Projection, ProjectionStatus};
 use crate::spatial::{Pose, Vector6, angular, pose_difference};
-use crate::surface::{Friction, FrictionProblem};
+use crate::surface::FrictionProblem;
 
 /// What holds the body, and where.
 #[derive(Clone, Debug)]
@@ -55,12 +55,15 @@ impl Coupling {
                 reached: None,
             },
         );
-        if self.friction.is_some() {
+        if let Some(friction) = &self.friction {
+            let rows = friction.holding();
+            let holding = rows.filter_map(|row| set.constraints.get(row as usize));
             self.anchor.follow(
                 &self.present.god_object,
                 &answer.projection.acceleration,
                 self.settings.k_s,
-                self.friction.as_ref().is_none_or(Friction::slid),
+                friction.slid(),
+                holding.map(|row| (row.features, row.obstacle_displacement)),
             );
         }
         if let Some(damped) = damped {
@@ -89,6 +92,7 @@ impl Coupling {
             metric,
             unconstrained,
             stuck_at: &self.anchor.acceleration(god_object, unconstrained, k_s),
+            carried: self.anchor.carried(k_s),
             reference_point: &Point3::from(god_object.translation.vector),
             rows: &self.rough_rows,
             constraints: &set.constraints,
@@ -139,7 +143,8 @@ impl Coupling {
             |round, project, frictionless| match friction {
                 Some(friction) => {
                     let stuck_at = anchor.acceleration(round.candidate, round.unconstrained, k_s);
-                    friction.hold(&given.rough(round, &stuck_at), project, frictionless)
+                    let problem = given.rough(round, &stuck_at, anchor.carried(k_s));
+                    friction.hold(&problem, project, frictionless)
                 }
                 None => frictionless,
             },

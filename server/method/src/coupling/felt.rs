@@ -7,7 +7,7 @@ use super::answer::Answer;
 use crate::constraint::{ConstraintSet, Feature};
 use crate::quasi_statics::{Metric, Projection};
 use crate::spatial::{Pose, Vector6, angular, linear, six};
-use crate::surface::TOUCHING_MOTION_TOLERANCES;
+use crate::surface::{Friction, TOUCHING_MOTION_TOLERANCES};
 
 /// A wrench on its way to the device.
 #[derive(Clone, Copy, Debug)]
@@ -55,10 +55,14 @@ impl Coupling {
         let along = self.present.moving.then(|| {
             let rows = projection.active.iter();
             let done = rows.filter_map(|row| {
-                let came = set.constraints.get(row.row as usize)?.came;
-                Some(row.multiplier * came)
+                let approach = set.constraints.get(row.row as usize)?.approach();
+                Some(row.multiplier * approach)
             });
-            done.sum::<f64>() * self.settings.k_h * felt.share
+            let along_surfaces = self
+                .friction
+                .as_ref()
+                .map_or(0.0, Friction::work_of_obstacles);
+            (done.sum::<f64>() + along_surfaces) * self.settings.k_h * felt.share
         });
         self.obstacle_work.arrive(along);
     }

@@ -48,10 +48,17 @@ impl Coupling {
         if arrived {
             self.take(set);
             self.arrival.observe(set.published.unwrap_or(time));
+            self.anchor.arrive(set);
         }
+        let ahead = if self.present.moving {
+            self.arrival.share_of_an_update(time)
+        } else {
+            0.0
+        };
         if self.present.moving {
-            self.carry_rows(time, set);
+            self.carry_rows(ahead, set);
         }
+        self.anchor.advance(ahead, self.present.moving);
         arrived
     }
 
@@ -140,13 +147,12 @@ impl Coupling {
         };
     }
 
-    /// Rows of obstacles that move, where those will be by now.
-    fn carry_rows(&mut self, time: f64, set: &ConstraintSet) {
-        let arrival = self.arrival.share_of_an_update(time);
+    /// Rows of obstacles that move, where those will be by now: `ahead` of the set by this share of its update's way.
+    fn carry_rows(&mut self, ahead: f64, set: &ConstraintSet) {
         for (row, constraint) in set.constraints.iter().take(self.bounds.len()).enumerate() {
-            if constraint.came != 0.0 {
-                let bound = self.basis.bound(constraint.gap)
-                    + self.settings.k_s * constraint.came * arrival;
+            let approach = constraint.approach();
+            if approach != 0.0 {
+                let bound = self.basis.bound(constraint.gap) + self.settings.k_s * approach * ahead;
                 self.targets[row] = bound;
                 self.bounds[row] = bound;
                 self.projector.set_bound(row, bound);

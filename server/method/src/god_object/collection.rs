@@ -168,7 +168,7 @@ impl GodObject {
                 (&self.world.body, &self.pose),
                 (obstacle, &placed.pose),
             ),
-            came: placed.came(&contact.point_on_obstacle, &contact.normal),
+            obstacle_displacement: placed.displacement_at(&contact.point_on_obstacle),
             shading_normal: self.surfaces(None).shading_normal(contact),
         }
     }
@@ -220,7 +220,7 @@ impl Surfaces for SceneSurfaces<'_> {
     }
 
     fn move_on(&self) -> bool {
-        let moves = |placed: &PlacedObstacle| placed.came_here() || placed.is_moving();
+        let moves = |placed: &PlacedObstacle| placed.has_moved() || placed.is_moving();
         self.obstacles.iter().any(moves)
     }
 
@@ -245,7 +245,7 @@ impl Surfaces for SceneSurfaces<'_> {
         match self.ahead {
             Some(ahead) => placed.way_ahead(point, normal, ahead),
             // By as much as it came it goes on until the next set.
-            None => placed.came(point, normal),
+            None => normal.dot(&placed.displacement_at(point)),
         }
     }
 }

@@ -106,7 +106,7 @@ impl GodObject {
         let surfaces = SceneSurfaces::new(&self.world, &self.obstacles, &self.shading, None);
         let mut any = false;
         for index in 0..at.places.len() {
-            let carried = !self.obstacles[index].came_here();
+            let carried = !self.obstacles[index].has_moved();
             if carried || !at.places[index].chosen || !reduction.conforms(at, index) {
                 continue;
             }

@@ -26,6 +26,7 @@
 //! | `report.rs`     | what one update did                                                               |
 
 mod candidates;
+mod carry;
 mod collection;
 mod free_motion;
 mod generation;

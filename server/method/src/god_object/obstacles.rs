@@ -60,7 +60,7 @@ impl PlacedObstacle {
         self.pose != self.target
     }
 
-    pub(super) fn came_here(&self) -> bool {
+    pub(super) fn has_moved(&self) -> bool {
         self.pose != self.before
     }
 
@@ -83,13 +83,12 @@ impl PlacedObstacle {
         linear(displacement).norm() + self.radius * angular(displacement).norm()
     }
 
-    /// How far its point that is now at `point` has come along `normal` in this update, m.
-    pub(super) fn came(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
-        if !self.came_here() {
-            return 0.0;
+    /// How far its point that is now at `point` has gone in this update, m.
+    pub(super) fn displacement_at(&self, point: &Point3<f64>) -> Vector3<f64> {
+        if !self.has_moved() {
+            return Vector3::zeros();
         }
-        let before = self.before * self.pose.inverse_transform_point(point);
-        normal.dot(&(point - before))
+        point - self.before * self.pose.inverse_transform_point(point)
     }
 
     /// How far its point at `point` goes next along `normal`, as far as the body makes room for it, m.
@@ -145,14 +144,14 @@ impl GodObject {
 
     /// Moves the obstacles to their targets, and the body out of their way. The longest path asked for, m.
     pub(super) fn carry_obstacles(&mut self, report: &mut StepReport) -> f64 {
-        let came = self.obstacles.iter().any(PlacedObstacle::came_here);
+        let moved = self.obstacles.iter().any(PlacedObstacle::has_moved);
         for obstacle in &mut self.obstacles {
             obstacle.before = obstacle.pose;
         }
         self.bound_half_spaces();
         let asked = self.longest_way_left();
         if asked == 0.0 {
-            if came {
+            if moved {
                 self.forget_arrivals();
             }
             return 0.0;
@@ -196,16 +195,16 @@ impl GodObject {
         self.set.sequence += 1;
         self.set.published = None;
         for row in &mut self.set.constraints {
-            row.came = 0.0;
+            row.obstacle_displacement = Vector3::zeros();
         }
     }
 
-    /// Bound on what the points of obstacles came in this update or are still to go, m.
+    /// Bound on how far the points of obstacles went in this update or are still to go, m.
     pub(super) fn longest_way(&self) -> f64 {
-        let came =
+        let made =
             |o: &PlacedObstacle| o.length(&pose_difference(&o.pose, &o.before, &Vector3::zeros()));
-        let moving = self.obstacles.iter().filter(|o| o.came_here());
-        moving.map(came).fold(self.longest_way_left(), f64::max)
+        let moving = self.obstacles.iter().filter(|o| o.has_moved());
+        moving.map(made).fold(self.longest_way_left(), f64::max)
     }
 
     fn longest_way_left(&self) -> f64 {

@@ -8,7 +8,7 @@ use crate::constraint::contact_jacobian;
 use crate::implicit::{ImplicitAnswer, LinearAnswer};
 use crate::quasi_statics::{HalfSpace, KKT_TOLERANCE, Projection, ProjectionStatus};
 use crate::spatial::{Vector6, advance_pose, angular, pose_difference};
-use crate::surface::FrictionProblem;
+use crate::surface::{Carried, FrictionProblem};
 
 /// Rounds that each cover less than this share of the one before add up to no less than an eighth of the linear answer in three rounds: where
 /// that one moves the body, they do.
@@ -55,11 +55,17 @@ impl GodObject {
         let mut projection =
             self.projector
                 .project(&metric, unconstrained, &self.rows, &self.warm_start);
+        // While obstacles go, nothing is asked of the body but to make room.
+        let (stuck_at, carried) = match ahead {
+            None => (self.carry.stuck_at(), self.carry.carried()),
+            Some(_) => (Vector6::zeros(), Carried::NOT),
+        };
         if let Some(friction) = &mut self.friction {
             let problem = FrictionProblem {
                 metric: &metric,
                 unconstrained,
-                stuck_at: &Vector6::zeros(),
+                stuck_at: &stuck_at,
+                carried,
                 reference_point: &center,
                 rows: &self.rows,
                 constraints: &self.set.constraints,
@@ -78,7 +84,9 @@ impl GodObject {
         self.warm_start
             .extend(projection.active.iter().map(|row| row.row));
         match projection.status {
-            ProjectionStatus::Solved => Some(self.implicit(unconstrained, projection, report)),
+            ProjectionStatus::Solved => {
+                Some(self.implicit(unconstrained, projection, (stuck_at, carried), report))
+            }
             // Two walls nearer to each other than twice the rest distance: the answer without easing out.
             ProjectionStatus::Infeasible if projection.kkt_residual <= KKT_TOLERANCE => {
                 self.warm_start.clear();
@@ -102,6 +110,7 @@ impl GodObject {
         &mut self,
         unconstrained: &Vector6,
         linear: Projection,
+        (stuck_at, carried): (Vector6, Carried<'_>),
         report: &mut StepReport,
     ) -> Projected {
         let reference_point = self.world.body.reference_point;
@@ -124,9 +133,11 @@ impl GodObject {
             |round, project, frictionless| match friction {
                 Some(friction) => {
                     // What stuck did so where the body is.
-                    let stuck_at =
+                    let from_here =
                         pose_difference(&start, round.candidate, &-angular(&linear.acceleration));
-                    friction.hold(&given.rough(round, &stuck_at), project, frictionless)
+                    let stuck_at = from_here + stuck_at;
+                    let problem = given.rough(round, &stuck_at, carried);
+                    friction.hold(&problem, project, frictionless)
                 }
                 None => frictionless,
             },

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::carry::Carry;
 use super::collection::GivenRows;
 use super::obstacles::PlacedObstacle;
 use super::substep::{StepMemory, Update};
@@ -32,6 +33,7 @@ pub struct GodObject {
     pub(super) shading: Vec<Option<ShadingNormals>>,
     pub(super) projector: Projector,
     pub(super) friction: Option<Friction>,
+    pub(super) carry: Carry,
     pub(super) collision: CollisionWorkspace,
     pub(super) contacts: Vec<Contact>,
     pub(super) implicit: ImplicitRounds,
@@ -73,6 +75,7 @@ impl GodObject {
         let radius = world.body.mesh.radius_about(&world.body.reference_point);
         let mut god_object = Self {
             friction: Friction::of(&world, &settings),
+            carry: Carry::default(),
             shading: world.obstacles.iter().map(ShadingNormals::of).collect(),
             obstacles: world
                 .obstacles
@@ -178,6 +181,7 @@ impl GodObject {
 
         // What moves by itself comes first: the body is out of its way before it follows the hand.
         let obstacles_moved = self.carry_obstacles(&mut report);
+        self.begin_carry(&start);
 
         // 3. to 5., repeated: a budget that runs out is safe, the pose reached is valid.
         let mut branch = angular(&unconstrained);

@@ -76,7 +76,8 @@ impl GodObject {
         report: &mut StepReport,
     ) -> bool {
         let length = self.motion_length(left);
-        let moves = length > self.settings.motion_tolerance; // false for NaN
+        let tolerance = self.settings.motion_tolerance;
+        let moves = length > tolerance || self.carry.way_left() > tolerance; // false for NaN
         let eases = self.set.gap_min < self.settings.rest_distance - self.settings.motion_tolerance;
         if !moves && !eases {
             return false;
@@ -128,6 +129,7 @@ impl GodObject {
         let gap_before = self.set.gap_min.min(self.settings.rest_distance);
         let known_within = self.set.complete_within;
         let time = self.go(&projected, &constrained, report);
+        self.carry.made(time * update.step_memory.damping);
         update.made += covered * time;
 
         // 5. Collect at the pose reached: what is published, unless that looks far ahead and another sub-step is likely. Most of the work is
@@ -171,6 +173,7 @@ impl GodObject {
         left: &Vector6,
         report: &mut StepReport,
     ) -> Option<(Projected, bool)> {
+        self.carry.ask(1.0);
         self.complete(left, report);
         let projected = self.project_complete(left, None, report)?;
         let trusted = if projected.settled {
@@ -183,12 +186,14 @@ impl GodObject {
             return Some((projected, false));
         }
         let share = left * (trusted / covered);
+        self.carry.ask(trusted / covered);
         self.complete(&share, report);
         let mut projected = self.project_complete(&share, None, report)?;
         // Rows on the way may let a share of the wish go as far as the whole.
         let covered = self.motion_length(&projected.acceleration);
         if covered > trusted {
             projected.acceleration *= trusted / covered;
+            self.carry.cut(trusted / covered);
         }
         Some((projected, true))
     }

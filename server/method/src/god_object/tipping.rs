@@ -11,7 +11,7 @@ use super::{GodObject, StepReport};
 use crate::constraint::{NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, ProjectionStatus};
 use crate::spatial::{Vector6, advance_pose};
-use crate::surface::FrictionProblem;
+use crate::surface::{Carried, FrictionProblem};
 
 impl GodObject {
     /// Whether the projected motion `first` of the wish `left` would be followed by one that is no shorter, by the rows that held the body,
@@ -59,6 +59,7 @@ impl GodObject {
                 metric: &metric,
                 unconstrained: &wish,
                 stuck_at: &Vector6::zeros(),
+                carried: Carried::NOT,
                 reference_point: &center,
                 rows: &self.rows,
                 constraints: &held,
@@ -77,6 +78,9 @@ impl GodObject {
         let Some(friction) = &self.friction else {
             return (path, 0.0);
         };
+        if self.carry.is_left() {
+            return (path, 0.0); // what sticks moves
+        }
         let body = &self.world.body;
         let metric = body.metric(self.settings.rotation_metric, &self.pose);
         metric.map_or((path, 0.0), |metric| {

@@ -8,7 +8,7 @@ mod shading;
 mod texture;
 mod texture_coordinates;
 
-pub use friction::{Friction, FrictionProblem};
+pub use friction::{Carried, Friction, FrictionProblem};
 pub(crate) use friction::{StickAnchor, TOUCHING_MOTION_TOLERANCES};
 pub use height_map::{HeightMap, HeightMapError, HeightMapTexture, UvHeightMapTexture};
 pub use passivity::EnergyObserver;

@@ -58,7 +58,7 @@ pub(crate) fn floor(settings: &Settings) -> ConstraintSet {
         normal: Vector3::z(),
         gap: settings.rest_distance,
         separation: Separation::default(),
-        came: 0.0,
+        obstacle_displacement: Vector3::zeros(),
         shading_normal: None,
     });
     set

@@ -213,7 +213,7 @@ mod tests {
                 normal: Vector3::z(),
                 gap,
                 separation: Default::default(),
-                came: 0.0,
+                obstacle_displacement: Vector3::zeros(),
                 shading_normal: None,
             });
             let before = self.lines.len();

@@ -119,7 +119,7 @@ pub(super) fn constraint_set(
             normal: contact.normal,
             gap: contact.gap,
             separation: Separation::default(),
-            came: 0.0,
+            obstacle_displacement: nalgebra::Vector3::zeros(),
             shading_normal: None,
         });
         set.gap_min = set.gap_min.min(contact.gap);

@@ -3,18 +3,68 @@
 //! The coupling's god-object stands still until the next set, and trails the hand. Friction measured from it would point
 //! back long after the hand has turned. The coupling therefore keeps its own body, which the force holds: `x_v`, at
 //! `a_c = k_s (x_v - x_s)`. It stays where it is while the contacts stick, bit for bit, over any number of sets, and the force
-//! `k_h k_s M (x_v - x_h)` does not jump when a set is replaced.
+//! `k_h k_s M (x_v - x_h)` does not jump when a set is replaced. Where obstacles move, it goes with those that it sticks to.
 
+use arrayvec::ArrayVec;
+use nalgebra::Vector3;
+
+use super::carried::Carried;
+use super::cone::MAX_CONE_CONTACTS;
+use crate::constraint::{ConstraintSet, FeaturePair};
 use crate::spatial::{Pose, Vector6, advance_pose, angular, pose_difference};
 
-/// The pose of the felt body.
-#[derive(Clone, Copy, Debug, Default)]
+/// The felt body.
+#[derive(Clone, Debug, Default)]
 pub(crate) struct StickAnchor {
     /// World from reference point; `None` before the first answer.
     felt: Option<Pose>,
+    /// The contacts that hold it, and how far their obstacles' points were ahead of the present set then, world, m.
+    stuck: ArrayVec<(FeaturePair, Vector3<f64>), MAX_CONE_CONTACTS>,
+    /// How far obstacles are ahead of the present set, as a share of what they moved in its update.
+    ahead: f64,
+    /// Whether an obstacle has moved since the last answer.
+    moves: bool,
 }
 
 impl StickAnchor {
+    /// Takes a new set in: its obstacles stand where they are there.
+    pub(crate) fn arrive(&mut self, set: &ConstraintSet) {
+        for (features, ahead) in &mut self.stuck {
+            let rows = &set.constraints;
+            let place = rows.binary_search_by_key(features, |row| row.features);
+            let near = |of: usize| {
+                rows.get(of)
+                    .filter(|row| row.features.obstacle == features.obstacle)
+            };
+            let row = place.map_or_else(
+                |next| near(next).or_else(|| near(next.wrapping_sub(1))),
+                |at| rows.get(at),
+            );
+            if let Some(row) = row {
+                *ahead -= row.obstacle_displacement;
+            }
+        }
+    }
+
+    /// Obstacles are so far ahead of the present set now, and move or not.
+    pub(crate) fn advance(&mut self, ahead: f64, moving: bool) {
+        self.ahead = ahead;
+        self.moves = moving || self.stuck.iter().any(|(_, then)| *then != Vector3::zeros());
+    }
+
+    /// What obstacles have moved since the felt body stuck.
+    pub(crate) fn carried(&self, k_s: f64) -> Carried<'_> {
+        if self.moves {
+            Carried::Since {
+                ahead: self.ahead,
+                stuck: &self.stuck,
+                k_s,
+            }
+        } else {
+            Carried::NOT
+        }
+    }
+
     /// a_0: the acceleration at which the felt body stands, seen from the god-object; `unconstrained` where it has no memory.
     pub(crate) fn acceleration(
         &self,
@@ -27,21 +77,28 @@ impl StickAnchor {
         })
     }
 
-    /// Takes the answer: the felt body goes to the constrained acceleration when a contact `slid`, else it stays.
+    /// Takes the answer: the felt body goes to the constrained acceleration when a contact `slid` or an obstacle moves, else it stays. `holding`: the
+    /// contacts that hold it, with what their obstacles moved in the present set's update, m.
     pub(crate) fn follow(
         &mut self,
         god_object: &Pose,
         constrained: &Vector6,
         k_s: f64,
         slid: bool,
+        holding: impl Iterator<Item = (FeaturePair, Vector3<f64>)>,
     ) {
-        if slid || self.felt.is_none() {
+        if slid || self.moves || self.felt.is_none() {
             self.felt = Some(advance_pose(god_object, &(constrained / k_s), 1.0));
         }
+        self.stuck.clear();
+        let ahead = self.ahead;
+        let holding = holding.map(|(features, displacement)| (features, displacement * ahead));
+        self.stuck.extend(holding.take(MAX_CONE_CONTACTS));
     }
 
     /// Forgets where the body was.
     pub(crate) fn forget(&mut self) {
         self.felt = None;
+        self.stuck.clear();
     }
 }

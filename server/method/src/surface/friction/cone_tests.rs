@@ -31,8 +31,15 @@ fn problem(
         let tangents = tangents_of(&normal).map(|t| row(point, &t));
         let normal = row(point, &normal);
         let slip = tangents.map(|t| t.dot(wished));
-        ConeContact::new(coefficient, normal, tangents, normal.dot(wished), slip)
-            .expect("unit directions")
+        ConeContact::new(
+            coefficient,
+            normal,
+            tangents,
+            normal.dot(wished),
+            slip,
+            [0.0; 2],
+        )
+        .expect("unit directions")
     };
     ConeProblem {
         contacts: contacts.iter().map(contact).collect(),

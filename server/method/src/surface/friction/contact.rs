@@ -6,7 +6,7 @@
 //! | j_n       | `normal`        | kg^(-1/2)   | `L^-1 J_n`                                                     |
 //! | j_t       | `tangents`      | kg^(-1/2)   | `L^-1 J_t`, two orthogonal directions of the contact plane     |
 //! | c_n       | `slack`         | m           | `J_n a_u - b`                                                  |
-//! | c_t       | `slip`          | m           | `J_t (a_u - a_0)`, a_0: where the contact stuck last           |
+//! | c_t       | `slip`          | m           | `J_t (a_u - a_0) - t u`, a_0: where the contact stuck last, u: where its obstacle went since |
 //! | lambda_n  | `load`          | N s^2       | normal multiplier, >= 0                                        |
 //! | lambda_t  | `grip`          | N s^2       | tangential multipliers, norm at most `mu lambda_n`             |
 
@@ -22,6 +22,8 @@ pub(super) struct ConeContact {
     pub(super) tangents: [Vector6; 2],
     pub(super) slack: f64,
     pub(super) slip: [f64; 2],
+    /// What the obstacle moved along the tangents in the set's update, m.
+    pub(super) obstacle: [f64; 2],
     pub(super) load: f64,
     pub(super) grip: [f64; 2],
     /// Multiplier that a unit of penetration or slip costs, the others held, kg.
@@ -37,6 +39,7 @@ impl ConeContact {
         tangents: [Vector6; 2],
         slack: f64,
         slip: [f64; 2],
+        obstacle: [f64; 2],
     ) -> Option<Self> {
         // The larger eigenvalue of the tangents' 2 x 2 block: a step of its inverse converges, and one number for both
         // directions keeps the cone round.
@@ -51,6 +54,7 @@ impl ConeContact {
             tangents,
             slack,
             slip,
+            obstacle,
             load: 0.0,
             grip: [0.0; 2],
             normal_step,

@@ -8,14 +8,15 @@
 //! Source: beyond the paper, which is frictionless. Coulomb's law in displacements, as the motion is quasi-static (Section 4.2).
 
 use arrayvec::ArrayVec;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
+use super::carried::Carried;
 use super::cone::{ConeProblem, MAX_CONE_CONTACTS};
 use super::contact::{ConeContact, tangents_of};
 use crate::constraint::{FeaturePair, NonPenetrationConstraint, contact_jacobian};
 use crate::quasi_statics::{HalfSpace, MAX_ACTIVE, Metric, Projection, ProjectionStatus};
 use crate::settings::Settings;
-use crate::spatial::{Pose, Vector6, linear};
+use crate::spatial::{Pose, Vector6, linear, six};
 use crate::world::World;
 
 /// A contact touches when its row is this near to equality, in motion tolerances: gaps at rest differ by as much.
@@ -55,6 +56,8 @@ pub struct FrictionProblem<'a> {
     pub unconstrained: &'a Vector6,
     /// a_0: the acceleration at which the contacts stuck last; zero in the god-object loop, where the body's pose remembers.
     pub stuck_at: &'a Vector6,
+    /// What obstacles have moved since then.
+    pub carried: Carried<'a>,
     /// G, world, m.
     pub reference_point: &'a Point3<f64>,
     /// The rows that were projected on.
@@ -66,6 +69,17 @@ pub struct FrictionProblem<'a> {
 }
 
 impl FrictionProblem<'_> {
+    /// Length in the metric of the farthest that an obstacle carries, m kg^(1/2).
+    fn longest_carried(&self) -> f64 {
+        if self.carried.is_nothing() {
+            return 0.0;
+        }
+        let carried = self.constraints.iter().map(|row| self.carried.of(row));
+        let longest = carried.map(|way| way.norm()).fold(0.0, f64::max);
+        self.metric
+            .norm(&six(&(Vector3::x() * longest), &Vector3::zeros()))
+    }
+
     /// Contact point of a row, world, m.
     fn point(&self, constraint: &NonPenetrationConstraint) -> Point3<f64> {
         self.moved.map_or(constraint.point, |(start, at, shaded)| {
@@ -136,6 +150,21 @@ impl Friction {
         self.acts
     }
 
+    /// Rows of the contacts that held the body in the last answer.
+    pub(crate) fn holding(&self) -> impl Iterator<Item = u32> + '_ {
+        let contacts = self.rows.iter().zip(&self.cone.contacts);
+        let loaded = contacts.filter(|(_, contact)| self.acts && contact.load > 0.0);
+        loaded.map(|(row, _)| *row)
+    }
+
+    /// What the last answer's tangential multipliers do over the ways that obstacles made in the set's update, kg m^2.
+    pub(crate) fn work_of_obstacles(&self) -> f64 {
+        let contacts = self.cone.contacts.iter().filter(|_| self.acts);
+        contacts
+            .map(|c| c.grip[0] * c.obstacle[0] + c.grip[1] * c.obstacle[1])
+            .sum()
+    }
+
     /// Adds friction to `frictionless`, the projection of the same problem. Without a frictional contact that carries
     /// load it is returned unchanged, bit for bit. `project` is Eq. (1) on the same rows for another a_u, from the rows given to
     /// start with.
@@ -155,7 +184,8 @@ impl Friction {
         let metric = problem.metric;
         let scale = metric
             .norm(problem.unconstrained)
-            .max(metric.norm(problem.stuck_at));
+            .max(metric.norm(problem.stuck_at))
+            .max(problem.longest_carried());
         let usable = scale.is_finite() && scale > 0.0;
         if !usable {
             return frictionless;
@@ -280,7 +310,9 @@ impl Friction {
         let metric = problem.metric;
         let point = problem.point(constraint);
         let point_row = |direction| contact_jacobian(&direction, &point, problem.reference_point);
-        let tangents = tangents_of(&linear(&row.jacobian)).map(point_row);
+        let directions = tangents_of(&linear(&row.jacobian));
+        let tangents = directions.map(point_row);
+        let carried = problem.carried.of(constraint);
         let normal = metric.whiten_row(&row.jacobian);
         // Touching is touching: the contact's own slack at `now` is taken as none.
         let gap = row.slack(&now.acceleration);
@@ -292,7 +324,8 @@ impl Friction {
             normal,
             tangents.map(|j| metric.whiten_row(&j)),
             gap - normal.dot(&at_now),
-            tangents.map(|j| j.dot(&wished)),
+            [0, 1].map(|i| tangents[i].dot(&wished) - directions[i].dot(&carried)),
+            directions.map(|t| t.dot(&constraint.obstacle_displacement)),
         );
         let Some(contact) = contact else {
             return false;

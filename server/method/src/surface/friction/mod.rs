@@ -1,6 +1,7 @@
 //! Coulomb friction: a cone of forces at each contact, beyond the paper.
 
 mod anchor;
+mod carried;
 mod cone;
 #[cfg(test)]
 mod cone_tests;
@@ -9,5 +10,6 @@ mod hold;
 mod newton;
 
 pub(crate) use anchor::StickAnchor;
+pub use carried::Carried;
 pub(crate) use hold::TOUCHING_MOTION_TOLERANCES;
 pub use hold::{Friction, FrictionProblem};
